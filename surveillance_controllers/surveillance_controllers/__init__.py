@@ -1,0 +1,1 @@
+"""Battery, planner and motion controllers of the surveillance robot."""

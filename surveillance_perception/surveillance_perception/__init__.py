@@ -1,0 +1,1 @@
+"""ArUco detection, marker server and camera arm of the surveillance robot."""
