@@ -1,0 +1,140 @@
+"""The mission record survives what kills its writer, and its summary counts right."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from surveillance_behaviour.mission_record import MissionRecord, RecordError, read, summarize
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / 'runs' / 'mission.jsonl'
+
+
+def test_what_was_written_is_read_back(path: Path) -> None:
+    with MissionRecord(path) as record:
+        record.start(0.0, 'surveillance', 'E', ['E', 'C1'])
+        record.decision(1.0, 'C1', 'URGENT', 'C1 went unvisited for 9.0 s')
+        record.visit(6.5, 'C1', 5.4)
+    events = read(path)
+    assert [(event.name, event.time) for event in events] == [
+        ('start', 0.0),
+        ('decision', 1.0),
+        ('visit', 6.5),
+    ]
+    assert events[1].text('reason') == 'C1 went unvisited for 9.0 s'
+    assert events[2].number('distance') == 5.4
+
+
+def test_a_killed_writer_loses_nothing(path: Path) -> None:
+    program = (
+        'import os, signal, sys\n'
+        'from surveillance_behaviour.mission_record import MissionRecord\n'
+        'record = MissionRecord(sys.argv[1])\n'
+        'record.start(0.0, "surveillance", "E", ["E"])\n'
+        'for turn in range(50):\n'
+        '    record.visit(float(turn), "E", 1.0)\n'
+        'os.kill(os.getpid(), signal.SIGKILL)\n'
+    )
+    code = subprocess.run([sys.executable, '-c', program, str(path)], check=False).returncode
+    assert code == -9
+    assert summarize(read(path)).visits == {'E': 50}
+
+
+@pytest.mark.parametrize('kept', [0, 1, 20])
+def test_a_torn_last_line_is_skipped_and_then_cut_off(path: Path, kept: int) -> None:
+    with MissionRecord(path) as record:
+        record.start(0.0, 'patrol', 'E', ['E'])
+        record.visit(1.0, 'E')
+    whole = path.read_bytes()
+    first = whole.index(b'\n') + 1
+    os.truncate(path, first + kept)
+    assert [event.name for event in read(path)] == ['start']
+    with MissionRecord(path) as record:
+        record.visit(2.0, 'E')
+    assert [(event.name, event.time) for event in read(path)] == [('start', 0.0), ('visit', 2.0)]
+
+
+def test_a_broken_line_is_named(path: Path) -> None:
+    path.parent.mkdir()
+    path.write_text('{"event": "end", "time": 1}\nnot json\n')
+    with pytest.raises(RecordError, match=r'mission\.jsonl:2: expected a JSON object .*not json'):
+        read(path)
+    path.write_text('{"event": "visit", "time": 1, "place": "E"}\n')
+    with pytest.raises(RecordError, match=r"jsonl:1: event 'visit' lacks distance"):
+        read(path)
+
+
+def test_files_that_cannot_be_used_are_named(tmp_path: Path) -> None:
+    with pytest.raises(RecordError, match=r'cannot read the mission record .*missing\.jsonl'):
+        read(tmp_path / 'missing.jsonl')
+    with pytest.raises(RecordError, match='cannot write the mission record'):
+        MissionRecord(tmp_path)
+
+
+def test_the_summary_counts_everything(path: Path) -> None:
+    with MissionRecord(path) as record:
+        record.start(100.0, 'surveillance', 'E', ['E', 'C1', 'R1'])
+        record.decision(101.0, 'C1', 'CORRIDOR', 'why')
+        record.visit(110.0, 'C1', 5.0)
+        record.decision(111.0, 'E', 'recharge', 'why')
+        record.failure(112.0, 'MOVE_TO_NEXT_ROOM', 'a door is closed')
+        record.visit(130.0, 'E', 5.5)
+        record.recharge(150.0, 'E', 20.0)
+        record.visit(160.0, 'C1', 5.0)
+        record.end(200.0)
+    summary = summarize(read(path))
+    assert summary.seconds == 100.0
+    assert summary.visits == {'E': 1, 'C1': 2, 'R1': 0}
+    assert summary.unvisited == {'E': 70.0, 'C1': 50.0, 'R1': 100.0}
+    assert summary.distance == 15.5
+    text = str(summary)
+    assert '1 min 40 s, 2 of 3 places visited, 3 visits, 15.5 m' in text
+    assert 'recharges: 1 (0 min 20 s)' in text
+    assert 'decisions by rule: CORRIDOR 1, recharge 1' in text
+    assert 'failures: MOVE_TO_NEXT_ROOM 1' in text
+
+
+def test_a_restart_goes_on_and_another_clock_starts_anew(path: Path) -> None:
+    with MissionRecord(path) as record:
+        record.start(0.0, 'surveillance', 'E', ['E', 'C1'])
+        record.visit(10.0, 'C1')
+        record.start(30.0, 'surveillance', 'C1', ['E', 'C1'])
+        record.visit(40.0, 'E')
+    assert summarize(read(path)).unvisited == {'E': 40.0, 'C1': 30.0}
+    assert summarize(read(path)).restarts == 1
+    with MissionRecord(path) as record:
+        record.start(0.0, 'surveillance', 'E', ['E', 'C1'])
+        record.visit(5.0, 'C1')
+    assert summarize(read(path)).unvisited == {'E': 40.0, 'C1': 30.0}
+    assert summarize(read(path)).seconds == 45.0
+
+
+def test_an_empty_record_says_so(path: Path) -> None:
+    MissionRecord(path).close()
+    assert str(summarize(read(path))) == 'Mission: nothing was recorded.'
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    legs=st.lists(st.tuples(st.floats(0.0, 1e4), st.sampled_from('ABCD')), max_size=30),
+    cut=st.integers(0, 200),
+)
+def test_no_finished_line_is_ever_lost(
+    tmp_path_factory: pytest.TempPathFactory, legs: list[tuple[float, str]], cut: int
+) -> None:
+    path = tmp_path_factory.mktemp('record') / 'mission.jsonl'
+    with MissionRecord(path) as record:
+        for seconds, place in legs:
+            record.visit(seconds, place)
+    content = path.read_bytes()
+    path.write_bytes(content[: max(0, len(content) - cut)])
+    finished = path.read_bytes().count(b'\n')
+    assert [event.text('place') for event in read(path)] == [p for _, p in legs][:finished]
