@@ -1,0 +1,196 @@
+"""A battery as the simulated robot has it: what drains it, and how it charges at the station.
+
+The charge is an energy in watt hours. Standing costs power over time; a metre driven and a radian turned cost
+energy each, whatever the speed, which is what rolling resistance does; the arm and the camera cost power while
+they are in use.
+
+Charging follows the usual constant-current, constant-voltage course of a lithium-ion cell: constant power up to
+`taper_from`, then a power that falls in proportion to what is missing, down to `taper_floor` of the full power, so
+that the charge ends in a finite time. Both parts have a closed form, so a step may be of any length.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+SECONDS_PER_HOUR = 3600.0
+
+
+@dataclass(frozen=True)
+class BatteryParameters:
+    """Sizes of the battery and of its consumers.
+
+    Attributes:
+        capacity: Energy of a full battery, Wh.
+        rest_power: Drawn all the time (computer, lidar), W.
+        joules_per_metre: Drawn by driving, J/m.
+        joules_per_radian: Drawn by turning, J/rad.
+        equipment_power: Drawn by arm and camera while they are in use, W.
+        charging_power: At the station, below `taper_from`, W.
+        taper_from: State of charge where charging slows down, 0 to 1 (excluded).
+        taper_floor: The least charging power, as a part of `charging_power`, above 0.
+        empty_voltage: Open-circuit voltage of an empty battery, V.
+        full_voltage: Open-circuit voltage of a full one, V.
+
+    Raises:
+        ValueError: A value is out of range; the text names it.
+    """
+
+    capacity: float = 40.0
+    rest_power: float = 15.0
+    joules_per_metre: float = 60.0
+    joules_per_radian: float = 6.0
+    equipment_power: float = 10.0
+    charging_power: float = 600.0
+    taper_from: float = 0.8
+    taper_floor: float = 0.1
+    empty_voltage: float = 18.0
+    full_voltage: float = 25.2
+
+    def __post_init__(self) -> None:
+        for name in ('capacity', 'charging_power', 'empty_voltage'):
+            if not getattr(self, name) > 0:
+                raise ValueError(f'{name} is {getattr(self, name)!r}: expected more than 0')
+        for name in ('rest_power', 'joules_per_metre', 'joules_per_radian', 'equipment_power'):
+            if not getattr(self, name) >= 0:
+                raise ValueError(f'{name} is {getattr(self, name)!r}: expected 0 or more')
+        if not 0 < self.taper_from < 1:
+            raise ValueError(f'taper_from is {self.taper_from!r}: expected between 0 and 1')
+        if not 0 < self.taper_floor <= 1:
+            raise ValueError(f'taper_floor is {self.taper_floor!r}: expected above 0, at most 1')
+        if not self.full_voltage > self.empty_voltage:
+            raise ValueError(
+                f'full_voltage is {self.full_voltage!r}: expected above empty_voltage {self.empty_voltage!r}'
+            )
+
+
+class Battery:
+    """The charge of one battery.
+
+    Args:
+        parameters: Its sizes.
+        level: Charge at the start, percent.
+    """
+
+    def __init__(self, parameters: BatteryParameters, level: float = 100.0) -> None:
+        self.parameters = parameters
+        self.energy = 0.0
+        self.set_level(level)
+
+    @property
+    def state_of_charge(self) -> float:
+        """The part of the capacity that is left, 0 to 1."""
+        return self.energy / self.parameters.capacity
+
+    @property
+    def level(self) -> float:
+        """The charge in percent, 0 to 100."""
+        return 100.0 * self.state_of_charge
+
+    @property
+    def percent(self) -> int:
+        """The charge in whole percent, rounded down: 0 only means empty within the last percent, 100 only full."""
+        return math.floor(self.level + 1e-9)
+
+    @property
+    def voltage(self) -> float:
+        """Open-circuit voltage, V: a straight line between empty and full."""
+        p = self.parameters
+        return p.empty_voltage + (p.full_voltage - p.empty_voltage) * self.state_of_charge
+
+    def set_level(self, level: float) -> None:
+        """Sets the charge, percent; held between 0 and 100."""
+        self.energy = self.parameters.capacity * min(max(level, 0.0), 100.0) / 100.0
+
+    def draw(
+        self,
+        seconds: float,
+        metres: float = 0.0,
+        radians: float = 0.0,
+        equipment_seconds: float = 0.0,
+    ) -> float:
+        """Takes what the robot used.
+
+        Args:
+            seconds: Time that passed.
+            metres: Way driven in it, forwards or backwards (0 or more).
+            radians: Angle turned in it, either way (0 or more).
+            equipment_seconds: Time for which arm or camera worked.
+
+        Returns:
+            The energy taken, Wh; less than asked for when the battery is empty.
+
+        Raises:
+            ValueError: An amount is negative.
+        """
+        if min(seconds, metres, radians, equipment_seconds) < 0:
+            raise ValueError(
+                'a negative amount drawn: expected time, way and angle of 0 or more, got '
+                f'{seconds!r} s, {metres!r} m, {radians!r} rad, {equipment_seconds!r} s of equipment'
+            )
+        p = self.parameters
+        joules = (
+            p.rest_power * seconds
+            + p.joules_per_metre * metres
+            + p.joules_per_radian * radians
+            + p.equipment_power * equipment_seconds
+        )
+        taken = min(self.energy, joules / SECONDS_PER_HOUR)
+        self.energy -= taken
+        return taken
+
+    def charging_power(self) -> float:
+        """The power the station gives at the present charge, W; 0 when full."""
+        p = self.parameters
+        charge = self.state_of_charge
+        if charge >= 1.0:
+            return 0.0
+        if charge < p.taper_from:
+            return p.charging_power
+        return p.charging_power * max(p.taper_floor, (1.0 - charge) / (1.0 - p.taper_from))
+
+    def charge(self, seconds: float) -> None:
+        """Charges for some time at the station.
+
+        Raises:
+            ValueError: The time is negative.
+        """
+        if seconds < 0:
+            raise ValueError(f'charging for {seconds!r} s: expected 0 or more')
+        p = self.parameters
+        left = seconds / SECONDS_PER_HOUR
+        bound = p.taper_from * p.capacity
+        if self.energy < bound:
+            hours = min(left, (bound - self.energy) / p.charging_power)
+            self.energy += hours * p.charging_power
+            left -= hours
+        floor_from = p.capacity * (1.0 - p.taper_floor * (1.0 - p.taper_from))
+        if left > 0 and self.energy < floor_from:
+            rate = p.charging_power / (p.capacity * (1.0 - p.taper_from))
+            to_floor = math.log((p.capacity - self.energy) / (p.capacity - floor_from)) / rate
+            hours = min(left, to_floor)
+            self.energy = p.capacity - (p.capacity - self.energy) * math.exp(-rate * hours)
+            left -= hours
+        if left > 0:
+            self.energy += left * p.taper_floor * p.charging_power
+        self.energy = min(self.energy, p.capacity)
+
+    def seconds_to_charge(self, level: float = 100.0) -> float:
+        """How long charging to `level` percent takes from the present charge, s; 0 when it is reached."""
+        p = self.parameters
+        wanted = p.capacity * min(level, 100.0) / 100.0
+        energy, hours = self.energy, 0.0
+        bound = p.taper_from * p.capacity
+        if energy < min(bound, wanted):
+            hours += (min(bound, wanted) - energy) / p.charging_power
+            energy = min(bound, wanted)
+        floor_from = p.capacity * (1.0 - p.taper_floor * (1.0 - p.taper_from))
+        if energy < min(floor_from, wanted):
+            rate = p.charging_power / (p.capacity * (1.0 - p.taper_from))
+            end = min(floor_from, wanted)
+            hours += math.log((p.capacity - energy) / (p.capacity - end)) / rate
+            energy = end
+        if energy < wanted:
+            hours += (wanted - energy) / (p.taper_floor * p.charging_power)
+        return hours * SECONDS_PER_HOUR

@@ -1,0 +1,291 @@
+"""The language of the operator's consoles: which commands exist, and how a typed line is read.
+
+A console speaks a `Grammar`: a list of `Command`, each a few fixed words followed by typed arguments.
+`Grammar.parse` turns one line into a `ParsedCommand` or raises `CommandError`, whose text names the word that
+was wrong and what was expected in its place. The same grammar answers `help` and proposes completions.
+
+The commands of the three controllers are defined here, in `BATTERY`, `PLANNER` and `MOTION`, so that each
+controller's own console and the one console for all of them cannot drift apart.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+Point3 = tuple[float, float, float]
+"""x, y, z in metres, world frame."""
+
+LONGEST_LINE = 20_000
+"""A line beyond this many characters is refused unread; 20,000 hold a plan of about a thousand points."""
+
+
+class CommandError(ValueError):
+    """A line that is no command; the text is one line, meant for the operator."""
+
+
+@dataclass(frozen=True)
+class Argument:
+    """One typed value of a command.
+
+    Attributes:
+        name: As shown in the help, in capitals.
+        expected: What a good value is, completing the sentence "expected ...".
+        read: Turns the text into the value; raises `ValueError` with a detail (or an empty text).
+        takes_rest: The argument takes the rest of the line, blanks included.
+    """
+
+    name: str
+    expected: str
+    read: Callable[[str], object]
+    takes_rest: bool = False
+
+
+@dataclass(frozen=True)
+class Command:
+    """Fixed words, the arguments after them, and a sentence for the help."""
+
+    words: tuple[str, ...]
+    arguments: tuple[Argument, ...]
+    description: str
+
+    @property
+    def name(self) -> str:
+        """The fixed words, as one text: `battery set`."""
+        return ' '.join(self.words)
+
+    @property
+    def usage(self) -> str:
+        """The command as it is typed: `battery set VALUE`."""
+        return ' '.join((*self.words, *(argument.name for argument in self.arguments)))
+
+
+@dataclass(frozen=True)
+class ParsedCommand:
+    """A command that was understood: its name and the values of its arguments."""
+
+    name: str
+    values: tuple[object, ...] = ()
+
+
+def integer(name: str, low: int, high: int) -> Argument:
+    """An argument that is a whole number from `low` to `high`."""
+
+    def read(text: str) -> int:
+        if not re.fullmatch(r'[+-]?\d{1,9}', text, re.ASCII) or not low <= int(text) <= high:
+            raise ValueError
+        return int(text)
+
+    return Argument(name, f'a whole number from {low} to {high}', read)
+
+
+def number(name: str, low: float, high: float, unit: str) -> Argument:
+    """An argument that is a real number from `low` to `high`."""
+
+    def read(text: str) -> float:
+        value = _real(text)
+        if not low <= value <= high:
+            raise ValueError
+        return value
+
+    return Argument(name, f'a number from {low:g} to {high:g} ({unit})', read)
+
+
+def points(name: str) -> Argument:
+    """An argument that is a list of points, `[[x, y, z], ...]`, possibly empty."""
+    return Argument(name, 'a list of points as [[x, y, z], ...]', _read_points, takes_rest=True)
+
+
+def _real(text: str) -> float:
+    value = float(text) if re.fullmatch(r'[+-]?[\d.]+([eE][+-]?\d+)?', text, re.ASCII) else math.nan
+    if not math.isfinite(value):
+        raise ValueError
+    return value
+
+
+def _read_points(text: str) -> tuple[Point3, ...]:
+    tokens = re.findall(r'\[|\]|,|[^\[\],\s]+', text)
+    position = 0
+
+    def take(wanted: str) -> bool:
+        nonlocal position
+        if position < len(tokens) and tokens[position] == wanted:
+            position += 1
+            return True
+        return False
+
+    def need(wanted: str, place: str) -> None:
+        if not take(wanted):
+            found = repr(tokens[position]) if position < len(tokens) else 'the end of the line'
+            raise ValueError(f'{found} {place}, where {wanted!r} belongs')
+
+    def coordinate(place: str) -> float:
+        nonlocal position
+        word = tokens[position] if position < len(tokens) else ''
+        position += 1
+        try:
+            return _real(word)
+        except ValueError:
+            found = repr(word) if word else 'the end of the line'
+            raise ValueError(f'{found} {place}, where a number belongs') from None
+
+    result: list[Point3] = []
+    need('[', 'at the start')
+    if not take(']'):
+        while True:
+            place = f'in point {len(result) + 1}'
+            need('[', place)
+            x = coordinate(place)
+            need(',', place)
+            y = coordinate(place)
+            need(',', place)
+            z = coordinate(place)
+            need(']', place)
+            result.append((x, y, z))
+            if not take(','):
+                break
+        need(']', f'after point {len(result)}')
+    if position < len(tokens):
+        raise ValueError(f'{tokens[position]!r} after the list')
+    return tuple(result)
+
+
+HELP = Command(('help',), (), 'List the commands.')
+STATUS = Command(('status',), (), 'Show the request that waits for a command, if there is one.')
+EXIT = Command(('exit',), (), 'Stop this node.')
+BUILT_IN = (HELP, STATUS, EXIT)
+"""Commands every console has."""
+
+BATTERY_SET = Command(
+    ('battery', 'set'), (integer('VALUE', 0, 100),), 'Set the battery level, in percent.'
+)
+BATTERY_OFFSET = Command(
+    ('battery', 'offset'),
+    (integer('OFFSET', -100, 100),),
+    'Add to the battery level, in percent; the level stays between 0 and 100.',
+)
+PLAN_SET = Command(
+    ('plan', 'set'),
+    (points('[[X,Y,Z],...]'),),
+    'Answer the waiting request with these points between its start and its goal, in metres.',
+)
+MOVE = Command(
+    ('move',),
+    (number('TIME', 0, 86_400, 'seconds'), number('DELTA', -1000, 1000, 'metres')),
+    'Carry out the waiting request in TIME seconds and stop at most DELTA metres off the goal on each axis.',
+)
+BATTERY = (BATTERY_SET, BATTERY_OFFSET)
+PLANNER = (PLAN_SET,)
+MOTION = (MOVE,)
+
+
+class Grammar:
+    """What one console understands.
+
+    Args:
+        commands: The console's own commands; `help`, `status` and `exit` are always added.
+    """
+
+    def __init__(self, commands: Sequence[Command]) -> None:
+        self.commands = (*commands, *BUILT_IN)
+
+    def parse(self, line: str) -> ParsedCommand | None:
+        """Reads one line.
+
+        Words may be in any case. A blank line, and one that begins with `#`, is no command.
+
+        Raises:
+            CommandError: The line is no command of this console.
+        """
+        if len(line) > LONGEST_LINE:
+            raise CommandError(f'a line of {len(line)} characters: expected at most {LONGEST_LINE}')
+        words = line.split()
+        if not words or words[0].startswith('#'):
+            return None
+        command = self._command_of(words)
+        return ParsedCommand(command.name, _read_arguments(command, line))
+
+    def _command_of(self, words: Sequence[str]) -> Command:
+        candidates: tuple[Command, ...] = self.commands
+        for depth in range(max(len(command.words) for command in self.commands)):
+            given = words[depth].lower() if depth < len(words) else ''
+            fitting = tuple(
+                command
+                for command in candidates
+                if len(command.words) > depth and command.words[depth] == given
+            )
+            if not fitting:
+                expected = _alternatives([c.words[depth] for c in candidates if len(c.words) > depth])
+                before = ' '.join(words[:depth])
+                where = f' after {before!r}' if before else ''
+                if not given:
+                    raise CommandError(f'the line ends{where}: expected {expected}')
+                raise CommandError(f'{_shown(words[depth])}{where} is no command: expected {expected}')
+            candidates = fitting
+            if len(candidates) == 1 and len(candidates[0].words) == depth + 1:
+                break
+        return candidates[0]
+
+    def help(self) -> str:
+        """Every command with its arguments and what it does, one a line."""
+        width = max(len(command.usage) for command in self.commands)
+        return '\n'.join(f'  {c.usage:<{width}}  {c.description}' for c in self.commands)
+
+    def completions(self, text: str) -> list[str]:
+        """The words that can stand where the last word of `text` is being typed, in alphabetical order."""
+        words = text.lower().split()
+        if not text or text[-1].isspace():
+            words.append('')
+        *done, typed = words
+        depth = len(done)
+        return sorted(
+            {
+                command.words[depth]
+                for command in self.commands
+                if len(command.words) > depth
+                and list(command.words[:depth]) == done
+                and command.words[depth].startswith(typed)
+            }
+        )
+
+
+def _read_arguments(command: Command, line: str) -> tuple[object, ...]:
+    rest = line.split(maxsplit=len(command.words))[len(command.words) :]
+    remaining = rest[0].strip() if rest else ''
+    values: list[object] = []
+    for argument in command.arguments:
+        if not remaining:
+            raise CommandError(
+                f'{command.name}: {argument.name} is missing: expected {argument.expected}'
+            )
+        if argument.takes_rest:
+            text, remaining = remaining, ''
+        else:
+            text, _, remaining = remaining.partition(' ')
+            remaining = remaining.strip()
+        try:
+            values.append(argument.read(text))
+        except ValueError as error:
+            detail = f' ({error})' if str(error) else ''
+            raise CommandError(
+                f'{command.name}: {argument.name} is {_shown(text)}{detail}: '
+                f'expected {argument.expected}'
+            ) from None
+    if remaining:
+        raise CommandError(
+            f'{command.name}: {_shown(remaining)} is too much: expected {command.usage!r}'
+        )
+    return tuple(values)
+
+
+def _shown(text: str) -> str:
+    return repr(text if len(text) <= 60 else text[:57] + '...')
+
+
+def _alternatives(words: Sequence[str]) -> str:
+    unique = list(dict.fromkeys(words))
+    if len(unique) == 1:
+        return repr(unique[0])
+    return ', '.join(map(repr, unique[:-1])) + f' or {unique[-1]!r}'

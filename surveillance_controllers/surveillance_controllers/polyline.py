@@ -1,0 +1,61 @@
+"""Paths as arrays of points: their length, the point a way along, and points at equal distances.
+
+A path is an array of shape (n, d), d = 2 or 3, in metres; consecutive points may coincide.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Points = NDArray[np.float64]
+
+
+def distances_along(path: ArrayLike) -> Points:
+    """The way from the first point to each point, shape (n,), metres; the first is 0."""
+    steps = np.linalg.norm(np.diff(np.asarray(path, dtype=float), axis=0), axis=1)
+    return np.concatenate(([0.0], np.cumsum(steps)))
+
+
+def length(path: ArrayLike) -> float:
+    """The length of a path in metres; 0 for a path of one point or none."""
+    points = np.asarray(path, dtype=float)
+    return float(distances_along(points)[-1]) if len(points) > 1 else 0.0
+
+
+def point_at(path: ArrayLike, distance: ArrayLike) -> Points:
+    """The point `distance` metres along a path, held at its two ends.
+
+    Args:
+        path: At least one point, shape (n, d).
+        distance: A number, or numbers of shape (k,).
+
+    Returns:
+        Shape (d,) for one distance, (k, d) for several.
+
+    Raises:
+        ValueError: The path has no points.
+    """
+    points = np.asarray(path, dtype=float)
+    if len(points) == 0:
+        raise ValueError('a path with no points')
+    along = distances_along(points)
+    return np.stack([np.interp(distance, along, axis) for axis in points.T], axis=-1)
+
+
+def equally_spaced(path: ArrayLike, spacing: float) -> Points:
+    """Points at equal distances along a path, both ends included.
+
+    Args:
+        path: At least one point, shape (n, d).
+        spacing: The wanted distance, metres, above 0. The distance taken is the largest one not above it
+            that divides the path's length.
+
+    Returns:
+        At least two points (the two ends), unless the path has no length: then one.
+    """
+    total = length(path)
+    if total == 0.0:
+        return np.asarray(path, dtype=float)[:1]
+    count = max(1, int(np.ceil(total / spacing - 1e-9)))
+    return point_at(path, np.linspace(0.0, total, count + 1))

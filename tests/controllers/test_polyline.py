@@ -1,0 +1,40 @@
+"""Points along a path: what spacing, ends and degenerate paths give."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from surveillance_controllers import polyline
+
+PATHS = st.lists(st.tuples(*[st.floats(-50, 50)] * 3), min_size=1, max_size=12)
+
+
+@given(PATHS, st.floats(0.01, 30))
+@settings(max_examples=80, deadline=None)
+def test_spaced_points_keep_the_ends_and_the_spacing(
+    path: list[tuple[float, float, float]], spacing: float
+) -> None:
+    points = polyline.equally_spaced(path, spacing)
+    total = polyline.length(path)
+    assert points[0] == pytest.approx(np.array(path[0]))
+    if total > 0:
+        assert points[-1] == pytest.approx(np.array(path[-1]))
+        along = np.linspace(0, total, len(points))
+        assert along[1] - along[0] <= spacing * (1 + 1e-6)
+        assert points == pytest.approx(polyline.point_at(path, along))
+
+
+def test_a_point_along_is_held_at_the_ends() -> None:
+    path = [(0, 0, 0), (3, 0, 0), (3, 4, 0)]
+    assert polyline.length(path) == 7
+    assert list(polyline.point_at(path, 5)) == [3, 2, 0]
+    assert list(polyline.point_at(path, -1)) == [0, 0, 0]
+    assert list(polyline.point_at(path, 99)) == [3, 4, 0]
+
+
+def test_a_path_without_points_is_refused() -> None:
+    with pytest.raises(ValueError, match='no points'):
+        polyline.point_at(np.zeros((0, 3)), 0)
