@@ -1,0 +1,334 @@
+"""What a place is: rooms, the doors that join them, a point in each, and where the robot starts.
+
+A `Place` knows nothing of ontologies or ROS. It is checked once, when it is made, so that whoever
+holds one may rely on it: every door joins two rooms, every room has a position, every room can be
+reached from the start.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections import deque
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from surveillance_ontology.parameter_file import KeyPath, read_parameter_file
+
+PLACE_KEYS = ('map', 'room_positions', 'robot_room', 'recharge_rooms')
+GEOMETRY_KEYS = ('walls', 'doors', 'markers', 'marker_size', 'marker_dictionary', 'station')
+_NAME = re.compile(r'[A-Za-z_][A-Za-z0-9_-]*\Z')
+
+Position = tuple[float, float, float]
+
+
+class PlaceError(ValueError):
+    """A description that is not a place: one line, beginning with the parameter that is wrong.
+
+    Attributes:
+        where: The parameter's path, e.g. ``('map', 'R1')``.
+        problem: What was found there and what was expected.
+    """
+
+    def __init__(self, where: KeyPath, problem: str) -> None:
+        super().__init__(f'{".".join(where)}: {problem}')
+        self.where = where
+        self.problem = problem
+
+
+@dataclass(frozen=True)
+class Place:
+    """Rooms joined by doors.
+
+    Attributes:
+        rooms: Doors of each room, in the order given.
+        positions: For each room a point inside that the robot can reach: x, y, z in metres, world
+            frame.
+        start: The room in which the robot is at first.
+        recharge_rooms: Rooms with a charging station.
+        closed: Doors that are closed at present.
+    """
+
+    rooms: Mapping[str, tuple[str, ...]]
+    positions: Mapping[str, Position]
+    start: str
+    recharge_rooms: tuple[str, ...] = ()
+    closed: frozenset[str] = frozenset()
+    _sides: dict[str, tuple[str, ...]] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        sides: dict[str, tuple[str, ...]] = {}
+        for room, doors in self.rooms.items():
+            for door in doors:
+                sides[door] = (*sides.get(door, ()), room)
+        object.__setattr__(self, '_sides', sides)
+
+    @property
+    def doors(self) -> Mapping[str, tuple[str, ...]]:
+        """The rooms on the sides of each door."""
+        return self._sides
+
+    def neighbours(self, room: str, *, through_closed: bool = False) -> dict[str, str]:
+        """Rooms next to ``room``, each with the (first open) door that leads there."""
+        found: dict[str, str] = {}
+        for door in self.rooms[room]:
+            if door in self.closed and not through_closed:
+                continue
+            for other in self._sides[door]:
+                if other != room:
+                    found.setdefault(other, door)
+        return found
+
+    def route(self, start: str, goal: str, *, through_closed: bool = False) -> list[str] | None:
+        """Rooms from ``start`` to ``goal`` over the fewest doors, both included; None: no way."""
+        came_from: dict[str, str | None] = {start: None}
+        queue = deque([start])
+        while queue:
+            room = queue.popleft()
+            if room == goal:
+                way = [room]
+                while (previous := came_from[way[-1]]) is not None:
+                    way.append(previous)
+                return way[::-1]
+            for other in self.neighbours(room, through_closed=through_closed):
+                if other not in came_from:
+                    came_from[other] = room
+                    queue.append(other)
+        return None
+
+    def reachable(self, start: str, *, through_closed: bool = False) -> set[str]:
+        """Rooms that can be reached from ``start``, itself included."""
+        seen = {start}
+        queue = [start]
+        while queue:
+            for other in self.neighbours(queue.pop(), through_closed=through_closed):
+                if other not in seen:
+                    seen.add(other)
+                    queue.append(other)
+        return seen
+
+    def with_room(self, name: str, position: Iterable[float], doors: Sequence[str]) -> Place:
+        """The place with a new room, or with further doors for a room that exists.
+
+        A new door joins two rooms once both have it, so it may lead nowhere for the moment.
+
+        Raises:
+            PlaceError: A name that cannot be used, a position that is no point, no doors.
+        """
+        where = ('map', name)
+        _check_name(where, 'room', name)
+        point = _position(('room_positions', name), list(position))
+        if name in self._sides:
+            raise PlaceError(where, 'already the name of a door')
+        if not doors:
+            raise PlaceError(where, 'has no doors, expected at least one')
+        _check_doors(where, doors, self.rooms)
+        if name in doors:
+            raise PlaceError(where, f"'{name}' is the room itself, expected the names of doors")
+        known = self.rooms.get(name, ())
+        if name in self.rooms and all(door in known for door in doors):
+            raise PlaceError(where, f'exists already with {_list("door", doors)}')
+        rooms = {**self.rooms, name: tuple(dict.fromkeys((*known, *doors)))}
+        place = replace(self, rooms=rooms, positions={**self.positions, name: point})
+        for door in doors:
+            if len(place._sides[door]) > 2:
+                raise PlaceError(
+                    where, f"door '{door}' already joins {' and '.join(self._sides[door])}"
+                )
+        return place
+
+    def without_room(self, name: str) -> Place:
+        """The place without a room; its doors stay where other rooms have them.
+
+        Raises:
+            PlaceError: The room is unknown, holds a charging station, or is the only way to others.
+        """
+        where = ('map', name)
+        if name not in self.rooms:
+            raise PlaceError(where, f'no such room; {_known("rooms", self.rooms)}')
+        if name in self.recharge_rooms:
+            raise PlaceError(where, 'holds a charging station and cannot be removed')
+        if len(self.rooms) == 1:
+            raise PlaceError(where, 'is the only room and cannot be removed')
+        rooms = {room: doors for room, doors in self.rooms.items() if room != name}
+        positions = {room: point for room, point in self.positions.items() if room != name}
+        anchor = self.start if self.start != name else next(iter(rooms))
+        left = replace(self, rooms=rooms, positions=positions, start=anchor)
+        before = self.reachable(anchor, through_closed=True)
+        cut_off = sorted(before - {name} - left.reachable(anchor, through_closed=True))
+        if cut_off:
+            raise PlaceError(where, f'is the only way to {", ".join(cut_off)}')
+        return replace(left, closed=left.closed & frozenset(left.doors))
+
+    def with_door(self, door: str, *, is_open: bool) -> Place:
+        """The place with a door opened or closed.
+
+        Raises:
+            PlaceError: No room has such a door.
+        """
+        if door not in self._sides:
+            raise PlaceError(('door', door), f'no such door; {_known("doors", self._sides)}')
+        closed = self.closed - {door} if is_open else self.closed | {door}
+        return replace(self, closed=closed)
+
+
+def make_place(
+    rooms: Any, room_positions: Any, robot_room: Any, recharge_rooms: Any = ()
+) -> Place:
+    """Check a description and make the `Place` of it.
+
+    Args:
+        rooms: Mapping of room to its list of doors.
+        room_positions: Mapping of room to ``[x, y]`` or ``[x, y, z]``, metres, world frame.
+        robot_room: Where the robot starts.
+        recharge_rooms: Rooms with a charging station.
+
+    Raises:
+        PlaceError: The first thing that is wrong, with the parameter it stands in.
+    """
+    checked = _rooms(rooms)
+    positions = _positions(room_positions, checked)
+    start = _member(('robot_room',), robot_room, checked)
+    stations = recharge_rooms
+    if not isinstance(stations, list | tuple):
+        raise PlaceError(('recharge_rooms',), f'expected a list of rooms, got {_shown(stations)}')
+    for station in stations:
+        _member(('recharge_rooms',), station, checked)
+    if twice := _first_duplicate(stations):
+        raise PlaceError(('recharge_rooms',), f"duplicate room '{twice}'")
+    place = Place(checked, positions, start, tuple(stations))
+    _check_graph(place)
+    return place
+
+
+def read_place(path: str | Path) -> Place:
+    """Read a place from its parameter file.
+
+    Raises:
+        ParameterFileError: The file cannot be read, or what it describes is not a place; one line
+            with file and line number.
+    """
+    file = read_parameter_file(path)
+    for key in file.values:
+        if key not in PLACE_KEYS and key not in GEOMETRY_KEYS:
+            known = ', '.join((*PLACE_KEYS, *GEOMETRY_KEYS))
+            raise file.error((key,), f'unknown parameter, expected one of {known}')
+    for key in PLACE_KEYS[:3]:
+        if key not in file.values:
+            raise file.error((), f"parameter '{key}' is missing")
+    try:
+        return make_place(
+            file.values['map'],
+            file.values['room_positions'],
+            file.values['robot_room'],
+            file.values.get('recharge_rooms', []),
+        )
+    except PlaceError as error:
+        raise file.error(error.where, error.problem) from None
+
+
+def _rooms(rooms: Any) -> dict[str, tuple[str, ...]]:
+    if not isinstance(rooms, Mapping) or not rooms:
+        raise PlaceError(('map',), f'expected rooms with their doors, got {_shown(rooms)}')
+    checked: dict[str, tuple[str, ...]] = {}
+    for room, doors in rooms.items():
+        where = ('map', str(room))
+        _check_name(where, 'room', room)
+        if not isinstance(doors, list | tuple) or not doors:
+            raise PlaceError(where, f'expected a list of at least one door, got {_shown(doors)}')
+        _check_doors(where, doors, rooms)
+        checked[room] = tuple(doors)
+    return checked
+
+
+def _check_doors(where: KeyPath, doors: Sequence[Any], rooms: Mapping[str, Any]) -> None:
+    for door in doors:
+        _check_name(where, 'door', door)
+        if door in rooms:
+            raise PlaceError(where, f"door '{door}' has the name of a room")
+    if twice := _first_duplicate(doors):
+        raise PlaceError(where, f"duplicate door '{twice}'")
+
+
+def _positions(positions: Any, rooms: Mapping[str, Any]) -> dict[str, Position]:
+    if not isinstance(positions, Mapping):
+        raise PlaceError(('room_positions',), f'expected room: [x, y], got {_shown(positions)}')
+    for room in positions:
+        if room not in rooms:
+            raise PlaceError(
+                ('room_positions', str(room)), f'no such room; {_known("rooms", rooms)}'
+            )
+    checked: dict[str, Position] = {}
+    for room in rooms:
+        if room not in positions:
+            raise PlaceError(('room_positions',), f"no position for room '{room}'")
+        checked[room] = _position(('room_positions', room), positions[room])
+    return checked
+
+
+def _position(where: KeyPath, value: Any) -> Position:
+    numbers = isinstance(value, list | tuple) and all(
+        isinstance(part, int | float) and not isinstance(part, bool) and math.isfinite(part)
+        for part in value
+    )
+    if not numbers or len(value) not in (2, 3):
+        raise PlaceError(where, f'expected [x, y] in metres, got {_shown(value)}')
+    x, y, z = (*map(float, value), 0.0)[:3]
+    return x, y, z
+
+
+def _check_graph(place: Place) -> None:
+    for door, sides in place.doors.items():
+        where = ('map', sides[0])
+        if len(sides) == 1:
+            raise PlaceError(
+                where, f"door '{door}' is in only one place, {sides[0]}; expected two"
+            )
+        if len(sides) > 2:
+            raise PlaceError(
+                where, f"door '{door}' is in {len(sides)} places, {', '.join(sides)}; expected two"
+            )
+    missing = sorted(set(place.rooms) - place.reachable(place.start))
+    if missing:
+        raise PlaceError(('map', missing[0]), f"cannot be reached from the start '{place.start}'")
+
+
+def _member(where: KeyPath, room: Any, rooms: Mapping[str, Any]) -> str:
+    if not isinstance(room, str) or room not in rooms:
+        raise PlaceError(where, f'no room {_shown(room)}; {_known("rooms", rooms)}')
+    return room
+
+
+def _check_name(where: KeyPath, kind: str, name: Any) -> None:
+    if not isinstance(name, str) or not _NAME.match(name):
+        raise PlaceError(
+            where,
+            f'{kind} name {_shown(name)}: expected letters, digits, _ and -, not a digit first'
+            + ('' if isinstance(name, str) else '; quote it'),
+        )
+
+
+def _first_duplicate(names: Sequence[str]) -> str | None:
+    seen: set[str] = set()
+    for name in names:
+        if name in seen:
+            return name
+        seen.add(name)
+    return None
+
+
+def _shown(value: Any, limit: int = 60) -> str:
+    text = repr(value)
+    return text if len(text) <= limit else text[: limit - 3] + '...'
+
+
+def _known(what: str, names: Iterable[str], limit: int = 12) -> str:
+    listed = list(names)
+    more = f' and {len(listed) - limit} more' if len(listed) > limit else ''
+    return f'the {what} are {", ".join(listed[:limit])}{more}'
+
+
+def _list(what: str, names: Sequence[str]) -> str:
+    return f'{what}{"s" if len(names) > 1 else ""} {", ".join(names)}'
