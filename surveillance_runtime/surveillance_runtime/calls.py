@@ -1,0 +1,311 @@
+"""Service calls and action goals that always end: with an answer, or with an error in time.
+
+Two ways to use them: blocking from a worker thread (`call`, `run`), or with `await` in a
+callback (`call_async`). Blocking in a callback would stop the executor that brings the answer.
+
+Deadlines here are steady time: how long a peer may take to answer has nothing to do with
+simulated time.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from action_msgs.msg import GoalStatus
+from rclpy.action import ActionClient
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.node import Node
+from rclpy.qos import qos_profile_action_status_default
+from rclpy.task import Future
+
+from surveillance_runtime.waiting import Interrupt
+
+DISCOVERY_PERIOD = 0.02
+"""Seconds between two looks for a server; rclpy offers no event for its appearance."""
+
+
+class CallFailed(Exception):
+    """A call did not bring an answer; the message is one line that names the peer."""
+
+
+class Unavailable(CallFailed):
+    """The server is not there, or went away before it answered."""
+
+
+class TimedOut(CallFailed):
+    """The server is there but did not answer in time."""
+
+
+class Interrupted(CallFailed):
+    """The caller's interrupt ended the wait."""
+
+
+class ServiceCaller:
+    """Calls one service.
+
+    Args:
+        node: The node that calls; an executor must spin it.
+        srv_type: The service's type.
+        name: The service's name, relative to the node's namespace.
+    """
+
+    def __init__(self, node: Node, srv_type: Any, name: str) -> None:
+        self._node = node
+        self._client = node.create_client(srv_type, name, callback_group=ReentrantCallbackGroup())
+        self.name = name
+
+    def is_ready(self) -> bool:
+        """Tell whether the server is there now."""
+        return bool(self._client.service_is_ready())
+
+    def call(self, request: Any, timeout: float, interrupt: Interrupt | None = None) -> Any:
+        """Call and block until the answer; from a worker thread only.
+
+        Args:
+            request: The request message.
+            timeout: Seconds for finding the server and for its answer together.
+            interrupt: Ends the wait early.
+
+        Returns:
+            The response message.
+
+        Raises:
+            Unavailable: No server within the time.
+            TimedOut: No answer within the time.
+            Interrupted: The interrupt was raised.
+        """
+        deadline = time.monotonic() + timeout
+        _await_ready(self.is_ready, deadline, interrupt, f'service {self.name}')
+        future = self._client.call_async(request)
+        try:
+            return _block_on(future, deadline, interrupt, f'service {self.name}')
+        except CallFailed:
+            self._client.remove_pending_request(future)
+            raise
+
+    async def call_async(self, request: Any, timeout: float) -> Any:
+        """Call from a callback with `await`; otherwise as `call`.
+
+        Raises:
+            Unavailable: The server is not there when the call is made.
+            TimedOut: No answer within the time.
+        """
+        if not self.is_ready():
+            raise Unavailable(f'service {self.name}: no server')
+        future = self._client.call_async(request)
+        executor = self._node.executor
+        late = threading.Event()
+
+        def expire() -> None:
+            late.set()
+            future.cancel()
+            executor.wake()
+
+        timer = threading.Timer(timeout, expire)
+        timer.daemon = True
+        timer.start()
+        try:
+            response = await future
+        finally:
+            timer.cancel()
+        if late.is_set() and not future.done():
+            self._client.remove_pending_request(future)
+            raise TimedOut(f'service {self.name}: no answer within {timeout:g} s')
+        return response
+
+
+@dataclass(frozen=True)
+class GoalEnd:
+    """How a goal ended.
+
+    Attributes:
+        status: `succeeded`, `aborted`, `canceled` or `rejected`.
+        result: The action's result message; None when rejected.
+    """
+
+    status: str
+    result: Any
+
+
+_STATUS = {
+    GoalStatus.STATUS_SUCCEEDED: 'succeeded',
+    GoalStatus.STATUS_ABORTED: 'aborted',
+    GoalStatus.STATUS_CANCELED: 'canceled',
+}
+
+
+class GoalCaller:
+    """Sends goals to one action server, one at a time.
+
+    A server that dies or restarts in the middle is noticed: its status topic comes or goes, and
+    the server that is there then is asked whether it knows the goal.
+
+    Args:
+        node: The node that calls; an executor must spin it.
+        action_type: The action's type.
+        name: The action's name, relative to the node's namespace.
+        cancel_timeout: Seconds that a server may take to end a cancelled goal.
+    """
+
+    def __init__(
+        self, node: Node, action_type: Any, name: str, cancel_timeout: float = 2.0
+    ) -> None:
+        self._node = node
+        group = ReentrantCallbackGroup()
+        self._client = ActionClient(node, action_type, name, callback_group=group)
+        self._action_type = action_type
+        self._cancel_timeout = cancel_timeout
+        self._servers_changed: Callable[[], None] | None = None
+        self._probe = node.create_client(
+            action_type.Impl.GetResultService, f'{name}/_action/get_result', callback_group=group
+        )
+        self._status = node.create_subscription(
+            action_type.Impl.GoalStatusMessage,
+            f'{name}/_action/status',
+            lambda _message: None,
+            qos_profile_action_status_default,
+            callback_group=group,
+            event_callbacks=SubscriptionEventCallbacks(matched=self._on_matched),
+        )
+        self.name = name
+
+    def is_ready(self) -> bool:
+        """Tell whether the server is there now."""
+        return bool(self._client.server_is_ready())
+
+    def run(
+        self,
+        goal: Any,
+        *,
+        accept_timeout: float,
+        result_timeout: float | None = None,
+        interrupt: Interrupt | None = None,
+        on_feedback: Callable[[Any], None] | None = None,
+    ) -> GoalEnd:
+        """Send a goal and block until it ends; from a worker thread only.
+
+        Args:
+            goal: The goal message.
+            accept_timeout: Seconds for finding the server and for its yes or no.
+            result_timeout: Seconds for the result after that; None waits as long as the server
+                lives. When it passes, the goal is cancelled.
+            interrupt: Ends the wait early; the goal is cancelled on the server.
+            on_feedback: Called with each feedback message, in the executor's thread.
+
+        Raises:
+            Unavailable: No server within the time, or it went away in the middle.
+            TimedOut: No yes or no, or no result, within the time.
+            Interrupted: The interrupt was raised; the server was told to cancel and has ended
+                the goal, or had `cancel_timeout` to do so.
+        """
+        what = f'action {self.name}'
+        deadline = time.monotonic() + accept_timeout
+        _await_ready(self.is_ready, deadline, interrupt, what)
+        feedback = None
+        if on_feedback is not None:
+            told = on_feedback
+
+            def feedback(message: Any) -> None:
+                told(message.feedback)
+
+        sent = self._client.send_goal_async(goal, feedback_callback=feedback)
+        try:
+            handle = _block_on(sent, deadline, interrupt, what)
+        except CallFailed:
+            # The goal may be accepted yet; it must not run on unseen.
+            sent.add_done_callback(_cancel_when_accepted)
+            raise
+        if not handle.accepted:
+            return GoalEnd('rejected', None)
+        wake = Interrupt()
+        lost = threading.Event()
+        self._servers_changed = lambda: self._ask_for(handle, lost, wake)
+        ended = handle.get_result_async()
+        ended.add_done_callback(lambda _future: wake.set())
+        remove = interrupt.subscribe(wake.set) if interrupt is not None else None
+        try:
+            wake.wait(result_timeout)
+        finally:
+            self._servers_changed = None
+            if remove is not None:
+                remove()
+        if not ended.done():
+            if lost.is_set():
+                raise Unavailable(f'{what}: the server went away before the goal ended')
+            self._cancel(handle, ended)
+            if interrupt is not None and interrupt.is_set():
+                raise Interrupted(f'{what}: interrupted')
+            raise TimedOut(f'{what}: no result within {result_timeout:g} s')
+        response = ended.result()
+        if response.status not in _STATUS:
+            raise Unavailable(f'{what}: the server does not know the goal any more')
+        return GoalEnd(_STATUS[response.status], response.result)
+
+    def _cancel(self, handle: Any, ended: Future) -> None:
+        done = threading.Event()
+        ended.add_done_callback(lambda _future: done.set())
+        handle.cancel_goal_async()
+        done.wait(self._cancel_timeout)
+
+    def _on_matched(self, _info: Any) -> None:
+        changed = self._servers_changed
+        if changed is not None:
+            changed()
+
+    def _ask_for(self, handle: Any, lost: threading.Event, wake: Interrupt) -> None:
+        """Ask whether a server is there that knows the goal; runs in the executor's thread."""
+
+        def give_up() -> None:
+            lost.set()
+            wake.set()
+
+        if not self._probe.service_is_ready():
+            give_up()
+            return
+        request = self._action_type.Impl.GetResultService.Request()
+        request.goal_id = handle.goal_id
+
+        def answered(future: Future) -> None:
+            response = future.result()
+            if response is not None and response.status == GoalStatus.STATUS_UNKNOWN:
+                give_up()
+
+        self._probe.call_async(request).add_done_callback(answered)
+
+
+def _cancel_when_accepted(sent: Future) -> None:
+    handle = sent.result()
+    if handle is not None and handle.accepted:
+        handle.cancel_goal_async()
+
+
+def _await_ready(
+    is_ready: Callable[[], bool], deadline: float, interrupt: Interrupt | None, what: str
+) -> None:
+    pause = interrupt if interrupt is not None else Interrupt()
+    while not is_ready():
+        if time.monotonic() >= deadline:
+            raise Unavailable(f'{what}: no server')
+        if pause.wait(DISCOVERY_PERIOD):
+            raise Interrupted(f'{what}: interrupted')
+
+
+def _block_on(future: Future, deadline: float, interrupt: Interrupt | None, what: str) -> Any:
+    woken = threading.Event()
+    future.add_done_callback(lambda _future: woken.set())
+    remove = interrupt.subscribe(woken.set) if interrupt is not None else None
+    try:
+        woken.wait(max(0.0, deadline - time.monotonic()))
+    finally:
+        if remove is not None:
+            remove()
+    if future.done():
+        return future.result()
+    if interrupt is not None and interrupt.is_set():
+        raise Interrupted(f'{what}: interrupted')
+    raise TimedOut(f'{what}: no answer in time')

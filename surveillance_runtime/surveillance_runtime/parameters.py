@@ -1,0 +1,129 @@
+"""Checks of parameter values, with errors that say what was wrong, where, and what was expected.
+
+A parameter's type is that of its default. An integer is accepted where a float is declared, since
+people write `speed:=1` and mean 1.0.
+"""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+Check = Callable[[Any], str | None]
+"""Looks at a valid value further; returns what was expected instead, or None when it is good."""
+
+_TYPE_NAMES = {bool: 'true or false', int: 'an integer', float: 'a number', str: 'a text'}
+_LIST_NAMES = {bool: 'booleans', int: 'integers', float: 'numbers', str: 'texts'}
+
+
+class ParameterError(ValueError):
+    """A parameter has a value that the node cannot work with; the message is one line."""
+
+
+@dataclass(frozen=True)
+class ParameterSpec:
+    """What values a parameter takes.
+
+    Attributes:
+        name: The parameter's name.
+        default: Its default; fixes the type.
+        element: Type of a list's elements; None for a single value.
+        minimum: Least value, for numbers and for the numbers in a list.
+        maximum: Greatest value, likewise.
+        choices: The only values allowed; empty for any.
+        check: Looks at the value after everything else.
+    """
+
+    name: str
+    default: Any
+    element: type | None = None
+    minimum: float | None = None
+    maximum: float | None = None
+    choices: tuple[Any, ...] = ()
+    check: Check | None = None
+
+    def accept(self, value: Any) -> Any:
+        """Return the value as the node works with it: numbers as declared, arrays as lists.
+
+        Raises:
+            ParameterError: The value has the wrong type or is out of range.
+        """
+        if self.element is None:
+            return self._checked(self._element(value, type(self.default), value), value)
+        if isinstance(value, str | bytes) or not isinstance(value, Sequence | array):
+            raise self.error(value)
+        return self._checked([self._element(v, self.element, value) for v in value], value)
+
+    def error(self, value: Any, expected: str | None = None) -> ParameterError:
+        """Build the error for a value that does not fit."""
+        return ParameterError(
+            f'parameter {self.name}: got {_shown(value)}, expected {expected or self.expected()}'
+        )
+
+    def expected(self) -> str:
+        """Say in words what values are allowed."""
+        if self.choices:
+            return 'one of ' + ', '.join(_shown(choice) for choice in self.choices)
+        if self.element is None:
+            text = _TYPE_NAMES[type(self.default)]
+        else:
+            text = f'a list of {_LIST_NAMES[self.element]}'
+        if self.minimum is not None and self.maximum is not None:
+            return f'{text} from {self.minimum} to {self.maximum}'
+        if self.minimum is not None:
+            return f'{text}, at least {self.minimum}'
+        if self.maximum is not None:
+            return f'{text}, at most {self.maximum}'
+        return text
+
+    def _element(self, element: Any, kind: type, whole: Any) -> Any:
+        if kind is float and isinstance(element, int) and not isinstance(element, bool):
+            element = float(element)
+        if kind is float:
+            fits = isinstance(element, float)
+        else:
+            fits = type(element) is kind
+        if not fits:
+            raise self.error(whole)
+        if self.choices and element not in self.choices:
+            raise self.error(whole)
+        if kind in (int, float) and (
+            (self.minimum is not None and not element >= self.minimum)
+            or (self.maximum is not None and not element <= self.maximum)
+        ):
+            raise self.error(whole)
+        return element
+
+    def _checked(self, accepted: Any, value: Any) -> Any:
+        if self.check is not None:
+            expected = self.check(accepted)
+            if expected is not None:
+                raise self.error(value, expected)
+        return accepted
+
+
+def element_type(name: str, default: Any, of: type | None) -> type | None:
+    """Find the type of a list parameter's elements; None when the default is a single value.
+
+    Raises:
+        TypeError: The default is an empty list and `of` is not given.
+    """
+    if not isinstance(default, list | tuple):
+        return None
+    if of is not None:
+        return of
+    if not default:
+        raise TypeError(f'parameter {name}: an empty default needs of=<element type>')
+    return type(default[0])
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, str):
+        return repr(value)
+    if isinstance(value, bool):
+        return 'true' if value else 'false'
+    if isinstance(value, Sequence | array) and not isinstance(value, bytes):
+        return '[' + ', '.join(_shown(element) for element in value) + ']'
+    return str(value)

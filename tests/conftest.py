@@ -1,0 +1,147 @@
+"""Fixtures for all tests: an own ROS domain for each test process, and a graph of real nodes."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import pathlib
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator
+from typing import Any, TypeVar
+
+import pytest
+
+T = TypeVar('T')
+
+LAST_DOMAIN = 101  # Ports of higher domains may collide with the system's ephemeral ports.
+
+
+def _claim_domain() -> tuple[int, Any]:
+    """Take a ROS domain that no other test process on this machine holds."""
+    folder = pathlib.Path(tempfile.gettempdir()) / 'surveillance-test-domains'
+    folder.mkdir(mode=0o777, exist_ok=True)
+    for domain in range(1, LAST_DOMAIN + 1):
+        lock = open(folder / str(domain), 'w')  # noqa: SIM115 - held until the process ends
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            lock.close()
+            continue
+        return domain, lock
+    raise RuntimeError(f'all ROS domains from 1 to {LAST_DOMAIN} are in use')
+
+
+_domain, _domain_lock = _claim_domain()
+os.environ['ROS_DOMAIN_ID'] = str(_domain)
+
+
+@pytest.fixture(scope='session')
+def ros_domain() -> int:
+    """The ROS domain of this test process, also in its environment."""
+    return _domain
+
+
+class Graph:
+    """Nodes of one test in a ROS context of their own, spun by one executor thread.
+
+    Attributes:
+        node: A plain node for scripted peers and clients.
+    """
+
+    def __init__(self) -> None:
+        import rclpy
+
+        from surveillance_runtime.node import ExecutorThread, PatrolNode
+
+        self.context = rclpy.Context()
+        rclpy.init(context=self.context, domain_id=_domain)
+        self._spinner = ExecutorThread(self.context)
+        self._nodes: list[PatrolNode] = []
+        self._changed = threading.Condition()
+        self.node = self.add(PatrolNode, name='test')
+        self._spinner.start()
+
+    def add(
+        self,
+        kind: Callable[..., T],
+        parameters: dict[str, Any] | None = None,
+        namespace: str = '',
+        **options: Any,
+    ) -> T:
+        """Create a node and spin it; `parameters` are its overrides, nested names dotted."""
+        from rclpy.parameter import Parameter
+
+        overrides = [Parameter(name, value=value) for name, value in (parameters or {}).items()]
+        node = kind(
+            **options,
+            context=self.context,
+            namespace=namespace,
+            parameter_overrides=overrides,
+            use_global_arguments=False,
+        )
+        self._nodes.append(node)  # type: ignore[arg-type]
+        self._spinner.executor.add_node(node)
+        return node
+
+    def remove(self, node: Any) -> None:
+        """Stop and destroy one node, as when its process ends."""
+        node.stop()
+        self._spinner.executor.remove_node(node)
+        self._nodes.remove(node)
+        done = threading.Event()
+        self._spinner.executor.create_task(lambda: (node.destroy_node(), done.set()))
+        assert done.wait(10), 'executor does not spin'
+
+    def until(self, predicate: Callable[[], Any], timeout: float = 10.0) -> Any:
+        """Wait until the predicate holds; it is looked at whenever `touch` is called and often.
+
+        Returns:
+            What the predicate returned.
+        """
+        deadline = time.monotonic() + timeout
+        with self._changed:
+            while not (value := predicate()):
+                remaining = deadline - time.monotonic()
+                assert remaining > 0, f'not within {timeout} s'
+                assert self._spinner.error is None, repr(self._spinner.error)
+                self._changed.wait(min(remaining, 0.01))
+        return value
+
+    def touch(self) -> None:
+        """Make `until` look at its predicate now."""
+        with self._changed:
+            self._changed.notify_all()
+
+    def listen(self, msg_type: Any, topic: str, qos: Any = 10) -> list[Any]:
+        """Subscribe; returns the list to which each message that arrives is appended."""
+        messages: list[Any] = []
+
+        def arrived(message: Any) -> None:
+            messages.append(message)
+            self.touch()
+
+        self.node.create_subscription(msg_type, topic, arrived, qos)
+        return messages
+
+    def close(self) -> None:
+        """Stop all nodes while messages flow, then the executor, then ROS."""
+        import rclpy
+
+        for node in reversed(self._nodes):
+            node.stop()
+        self._spinner.stop()
+        for node in reversed(self._nodes):
+            node.destroy_node()
+        rclpy.try_shutdown(context=self.context)
+        if self._spinner.error is not None:
+            raise self._spinner.error
+
+
+@pytest.fixture
+def graph() -> Iterator[Graph]:
+    """A graph of real nodes; see `Graph`."""
+    graph = Graph()
+    yield graph
+    graph.close()

@@ -1,0 +1,247 @@
+"""Calls and goals that always end, against scripted servers."""
+
+from __future__ import annotations
+
+import threading
+
+import pytest
+from geometry_msgs.msg import Point
+from rosgraph_msgs.msg import Clock
+from std_srvs.srv import Trigger
+
+from surveillance_interfaces.action import FollowPath
+from surveillance_runtime.calls import GoalCaller, Interrupted, ServiceCaller, TimedOut, Unavailable
+from surveillance_runtime.goals import GoalAborted, GoalServer
+from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.waiting import ClockWait, Interrupt
+
+
+def in_thread(work):
+    """Run work on a thread; returns a function that waits for it and gives or raises its end."""
+    outcome = []
+
+    def body():
+        try:
+            outcome.append((work(), None))
+        except Exception as error:
+            outcome.append((None, error))
+
+    thread = threading.Thread(target=body)
+    thread.start()
+
+    def end():
+        thread.join(10)
+        assert not thread.is_alive(), 'hangs'
+        value, error = outcome[0]
+        if error is not None:
+            raise error
+        return value
+
+    return end
+
+
+@pytest.fixture
+def server(graph):
+    return graph.add(PatrolNode, name='server')
+
+
+def follow(*points):
+    return FollowPath.Goal(path=[Point(x=float(x)) for x in points])
+
+
+def test_service_call_brings_the_answer(graph, server):
+    server.create_service(Trigger, 'ask', lambda _q, a: Trigger.Response(success=True, message='y'))
+    answer = ServiceCaller(graph.node, Trigger, 'ask').call(Trigger.Request(), timeout=5.0)
+    assert answer.message == 'y'
+
+
+def test_service_call_ends_without_a_server(graph):
+    with pytest.raises(Unavailable, match='service ask: no server'):
+        ServiceCaller(graph.node, Trigger, 'ask').call(Trigger.Request(), timeout=0.05)
+
+
+def test_service_call_ends_by_interrupt_and_by_deadline(graph, server):
+    reached = threading.Event()
+
+    async def never(_request, _response):
+        from rclpy.task import Future
+
+        reached.set()
+        await Future()
+
+    server.create_service(Trigger, 'ask', never)
+    caller = ServiceCaller(graph.node, Trigger, 'ask')
+    interrupt = Interrupt()
+    end = in_thread(lambda: caller.call(Trigger.Request(), 20.0, interrupt))
+    assert reached.wait(5)
+    interrupt.set()
+    with pytest.raises(Interrupted):
+        end()
+    with pytest.raises(TimedOut):
+        caller.call(Trigger.Request(), timeout=0.2)
+
+
+def test_service_call_in_a_callback_is_awaited(graph, server):
+    server.create_service(Trigger, 'ask', lambda _q, a: Trigger.Response(success=True, message='y'))
+    inner = ServiceCaller(graph.node, Trigger, 'ask')
+    outer = ServiceCaller(graph.node, Trigger, 'relay')
+
+    async def relay(request, _response):
+        return await inner.call_async(request, timeout=5.0)
+
+    graph.node.create_service(Trigger, 'relay', relay)
+    graph.until(inner.is_ready)
+    assert outer.call(Trigger.Request(), timeout=5.0).message == 'y'
+
+
+def test_awaited_call_times_out(graph, server):
+    async def never(_request, _response):
+        from rclpy.task import Future
+
+        await Future()
+
+    server.create_service(Trigger, 'ask', never)
+    inner = ServiceCaller(graph.node, Trigger, 'ask')
+    graph.until(inner.is_ready)
+    seen = []
+
+    async def relay(_request, response):
+        try:
+            await inner.call_async(Trigger.Request(), timeout=0.1)
+        except TimedOut as error:
+            seen.append(str(error))
+        return response
+
+    graph.node.create_service(Trigger, 'relay', relay)
+    ServiceCaller(graph.node, Trigger, 'relay').call(Trigger.Request(), timeout=5.0)
+    assert seen == ['service ask: no answer within 0.1 s']
+
+
+def test_goal_succeeds_with_feedback(graph, server):
+    def execute(goal, run):
+        for point in goal.path:
+            run.feedback(FollowPath.Feedback(position=point))
+        return FollowPath.Result(position=goal.path[-1])
+
+    GoalServer(server, FollowPath, 'follow_path', execute)
+    passed = []
+    end = GoalCaller(graph.node, FollowPath, 'follow_path').run(
+        follow(1, 2), accept_timeout=5.0, on_feedback=lambda f: passed.append(f.position.x)
+    )
+    assert (end.status, end.result.position.x) == ('succeeded', 2.0)
+    graph.until(lambda: passed == [1.0, 2.0])
+
+
+def test_goal_aborts_with_its_result(graph, server):
+    def execute(goal, run):
+        raise GoalAborted('blocked by D1', FollowPath.Result(position=Point(x=0.5)))
+
+    GoalServer(server, FollowPath, 'follow_path', execute)
+    end = GoalCaller(graph.node, FollowPath, 'follow_path').run(follow(1), accept_timeout=5.0)
+    assert (end.status, end.result.position.x) == ('aborted', 0.5)
+
+
+def test_exception_in_execute_aborts_the_goal_and_the_server_goes_on(graph, server):
+    def execute(goal, run):
+        return FollowPath.Result(position=goal.path[0])
+
+    GoalServer(server, FollowPath, 'follow_path', execute)
+    caller = GoalCaller(graph.node, FollowPath, 'follow_path')
+    assert caller.run(follow(), accept_timeout=5.0).status == 'aborted'
+    assert caller.run(follow(3), accept_timeout=5.0).status == 'succeeded'
+
+
+def waiting_server(server, name='follow_path'):
+    """A server whose goals run until they are interrupted; returns its list of started runs."""
+    runs = []
+
+    def execute(goal, run):
+        runs.append(run)
+        run.sleep(1e6)
+        return FollowPath.Result(position=goal.path[0])
+
+    GoalServer(server, FollowPath, name, execute)
+    return runs
+
+
+def test_interrupt_cancels_the_goal_on_the_server(graph, server):
+    runs = waiting_server(server)
+    caller = GoalCaller(graph.node, FollowPath, 'follow_path')
+    interrupt = Interrupt()
+    end = in_thread(lambda: caller.run(follow(1), accept_timeout=5.0, interrupt=interrupt))
+    graph.until(lambda: runs)
+    interrupt.set()
+    with pytest.raises(Interrupted):
+        end()
+    assert runs[0].cancelled
+
+
+def test_result_deadline_cancels_the_goal(graph, server):
+    runs = waiting_server(server)
+    caller = GoalCaller(graph.node, FollowPath, 'follow_path')
+    with pytest.raises(TimedOut):
+        caller.run(follow(1), accept_timeout=5.0, result_timeout=0.1)
+    assert runs[0].cancelled
+
+
+def test_newer_goal_takes_the_place_of_the_running_one(graph, server):
+    runs = waiting_server(server)
+    first = GoalCaller(graph.node, FollowPath, 'follow_path')
+    second = GoalCaller(graph.node, FollowPath, 'follow_path')
+    interrupt = Interrupt()
+    end_of_first = in_thread(lambda: first.run(follow(1), accept_timeout=5.0))
+    graph.until(lambda: len(runs) == 1)
+    end_of_second = in_thread(
+        lambda: second.run(follow(2), accept_timeout=5.0, interrupt=interrupt)
+    )
+    assert end_of_first().status == 'aborted'
+    graph.until(lambda: len(runs) == 2)
+    interrupt.set()
+    with pytest.raises(Interrupted):
+        end_of_second()
+
+
+def test_server_that_goes_away_in_the_middle_is_noticed(graph, server):
+    runs = waiting_server(server)
+    caller = GoalCaller(graph.node, FollowPath, 'follow_path')
+    end = in_thread(lambda: caller.run(follow(1), accept_timeout=5.0))
+    graph.until(lambda: runs)
+    server.stopping.subscribe = lambda _callback: None  # as by SIGKILL: no goodbye to goals
+    server.get_logger().debug('going')
+    graph._spinner.executor.remove_node(server)
+    graph._nodes.remove(server)
+    graph._spinner.executor.create_task(server.destroy_node)
+    with pytest.raises(Unavailable, match='went away'):
+        end()
+    runs[0].interrupt.set()
+
+
+def test_no_action_server(graph):
+    with pytest.raises(Unavailable, match='action follow_path: no server'):
+        GoalCaller(graph.node, FollowPath, 'follow_path').run(follow(1), accept_timeout=0.05)
+
+
+def test_clock_wait_follows_simulated_time(graph):
+    node = graph.add(PatrolNode, name='sleeper', parameters={'use_sim_time': True})
+    clock = graph.node.create_publisher(Clock, '/clock', 1)
+    wait = ClockWait(node)
+
+    def tick(second):
+        message = Clock()
+        message.clock.sec = second
+        clock.publish(message)
+
+    graph.until(lambda: (tick(100), wait.now() == 100.0)[1])
+    end = in_thread(lambda: wait.sleep(50.0))
+    tick(149)
+    graph.until(lambda: wait.now() == 149.0)
+    tick(151)
+    assert end() is True
+
+
+def test_clock_wait_ends_by_interrupt(graph):
+    wait = ClockWait(graph.node)
+    interrupt = Interrupt()
+    end = in_thread(lambda: wait.sleep(1000.0, interrupt))
+    interrupt.set()
+    assert end() is False

@@ -1,0 +1,151 @@
+"""Parameters, threads and the life of a node's process."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+
+import pytest
+from rclpy.parameter import Parameter
+
+from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.parameters import ParameterError
+
+
+class Patient(PatrolNode):
+    """Declares one parameter of each kind."""
+
+    def __init__(self, **node_options):
+        super().__init__('patient', **node_options)
+        self.heard = []
+        self.level = self.parameter(
+            'level', 50, 'Percent.', minimum=0, maximum=100, on_change=self.heard.append
+        )
+        self.speed = self.parameter('speed', 1.0, 'Metres per second.', minimum=0.0)
+        self.mode = self.parameter('mode', 'RANDOM', 'Mode.', choices=('MANUAL', 'RANDOM'))
+        self.rooms = self.parameter('rooms', [], 'Names.', of=str)
+        self.even = self.parameter(
+            'even', 2, 'Even.', check=lambda v: None if v % 2 == 0 else 'an even number'
+        )
+
+
+def test_defaults_and_overrides_have_the_declared_types(graph):
+    node = graph.add(Patient, parameters={'level': 7, 'speed': 2, 'rooms': ['E', 'C1']})
+    assert (node.level, node.speed, node.mode, node.rooms) == (7, 2.0, 'RANDOM', ['E', 'C1'])
+    assert isinstance(node.speed, float)
+
+
+@pytest.mark.parametrize(
+    ('name', 'value', 'expected'),
+    [
+        ('level', 101, 'parameter level: got 101, expected an integer from 0 to 100'),
+        ('level', 'full', "parameter level: got 'full', expected an integer from 0 to 100"),
+        ('level', True, 'parameter level: got true, expected an integer from 0 to 100'),
+        ('speed', -1.0, 'parameter speed: got -1.0, expected a number, at least 0.0'),
+        ('mode', 'AUTO', "parameter mode: got 'AUTO', expected one of 'MANUAL', 'RANDOM'"),
+        ('rooms', 'E', "parameter rooms: got 'E', expected a list of texts"),
+        ('rooms', [1, 2], 'parameter rooms: got [1, 2], expected a list of texts'),
+        ('even', 3, 'parameter even: got 3, expected an even number'),
+    ],
+)
+def test_bad_value_is_refused_in_the_same_words_at_start_and_at_run_time(
+    graph, name, value, expected
+):
+    with pytest.raises(ParameterError) as error:
+        graph.add(Patient, parameters={name: value})
+    assert str(error.value) == expected
+    node = graph.add(Patient)
+    result = node.set_parameters([Parameter(name, value=value)])[0]
+    assert not result.successful
+    assert result.reason == expected or 'out of range' in result.reason
+
+
+def test_change_at_run_time_reaches_the_node(graph):
+    node = graph.add(Patient)
+    assert node.set_parameters([Parameter('level', value=12)])[0].successful
+    assert node.heard == [12]
+
+
+def test_parameters_below_a_prefix_come_in_order(graph):
+    node = graph.add(
+        PatrolNode, name='map', parameters={'map.R1': ['D1'], 'map.C1': ['D1', 'D2'], 'other': 1}
+    )
+    assert node.parameters_under('map') == {'R1': ['D1'], 'C1': ['D1', 'D2']}
+
+
+def test_stop_wakes_and_joins_threads(graph):
+    node = graph.add(PatrolNode, name='worker')
+    started = threading.Event()
+    ended = []
+
+    def work():
+        started.set()
+        node.stopping.wait()
+        ended.append(True)
+
+    node.spawn(work)
+    assert started.wait(5)
+    node.stop()
+    assert ended == [True]
+
+
+def test_exception_in_a_thread_fails_the_node(graph, capsys):
+    node = graph.add(PatrolNode, name='worker')
+
+    def work():
+        raise LookupError('no such place')
+
+    node.spawn(work)
+    assert node.failed.wait(5)
+    assert node.failure == 'LookupError: no such place'
+
+
+PROGRAM = """
+import sys
+from surveillance_runtime.node import PatrolNode, run_node
+class Program(PatrolNode):
+    def __init__(self):
+        super().__init__('program')
+        self.parameter('level', 1, 'Level.', minimum=0, maximum=9)
+        self.create_timer(0.0, lambda: print('spinning', flush=True))
+    def on_stop(self):
+        print('stopping', flush=True)
+sys.exit(run_node(Program, sys.argv[1:]))
+"""
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_process_stops_cleanly_on_a_signal(number):
+    process = subprocess.Popen(
+        [sys.executable, '-c', PROGRAM], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    assert process.stdout.readline() == 'spinning\n'
+    os.kill(process.pid, number)
+    os.kill(process.pid, number)
+    out, err = process.communicate(timeout=10)
+    assert process.returncode == 0
+    assert out.endswith('stopping\n')
+    assert err == ''
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'complaint'),
+    [
+        (['-p', 'level:=12'], 'parameter level: got 12, expected an integer from 0 to 9'),
+        (['-p', 'level:=high'], "parameter level: got 'high', expected an integer from 0 to 9"),
+        (['--params-file', 'missing.yaml'], 'parameter file missing.yaml: No such file'),
+    ],
+)
+def test_process_with_a_bad_parameter_says_so_in_one_line(arguments, complaint):
+    run = subprocess.run(
+        [sys.executable, '-c', PROGRAM, '--ros-args', *arguments],
+        capture_output=True,
+        text=True,
+        timeout=20,
+    )
+    assert run.returncode == 1
+    assert run.stderr.count('\n') == 1
+    assert complaint in run.stderr
