@@ -1,8 +1,8 @@
 """Regular places made from rectangles: an office floor, and grids, rings and trees of rooms.
 
 A place is drawn by naming rectangles and which of them a door connects; walls, door positions and
-room positions follow. The result is the parameter mapping that a place's YAML file holds, so what is
-generated here can be written to a file and be checked and changed by hand afterwards:
+room positions follow. The result is the parameter mapping that a place's YAML file holds, so what
+is generated here can be written to a file and be checked and changed by hand afterwards:
 
     python -m surveillance_simulation.place_generation office > config/office.yaml
 """

@@ -1,0 +1,293 @@
+"""The unchanging geometry of a place: walls, doors, markers, station, as its parameter file says.
+
+Walls and doors are boxes around a centre line. A wall runs through; each door cuts its opening out
+of the wall it lies on. Everything is checked when it is read: a `WorldError` is one line that names
+the entry, its value and what was expected.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from surveillance_ontology.place import Place, PlaceError, make_place
+
+Point = tuple[float, float]
+Pose = tuple[float, float, float]
+
+WALL_THICKNESS = 0.1
+WALL_HEIGHT = 2.5
+_ON_WALL = 0.03
+
+
+class WorldError(ValueError):
+    """A place's geometry, or a change to it, makes no sense; the message is one line.
+
+    Attributes:
+        where: The path of the parameter that is wrong, e.g. `('walls', 'south')`; may be empty.
+        problem: What was found there and what was expected.
+    """
+
+    def __init__(self, problem: str, *where: str) -> None:
+        super().__init__(f'{".".join(where)}: {problem}' if where else problem)
+        self.where = where
+        self.problem = problem
+
+
+@dataclass(frozen=True)
+class Wall:
+    """A straight wall by the ends of its centre line, metres."""
+
+    name: str
+    start: Point
+    end: Point
+
+    @property
+    def length(self) -> float:
+        """Length of the centre line, metres."""
+        return math.dist(self.start, self.end)
+
+
+@dataclass(frozen=True)
+class Door:
+    """An opening in a wall: centre (metres), direction along the wall (rad), width (metres)."""
+
+    name: str
+    x: float
+    y: float
+    yaw: float
+    width: float
+
+    @property
+    def ends(self) -> tuple[Point, Point]:
+        """The two jambs, metres."""
+        dx = math.cos(self.yaw) * self.width / 2
+        dy = math.sin(self.yaw) * self.width / 2
+        return (self.x - dx, self.y - dy), (self.x + dx, self.y + dy)
+
+
+@dataclass(frozen=True)
+class Marker:
+    """A square ArUco panel: id, centre and side in metres, direction its picture faces in rad."""
+
+    name: str
+    id: int
+    x: float
+    y: float
+    z: float
+    yaw: float
+    size: float
+
+
+@dataclass(frozen=True)
+class FloorPlan:
+    """Everything about a place that its file says.
+
+    Attributes:
+        place: The rooms, which doors join them, a point in each.
+        walls: Walls by name, uncut.
+        doors: Doors by name.
+        markers: Markers by name.
+        marker_dictionary: OpenCV's name of the markers' dictionary.
+        station: Pose of the charging station, metres and rad.
+    """
+
+    place: Place
+    walls: Mapping[str, Wall]
+    doors: Mapping[str, Door]
+    markers: Mapping[str, Marker]
+    marker_dictionary: str
+    station: Pose
+
+    @classmethod
+    def from_parameters(cls, parameters: Mapping[str, Any]) -> FloorPlan:
+        """Return the plan that a place's parameters describe.
+
+        Args:
+            parameters: The mapping below `ros__parameters` in the place's file.
+
+        Raises:
+            WorldError: An entry is missing, of the wrong shape or contradicts another.
+        """
+        walls = {}
+        for name, (x1, y1, x2, y2) in _rows(parameters, 'walls', ('x1', 'y1', 'x2', 'y2')).items():
+            walls[name] = Wall(name, (x1, y1), (x2, y2))
+        doors = {
+            name: Door(name, *row)
+            for name, row in _rows(parameters, 'doors', ('x', 'y', 'yaw', 'width')).items()
+        }
+        size = _number(parameters.get('marker_size', 0.2), 'marker_size')
+        markers = {}
+        columns = ('id', 'x', 'y', 'z', 'yaw')
+        for name, row in _rows(parameters, 'markers', columns, required=False).items():
+            if row[0] != int(row[0]) or row[0] < 0:
+                raise WorldError(f'id {row[0]:g}: expected a whole number from 0', 'markers', name)
+            markers[name] = Marker(name, int(row[0]), row[1], row[2], row[3], row[4], size)
+        station = _row(parameters.get('station'), ('x', 'y', 'yaw'), 'station')
+        plan = cls(
+            place=_place(parameters),
+            walls=walls,
+            doors=doors,
+            markers=markers,
+            marker_dictionary=_name(
+                parameters.get('marker_dictionary', 'DICT_5X5_100'), 'marker_dictionary'
+            ),
+            station=(station[0], station[1], station[2]),
+        )
+        plan._check()
+        return plan
+
+    @property
+    def start(self) -> Pose:
+        """Where the robot starts: at the station if that is in its room, else at the room's point."""
+        if self.place.start in self.place.recharge_rooms:
+            return self.station
+        x, y, _ = self.place.positions[self.place.start]
+        return x, y, 0.0
+
+    def _check(self) -> None:
+        for wall in self.walls.values():
+            if wall.length < WALL_THICKNESS:
+                raise WorldError(
+                    f'length {wall.length:g} m: expected at least the thickness of a wall, '
+                    f'{WALL_THICKNESS:g} m',
+                    'walls',
+                    wall.name,
+                )
+        for door in self.doors.values():
+            if not 0.3 <= door.width <= 20.0:
+                raise WorldError(
+                    f'width {door.width:g} m: expected 0.3 to 20 m', 'doors', door.name
+                )
+            if not self.walls_of(door):
+                raise WorldError(
+                    f'({door.x:g}, {door.y:g}) with width {door.width:g} m lies on no wall: '
+                    f'expected both its jambs on the centre line of one wall',
+                    'doors',
+                    door.name,
+                )
+        for name, (first, _) in self.place.doors.items():
+            if name not in self.doors:
+                raise WorldError(
+                    f"door '{name}' has no position: expected an entry doors.{name}", 'map', first
+                )
+        for name in self.doors.keys() - self.place.doors.keys():
+            raise WorldError('leads into no place: expected it in the map', 'doors', name)
+        self._check_markers()
+
+    def _check_markers(self) -> None:
+        seen: dict[int, str] = {}
+        for name, marker in self.markers.items():
+            if marker.id in seen:
+                raise WorldError(
+                    f'id {marker.id} is that of {seen[marker.id]} already: expected each id once',
+                    'markers',
+                    name,
+                )
+            seen[marker.id] = name
+            if marker.size <= 0:
+                raise WorldError(f'{marker.size:g} m: expected more than 0', 'marker_size')
+            if not 0.0 <= marker.z <= WALL_HEIGHT:
+                raise WorldError(
+                    f'height {marker.z:g} m: expected 0 to {WALL_HEIGHT:g} m, as high as the walls',
+                    'markers',
+                    name,
+                )
+
+    def walls_of(self, door: Door) -> list[Wall]:
+        """Return the walls that a door cuts through."""
+        return [
+            wall
+            for wall in self.walls.values()
+            if all(_distance_to_line(end, wall) < _ON_WALL for end in door.ends)
+        ]
+
+    def wall_pieces(self) -> list[tuple[Point, Point]]:
+        """Return the centre lines of the walls with the doors' openings cut out, metres."""
+        cuts: dict[str, list[tuple[float, float]]] = {name: [] for name in self.walls}
+        for door in self.doors.values():
+            for wall in self.walls_of(door):
+                low, high = sorted(_along(end, wall) for end in door.ends)
+                cuts[wall.name].append((low, high))
+        pieces = []
+        for wall in self.walls.values():
+            reached = 0.0
+            for low, high in [*sorted(cuts[wall.name]), (wall.length, wall.length)]:
+                if low - reached > 1e-6:
+                    pieces.append((_at(wall, reached), _at(wall, low)))
+                reached = max(reached, high)
+        return pieces
+
+    @property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """West, south, east and north edge of the walls' centre lines, metres."""
+        ends = np.array([end for wall in self.walls.values() for end in (wall.start, wall.end)])
+        (west, south), (east, north) = ends.min(axis=0), ends.max(axis=0)
+        return float(west), float(south), float(east), float(north)
+
+
+def _along(point: Point, wall: Wall) -> float:
+    dx, dy = wall.end[0] - wall.start[0], wall.end[1] - wall.start[1]
+    return ((point[0] - wall.start[0]) * dx + (point[1] - wall.start[1]) * dy) / wall.length
+
+
+def _at(wall: Wall, along: float) -> Point:
+    share = along / wall.length
+    return (
+        wall.start[0] + share * (wall.end[0] - wall.start[0]),
+        wall.start[1] + share * (wall.end[1] - wall.start[1]),
+    )
+
+
+def _distance_to_line(point: Point, wall: Wall) -> float:
+    along = min(max(_along(point, wall), 0.0), wall.length)
+    return math.dist(point, _at(wall, along))
+
+
+def _number(value: object, *where: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise WorldError(f'{value!r}: expected a number', *where)
+    return float(value)
+
+
+def _row(value: object, columns: Sequence[str], *where: str) -> list[float]:
+    expected = f'expected [{", ".join(columns)}]'
+    if value is None:
+        raise WorldError(f'missing: {expected}', *where)
+    if isinstance(value, str) or not isinstance(value, Sequence) or len(value) != len(columns):
+        raise WorldError(f'{value!r}: {expected}', *where)
+    return [_number(entry, *where) for entry in value]
+
+
+def _rows(
+    parameters: Mapping[str, Any], section: str, columns: Sequence[str], required: bool = True
+) -> dict[str, list[float]]:
+    entries = parameters.get(section)
+    if entries is None and not required:
+        return {}
+    if not isinstance(entries, Mapping) or not entries:
+        expected = f'expected NAME: [{", ".join(columns)}] for each'
+        raise WorldError(f'missing or empty: {expected}', section)
+    return {str(name): _row(row, columns, section, str(name)) for name, row in entries.items()}
+
+
+def _name(value: object, *where: str) -> str:
+    if not isinstance(value, str) or not value:
+        raise WorldError(f'{value!r}: expected a name', *where)
+    return value
+
+
+def _place(parameters: Mapping[str, Any]) -> Place:
+    try:
+        return make_place(
+            parameters.get('map'),
+            parameters.get('room_positions'),
+            parameters.get('robot_room'),
+            parameters.get('recharge_rooms', ()),
+        )
+    except PlaceError as error:
+        raise WorldError(error.problem, *error.where) from None
