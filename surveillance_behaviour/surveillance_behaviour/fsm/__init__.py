@@ -1,0 +1,61 @@
+"""A state machine engine with SMACH's interface and without ROS.
+
+``from surveillance_behaviour import fsm as smach`` runs machines written for SMACH.
+"""
+
+from __future__ import annotations
+
+from surveillance_behaviour.fsm.container import Container
+from surveillance_behaviour.fsm.exceptions import (
+    InvalidConstructionError,
+    InvalidStateError,
+    InvalidTransitionError,
+    InvalidUserCodeError,
+    MissingKeyError,
+    PreemptIgnoredError,
+    SmachError,
+)
+from surveillance_behaviour.fsm.interface import CBInterface, cb_interface, has_smach_interface
+from surveillance_behaviour.fsm.log import (
+    logdebug,
+    logerr,
+    loginfo,
+    logwarn,
+    reset_loggers,
+    set_loggers,
+)
+from surveillance_behaviour.fsm.shutdown import is_shutdown, set_shutdown_check
+from surveillance_behaviour.fsm.state import CBState, State
+from surveillance_behaviour.fsm.state_machine import StateMachine
+from surveillance_behaviour.fsm.user_data import Remapper, UserData
+from surveillance_behaviour.fsm.waiting import Clock, Interrupt, WallClock
+
+__all__ = [
+    'CBInterface',
+    'CBState',
+    'Clock',
+    'Container',
+    'Interrupt',
+    'InvalidConstructionError',
+    'InvalidStateError',
+    'InvalidTransitionError',
+    'InvalidUserCodeError',
+    'MissingKeyError',
+    'PreemptIgnoredError',
+    'Remapper',
+    'SmachError',
+    'State',
+    'StateMachine',
+    'UserData',
+    'WallClock',
+    'cb_interface',
+    'has_smach_interface',
+    'is_shutdown',
+    'logdebug',
+    'logerr',
+    'loginfo',
+    'logwarn',
+    'reset_loggers',
+    'set_loggers',
+    'set_shutdown_check',
+]

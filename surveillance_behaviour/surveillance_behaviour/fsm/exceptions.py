@@ -1,0 +1,47 @@
+"""The errors of the engine, with SMACH's names.
+
+Every message names the state by its path from the root (``ROOT/CHILD/LEAF``), the outcome or the
+userdata key in question, and what was expected instead.
+"""
+
+from __future__ import annotations
+
+
+class SmachError(Exception):
+    """Base of every error that the engine raises.
+
+    Attributes:
+        message: The text, as SMACH's exceptions keep it.
+    """
+
+    def __init__(self, message: str = '') -> None:
+        super().__init__(message)
+        self.message = message
+
+    def __str__(self) -> str:
+        # KeyError, which one subclass mixes in, would show the repr.
+        return self.message
+
+
+class InvalidStateError(SmachError):
+    """A state, a label or a container's specification is wrong."""
+
+
+class InvalidTransitionError(SmachError):
+    """An outcome is undeclared, or leads to no state and to no outcome of the container."""
+
+
+class InvalidConstructionError(InvalidStateError):
+    """A construction method was called while the wrong container, or none, was open."""
+
+
+class InvalidUserCodeError(SmachError):
+    """User code raised, or broke the userdata contract; ``__cause__`` keeps what it raised."""
+
+
+class MissingKeyError(InvalidUserCodeError, KeyError):
+    """A declared userdata key was read before anything wrote it (a ``KeyError``, as in SMACH)."""
+
+
+class PreemptIgnoredError(SmachError):
+    """A state ignored a preempt beyond its bound and no outcome was there to go on with."""
