@@ -1,0 +1,541 @@
+"""RDF triples to OWL axioms and SWRL rules.
+
+Follows OWL 2 Mapping to RDF Graphs (https://www.w3.org/TR/owl2-mapping-to-rdf/), section 3, and the SWRL
+submission's RDF syntax. What is not understood is reported with its line, never dropped in silence.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from surveillance_ontology import axioms as ax
+from surveillance_ontology.axioms import OWL, RDF, RDFS, SWRL, XSD, Axiom, Literal, local_name
+from surveillance_ontology.rdf_xml import Graph, Node, RdfSyntaxError
+
+_TYPE = RDF + 'type'
+_DECLARATIONS = {
+    OWL + 'Class': 'class',
+    RDFS + 'Class': 'class',
+    OWL + 'ObjectProperty': 'object_property',
+    OWL + 'DatatypeProperty': 'data_property',
+    OWL + 'AnnotationProperty': 'annotation_property',
+    OWL + 'OntologyProperty': 'annotation_property',
+    OWL + 'NamedIndividual': 'individual',
+    RDFS + 'Datatype': 'datatype',
+    OWL + 'DataRange': 'datatype',
+}
+_CHARACTERISTICS: dict[str, Callable[[ax.PropertyExpression], Axiom]] = {
+    OWL + 'InverseFunctionalProperty': ax.InverseFunctionalObjectProperty,
+    OWL + 'ReflexiveProperty': ax.ReflexiveObjectProperty,
+    OWL + 'IrreflexiveProperty': ax.IrreflexiveObjectProperty,
+    OWL + 'SymmetricProperty': ax.SymmetricObjectProperty,
+    OWL + 'AsymmetricProperty': ax.AsymmetricObjectProperty,
+    OWL + 'TransitiveProperty': ax.TransitiveObjectProperty,
+}
+_ANNOTATIONS = {RDFS + name for name in ('label', 'comment', 'seeAlso', 'isDefinedBy')} | {
+    OWL + name
+    for name in ('versionInfo', 'deprecated', 'priorVersion', 'backwardCompatibleWith')
+    + ('incompatibleWith', 'versionIRI')
+}
+_STRUCTURE = {RDF + 'first', RDF + 'rest'} | {
+    OWL + name
+    for name in (
+        'onProperty onClass onDataRange onDatatype withRestrictions onProperties someValuesFrom '
+        'allValuesFrom hasValue hasSelf cardinality minCardinality maxCardinality '
+        'qualifiedCardinality minQualifiedCardinality maxQualifiedCardinality members '
+        'distinctMembers annotatedSource annotatedProperty annotatedTarget sourceIndividual '
+        'assertionProperty targetIndividual targetValue'
+    ).split()
+}
+_BUILT_IN = (OWL, RDF, RDFS, XSD, SWRL)
+
+
+class Mapping:
+    """Turns one graph into `axioms` (document order) and `unsupported` (sentences)."""
+
+    def __init__(self, graph: Graph) -> None:
+        self.axioms: dict[Axiom, None] = {}
+        self.unsupported: list[str] = []
+        self.iri = ''
+        self._places = graph.places
+        self._nodes: dict[str, dict[str, list[Node]]] = {}
+        self._kinds: dict[str, set[str]] = {}
+        self._expressions: dict[str, ax.ClassExpression] = {}
+        self._open: set[str] = set()
+        self._variables: set[str] = set()
+        for subject, predicate, value in graph.triples:
+            self._nodes.setdefault(subject, {}).setdefault(predicate, []).append(value)
+            if predicate == _TYPE and isinstance(value, str):
+                kind = _DECLARATIONS.get(value)
+                if kind is not None:
+                    self._kinds.setdefault(subject, set()).add(kind)
+                elif value == OWL + 'Ontology' and not self.iri:
+                    self.iri = subject
+                elif value in _CHARACTERISTICS:
+                    self._kinds.setdefault(subject, set()).add('object_property')
+                elif value == SWRL + 'Variable':
+                    self._variables.add(subject)
+        for subject, properties in self._nodes.items():
+            self._subject(subject, properties)
+
+    # --- reporting ---
+
+    def _where(self, node: str) -> str:
+        place = self._places.get(node)
+        return f'line {place[0]}: ' if place else ''
+
+    def _report(self, node: str, what: str) -> None:
+        self.unsupported.append(self._where(node) + what)
+
+    def _fail(self, node: str, message: str) -> RdfSyntaxError:
+        return RdfSyntaxError(message, *self._places.get(node, (0, 0)))
+
+    # --- reading parts ---
+
+    def _one(self, node: str, predicate: str) -> Node | None:
+        values = self._nodes.get(node, {}).get(predicate)
+        return values[0] if values else None
+
+    def _resource(self, node: str, predicate: str) -> str:
+        value = self._one(node, predicate)
+        if not isinstance(value, str):
+            raise self._fail(node, f'expected a resource as {local_name(predicate)}, got {value!r}')
+        return value
+
+    def _list(self, head: Node) -> list[Node]:
+        items: list[Node] = []
+        seen: set[str] = set()
+        node = head
+        while node != RDF + 'nil':
+            if not isinstance(node, str) or node in seen:
+                raise self._fail(str(head), 'expected a list that ends in rdf:nil')
+            seen.add(node)
+            first = self._one(node, RDF + 'first')
+            rest = self._one(node, RDF + 'rest')
+            if first is None or rest is None:
+                raise self._fail(node, 'expected rdf:first and rdf:rest in a list')
+            items.append(first)
+            node = rest
+        return items
+
+    def _resources(self, head: Node) -> list[str]:
+        items = self._list(head)
+        for item in items:
+            if not isinstance(item, str):
+                raise self._fail(str(head), f'expected resources in a list, got the literal {item.lexical!r}')
+        return items  # type: ignore[return-value]
+
+    def _property(self, node: str) -> ax.PropertyExpression:
+        inverse = self._one(node, OWL + 'inverseOf')
+        if node.startswith('_:') and isinstance(inverse, str):
+            return ax.ObjectInverseOf(inverse)
+        return node
+
+    def _is_data(self, prop: str, range_node: Node | None = None) -> bool:
+        kinds = self._kinds.get(prop, ())
+        if 'object_property' in kinds:
+            return False
+        if 'data_property' in kinds:
+            return True
+        return isinstance(range_node, str) and self._is_data_range(range_node)
+
+    def _is_data_range(self, node: str) -> bool:
+        if 'datatype' in self._kinds.get(node, ()) or node == RDFS + 'Literal':
+            return True
+        return node.startswith(XSD)
+
+    def _number(self, node: str, predicate: str) -> int | None:
+        value = self._one(node, predicate)
+        if value is None:
+            return None
+        try:
+            number = int(value.lexical) if isinstance(value, Literal) else -1
+        except ValueError:
+            number = -1
+        if number < 0:
+            shown = value.lexical if isinstance(value, Literal) else value
+            raise self._fail(node, f'expected a whole number as {local_name(predicate)}, got {shown!r}')
+        return number
+
+    def data_range(self, node: Node) -> ax.DataRange:
+        """The data range a node stands for."""
+        if not isinstance(node, str):
+            raise RdfSyntaxError(f'expected a data range, got the literal {node.lexical!r}')
+        if not node.startswith('_:'):
+            return node
+        properties = self._nodes.get(node, {})
+        if OWL + 'oneOf' in properties:
+            items = self._list(properties[OWL + 'oneOf'][0])
+            return ax.DataOneOf(tuple(item for item in items if isinstance(item, Literal)))
+        for predicate, record in (
+            (OWL + 'intersectionOf', ax.DataIntersectionOf),
+            (OWL + 'unionOf', ax.DataUnionOf),
+        ):
+            if predicate in properties:
+                return record(tuple(map(self.data_range, self._list(properties[predicate][0]))))
+        if OWL + 'datatypeComplementOf' in properties:
+            return ax.DataComplementOf(self.data_range(properties[OWL + 'datatypeComplementOf'][0]))
+        if OWL + 'onDatatype' in properties:
+            facets = []
+            for facet in self._resources(self._one(node, OWL + 'withRestrictions') or RDF + 'nil'):
+                for name, values in self._nodes.get(facet, {}).items():
+                    facets += [(name, value) for value in values if isinstance(value, Literal)]
+            return ax.DatatypeRestriction(self._resource(node, OWL + 'onDatatype'), tuple(facets))
+        raise self._fail(node, 'expected a data range')
+
+    def expression(self, node: Node) -> ax.ClassExpression:
+        """The class expression a node stands for."""
+        if not isinstance(node, str):
+            raise RdfSyntaxError(f'expected a class, got the literal {node.lexical!r}')
+        if not node.startswith('_:'):
+            return node
+        known = self._expressions.get(node)
+        if known is not None:
+            return known
+        if node in self._open:
+            raise self._fail(node, 'a class expression contains itself')
+        self._open.add(node)
+        expression = self._expressions[node] = self._expression(node)
+        self._open.discard(node)
+        return expression
+
+    def _expression(self, node: str) -> ax.ClassExpression:
+        properties = self._nodes.get(node, {})
+        for predicate, record in (
+            (OWL + 'intersectionOf', ax.ObjectIntersectionOf),
+            (OWL + 'unionOf', ax.ObjectUnionOf),
+        ):
+            if predicate in properties:
+                return record(tuple(map(self.expression, self._list(properties[predicate][0]))))
+        if OWL + 'complementOf' in properties:
+            return ax.ObjectComplementOf(self.expression(properties[OWL + 'complementOf'][0]))
+        if OWL + 'oneOf' in properties:
+            return ax.ObjectOneOf(tuple(self._resources(properties[OWL + 'oneOf'][0])))
+        if OWL + 'onProperty' in properties:
+            return self._restriction(node, properties)
+        raise self._fail(node, 'expected a class expression')
+
+    def _restriction(self, node: str, properties: dict[str, list[Node]]) -> ax.ClassExpression:
+        on = self._resource(node, OWL + 'onProperty')
+        prop = self._property(on)
+        filler = self._one(node, OWL + 'someValuesFrom') or self._one(node, OWL + 'allValuesFrom')
+        if OWL + 'hasValue' in properties:
+            value = properties[OWL + 'hasValue'][0]
+            if isinstance(value, Literal):
+                return ax.DataHasValue(on, value)
+            return ax.ObjectHasValue(prop, value)
+        if OWL + 'hasSelf' in properties:
+            return ax.ObjectHasSelf(prop)
+        if filler is not None:
+            some = OWL + 'someValuesFrom' in properties
+            if self._is_data(on, filler):
+                data = ax.DataSomeValuesFrom if some else ax.DataAllValuesFrom
+                return data(on, self.data_range(filler))
+            quantified = ax.ObjectSomeValuesFrom if some else ax.ObjectAllValuesFrom
+            return quantified(prop, self.expression(filler))
+        on_class = self._one(node, OWL + 'onClass')
+        on_range = self._one(node, OWL + 'onDataRange')
+        data = on_range is not None or (on_class is None and self._is_data(on))
+        for plain, qualified, of_objects, of_data in (
+            ('minCardinality', 'minQualifiedCardinality')
+            + (ax.ObjectMinCardinality, ax.DataMinCardinality),
+            ('maxCardinality', 'maxQualifiedCardinality')
+            + (ax.ObjectMaxCardinality, ax.DataMaxCardinality),
+            ('cardinality', 'qualifiedCardinality')
+            + (ax.ObjectExactCardinality, ax.DataExactCardinality),
+        ):
+            number = self._number(node, OWL + plain)
+            if number is None:
+                number = self._number(node, OWL + qualified)
+            if number is None:
+                continue
+            if data:
+                return of_data(number, on, self.data_range(on_range or RDFS + 'Literal'))
+            return of_objects(number, prop, self.expression(on_class or OWL + 'Thing'))
+        raise self._fail(node, f'restriction on {local_name(on)} states nothing that is understood')
+
+    # --- axioms ---
+
+    def _add(self, axiom: Axiom) -> None:
+        self.axioms[axiom] = None
+
+    def _subject(self, subject: str, properties: dict[str, list[Node]]) -> None:
+        types = [value for value in properties.get(_TYPE, ()) if isinstance(value, str)]
+        special = next((_SPECIAL[name] for name in types if name in _SPECIAL), None)
+        if special is not None:
+            special(self, subject, properties)
+            return
+        for name in types:
+            self._type(subject, name, properties)
+        for predicate, values in properties.items():
+            if predicate == _TYPE or predicate in _STRUCTURE:
+                continue
+            handler = _PREDICATES.get(predicate)
+            for value in values:
+                if handler is not None:
+                    handler(self, subject, value)
+                else:
+                    self._statement(subject, predicate, value)
+
+    def _type(self, subject: str, name: str, properties: dict[str, list[Node]]) -> None:
+        kind = _DECLARATIONS.get(name)
+        if kind is not None:
+            if not subject.startswith('_:'):
+                self._add(ax.Declaration(kind, subject))
+        elif name in _CHARACTERISTICS:
+            if not subject.startswith('_:'):
+                self._add(ax.Declaration('object_property', subject))
+            self._add(_CHARACTERISTICS[name](self._property(subject)))
+        elif name == OWL + 'FunctionalProperty':
+            if self._is_data(subject):
+                self._add(ax.FunctionalDataProperty(subject))
+            else:
+                self._add(ax.FunctionalObjectProperty(self._property(subject)))
+        elif name == OWL + 'Ontology' or name in (OWL + 'Restriction', RDF + 'List'):
+            pass
+        elif name in (SWRL + 'Variable', SWRL + 'AtomList', SWRL + 'Builtin', RDF + 'Property'):
+            pass
+        elif name.startswith(SWRL) and name.endswith('Atom'):
+            pass
+        elif name.startswith(_BUILT_IN[:3]) and name not in (ax.THING, ax.NOTHING):
+            self._report(subject, f'type {name} of {subject} is not understood')
+        else:
+            self._add(ax.ClassAssertion(self.expression(name), subject))
+
+    def _statement(self, subject: str, predicate: str, value: Node) -> None:
+        kinds = self._kinds.get(predicate, set())
+        if 'annotation_property' in kinds or predicate in _ANNOTATIONS or subject == self.iri:
+            if not subject.startswith('_:'):
+                self._add(ax.AnnotationAssertion(predicate, subject, value))
+        elif predicate.startswith(SWRL):
+            pass
+        elif predicate.startswith(_BUILT_IN[:3]):
+            self._report(subject, f'{predicate} on {subject} is not understood')
+        elif isinstance(value, Literal):
+            if 'object_property' in kinds and 'data_property' not in kinds:
+                raise self._fail(
+                    subject,
+                    f'object property {local_name(predicate)} of {local_name(subject)}'
+                    f' has the literal {value.lexical!r}, expected an individual',
+                )
+            self._add(ax.DataPropertyAssertion(predicate, subject, value))
+        elif 'data_property' in kinds and 'object_property' not in kinds:
+            raise self._fail(
+                subject,
+                f'data property {local_name(predicate)} of {local_name(subject)}'
+                f' has the resource {value}, expected a literal',
+            )
+        else:
+            self._add(ax.ObjectPropertyAssertion(predicate, subject, value))
+
+    def _imports(self, subject: str, value: Node) -> None:
+        self._add(ax.Import(str(value)))
+        self._report(subject, f'owl:imports <{value}> is not followed')
+
+    def _sub_class(self, subject: str, value: Node) -> None:
+        self._add(ax.SubClassOf(self.expression(subject), self.expression(value)))
+
+    def _equivalent_class(self, subject: str, value: Node) -> None:
+        if self._is_data_range(subject):
+            self._add(ax.DatatypeDefinition(subject, self.data_range(value)))
+        else:
+            self._add(ax.EquivalentClasses((self.expression(subject), self.expression(value))))
+
+    def _disjoint_classes(self, subject: str, value: Node) -> None:
+        self._add(ax.DisjointClasses((self.expression(subject), self.expression(value))))
+
+    def _disjoint_union(self, subject: str, value: Node) -> None:
+        self._add(ax.DisjointUnion(subject, tuple(map(self.expression, self._list(value)))))
+
+    def _defined(self, subject: str, predicate: str, value: Node) -> None:
+        """A named class directly carries the expression (OWL 1 style): an equivalence."""
+        if subject.startswith('_:'):
+            return
+        operands = [value] if predicate == OWL + 'complementOf' else self._list(value)
+        if predicate == OWL + 'complementOf':
+            other: ax.ClassExpression = ax.ObjectComplementOf(self.expression(operands[0]))
+        elif predicate == OWL + 'oneOf':
+            if self._is_data_range(subject):
+                literals = tuple(item for item in operands if isinstance(item, Literal))
+                self._add(ax.DatatypeDefinition(subject, ax.DataOneOf(literals)))
+                return
+            other = ax.ObjectOneOf(tuple(self._resources(value)))
+        elif predicate == OWL + 'unionOf':
+            other = ax.ObjectUnionOf(tuple(map(self.expression, operands)))
+        else:
+            other = ax.ObjectIntersectionOf(tuple(map(self.expression, operands)))
+        self._add(ax.EquivalentClasses((subject, other)))
+
+    def _sub_property(self, subject: str, value: Node) -> None:
+        assert isinstance(value, str)
+        if self._is_data(subject) or self._is_data(value):
+            self._add(ax.SubDataPropertyOf(subject, value))
+        elif 'annotation_property' not in self._kinds.get(subject, ()):
+            self._add(ax.SubObjectPropertyOf(self._property(subject), self._property(value)))
+        else:
+            self._report(subject, f'annotation property {subject} below {value} has no meaning here')
+
+    def _chain(self, subject: str, value: Node) -> None:
+        chain = tuple(self._property(item) for item in self._resources(value))
+        self._add(ax.SubPropertyChainOf(chain, self._property(subject)))
+
+    def _equivalent_property(self, subject: str, value: Node) -> None:
+        assert isinstance(value, str)
+        if self._is_data(subject) or self._is_data(value):
+            self._add(ax.EquivalentDataProperties((subject, value)))
+        else:
+            pair = (self._property(subject), self._property(value))
+            self._add(ax.EquivalentObjectProperties(pair))
+
+    def _disjoint_property(self, subject: str, value: Node) -> None:
+        assert isinstance(value, str)
+        if self._is_data(subject) or self._is_data(value):
+            self._add(ax.DisjointDataProperties((subject, value)))
+        else:
+            pair = (self._property(subject), self._property(value))
+            self._add(ax.DisjointObjectProperties(pair))
+
+    def _inverse(self, subject: str, value: Node) -> None:
+        assert isinstance(value, str)
+        if not subject.startswith('_:'):
+            self._add(ax.InverseObjectProperties(subject, self._property(value)))
+
+    def _domain(self, subject: str, value: Node) -> None:
+        if self._is_data(subject):
+            self._add(ax.DataPropertyDomain(subject, self.expression(value)))
+        elif 'annotation_property' not in self._kinds.get(subject, ()):
+            self._add(ax.ObjectPropertyDomain(self._property(subject), self.expression(value)))
+
+    def _range(self, subject: str, value: Node) -> None:
+        if self._is_data(subject, value):
+            self._add(ax.DataPropertyRange(subject, self.data_range(value)))
+        elif 'annotation_property' not in self._kinds.get(subject, ()):
+            self._add(ax.ObjectPropertyRange(self._property(subject), self.expression(value)))
+
+    def _same(self, subject: str, value: Node) -> None:
+        self._add(ax.SameIndividual(frozenset((subject, str(value)))))
+
+    def _different(self, subject: str, value: Node) -> None:
+        self._add(ax.DifferentIndividuals(frozenset((subject, str(value)))))
+
+    def _key(self, subject: str, value: Node) -> None:
+        props = self._resources(value)
+        data = tuple(prop for prop in props if self._is_data(prop))
+        objects = tuple(self._property(prop) for prop in props if not self._is_data(prop))
+        self._add(ax.HasKey(self.expression(subject), objects, data))
+
+    # --- nodes with a shape of their own ---
+
+    def _all_different(self, node: str, properties: dict[str, list[Node]]) -> None:
+        for predicate in (OWL + 'members', OWL + 'distinctMembers'):
+            for head in properties.get(predicate, ()):
+                members = frozenset(self._resources(head))
+                if len(members) > 1:
+                    self._add(ax.DifferentIndividuals(members))
+
+    def _all_disjoint_classes(self, node: str, properties: dict[str, list[Node]]) -> None:
+        for head in properties.get(OWL + 'members', ()):
+            self._add(ax.DisjointClasses(tuple(map(self.expression, self._list(head)))))
+
+    def _all_disjoint_properties(self, node: str, properties: dict[str, list[Node]]) -> None:
+        for head in properties.get(OWL + 'members', ()):
+            props = self._resources(head)
+            if any(self._is_data(prop) for prop in props):
+                self._add(ax.DisjointDataProperties(tuple(props)))
+            else:
+                self._add(ax.DisjointObjectProperties(tuple(map(self._property, props))))
+
+    def _negative(self, node: str, properties: dict[str, list[Node]]) -> None:
+        source = self._resource(node, OWL + 'sourceIndividual')
+        prop = self._resource(node, OWL + 'assertionProperty')
+        value = self._one(node, OWL + 'targetValue')
+        if isinstance(value, Literal):
+            self._add(ax.NegativeDataPropertyAssertion(prop, source, value))
+            return
+        target = self._resource(node, OWL + 'targetIndividual')
+        expression = self._property(prop)
+        if isinstance(expression, ax.ObjectInverseOf):
+            source, target, prop = target, source, expression.prop
+        self._add(ax.NegativeObjectPropertyAssertion(prop, source, target))
+
+    def _annotated(self, node: str, properties: dict[str, list[Node]]) -> None:
+        self._report(node, 'an annotation on an axiom is not kept')
+
+    def _rule(self, node: str, properties: dict[str, list[Node]]) -> None:
+        body = tuple(map(self._atom, self._resources(self._one(node, SWRL + 'body') or RDF + 'nil')))
+        head = tuple(map(self._atom, self._resources(self._one(node, SWRL + 'head') or RDF + 'nil')))
+        annotations = tuple(
+            (predicate, value)
+            for predicate, values in properties.items()
+            if predicate not in (_TYPE, SWRL + 'body', SWRL + 'head')
+            for value in values
+        )
+        self._add(ax.Rule(body, head, annotations))
+
+    def _argument(self, value: Node | None, atom: str) -> str | ax.Variable | Literal:
+        if value is None:
+            raise self._fail(atom, 'a rule atom lacks an argument')
+        if isinstance(value, str) and value in self._variables:
+            return ax.Variable(value)
+        return value
+
+    def _atom(self, node: str) -> ax.Atom:
+        kind = self._one(node, _TYPE)
+        first = self._one(node, SWRL + 'argument1')
+        second = self._one(node, SWRL + 'argument2')
+        if kind == SWRL + 'BuiltinAtom':
+            head = self._one(node, SWRL + 'arguments') or RDF + 'nil'
+            arguments = tuple(self._argument(item, node) for item in self._list(head))
+            return ax.BuiltinAtom(self._resource(node, SWRL + 'builtin'), arguments)  # type: ignore[arg-type]
+        one = self._argument(first, node)
+        if kind == SWRL + 'ClassAtom':
+            cls = self.expression(self._resource(node, SWRL + 'classPredicate'))
+            return ax.ClassAtom(cls, one)  # type: ignore[arg-type]
+        if kind == SWRL + 'DataRangeAtom':
+            return ax.DataRangeAtom(self.data_range(self._resource(node, SWRL + 'dataRange')), one)  # type: ignore[arg-type]
+        two = self._argument(second, node)
+        if kind == SWRL + 'IndividualPropertyAtom':
+            prop = self._property(self._resource(node, SWRL + 'propertyPredicate'))
+            return ax.ObjectPropertyAtom(prop, one, two)  # type: ignore[arg-type]
+        if kind == SWRL + 'DatavaluedPropertyAtom':
+            name = self._resource(node, SWRL + 'propertyPredicate')
+            return ax.DataPropertyAtom(name, one, two)  # type: ignore[arg-type]
+        if kind == SWRL + 'SameIndividualAtom':
+            return ax.SameIndividualAtom(one, two)  # type: ignore[arg-type]
+        if kind == SWRL + 'DifferentIndividualsAtom':
+            return ax.DifferentIndividualsAtom(one, two)  # type: ignore[arg-type]
+        raise self._fail(node, f'rule atom of type {kind} is not understood')
+
+
+_PREDICATES: dict[str, Callable[[Mapping, str, Node], None]] = {
+    OWL + 'imports': Mapping._imports,
+    RDFS + 'subClassOf': Mapping._sub_class,
+    OWL + 'equivalentClass': Mapping._equivalent_class,
+    OWL + 'disjointWith': Mapping._disjoint_classes,
+    OWL + 'disjointUnionOf': Mapping._disjoint_union,
+    RDFS + 'subPropertyOf': Mapping._sub_property,
+    OWL + 'propertyChainAxiom': Mapping._chain,
+    OWL + 'equivalentProperty': Mapping._equivalent_property,
+    OWL + 'propertyDisjointWith': Mapping._disjoint_property,
+    OWL + 'inverseOf': Mapping._inverse,
+    RDFS + 'domain': Mapping._domain,
+    RDFS + 'range': Mapping._range,
+    OWL + 'sameAs': Mapping._same,
+    OWL + 'differentFrom': Mapping._different,
+    OWL + 'hasKey': Mapping._key,
+    OWL + 'datatypeComplementOf': lambda *_: None,
+}
+for _name in ('intersectionOf', 'unionOf', 'complementOf', 'oneOf'):
+    _PREDICATES[OWL + _name] = lambda mapping, subject, value, predicate=OWL + _name: (  # type: ignore[misc]
+        mapping._defined(subject, predicate, value)
+    )
+
+_SPECIAL: dict[str, Callable[[Mapping, str, dict[str, list[Node]]], None]] = {
+    OWL + 'AllDifferent': Mapping._all_different,
+    OWL + 'AllDisjointClasses': Mapping._all_disjoint_classes,
+    OWL + 'AllDisjointProperties': Mapping._all_disjoint_properties,
+    OWL + 'NegativePropertyAssertion': Mapping._negative,
+    OWL + 'Axiom': Mapping._annotated,
+    OWL + 'Annotation': Mapping._annotated,
+    SWRL + 'Imp': Mapping._rule,
+}

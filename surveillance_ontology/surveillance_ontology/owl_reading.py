@@ -1,0 +1,83 @@
+"""Reading an ontology document into axioms, with exact datatypes and the place of every error."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from surveillance_ontology.axioms import Axiom
+from surveillance_ontology.owl_mapping import Mapping
+from surveillance_ontology.rdf_ntriples import parse_ntriples
+from surveillance_ontology.rdf_xml import RdfSyntaxError, parse_rdf_xml
+
+DEFAULT_SIZE_LIMIT = 256 * 1024 * 1024
+
+
+class OntologyFileError(ValueError):
+    """A document that cannot be read. `str()` is one line: path, line, column and what was expected."""
+
+    def __init__(self, path: str, line: int, column: int, message: str) -> None:
+        place = f':{line}:{column}' if line else ''
+        super().__init__(f'{path}{place}: {message}')
+        self.path, self.line, self.column, self.message = path, line, column, message
+
+
+@dataclass(frozen=True)
+class OntologyDocument:
+    """What a document states.
+
+    Attributes:
+        axioms: In document order, without repeats.
+        unsupported: One sentence for each statement that was not understood.
+        format: 'rdfxml' or 'ntriples'.
+        iri: The IRI in the document's owl:Ontology header, '' without one.
+        prefixes: Namespace prefixes declared by the document.
+    """
+
+    axioms: list[Axiom]
+    unsupported: list[str]
+    format: str
+    iri: str
+    prefixes: dict[str, str]
+
+
+def read_ontology(
+    source: str | Path | bytes, iri: str, *, size_limit: int = DEFAULT_SIZE_LIMIT
+) -> OntologyDocument:
+    """Reads a document; the format (RDF/XML, N-Triples) is told by its first character.
+
+    Args:
+        source: A path, or the document itself as bytes.
+        iri: Base for relative IRIs where the document gives none.
+        size_limit: Largest document accepted, bytes.
+
+    Raises:
+        OntologyFileError: Not readable, too large, or not an ontology; nothing is half-read.
+    """
+    if isinstance(source, bytes):
+        name, data = '<document>', source
+    else:
+        name = str(source)
+        try:
+            with open(source, 'rb') as file:
+                data = file.read(size_limit + 1)
+        except OSError as error:
+            raise OntologyFileError(name, 0, 0, error.strerror or str(error)) from None
+    if len(data) > size_limit:
+        raise OntologyFileError(name, 0, 0, f'larger than the limit of {size_limit} bytes')
+    start = data.lstrip(b'\xef\xbb\xbf \t\r\n')
+    try:
+        if start.startswith(b'<') and start[1:2] not in b'hu' or start[:2] in (b'\xff\xfe', b'\xfe\xff'):
+            graph, form = parse_rdf_xml(data, iri), 'rdfxml'
+        elif not start:
+            raise RdfSyntaxError('the document is empty', 1, 1)
+        else:
+            graph, form = parse_ntriples(data), 'ntriples'
+        mapping = Mapping(graph)
+    except RdfSyntaxError as error:
+        raise OntologyFileError(name, error.line, error.column, error.message) from None
+    except RecursionError:
+        raise OntologyFileError(name, 0, 0, 'class expressions nest too deeply') from None
+    return OntologyDocument(
+        list(mapping.axioms), mapping.unsupported, form, mapping.iri, graph.prefixes
+    )

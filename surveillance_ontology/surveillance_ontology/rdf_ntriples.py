@@ -1,0 +1,74 @@
+"""N-Triples to triples (https://www.w3.org/TR/n-triples/)."""
+
+from __future__ import annotations
+
+import re
+
+from surveillance_ontology.axioms import RDF, XSD, Literal
+from surveillance_ontology.rdf_xml import Graph, Node, RdfSyntaxError
+
+_IRI = r'<((?:[^\x00-\x20<>"{}|^`\\]|\\u[0-9A-Fa-f]{4}|\\U[0-9A-Fa-f]{8})*)>'
+_BLANK = r'(_:[\w.\-]*[\w\-])'
+_TEXT = r'"((?:[^"\\\r\n]|\\.)*)"(?:\^\^' + _IRI + r'|@([A-Za-z]+(?:-[A-Za-z0-9]+)*))?'
+_STATEMENT = re.compile(
+    rf'\s*(?:{_IRI}|{_BLANK})\s*{_IRI}\s*(?:{_IRI}|{_BLANK}|{_TEXT})\s*\.\s*(?:#.*)?$'
+)
+_ESCAPE = re.compile(r'\\(?:u([0-9A-Fa-f]{4})|U([0-9A-Fa-f]{8})|(.))')
+_SIMPLE = {'t': '\t', 'b': '\b', 'n': '\n', 'r': '\r', 'f': '\f', '"': '"', "'": "'", '\\': '\\'}
+
+
+def _unescape(text: str) -> str:
+    if '\\' not in text:
+        return text
+
+    def plain(found: re.Match[str]) -> str:
+        code = found[1] or found[2]
+        if code:
+            return chr(int(code, 16))
+        if found[3] not in _SIMPLE:
+            raise ValueError(f'escape \\{found[3]} is not one of N-Triples')
+        return _SIMPLE[found[3]]
+
+    return _ESCAPE.sub(plain, text)
+
+
+def parse_ntriples(data: bytes) -> Graph:
+    """Parses a document.
+
+    Raises:
+        RdfSyntaxError: With line and column, for a line that is no triple or bytes that are not UTF-8.
+    """
+    try:
+        text = data.decode('utf-8-sig')
+    except UnicodeDecodeError as error:
+        line = data.count(b'\n', 0, error.start) + 1
+        raise RdfSyntaxError(f'not UTF-8: {error.reason}', line, 1) from None
+    graph = Graph()
+    for number, line in enumerate(text.split('\n'), 1):
+        if not line.strip() or line.lstrip().startswith('#'):
+            continue
+        found = _STATEMENT.match(line.rstrip('\r'))
+        if found is None:
+            column = len(line) - len(line.lstrip()) + 1
+            raise RdfSyntaxError(
+                'expected an RDF/XML document or an N-Triples statement'
+                f' `<subject> <predicate> object .`, got {line.strip()[:60]!r}',
+                number,
+                column,
+            )
+        try:
+            subject = _unescape(found[1]) if found[1] is not None else found[2]
+            value: Node
+            if found[6] is not None:
+                if found[8]:
+                    value = Literal(_unescape(found[6]), RDF + 'langString', found[8].lower())
+                else:
+                    datatype = _unescape(found[7]) if found[7] is not None else XSD + 'string'
+                    value = Literal(_unescape(found[6]), datatype)
+            else:
+                value = _unescape(found[4]) if found[4] is not None else found[5]
+        except (ValueError, OverflowError) as error:
+            raise RdfSyntaxError(str(error), number, 1) from None
+        graph.places.setdefault(subject, (number, 1))
+        graph.triples.append((subject, _unescape(found[3]), value))
+    return graph

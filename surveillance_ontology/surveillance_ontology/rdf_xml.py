@@ -1,0 +1,312 @@
+"""RDF/XML to triples, with exact datatypes and the place of every error.
+
+Follows RDF 1.1 XML Syntax (https://www.w3.org/TR/rdf-syntax-grammar/) on top of expat. Document type
+declarations may define short plain-text entities (Protégé writes namespaces that way); entities inside
+entities, external ones and parameter entities are refused, so a document cannot expand itself.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from typing import TypeAlias
+from urllib.parse import urljoin
+from xml.parsers import expat
+
+from surveillance_ontology.axioms import RDF, XSD, Literal
+
+Node: TypeAlias = str | Literal
+Triple: TypeAlias = tuple[str, str, Node]
+
+_XML = 'http://www.w3.org/XML/1998/namespace'
+_ABSOLUTE = re.compile(r'[A-Za-z][A-Za-z0-9+.\-]*:')
+_FORBIDDEN = re.compile(r'[\x00-\x20<>"{}|\\^`]')
+_MAX_ENTITY = 512
+_MAX_DEPTH = 20_000
+
+_SYNTAX = {
+    RDF + name for name in ('about', 'ID', 'nodeID', 'resource', 'datatype', 'parseType', 'bagID')
+}
+
+
+class RdfSyntaxError(ValueError):
+    """A document that is not what it should be; `line` and `column` count from 1, 0 when not known."""
+
+    def __init__(self, message: str, line: int = 0, column: int = 0) -> None:
+        super().__init__(message)
+        self.message, self.line, self.column = message, line, column
+
+
+@dataclass
+class Graph:
+    """Triples of one document in document order.
+
+    `places` holds (line, column) of the first statement about each subject.
+    """
+
+    triples: list[Triple] = field(default_factory=list)
+    prefixes: dict[str, str] = field(default_factory=dict)
+    places: dict[str, tuple[int, int]] = field(default_factory=dict)
+
+
+@dataclass(slots=True)
+class _Frame:
+    kind: str  # 'root', 'node', 'property', 'collection', 'empty', 'xml'
+    subject: str = ''
+    predicate: str = ''
+    object: Node | None = None
+    datatype: str = ''
+    text: list[str] = field(default_factory=list)
+    base: str = ''
+    language: str = ''
+    items: list[str] = field(default_factory=list)
+    counter: int = 0
+    reified: str = ''
+
+
+def resolve(base: str, reference: str) -> str:
+    """An IRI reference against a base IRI (RFC 3986); raises RdfSyntaxError for a forbidden character."""
+    found = _FORBIDDEN.search(reference)
+    if found:
+        raise RdfSyntaxError(f'IRI {reference!r} contains {found.group()!r}')
+    if _ABSOLUTE.match(reference):
+        return reference
+    stem = base.partition('#')[0]
+    if not reference:
+        return stem
+    if reference[0] == '#':
+        return stem + reference
+    return urljoin(stem, reference)
+
+
+class _Reader:
+    def __init__(self, base: str) -> None:
+        self.graph = Graph()
+        self.stack = [_Frame('root', base=base)]
+        self.blank = 0
+        self.ids: set[str] = set()
+        self.seen_root = False
+        parser = expat.ParserCreate(namespace_separator='')
+        parser.buffer_text = True
+        parser.namespace_prefixes = False
+        parser.StartElementHandler = self.start
+        parser.EndElementHandler = self.end
+        parser.CharacterDataHandler = self.characters
+        parser.StartNamespaceDeclHandler = self.namespace
+        parser.EntityDeclHandler = self.entity
+        parser.ExternalEntityRefHandler = self.external
+        self.parser = parser
+
+    def fail(self, message: str) -> RdfSyntaxError:
+        parser = self.parser
+        return RdfSyntaxError(message, parser.CurrentLineNumber, parser.CurrentColumnNumber + 1)
+
+    def external(self, *_: object) -> int:
+        raise self.fail('external entities are refused')
+
+    def entity(self, name: str, is_parameter: bool, value: str | None, *_: object) -> None:
+        if is_parameter or value is None:
+            raise self.fail(f'entity {name!r} is refused: only plain text may stand in an entity')
+        if '&' in value or '<' in value or len(value) > _MAX_ENTITY:
+            raise self.fail(
+                f'entity {name!r} is refused: expected plain text of at most {_MAX_ENTITY} characters'
+            )
+
+    def namespace(self, prefix: str | None, uri: str | None) -> None:
+        self.graph.prefixes.setdefault(prefix or '', uri or '')
+
+    def new_blank(self) -> str:
+        self.blank += 1
+        return f'_:g{self.blank}'
+
+    def resolve(self, base: str, reference: str) -> str:
+        try:
+            return resolve(base, reference)
+        except RdfSyntaxError as error:
+            raise self.fail(error.message) from None
+
+    def emit(self, subject: str, predicate: str, value: Node, reified: str = '') -> None:
+        graph = self.graph
+        if subject not in graph.places:
+            parser = self.parser
+            graph.places[subject] = (parser.CurrentLineNumber, parser.CurrentColumnNumber + 1)
+        graph.triples.append((subject, predicate, value))
+        if reified:
+            graph.triples += [
+                (reified, RDF + 'type', RDF + 'Statement'),
+                (reified, RDF + 'subject', subject),
+                (reified, RDF + 'predicate', predicate),
+                (reified, RDF + 'object', value),
+            ]
+
+    def named(self, base: str, name: str) -> str:
+        iri = self.resolve(base, '#' + name)
+        if iri in self.ids:
+            raise self.fail(f'rdf:ID {name!r} stands twice in the document')
+        self.ids.add(iri)
+        return iri
+
+    # --- expat handlers ---
+
+    def start(self, name: str, attributes: dict[str, str]) -> None:
+        parent = self.stack[-1]
+        if len(self.stack) > _MAX_DEPTH:
+            raise self.fail(f'elements nest deeper than {_MAX_DEPTH}')
+        if parent.kind == 'xml':
+            self.stack.append(_Frame('xml'))
+            return
+        base, language = parent.base, parent.language
+        if attributes:
+            if _XML + 'base' in attributes:
+                base = self.resolve(base, attributes.pop(_XML + 'base'))
+            if _XML + 'lang' in attributes:
+                language = attributes.pop(_XML + 'lang').lower()
+        if parent.kind == 'root':
+            if name == RDF + 'RDF' and not self.seen_root:
+                self.seen_root = True
+                self.stack.append(_Frame('root', base=base, language=language))
+                return
+            if not self.seen_root and ':' not in name:
+                raise self.fail(f'expected rdf:RDF, got element {name!r} without a namespace')
+            self.seen_root = True
+            self.node(name, attributes, base, language)
+        elif parent.kind == 'node':
+            self.property(name, attributes, base, language, parent)
+        elif parent.kind == 'collection':
+            parent.items.append(self.node(name, attributes, base, language))
+        elif parent.kind == 'property':
+            if parent.object is not None:
+                raise self.fail(f'second value {name!r} inside one property element')
+            parent.object = self.node(name, attributes, base, language)
+        else:
+            raise self.fail(f'element {name!r} inside a property that has its value already')
+
+    def node(self, name: str, attributes: dict[str, str], base: str, language: str) -> str:
+        if ':' not in name:
+            raise self.fail(f'element {name!r} has no namespace')
+        about = attributes.pop(RDF + 'about', None)
+        ident = attributes.pop(RDF + 'ID', None)
+        node_id = attributes.pop(RDF + 'nodeID', None)
+        if about is not None:
+            subject = self.resolve(base, about)
+        elif ident is not None:
+            subject = self.named(base, ident)
+        elif node_id is not None:
+            subject = '_:n' + node_id
+        else:
+            subject = self.new_blank()
+        if name != RDF + 'Description':
+            self.emit(subject, RDF + 'type', name)
+        for key, value in attributes.items():
+            self.attribute(subject, key, value, base, language)
+        self.stack.append(_Frame('node', subject, base=base, language=language))
+        return subject
+
+    def attribute(self, subject: str, key: str, value: str, base: str, language: str) -> None:
+        if key == RDF + 'type':
+            self.emit(subject, key, self.resolve(base, value))
+        elif ':' not in key:
+            raise self.fail(f'attribute {key!r} has no namespace')
+        elif key in _SYNTAX:
+            raise self.fail(f'attribute {key!r} does not belong here')
+        else:
+            self.emit(subject, key, _text(value, '', language))
+
+    def property(
+        self, name: str, attributes: dict[str, str], base: str, language: str, parent: _Frame
+    ) -> None:
+        if ':' not in name:
+            raise self.fail(f'property element {name!r} has no namespace')
+        if name == RDF + 'li':
+            parent.counter += 1
+            name = f'{RDF}_{parent.counter}'
+        frame = _Frame('property', parent.subject, name, base=base, language=language)
+        self.stack.append(frame)
+        if not attributes:
+            return
+        ident = attributes.pop(RDF + 'ID', None)
+        if ident is not None:
+            frame.reified = self.named(base, ident)
+        parse_type = attributes.pop(RDF + 'parseType', None)
+        frame.datatype = attributes.pop(RDF + 'datatype', '')
+        if frame.datatype:
+            frame.datatype = self.resolve(base, frame.datatype)
+        resource = attributes.pop(RDF + 'resource', None)
+        node_id = attributes.pop(RDF + 'nodeID', None)
+        if parse_type == 'Collection':
+            frame.kind = 'collection'
+        elif parse_type == 'Resource':
+            frame.kind = 'node'
+            self.emit(frame.subject, name, blank := self.new_blank(), frame.reified)
+            frame.subject, frame.predicate = blank, ''
+        elif parse_type is not None:
+            frame.kind, frame.datatype = 'xml', RDF + 'XMLLiteral'
+        elif resource is not None:
+            frame.kind, frame.object = 'empty', self.resolve(base, resource)
+        elif node_id is not None:
+            frame.kind, frame.object = 'empty', '_:n' + node_id
+        elif attributes:
+            frame.kind, frame.object = 'empty', self.new_blank()
+        if attributes:
+            if not isinstance(frame.object, str):
+                raise self.fail(f'attribute {next(iter(attributes))!r} does not belong here')
+            for key, value in attributes.items():
+                self.attribute(frame.object, key, value, base, language)
+
+    def characters(self, text: str) -> None:
+        frame = self.stack[-1]
+        if frame.kind == 'property' or frame.kind == 'xml':
+            frame.text.append(text)
+        elif text.strip():
+            raise self.fail(f'text {text.strip()[:40]!r} where an element is expected')
+
+    def end(self, name: str) -> None:
+        frame = self.stack.pop()
+        if frame.kind == 'property':
+            value = frame.object
+            text = ''.join(frame.text)
+            if value is None:
+                value = _text(text, frame.datatype, frame.language)
+            elif text.strip():
+                raise self.fail(f'text {text.strip()[:40]!r} beside an element')
+            self.emit(frame.subject, frame.predicate, value, frame.reified)
+        elif frame.kind == 'empty':
+            assert frame.object is not None
+            self.emit(frame.subject, frame.predicate, frame.object, frame.reified)
+        elif frame.kind == 'collection':
+            head = RDF + 'nil'
+            for item in reversed(frame.items):
+                cell = self.new_blank()
+                self.emit(cell, RDF + 'first', item)
+                self.emit(cell, RDF + 'rest', head)
+                head = cell
+            self.emit(frame.subject, frame.predicate, head, frame.reified)
+        elif frame.kind == 'xml' and frame.predicate:
+            value = Literal(''.join(frame.text), frame.datatype)
+            self.emit(frame.subject, frame.predicate, value, frame.reified)
+
+
+def _text(text: str, datatype: str, language: str) -> Literal:
+    if datatype:
+        return Literal(text, datatype)
+    if language:
+        return Literal(text, RDF + 'langString', language)
+    return Literal(text, XSD + 'string')
+
+
+def parse_rdf_xml(data: bytes, base: str) -> Graph:
+    """Parses a document.
+
+    Raises:
+        RdfSyntaxError: With line and column, for anything that is not RDF/XML or would expand entities.
+    """
+    reader = _Reader(base)
+    try:
+        reader.parser.Parse(data, True)
+    except expat.ExpatError as error:
+        raise RdfSyntaxError(
+            f'not well-formed XML: {expat.ErrorString(error.code)}', error.lineno, error.offset + 1
+        ) from None
+    if not reader.seen_root:
+        raise RdfSyntaxError('the document holds no element', 1, 1)
+    return reader.graph
