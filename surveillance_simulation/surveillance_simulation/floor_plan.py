@@ -143,7 +143,7 @@ class FloorPlan:
 
     @property
     def start(self) -> Pose:
-        """Where the robot starts: at the station if that is in its room, else at the room's point."""
+        """Where the robot starts: the station if that is in its room, else the room's point."""
         if self.place.start in self.place.recharge_rooms:
             return self.station
         x, y, _ = self.place.positions[self.place.start]

@@ -1,0 +1,129 @@
+"""The simulated camera: its lens, where it is, and what it suffers from.
+
+The optical frame is REP-103's: x right, y down, z forward. Pixel centres have whole coordinates.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+Picture = npt.NDArray[np.uint8]
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A pinhole camera without distortion.
+
+    Attributes:
+        width: Columns of the picture.
+        height: Rows of the picture.
+        focal: Focal length, pixels.
+    """
+
+    width: int
+    height: int
+    focal: float
+
+    @classmethod
+    def from_field_of_view(
+        cls, width: int = 640, height: int = 480, horizontal: float = math.radians(60)
+    ) -> Camera:
+        """Return a camera by the size of its picture and its horizontal field of view (rad).
+
+        Raises:
+            ValueError: The picture has no area, or the field of view is not between 0 and pi.
+        """
+        if width < 1 or height < 1:
+            raise ValueError(f'a picture of {width}x{height} pixels has no area')
+        if not 0.0 < horizontal < math.pi:
+            raise ValueError(f'field of view {horizontal:g} rad: expected between 0 and pi')
+        return cls(width, height, width / 2 / math.tan(horizontal / 2))
+
+    @property
+    def matrix(self) -> Array:
+        """Camera matrix (3, 3)."""
+        return np.array(
+            [
+                [self.focal, 0.0, (self.width - 1) / 2],
+                [0.0, self.focal, (self.height - 1) / 2],
+                [0.0, 0.0, 1.0],
+            ]
+        )
+
+
+def camera_pose(
+    x: float, y: float, z: float, yaw: float, pitch: float = 0.0, roll: float = 0.0
+) -> Array:
+    """Return the transform (4, 4) from the optical frame to the world.
+
+    Args:
+        x: Position, metres.
+        y: Position, metres.
+        z: Height, metres.
+        yaw: Direction of view in the plane, rad, anticlockwise from x.
+        pitch: Angle of view above the horizon, rad.
+        roll: Rotation about the line of sight, rad, clockwise as the camera sees it.
+    """
+    forward = np.array(
+        [math.cos(yaw) * math.cos(pitch), math.sin(yaw) * math.cos(pitch), math.sin(pitch)]
+    )
+    right = np.array([math.sin(yaw), -math.cos(yaw), 0.0])
+    down = np.cross(forward, right)
+    pose = np.eye(4)
+    pose[:3, 0] = math.cos(roll) * right + math.sin(roll) * down
+    pose[:3, 1] = math.cos(roll) * down - math.sin(roll) * right
+    pose[:3, 2] = forward
+    pose[:3, 3] = (x, y, z)
+    return pose
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """What stands between the scene and its picture.
+
+    Attributes:
+        light: Factor on the brightness: 1 a lit room, 0.1 a dark one, 2 overexposed.
+        noise: Standard deviation of the sensor's noise, grey levels.
+        blur: Standard deviation of the lens's blur, pixels.
+        motion: Length of the streak that motion draws, pixels.
+        motion_angle: Direction of the streak in the picture, rad, from x towards y.
+    """
+
+    light: float = 1.0
+    noise: float = 2.0
+    blur: float = 0.4
+    motion: float = 0.0
+    motion_angle: float = 0.0
+
+
+def expose(
+    scene: npt.NDArray[np.float32], conditions: Conditions, rng: np.random.Generator
+) -> Picture:
+    """Return the picture (rows, columns, channels) that the camera takes of ideal brightnesses."""
+    taken = scene
+    if conditions.blur > 0:
+        taken = cv2.GaussianBlur(taken, (0, 0), conditions.blur)
+    if conditions.motion > 1:
+        taken = cv2.filter2D(taken, -1, _streak(conditions.motion, conditions.motion_angle))
+    if conditions.light != 1.0:
+        taken = taken * np.float32(conditions.light)
+    if conditions.noise > 0:
+        grain = rng.standard_normal(taken.shape, dtype=np.float32)
+        taken = cv2.scaleAdd(grain, conditions.noise, taken)
+    return np.asarray(cv2.convertScaleAbs(np.maximum(taken, 0.0)), dtype=np.uint8)
+
+
+def _streak(length: float, angle: float) -> npt.NDArray[np.float32]:
+    """Return a kernel that averages along a line of the given length (pixels)."""
+    half = math.ceil(length / 2)
+    kernel = np.zeros((2 * half + 1, 2 * half + 1), np.float32)
+    samples = np.linspace(-length / 2, length / 2, 8 * half + 1)
+    columns, rows = half + samples * math.cos(angle), half + samples * math.sin(angle)
+    np.add.at(kernel, (np.rint(rows).astype(int), np.rint(columns).astype(int)), 1.0)
+    return np.asarray(kernel / kernel.sum(), dtype=np.float32)
