@@ -1,0 +1,1 @@
+"""Which place next: rules, policies within the rules, and the battery's reserve. No ROS inside."""

@@ -1,0 +1,128 @@
+"""When to go charging: early enough for the worst next leg and the way home from there.
+
+A fixed level strands a robot: what is enough beside the station is not enough at the far end of
+the map. The reserve asked for here therefore depends on where the robot is and on how fast the
+battery was seen to fall.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+
+from surveillance_behaviour.policy.graph import PatrolGraph
+
+LEGS_REMEMBERED = 50
+
+
+@dataclass(frozen=True)
+class BatteryLimits:
+    """The battery's parameters, in percent.
+
+    Attributes:
+        require_recharge: Below this the robot goes charging in any case.
+        stop_recharge: From this on it may leave the station.
+        margin: What is left at the station after the worst leg and the way home.
+
+    Raises:
+        ValueError: The levels are not in order.
+    """
+
+    require_recharge: float = 20.0
+    stop_recharge: float = 90.0
+    margin: float = 5.0
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.require_recharge < self.stop_recharge <= 100.0:
+            raise ValueError(
+                'expected 0 <= battery_require_recharge < battery_stop_recharge <= 100, got '
+                f'{self.require_recharge:g} and {self.stop_recharge:g}'
+            )
+
+
+@dataclass
+class DrawEstimate:
+    """How fast the battery falls, learnt from what its level was before and after each leg.
+
+    The highest rate of the last legs counts: a reserve that is right on average strands every
+    second time. A percent is added to each fall, since the level is known in whole percents.
+
+    Attributes:
+        fixed: Percent per second; 0: learn it.
+    """
+
+    fixed: float = 0.0
+    _rates: deque[float] = field(default_factory=lambda: deque(maxlen=LEGS_REMEMBERED))
+    _mark: tuple[float, float] | None = None
+
+    def observe(self, time: float, level: float) -> None:
+        """The level at the end of a leg or of a stay; charging starts a new stretch."""
+        if self._mark is None or level > self._mark[1] or time <= self._mark[0]:
+            self._mark = (time, level)
+            return
+        fallen = self._mark[1] - level
+        if fallen >= 2.0:
+            self._rates.append((fallen + 1.0) / (time - self._mark[0]))
+            self._mark = (time, level)
+
+    def forget(self) -> None:
+        """The level was set from outside: what it did since the last leg says nothing."""
+        self._mark = None
+
+    @property
+    def percent_per_second(self) -> float:
+        """The fastest fall of the last legs; 0 while nothing is known."""
+        return self.fixed if self.fixed > 0.0 else max(self._rates, default=0.0)
+
+
+def reserve(
+    graph: PatrolGraph,
+    place: str,
+    next_places: Iterable[str],
+    stations: Sequence[str],
+    draw: float,
+    limits: BatteryLimits,
+) -> tuple[float, str]:
+    """The level at which the robot must not go on, and why that one.
+
+    Args:
+        graph: The map.
+        place: Where the robot is.
+        next_places: Where it could go instead of charging.
+        stations: The places with a charging station.
+        draw: Percent per second.
+        limits: The parameters; the result lies between ``require_recharge`` and a little below
+            ``stop_recharge``, so that a charged robot always goes on.
+
+    Returns:
+        Percent, and a clause that explains it.
+    """
+    needed = {
+        other: graph.seconds(place, other) + way_home(graph, other, stations)
+        for other in next_places
+        if other in graph.index
+    }
+    finite = {other: seconds for other, seconds in needed.items() if math.isfinite(seconds)}
+    fixed = f'the level that requires charging is {limits.require_recharge:g} %'
+    if not finite or draw <= 0.0:
+        return limits.require_recharge, fixed
+    worst = max(sorted(finite), key=lambda other: finite[other])
+    level = draw * finite[worst] + limits.margin
+    if level <= limits.require_recharge:
+        return limits.require_recharge, fixed
+    most = max(limits.require_recharge, limits.stop_recharge - limits.margin)
+    words = (
+        f'{worst} and home from there takes {finite[worst]:.1f} s at {draw:.3g} % a second, '
+        f'with {limits.margin:g} % to spare'
+    )
+    return min(level, most), words
+
+
+def way_home(graph: PatrolGraph, place: str, stations: Sequence[str]) -> float:
+    """Seconds from ``place`` to the nearest charging place; inf when there is none."""
+    return min(
+        (graph.seconds(place, station) for station in stations if station in graph.index),
+        default=math.inf,
+    )

@@ -1,0 +1,193 @@
+"""The map as a patrol sees it: places, the ways between neighbours, and what they cost in time.
+
+A leg costs the time to drive it; whoever enters a place also spends ``dwell`` seconds there. All
+costs that leave this module are the sum of both, in seconds.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import networkx
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra
+
+from surveillance_behaviour.policy.tour import Tour, tour_over_blocks
+
+
+class GraphError(ValueError):
+    """A map cannot be patrolled as it is; the message names the place or the line."""
+
+
+@dataclass(frozen=True, eq=False)
+class PatrolGraph:
+    """Places and the ways between them. Derived quantities are computed once, when first asked for.
+
+    Attributes:
+        legs: For each place, its neighbours and the seconds it takes to drive there. Symmetric.
+        dwell: Seconds that the robot stays in each place it enters.
+
+    Raises:
+        GraphError: A leg leads to an unknown place, is not positive, or differs from its way back.
+    """
+
+    legs: Mapping[str, Mapping[str, float]]
+    dwell: float = 0.0
+
+    def __post_init__(self) -> None:
+        for place, ways in self.legs.items():
+            for other, seconds in ways.items():
+                if other not in self.legs:
+                    raise GraphError(f'{place} leads to {other}, which is not a place of the map')
+                if not seconds + self.dwell > 0.0 or not math.isfinite(seconds):
+                    raise GraphError(f'{place} to {other} takes {seconds} s, expected more than 0')
+                if self.legs[other].get(place) != seconds:
+                    raise GraphError(
+                        f'{place} leads to {other}, but {other} not back in {seconds} s'
+                    )
+
+    @cached_property
+    def places(self) -> tuple[str, ...]:
+        """All places, in the order of every array below."""
+        return tuple(sorted(self.legs))
+
+    @cached_property
+    def index(self) -> Mapping[str, int]:
+        """Position of each place in :attr:`places`."""
+        return {place: position for position, place in enumerate(self.places)}
+
+    @cached_property
+    def adjacency(self) -> csr_array:
+        """Seconds of each leg, dwell included, sparse, shape (n, n)."""
+        rows, columns, costs = [], [], []
+        for place, ways in self.legs.items():
+            for other, seconds in ways.items():
+                rows.append(self.index[place])
+                columns.append(self.index[other])
+                costs.append(seconds + self.dwell)
+        shape = (len(self.places), len(self.places))
+        return csr_array((costs, (rows, columns)), shape=shape)
+
+    @cached_property
+    def _shortest(self) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+        distances, before = dijkstra(self.adjacency, return_predecessors=True)
+        return distances, before
+
+    @property
+    def distances(self) -> NDArray[np.float64]:
+        """Seconds from each place to each other by the shortest way, shape (n, n); inf: no way."""
+        return self._shortest[0]
+
+    def seconds(self, start: str, goal: str) -> float:
+        """Seconds from ``start`` to ``goal`` by the shortest way; inf when there is none."""
+        return float(self.distances[self.index[start], self.index[goal]])
+
+    def route(self, start: str, goal: str) -> tuple[str, ...]:
+        """The places on the shortest way, without ``start``, with ``goal``.
+
+        Raises:
+            GraphError: There is no way.
+        """
+        begin, place = self.index[start], self.index[goal]
+        backwards = []
+        while place != begin:
+            backwards.append(self.places[place])
+            place = int(self._shortest[1][begin, place])
+            if place < 0:
+                raise GraphError(f'there is no way from {start} to {goal}')
+        return tuple(reversed(backwards))
+
+    def connected(self, place: str) -> PatrolGraph:
+        """The part of the map that can be reached from ``place``; itself when that is all."""
+        within = np.isfinite(self.distances[self.index[place]])
+        if within.all():
+            return self
+        return self.restricted(
+            name for name, inside in zip(self.places, within, strict=True) if inside
+        )
+
+    def restricted(self, kept: Iterable[str]) -> PatrolGraph:
+        """The map without all places but ``kept``."""
+        names = set(kept)
+        legs = {
+            place: {other: cost for other, cost in ways.items() if other in names}
+            for place, ways in self.legs.items()
+            if place in names
+        }
+        return PatrolGraph(legs, self.dwell)
+
+    def without_leg(self, start: str, goal: str) -> PatrolGraph:
+        """The map without the direct way between two places."""
+        gone = {(start, goal), (goal, start)}
+        legs = {
+            place: {other: cost for other, cost in ways.items() if (place, other) not in gone}
+            for place, ways in self.legs.items()
+        }
+        return PatrolGraph(legs, self.dwell)
+
+    @cached_property
+    def tour(self) -> Tour:
+        """The shortest closed tour of a connected map, or a good one with a lower bound.
+
+        Raises:
+            GraphError: The map is not connected.
+        """
+        if not np.isfinite(self.distances).all():
+            raise GraphError('no tour leads through all places: the map is not connected')
+        network = networkx.Graph()
+        network.add_nodes_from(self.places)
+        network.add_edges_from((place, other) for place in self.legs for other in self.legs[place])
+        blocks = [
+            sorted(self.index[place] for place in block)
+            for block in networkx.biconnected_components(network)
+        ]
+        return tour_over_blocks((self.distances + self.distances.T) / 2.0, sorted(blocks))
+
+    @cached_property
+    def walk(self) -> tuple[str, ...]:
+        """The tour step by step over neighbours, closed: after the last place comes the first."""
+        order = [self.places[position] for position in self.tour.order]
+        if len(order) < 2:
+            return tuple(order)
+        steps: list[str] = []
+        for start, goal in zip(order, [*order[1:], order[0]], strict=True):
+            steps.extend(self.route(start, goal))
+        return tuple(steps)
+
+
+def graph_of_places(
+    connections: Mapping[str, Iterable[str]],
+    positions: Mapping[str, Sequence[float]],
+    speed: float = 1.0,
+    dwell: float = 0.0,
+) -> PatrolGraph:
+    """A graph whose legs are as long as the straight line between the places.
+
+    Args:
+        connections: For each place, its neighbours.
+        positions: A point in each place, metres.
+        speed: Metres per second.
+        dwell: Seconds spent in each place.
+
+    Raises:
+        GraphError: A position is missing, or the connections do not fit together.
+    """
+    for place in connections:
+        if place not in positions:
+            raise GraphError(f'{place} has no position')
+    return PatrolGraph(
+        {
+            place: {
+                other: math.dist(positions[place][:2], positions[other][:2]) / speed
+                for other in others
+                if other in positions
+            }
+            for place, others in connections.items()
+        },
+        dwell,
+    )

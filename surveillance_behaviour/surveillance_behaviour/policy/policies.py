@@ -1,0 +1,250 @@
+"""Policies: how good is each of the places that the rules allow?
+
+A policy is a function from a :class:`Situation` and the allowed places to a :class:`Score` for
+each. It keeps nothing between calls, so it can be changed at run time, and whatever it needs to
+remember (the target it was heading for) stands in the situation.
+
+========= ========================================================================================
+seed      any allowed place, at random: what both of the project's ancestors do
+oldest    the allowed place that went unvisited longest
+lookahead the way to wherever on the whole map (time unvisited - time to get there) is highest
+tour      the place from which the rest of the shortest closed tour leaves the least waiting
+random    uniform choice, the literature's baseline
+CR        conscientious reactive: the neighbour idle longest (Machado et al. 2002)
+HCR       heuristic conscientious reactive: idleness and nearness, normalised (Almeida et al. 2004)
+HPCC      heuristic path-finder conscientious cognitive: picks a goal on the whole map like HCR and
+          keeps it, and goes there over idle places (Almeida et al. 2004)
+cycle     round the shortest closed tour, always in the same sense (Chevaleyre 2004)
+========= ========================================================================================
+
+``random``, ``CR``, ``HCR``, ``HPCC`` and ``cycle`` know no rules in the literature; run them with
+an empty list of rules to compare.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Mapping, Sequence
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra
+
+from surveillance_behaviour.policy.graph import PatrolGraph
+from surveillance_behaviour.policy.situation import Score, Situation
+
+Scores = Mapping[str, Score]
+DEFAULT_POLICY = 'tour'
+MEAN_WEIGHT = 1e-3
+"""How much the mean wait counts beside the longest one where ``tour`` compares two ways."""
+
+
+class Policy(Protocol):
+    """Scores the allowed places."""
+
+    def __call__(self, situation: Situation, allowed: Sequence[str]) -> Scores:
+        """A score for each of ``allowed``, which is not empty."""
+
+
+def make_policy(name: str, generator: random.Random | None = None) -> Policy:
+    """The policy of that name.
+
+    Args:
+        name: One of :data:`POLICIES`.
+        generator: Where the random ones take their chance from.
+
+    Raises:
+        ValueError: There is no such policy.
+    """
+    if name not in POLICIES:
+        raise ValueError(f'unknown policy {name!r}, expected one of {", ".join(POLICIES)}')
+    return POLICIES[name](generator or random.Random())
+
+
+def _by_chance(generator: random.Random) -> Policy:
+    def score(situation: Situation, allowed: Sequence[str]) -> Scores:
+        return {place: Score(generator.random(), place, 'drawn at random') for place in allowed}
+
+    return score
+
+
+def oldest(situation: Situation, allowed: Sequence[str]) -> Scores:
+    """The time each place went unvisited."""
+    scores = {}
+    for place in allowed:
+        seconds = situation.unvisited(place)
+        scores[place] = Score(seconds, place, f'it went unvisited for {seconds:.1f} s')
+    return scores
+
+
+def lookahead(situation: Situation, allowed: Sequence[str]) -> Scores:
+    """The best (time unvisited - time to get there) of all places, by way of each candidate."""
+    graph = situation.graph
+    scores = {}
+    for place in allowed:
+        worth = situation.idleness - _seconds_by_way_of(situation, place)
+        worth[graph.index[situation.place]] = -np.inf
+        best = int(np.argmax(worth))
+        target = graph.places[best]
+        scores[place] = Score(
+            float(worth[best]),
+            target,
+            f'{_leads_to(place, target)} went unvisited for {situation.idleness[best]:.1f} s '
+            f'and is {situation.idleness[best] - worth[best]:.1f} s away',
+        )
+    return scores
+
+
+def tour(situation: Situation, allowed: Sequence[str]) -> Scores:
+    """The longest wait of any place if the robot went round the tour from each candidate on.
+
+    The robot may join the tour wherever it passes through the candidate, in either sense. On the
+    tour, its next step leaves the least waiting; off it (charged, blocked, held by a rule), this
+    finds where to join again.
+    """
+    graph = situation.graph
+    steps = np.array([graph.index[place] for place in graph.walk], dtype=np.intp)
+    scores = {}
+    for place in allowed:
+        start = graph.seconds(situation.place, place)
+        longest, mean, target = min(
+            _wait_on_the_way(situation, way, start, begin)
+            for way in (steps, steps[::-1])
+            for begin in np.flatnonzero(way == graph.index[place])
+        )
+        name = graph.places[target]
+        scores[place] = Score(
+            -(longest + MEAN_WEIGHT * mean),
+            name,
+            f'the tour from there leaves no place longer than {longest:.1f} s ({name})',
+        )
+    return scores
+
+
+def _wait_on_the_way(
+    situation: Situation, way: NDArray[np.intp], start: float, begin: int
+) -> tuple[float, float, int]:
+    """Longest and mean time the places will have waited when the robot meets them on its way.
+
+    Args:
+        situation: Where the robot is now.
+        way: A closed walk as indices of places.
+        start: Seconds until the robot is at ``way[begin]``.
+        begin: Where on the walk it begins.
+
+    Returns:
+        The longest wait, the mean wait, seconds, and which place waits longest.
+    """
+    order = np.roll(way, -begin)
+    legs = situation.graph.distances[order[:-1], order[1:]]
+    met = start + np.concatenate(([0.0], np.cumsum(legs)))
+    places, first = np.unique(order, return_index=True)
+    waits = situation.idleness[places] + met[first]
+    worst = int(np.argmax(waits))
+    return float(waits[worst]), float(waits.mean()), int(places[worst])
+
+
+def heuristic_reactive(situation: Situation, allowed: Sequence[str]) -> Scores:
+    """Half the idleness, half the nearness of each candidate, each over the greatest of them."""
+    idle = np.array([situation.unvisited(place) for place in allowed])
+    far = np.array([situation.graph.seconds(situation.place, place) for place in allowed])
+    return {
+        place: Score(
+            float(value),
+            place,
+            f'it went unvisited for {seconds:.1f} s and is {away:.1f} s away',
+        )
+        for place, value, seconds, away in zip(allowed, _worth(idle, far), idle, far, strict=True)
+    }
+
+
+def heuristic_cognitive(situation: Situation, allowed: Sequence[str]) -> Scores:
+    """Towards the goal with the best mix of idleness and nearness, over places that are idle."""
+    graph = situation.graph
+    here = graph.index[situation.place]
+    far, idle = graph.distances[here], situation.idleness
+    if situation.target in graph.index and situation.target != situation.place:
+        goal = graph.index[situation.target]
+    else:
+        worth = _worth(idle, far)
+        worth[here] = -np.inf
+        goal = int(np.argmax(worth))
+    target = graph.places[goal]
+    costs = _idle_ways(graph, idle, goal)
+    return {
+        place: Score(
+            -float(costs[here, graph.index[place]] + costs[graph.index[place], goal]),
+            target,
+            f'{_leads_to(place, target)} went unvisited for {idle[goal]:.1f} s '
+            f'and is {far[goal]:.1f} s away',
+        )
+        for place in allowed
+    }
+
+
+def _idle_ways(graph: PatrolGraph, idle: NDArray[np.float64], goal: int) -> NDArray[np.float64]:
+    """Costs of ways from each place to each: half the time, half the freshness of what is entered.
+
+    Only the row of each place to its neighbours and the column of ``goal`` are filled in.
+    """
+    direct = graph.adjacency
+    coo = direct.tocoo()
+    longest, idlest = max(float(coo.data.max()), 1e-9), max(float(idle.max()), 1e-9)
+    weights = coo.data / longest + (1.0 - np.clip(idle[coo.col] / idlest, 0.0, 1.0)) + 1e-6
+    towards = csr_array((weights, (coo.col, coo.row)), shape=direct.shape)
+    costs: NDArray[np.float64] = np.full(direct.shape, np.inf)
+    costs[coo.row, coo.col] = weights
+    costs[:, goal] = dijkstra(towards, indices=goal)
+    return costs
+
+
+def cycle(situation: Situation, allowed: Sequence[str]) -> Scores:
+    """How soon each candidate comes on the closed tour, from where the robot is on it.
+
+    Where the tour passes a place several times, the robot is taken to be at the pass after which
+    the next steps have waited longest.
+    """
+    graph = situation.graph
+    walk = graph.walk
+    passes = [number for number, place in enumerate(walk) if place == situation.place]
+    here = max(passes, key=lambda number: situation.unvisited(walk[(number + 1) % len(walk)]))
+    ahead = walk[here + 1 :] + walk[: here + 1]
+    return {
+        place: Score(
+            -float(ahead.index(place)),
+            place,
+            f'it is {ahead.index(place) + 1} steps on, on the tour',
+        )
+        for place in allowed
+    }
+
+
+def _seconds_by_way_of(situation: Situation, place: str) -> NDArray[np.float64]:
+    """Seconds to each place when the robot first goes to ``place``, shape (n,)."""
+    graph = situation.graph
+    return graph.seconds(situation.place, place) + graph.distances[graph.index[place]]
+
+
+def _worth(idle: NDArray[np.float64], far: NDArray[np.float64]) -> NDArray[np.float64]:
+    nearness: NDArray[np.float64] = 1.0 - far / max(float(far.max()), 1e-9)
+    return idle / max(float(idle.max()), 1e-9) + nearness
+
+
+def _leads_to(place: str, target: str) -> str:
+    return 'it' if place == target else f'it leads to {target}, which'
+
+
+POLICIES: Mapping[str, Callable[[random.Random], Policy]] = {
+    'tour': lambda generator: tour,
+    'lookahead': lambda generator: lookahead,
+    'oldest': lambda generator: oldest,
+    'seed': _by_chance,
+    'random': _by_chance,
+    'CR': lambda generator: oldest,
+    'HCR': lambda generator: heuristic_reactive,
+    'HPCC': lambda generator: heuristic_cognitive,
+    'cycle': lambda generator: cycle,
+}
+"""What makes each policy, by name."""

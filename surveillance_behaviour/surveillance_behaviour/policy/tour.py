@@ -1,0 +1,375 @@
+"""Shortest closed tours through all places of a map, and how short a tour can be at best.
+
+A single robot cannot do better than the shortest closed tour: whatever it does, some place's
+two successive visits enclose a visit to every other place, so that place waits at least one tour
+(Chevaleyre 2004, "Theoretical analysis of the multi-agent patrolling problem"). The length of
+the tour is therefore the bound that every patrol is measured by.
+
+All functions take a symmetric matrix of distances, shape (n, n), that obeys the triangle
+inequality (shortest ways between all places do). They are deterministic.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Matrix = NDArray[np.float64]
+
+EXACT_UP_TO = 12
+"""The largest number of places for which the exact tour is computed, by dynamic programming."""
+NEIGHBOURS = 12
+"""How many nearest places each place is tried beside when a tour is improved."""
+ASCENT_STEPS = 150
+"""Steps of the subgradient ascent that raises the lower bound."""
+KICKS = 2000
+"""How often a good tour of a large map is disturbed and improved again."""
+
+
+@dataclass(frozen=True)
+class Tour:
+    """A closed tour and what is known of the best one.
+
+    Attributes:
+        order: Indices of all places, each once; from the last one it goes back to the first.
+        length: Length of the tour, in the unit of the distances.
+        bound: No closed tour is shorter than this.
+    """
+
+    order: tuple[int, ...]
+    length: float
+    bound: float
+
+    @property
+    def exact(self) -> bool:
+        """Whether the tour is known to be the shortest."""
+        return self.length <= self.bound * (1.0 + 1e-6) + 1e-9
+
+
+def shortest_tour(distances: Matrix) -> Tour:
+    """The exact tour of a small map, a good tour and a lower bound of a large one."""
+    count = len(distances)
+    if count <= 3:
+        order = tuple(range(count))
+        length = tour_length(distances, order)
+        return Tour(order, length, length)
+    if count <= EXACT_UP_TO:
+        order = _exact_order(distances)
+        length = tour_length(distances, order)
+        return Tour(order, length, length)
+    order = _good_order(distances)
+    length = tour_length(distances, order)
+    return Tour(order, length, min(length, _one_tree_bound(distances, length)))
+
+
+def tour_over_blocks(distances: Matrix, blocks: Iterable[Sequence[int]]) -> Tour:
+    """The tour of a map from the tours of its biconnected blocks.
+
+    A closed walk through the whole map passes from block to block only at the places they share,
+    so it splits there into one closed walk for each block: the shortest tours add up.
+
+    Args:
+        distances: Shape (n, n), shortest ways on the map.
+        blocks: The biconnected components of the map, as indices.
+    """
+    rings: list[list[int]] = []
+    at: dict[int, list[int]] = {}
+    bound = 0.0
+    for members in blocks:
+        chosen = np.asarray(members, dtype=np.intp)
+        tour = shortest_tour(np.ascontiguousarray(distances[np.ix_(chosen, chosen)]))
+        bound += tour.bound
+        for place in members:
+            at.setdefault(place, []).append(len(rings))
+        rings.append([members[position] for position in tour.order])
+    order = tuple(_joined(rings, at))
+    length = tour_length(distances, order)
+    return Tour(order, length, min(bound, length))
+
+
+def _joined(rings: list[list[int]], at: dict[int, list[int]]) -> Iterator[int]:
+    """All places in the order in which one walk through all rings first meets them."""
+    used: set[int] = set()
+    pending: list[Iterator[int]] = [iter([0])]
+    while pending:
+        place = next(pending[-1], None)
+        if place is None:
+            pending.pop()
+            continue
+        yield place
+        for number in at.get(place, ()):
+            if number not in used:
+                used.add(number)
+                start = rings[number].index(place)
+                pending.append(iter(rings[number][start + 1 :] + rings[number][:start]))
+
+
+def tour_length(distances: Matrix, order: tuple[int, ...]) -> float:
+    """Length of the closed tour that visits the places in this order."""
+    indices = np.asarray(order, dtype=np.intp)
+    return float(distances[indices, np.roll(indices, -1)].sum())
+
+
+def _exact_order(distances: Matrix) -> tuple[int, ...]:
+    """Held and Karp's dynamic programme over sets of visited places."""
+    count = len(distances)
+    others = count - 1
+    size = 1 << others
+    cost = np.full((size, others), np.inf)
+    came_from = np.zeros((size, others), dtype=np.intp)
+    for last in range(others):
+        cost[1 << last, last] = distances[others, last]
+    for visited in range(1, size):
+        for last in range(others):
+            if not visited >> last & 1 or visited == 1 << last:
+                continue
+            before = cost[visited ^ (1 << last)] + distances[:others, last]
+            best = int(np.argmin(before))
+            cost[visited, last] = before[best]
+            came_from[visited, last] = best
+    last = int(np.argmin(cost[size - 1] + distances[:others, others]))
+    order, visited = [others], size - 1
+    while visited:
+        order.append(last)
+        visited, last = visited ^ (1 << last), int(came_from[visited, last])
+    return tuple(order)
+
+
+def _good_order(distances: Matrix) -> tuple[int, ...]:
+    """The better of two first tours, each improved until no single change shortens it."""
+    tours = [_Improvement(distances, start(distances)) for start in (_preorder, _nearest)]
+    for tour in tours:
+        tour.improve(list(tour.order))
+    best = min(tours, key=lambda tour: tour_length(distances, tuple(tour.order)))
+    best.kick(KICKS, random.Random(0))
+    return tuple(best.order)
+
+
+def _preorder(distances: Matrix) -> list[int]:
+    """Depth-first order of a minimum spanning tree: already the best tour of a ring."""
+    parents = _spanning_tree(distances)
+    children: list[list[int]] = [[] for _ in distances]
+    for child, parent in enumerate(parents):
+        if parent >= 0:
+            children[parent].append(child)
+    order, stack = [], [0]
+    while stack:
+        place = stack.pop()
+        order.append(place)
+        stack.extend(sorted(children[place], key=lambda child: -distances[place, child]))
+    return order
+
+
+def _nearest(distances: Matrix) -> list[int]:
+    """Always on to the nearest place not visited yet."""
+    order = [0]
+    left = np.ones(len(distances), dtype=bool)
+    left[0] = False
+    while left.any():
+        row = np.where(left, distances[order[-1]], np.inf)
+        order.append(int(np.argmin(row)))
+        left[order[-1]] = False
+    return order
+
+
+def _spanning_tree(distances: Matrix) -> list[int]:
+    """Prim's algorithm; the parent of each place, -1 for the first."""
+    count = len(distances)
+    best = distances[0].copy()
+    parents = np.zeros(count, dtype=np.intp)
+    parents[0] = -1
+    done = np.zeros(count, dtype=bool)
+    done[0] = True
+    for _ in range(count - 1):
+        place = int(np.argmin(np.where(done, np.inf, best)))
+        done[place] = True
+        closer = (distances[place] < best) & ~done
+        best[closer] = distances[place][closer]
+        parents[closer] = place
+    return [int(parent) for parent in parents]
+
+
+class _Improvement:
+    """2-opt and Or-opt with neighbour lists: takes changes until none shortens the tour.
+
+    Places whose surroundings did not change since they were last looked at are skipped
+    (Bentley's don't-look bits), which makes it near linear in the number of places.
+    """
+
+    def __init__(self, distances: Matrix, order: list[int]) -> None:
+        self._rows: list[list[float]] = distances.tolist()
+        self.order = order
+        self._at = [0] * len(order)
+        self._note(0, len(order))
+        ranked = np.argsort(distances, axis=1, kind='stable')[:, 1 : NEIGHBOURS + 1]
+        self._near: list[list[int]] = ranked.tolist()
+
+    def _note(self, first: int, end: int) -> None:
+        for position in range(first, end):
+            self._at[self.order[position]] = position
+
+    def improve(self, waiting: list[int]) -> float:
+        """Improves around the given places; what that saved."""
+        listed = set(waiting)
+        saved = 0.0
+        while waiting:
+            place = waiting.pop()
+            listed.discard(place)
+            gain, touched = self._two_opt(place)
+            if not touched:
+                gain, touched = self._or_opt(place)
+            saved += gain
+            for other in touched:
+                if other not in listed:
+                    listed.add(other)
+                    waiting.append(other)
+        return saved
+
+    def kick(self, times: int, generator: random.Random) -> None:
+        """Exchanges two short neighbouring stretches at random, improves, keeps what is shorter."""
+        count, rows = len(self.order), self._rows
+        reach = min(30, (count - 2) // 2)
+        for _ in range(times):
+            first = generator.randrange(count - 2)
+            middle = min(count - 2, first + generator.randint(1, reach))
+            last = min(count - 1, middle + generator.randint(1, reach))
+            if not first < middle < last:
+                continue
+            order, at = self.order, self._at
+            self.order, self._at = order.copy(), at.copy()
+            ends = [order[first], order[first + 1], order[middle]]
+            ends += [order[middle + 1], order[last], order[(last + 1) % count]]
+            a, b, c, d, e, f = ends
+            lost = rows[a][d] + rows[e][b] + rows[c][f] - rows[a][b] - rows[c][d] - rows[e][f]
+            turned = order[middle + 1 : last + 1] + order[first + 1 : middle + 1]
+            self.order[first + 1 : last + 1] = turned
+            self._note(first + 1, last + 1)
+            if self.improve(ends) < lost:
+                self.order, self._at = order, at
+
+    def _two_opt(self, place: int) -> tuple[float, tuple[int, ...]]:
+        """Exchanges two edges, one of them at ``place``; the gain and the changed edges' ends."""
+        order, rows, count = self.order, self._rows, len(self.order)
+        for step in (1, -1):
+            position = self._at[place]
+            follower = order[(position + step) % count]
+            edge = rows[place][follower]
+            for near in self._near[place]:
+                gain = edge - rows[place][near]
+                if gain <= 1e-9:
+                    break
+                beyond = order[(self._at[near] + step) % count]
+                gain += rows[near][beyond] - rows[follower][beyond]
+                if gain > 1e-9 and near != follower:
+                    if step == 1:
+                        self._reverse(position + 1, self._at[near])
+                    else:
+                        self._reverse(self._at[near], position - 1)
+                    return gain, (place, follower, near, beyond)
+        return 0.0, ()
+
+    def _reverse(self, first: int, last: int) -> None:
+        """Turns round the stretch from ``first`` to ``last``, or what is outside of it."""
+        order, count = self.order, len(self.order)
+        first, last = first % count, last % count
+        if first <= last and 2 * (last - first + 1) <= count + 2:
+            order[first : last + 1] = order[first : last + 1][::-1]
+            self._note(first, last + 1)
+            return
+        length = (last - first) % count + 1
+        if 2 * length > count:
+            first, last, length = last + 1, first - 1, count - length
+        for offset in range(length // 2):
+            low, high = (first + offset) % count, (last - offset) % count
+            order[low], order[high] = order[high], order[low]
+            self._at[order[low]], self._at[order[high]] = low, high
+
+    def _or_opt(self, place: int) -> tuple[float, tuple[int, ...]]:
+        """Moves a stretch of up to three places that begins with ``place`` beside a near one."""
+        order, rows, count = self.order, self._rows, len(self.order)
+        for length in (1, 2, 3):
+            first = self._at[place]
+            if first + length > count - 1 or first == 0:
+                continue
+            stretch = order[first : first + length]
+            before, after = order[first - 1], order[first + length]
+            head, tail = stretch[0], stretch[-1]
+            freed = rows[before][head] + rows[tail][after] - rows[before][after]
+            if freed <= 1e-9:
+                continue
+            for near in self._near[place]:
+                if rows[place][near] >= freed:
+                    break
+                if near in stretch:
+                    continue
+                for outer in (self._neighbour(near, 1), self._neighbour(near, -1)):
+                    if outer in stretch:
+                        continue
+                    added = rows[near][head] + rows[tail][outer] - rows[near][outer]
+                    if freed - added > 1e-9:
+                        self._move(first, length, near, outer)
+                        return freed - added, (before, after, head, tail, near, outer)
+        return 0.0, ()
+
+    def _neighbour(self, place: int, step: int) -> int:
+        return self.order[(self._at[place] + step) % len(self.order)]
+
+    def _move(self, first: int, length: int, near: int, outer: int) -> None:
+        """Puts the stretch between ``near`` and ``outer``, its head at ``near``."""
+        order = self.order
+        stretch = order[first : first + length]
+        forward = self._neighbour(near, 1) == outer
+        del order[first : first + length]
+        where = order.index(near)
+        if forward:
+            order[where + 1 : where + 1] = stretch
+        else:
+            order[where:where] = stretch[::-1]
+        self._note(min(first, where), min(len(order), max(first, where) + length + 1))
+
+
+def _one_tree_bound(distances: Matrix, upper: float) -> float:
+    """Held and Karp's lower bound: the dearest minimum 1-tree under node prices.
+
+    Args:
+        distances: Shape (n, n).
+        upper: Length of a known tour, which scales the steps.
+    """
+    count = len(distances)
+    prices = np.zeros(count)
+    best, pace, stale = 0.0, 2.0, 0
+    for _ in range(ASCENT_STEPS):
+        priced = distances + prices[:, None] + prices[None, :]
+        value, degrees = _one_tree(priced)
+        value -= 2.0 * float(prices.sum())
+        if value > best + 1e-9:
+            best, stale = value, 0
+        else:
+            stale += 1
+            if stale >= 5:
+                pace, stale = pace / 2.0, 0
+        slope = degrees - 2.0
+        steepness = float(slope @ slope)
+        if steepness == 0.0 or best >= upper * (1.0 - 1e-7):
+            break
+        prices += pace * max(upper - value, 1e-9) / steepness * slope
+    return best
+
+
+def _one_tree(priced: Matrix) -> tuple[float, NDArray[np.float64]]:
+    """Cost and degrees of a minimum spanning tree of all but the last place, plus that one's
+    two cheapest edges."""
+    inner = priced[:-1, :-1]
+    parents = np.asarray(_spanning_tree(inner))
+    children = np.arange(1, len(inner))
+    cost = float(inner[children, parents[1:]].sum())
+    degrees = np.bincount(parents[1:], minlength=len(priced)).astype(float)
+    degrees[children] += 1.0
+    two = np.argpartition(priced[-1, :-1], 1)[:2]
+    degrees[two] += 1.0
+    degrees[-1] = 2.0
+    return cost + float(priced[-1, two].sum()), degrees
