@@ -17,6 +17,11 @@ setup(
     description='Battery, planner and motion controllers of the surveillance robot.',
     license='Apache-2.0',
     entry_points={
-        'console_scripts': [],
+        'console_scripts': [
+            'battery_controller = surveillance_controllers.battery_controller_node:main',
+            'planner_controller = surveillance_controllers.planner_controller_node:main',
+            'motion_controller = surveillance_controllers.motion_controller_node:main',
+            'console = surveillance_controllers.console_node:main',
+        ],
     },
 )

@@ -1,12 +1,13 @@
 """A battery as the simulated robot has it: what drains it, and how it charges at the station.
 
-The charge is an energy in watt hours. Standing costs power over time; a metre driven and a radian turned cost
-energy each, whatever the speed, which is what rolling resistance does; the arm and the camera cost power while
-they are in use.
+The charge is an energy in watt hours. Standing costs power over time; a metre driven and a radian
+turned cost energy each, whatever the speed, which is what rolling resistance does; the arm and the
+camera cost power while they are in use.
 
-Charging follows the usual constant-current, constant-voltage course of a lithium-ion cell: constant power up to
-`taper_from`, then a power that falls in proportion to what is missing, down to `taper_floor` of the full power, so
-that the charge ends in a finite time. Both parts have a closed form, so a step may be of any length.
+Charging follows the usual constant-current, constant-voltage course of a lithium-ion cell:
+constant power up to `taper_from`, then a power that falls in proportion to what is missing, down
+to `taper_floor` of the full power, so that the charge ends in a finite time. Both parts have a
+closed form, so a step may be of any length.
 """
 
 from __future__ import annotations
@@ -61,7 +62,8 @@ class BatteryParameters:
             raise ValueError(f'taper_floor is {self.taper_floor!r}: expected above 0, at most 1')
         if not self.full_voltage > self.empty_voltage:
             raise ValueError(
-                f'full_voltage is {self.full_voltage!r}: expected above empty_voltage {self.empty_voltage!r}'
+                f'full_voltage is {self.full_voltage!r}: '
+                f'expected above empty_voltage {self.empty_voltage!r}'
             )
 
 
@@ -90,7 +92,8 @@ class Battery:
 
     @property
     def percent(self) -> int:
-        """The charge in whole percent, rounded down: 0 only means empty within the last percent, 100 only full."""
+        """The charge in whole percent, rounded down: 0 only means empty within the last percent,
+        100 only full."""
         return math.floor(self.level + 1e-9)
 
     @property
@@ -127,7 +130,7 @@ class Battery:
         if min(seconds, metres, radians, equipment_seconds) < 0:
             raise ValueError(
                 'a negative amount drawn: expected time, way and angle of 0 or more, got '
-                f'{seconds!r} s, {metres!r} m, {radians!r} rad, {equipment_seconds!r} s of equipment'
+                f'{seconds} s, {metres} m, {radians} rad, {equipment_seconds} s of equipment'
             )
         p = self.parameters
         joules = (
@@ -177,7 +180,8 @@ class Battery:
         self.energy = min(self.energy, p.capacity)
 
     def seconds_to_charge(self, level: float = 100.0) -> float:
-        """How long charging to `level` percent takes from the present charge, s; 0 when it is reached."""
+        """How long charging to `level` percent takes from the present charge, s; 0 when it is
+        reached."""
         p = self.parameters
         wanted = p.capacity * min(level, 100.0) / 100.0
         energy, hours = self.energy, 0.0

@@ -1,11 +1,12 @@
 """The language of the operator's consoles: which commands exist, and how a typed line is read.
 
-A console speaks a `Grammar`: a list of `Command`, each a few fixed words followed by typed arguments.
-`Grammar.parse` turns one line into a `ParsedCommand` or raises `CommandError`, whose text names the word that
-was wrong and what was expected in its place. The same grammar answers `help` and proposes completions.
+A console speaks a `Grammar`: a list of `Command`, each a few fixed words followed by typed
+arguments. `Grammar.parse` turns one line into a `ParsedCommand` or raises `CommandError`, whose
+text names the word that was wrong and what was expected in its place. The same grammar answers
+`help` and proposes completions.
 
-The commands of the three controllers are defined here, in `BATTERY`, `PLANNER` and `MOTION`, so that each
-controller's own console and the one console for all of them cannot drift apart.
+The commands of the three controllers are defined here, in `BATTERY`, `PLANNER` and `MOTION`, so
+that each controller's own console and the one console for all of them cannot drift apart.
 """
 
 from __future__ import annotations
@@ -19,7 +20,8 @@ Point3 = tuple[float, float, float]
 """x, y, z in metres, world frame."""
 
 LONGEST_LINE = 20_000
-"""A line beyond this many characters is refused unread; 20,000 hold a plan of about a thousand points."""
+"""A line beyond this many characters is refused unread; 20,000 hold a plan of about a thousand
+points."""
 
 
 class CommandError(ValueError):
@@ -174,7 +176,7 @@ PLAN_SET = Command(
 MOVE = Command(
     ('move',),
     (number('TIME', 0, 86_400, 'seconds'), number('DELTA', -1000, 1000, 'metres')),
-    'Carry out the waiting request in TIME seconds and stop at most DELTA metres off the goal on each axis.',
+    'Carry out the waiting request in TIME s; stop at most DELTA m off the goal on each axis.',
 )
 BATTERY = (BATTERY_SET, BATTERY_OFFSET)
 PLANNER = (PLAN_SET,)
@@ -217,12 +219,16 @@ class Grammar:
                 if len(command.words) > depth and command.words[depth] == given
             )
             if not fitting:
-                expected = _alternatives([c.words[depth] for c in candidates if len(c.words) > depth])
+                expected = _alternatives(
+                    [c.words[depth] for c in candidates if len(c.words) > depth]
+                )
                 before = ' '.join(words[:depth])
                 where = f' after {before!r}' if before else ''
                 if not given:
                     raise CommandError(f'the line ends{where}: expected {expected}')
-                raise CommandError(f'{_shown(words[depth])}{where} is no command: expected {expected}')
+                raise CommandError(
+                    f'{_shown(words[depth])}{where} is no command: expected {expected}'
+                )
             candidates = fitting
             if len(candidates) == 1 and len(candidates[0].words) == depth + 1:
                 break
@@ -234,7 +240,8 @@ class Grammar:
         return '\n'.join(f'  {c.usage:<{width}}  {c.description}' for c in self.commands)
 
     def completions(self, text: str) -> list[str]:
-        """The words that can stand where the last word of `text` is being typed, in alphabetical order."""
+        """The words that can stand where the last word of `text` is being typed, in alphabetical
+        order."""
         words = text.lower().split()
         if not text or text[-1].isspace():
             words.append('')

@@ -40,7 +40,8 @@ def point_at(path: ArrayLike, distance: ArrayLike) -> Points:
     if len(points) == 0:
         raise ValueError('a path with no points')
     along = distances_along(points)
-    return np.stack([np.interp(distance, along, axis) for axis in points.T], axis=-1)
+    where = np.asarray(distance, dtype=float)
+    return np.stack([np.interp(where, along, axis) for axis in points.T], axis=-1)
 
 
 def equally_spaced(path: ArrayLike, spacing: float) -> Points:
@@ -48,8 +49,8 @@ def equally_spaced(path: ArrayLike, spacing: float) -> Points:
 
     Args:
         path: At least one point, shape (n, d).
-        spacing: The wanted distance, metres, above 0. The distance taken is the largest one not above it
-            that divides the path's length.
+        spacing: The wanted distance, metres, above 0. The distance taken is the largest one not
+            above it that divides the path's length.
 
     Returns:
         At least two points (the two ends), unless the path has no length: then one.

@@ -1,7 +1,8 @@
-"""What the controllers do in RANDOM mode: the stimuli that stand in for hardware, drawn from a seeded generator.
+"""What the controllers do in RANDOM mode: the stimuli that stand in for hardware, drawn from a
+seeded generator.
 
-Each generator is a plain function of a `random.Random`, so that a run with the same `random_seed` takes the
-same course.
+Each generator is a plain function of a `random.Random`, so that a run with the same `random_seed`
+takes the same course.
 """
 
 from __future__ import annotations
@@ -24,7 +25,8 @@ GOAL_ERROR = 0.2
 
 
 def generator(seed: int) -> random.Random:
-    """A generator for a node's `random_seed`: repeatable, or seeded by the system when `seed` is negative."""
+    """A generator for a node's `random_seed`: repeatable, or seeded by the system when `seed` is
+    negative."""
     return random.Random(seed if seed >= 0 else None)
 
 

@@ -51,7 +51,9 @@ def test_a_battery_never_gives_more_than_it_holds(
 
 @given(level=LEVELS, first=TIMES, second=TIMES)
 @settings(max_examples=60, deadline=None)
-def test_charging_in_two_steps_is_charging_in_one(level: float, first: float, second: float) -> None:
+def test_charging_in_two_steps_is_charging_in_one(
+    level: float, first: float, second: float
+) -> None:
     twice, once = Battery(BatteryParameters(), level), Battery(BatteryParameters(), level)
     twice.charge(first)
     twice.charge(second)

@@ -1,0 +1,167 @@
+"""The node `battery_controller`: says how full the battery is, and charges it.
+
+Publishes `battery_level` (percent) and `state/battery_low`, and serves `recharge`. Where the level
+comes from is the execution mode's matter: the operator (MANUAL), chance (RANDOM), or a model of the
+battery that watches the robot move and charges at the station only (SIMULATED).
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any, TextIO
+
+from geometry_msgs.msg import PoseWithCovarianceStamped
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.task import Future
+from sensor_msgs.msg import BatteryState, JointState
+from std_msgs.msg import Bool, UInt8
+from std_srvs.srv import Empty
+
+from surveillance_controllers import conversions, stimuli
+from surveillance_controllers.battery_model import Battery
+from surveillance_controllers.battery_use import BatteryInUse
+from surveillance_controllers.console_commands import BATTERY, BATTERY_SET, ParsedCommand
+from surveillance_controllers.controller_parameters import battery_settings, execution_mode
+from surveillance_controllers.operator_console import OperatorConsole
+from surveillance_controllers.progress_display import charge_display
+from surveillance_runtime.node import PatrolNode, run_node
+from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
+from surveillance_runtime.waiting import ClockWait
+
+RECHARGE_STEPS = 50
+"""Steps in which `recharge` fills an empty battery in MANUAL and RANDOM."""
+
+
+class BatteryController(PatrolNode):
+    """The robot's battery, as its execution mode has it.
+
+    Args:
+        console_source: Where the operator's lines come from; standard input unless given.
+    """
+
+    def __init__(self, console_source: TextIO | None = None, **node_options: Any) -> None:
+        super().__init__('battery_controller', **node_options)
+        self._mode = execution_mode(self)
+        self._settings = battery_settings(self, self._set_low_below)
+        self._low_below = self._settings.require_recharge
+        self._battery = Battery(self._settings.model, self._settings.initial_value)
+        self._wait = ClockWait(self)
+        self._lock = threading.RLock()
+        self._said: tuple[int, bool] | None = None
+        self._level_topic = self.create_publisher(UInt8, 'battery_level', STATE_QOS)
+        self._low_topic = self.create_publisher(Bool, 'state/battery_low', STATE_QOS)
+        self._recharging: list[Future] = []
+        group = ReentrantCallbackGroup()
+        self.create_service(Empty, 'recharge', self._on_recharge, callback_group=group)
+        self._console = OperatorConsole(self, BATTERY, self._carry_out, self._status)
+        self._change(lambda: None)
+        self.get_logger().info(f'{self._mode} mode, battery at {self._battery.percent} %')
+        if self._mode == 'MANUAL' and self._settings.console:
+            self._console.open(console_source)
+        elif self._mode == 'RANDOM':
+            self.spawn(self._switch_at_random)
+        elif self._mode == 'SIMULATED':
+            self._start_simulation()
+
+    def _change(self, change: Callable[[], None]) -> None:
+        """Changes the charge and publishes what became different."""
+        with self._lock:
+            change()
+            said = self._battery.percent, self._battery.level < self._low_below
+            before, self._said = self._said, said
+            if before is None or said[0] != before[0]:
+                self._level_topic.publish(UInt8(data=said[0]))
+            if before is None or said[1] != before[1]:
+                self._low_topic.publish(Bool(data=said[1]))
+                word = 'low' if said[1] else 'not low'
+                self.get_logger().info(f'battery {word}: {said[0]} % (low below {self._low_below})')
+
+    def _set_low_below(self, percent: int) -> None:
+        self._low_below = percent
+        self._change(lambda: None)
+
+    def _set_level(self, level: float) -> None:
+        self._change(partial(self._battery.set_level, level))
+
+    def _carry_out(self, command: ParsedCommand) -> str:
+        (value,) = command.values
+        assert isinstance(value, int)
+        with self._lock:
+            base = 0.0 if command.name == BATTERY_SET.name else self._battery.level
+            self._set_level(base + value)
+        return self._status()
+
+    def _status(self) -> str:
+        return f'The battery is at {self._battery.percent} %.'
+
+    def _switch_at_random(self) -> None:
+        draw = stimuli.generator(self._settings.random_seed)
+        while self._wait.sleep(draw.uniform(*self._settings.random_battery_time), self.stopping):
+            self._set_level(100.0 if self._battery.percent == 0 else 0.0)
+
+    def _start_simulation(self) -> None:
+        s = self._settings
+        self._use = BatteryInUse(self._battery, s.station, s.dock_reach, self._wait.now())
+        self._state_topic = self.create_publisher(BatteryState, 'battery_state', STATE_QOS)
+        self.create_subscription(PoseWithCovarianceStamped, 'amcl_pose', self._on_pose, STATE_QOS)
+        self.create_subscription(JointState, 'joint_states', self._on_joints, SENSOR_QOS)
+        self.create_timer(s.update_period, self._update)
+
+    def _on_pose(self, message: PoseWithCovarianceStamped) -> None:
+        self._use.see_pose(conversions.pose_from(message.pose.pose), self._wait.now())
+
+    def _on_joints(self, message: JointState) -> None:
+        self._use.see_joints(message.position)
+
+    def _update(self) -> None:
+        self._change(partial(self._use.advance, self._wait.now()))
+        state = conversions.battery_state(self._battery, charging=self._use.docked)
+        state.header.stamp = self.get_clock().now().to_msg()
+        self._state_topic.publish(state)
+
+    async def _on_recharge(self, _request: Any, response: Any) -> Any:
+        done = Future()
+        with self._lock:
+            self._recharging.append(done)
+            first = len(self._recharging) == 1
+        if first:
+            self.spawn(self._recharge)
+        await done
+        return response
+
+    def _recharge(self) -> None:
+        charge = self._await_full if self._mode == 'SIMULATED' else self._fill
+        try:
+            with charge_display(self._battery.level, bar=not self._console.has_terminal) as show:
+                charge(show)
+        finally:
+            with self._lock:
+                clients, self._recharging = self._recharging, []
+            for done in clients:
+                done.set_result(None)
+            # A future that is set from another thread does not wake the executor.
+            self.executor.wake()
+
+    def _fill(self, show: Callable[[float], None]) -> None:
+        pause = self._settings.recharge_seconds / RECHARGE_STEPS
+        while self._battery.level < 100.0 and self._wait.sleep(pause, self.stopping):
+            with self._lock:
+                self._set_level(self._battery.level + 100.0 / RECHARGE_STEPS)
+            show(self._battery.level)
+
+    def _await_full(self, show: Callable[[float], None]) -> None:
+        while self._battery.level < 100.0:
+            problem = self._use.why_not_charging()
+            if problem is not None:
+                self.get_logger().warn(f'recharge: {problem}; it is at {self._battery.percent} %')
+                return
+            if not self._wait.sleep(self._settings.update_period, self.stopping):
+                return
+            show(self._battery.level)
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Runs the node until it is stopped."""
+    return run_node(BatteryController, args)

@@ -1,0 +1,176 @@
+"""The parameters of the controllers, declared with their descriptions and checked in one place."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields
+
+from surveillance_controllers.battery_model import BatteryParameters
+from surveillance_controllers.battery_use import Pose
+from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.parameters import ParameterError
+
+EXECUTION_MODES = ('MANUAL', 'RANDOM', 'SIMULATED')
+
+_BATTERY_MODEL = {
+    'capacity': 'Energy of a full battery, Wh.',
+    'rest_power': 'Drawn all the time, W.',
+    'joules_per_metre': 'Drawn by driving, J/m.',
+    'joules_per_radian': 'Drawn by turning, J/rad.',
+    'equipment_power': 'Drawn by arm and camera while the arm moves, W.',
+    'charging_power': 'Given by the station while the battery is below taper_from, W.',
+    'taper_from': 'State of charge from which charging slows down, between 0 and 1.',
+    'taper_floor': 'Least charging power as a part of charging_power.',
+    'empty_voltage': 'Voltage of an empty battery, V.',
+    'full_voltage': 'Voltage of a full battery, V.',
+}
+
+
+def execution_mode(node: PatrolNode) -> str:
+    """Declares `execution_mode`."""
+    mode: str = node.parameter(
+        'execution_mode',
+        'RANDOM',
+        'Where the node takes its actions from: the operator, chance, or the simulated robot.',
+        choices=EXECUTION_MODES,
+        read_only=True,
+    )
+    return mode
+
+
+def random_seed(node: PatrolNode) -> int:
+    """Declares `random_seed`."""
+    seed: int = node.parameter(
+        'random_seed',
+        -1,
+        'Makes a RANDOM run repeatable; -1 takes another course each time.',
+        minimum=-1,
+        read_only=True,
+    )
+    return seed
+
+
+def reads_console(node: PatrolNode) -> bool:
+    """Declares `console`."""
+    reads: bool = node.parameter(
+        'console',
+        True,
+        'In MANUAL mode, read commands from standard input; they always come by ~/command too.',
+        read_only=True,
+    )
+    return reads
+
+
+def _interval(values: Sequence[float]) -> str | None:
+    good = len(values) == 2 and 0 < values[0] <= values[1]
+    return None if good else 'two numbers above 0, the shortest and the longest time'
+
+
+def _pose(values: Sequence[float]) -> str | None:
+    return None if len(values) == 3 else 'three numbers: x, y, yaw'
+
+
+@dataclass(frozen=True)
+class BatterySettings:
+    """What `battery_controller` is told by its parameters; units as declared."""
+
+    initial_value: int
+    require_recharge: int
+    model: BatteryParameters
+    random_seed: int
+    random_battery_time: tuple[float, float]
+    recharge_seconds: float
+    station: Pose
+    dock_reach: float
+    update_period: float
+    console: bool
+
+
+def battery_settings(
+    node: PatrolNode, on_require_recharge: Callable[[int], None]
+) -> BatterySettings:
+    """Declares the parameters of `battery_controller`.
+
+    Args:
+        node: The node.
+        on_require_recharge: Told when `battery_require_recharge` is set at run time.
+
+    Raises:
+        ParameterError: A value is of the wrong type or out of range.
+    """
+    defaults = BatteryParameters()
+    model = {
+        field.name: node.parameter(
+            f'battery.{field.name}',
+            getattr(defaults, field.name),
+            'SIMULATED: ' + _BATTERY_MODEL[field.name],
+            minimum=0.0,
+            read_only=True,
+        )
+        for field in fields(defaults)
+    }
+    try:
+        parameters = BatteryParameters(**model)
+    except ValueError as error:
+        raise ParameterError(f'parameter battery.{error}') from None
+    interval = node.parameter(
+        'random_battery_time',
+        [10.0, 15.0],
+        'RANDOM: shortest and longest time between two changes of the battery, s.',
+        check=_interval,
+        read_only=True,
+    )
+    station = node.parameter(
+        'station',
+        [0.0, 0.0, 0.0],
+        'Where the charging station is: x, y in metres, yaw in radians, world frame.',
+        check=_pose,
+        read_only=True,
+    )
+    return BatterySettings(
+        initial_value=node.parameter(
+            'battery_initial_value',
+            100,
+            'Charge at the start, percent.',
+            minimum=0,
+            maximum=100,
+            read_only=True,
+        ),
+        require_recharge=node.parameter(
+            'battery_require_recharge',
+            20,
+            'Below this charge the battery counts as low, percent.',
+            minimum=0,
+            maximum=100,
+            on_change=on_require_recharge,
+        ),
+        model=parameters,
+        random_seed=random_seed(node),
+        random_battery_time=(interval[0], interval[1]),
+        recharge_seconds=node.parameter(
+            'recharge_seconds',
+            6.0,
+            'MANUAL and RANDOM: time in which recharge fills an empty battery, s.',
+            minimum=0.0,
+            maximum=86_400.0,
+            read_only=True,
+        ),
+        station=(station[0], station[1], station[2]),
+        dock_reach=node.parameter(
+            'dock_reach',
+            0.5,
+            'SIMULATED: the robot charges within this distance of the station, m.',
+            minimum=0.0,
+            maximum=100.0,
+            read_only=True,
+        ),
+        update_period=node.parameter(
+            'battery_update_period',
+            1.0,
+            'SIMULATED: time between two steps of the battery model, s.',
+            minimum=0.01,
+            maximum=60.0,
+            read_only=True,
+        ),
+        console=reads_console(node),
+    )
