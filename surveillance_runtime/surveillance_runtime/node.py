@@ -8,6 +8,7 @@ messages still flow (a running goal can be cancelled), and only then takes ROS d
 
 from __future__ import annotations
 
+import itertools
 import signal
 import sys
 import threading
@@ -175,6 +176,10 @@ class PatrolNode(Node):  # type: ignore[misc]
             self.get_logger().fatal(reason)
             self.failed.set()
 
+    def finish(self) -> None:
+        """End the node's process as wanted, as SIGTERM does: the exit code is 0."""
+        self.failed.set()
+
     def on_stop(self) -> None:
         """Called once when the node stops, while messages still flow."""
 
@@ -320,7 +325,7 @@ def _check_parameter_files(argv: Sequence[str]) -> None:
     Raises:
         StartError: A file is missing or is not YAML.
     """
-    for option, path in zip(argv, argv[1:], strict=False):
+    for option, path in itertools.pairwise(argv):
         if option != '--params-file':
             continue
         try:
