@@ -9,6 +9,7 @@ simulated time.
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Callable
@@ -27,6 +28,13 @@ from surveillance_runtime.waiting import Interrupt
 
 DISCOVERY_PERIOD = 0.02
 """Seconds between two looks for a server; rclpy offers no event for its appearance."""
+
+
+PROBE_PERIOD = 0.5
+"""Seconds between two questions to a server that came or went while a goal runs."""
+
+DOUBT_SECONDS = 5.0
+"""How long such a server is asked: its services are discovered one by one."""
 
 
 class CallFailed(Exception):
@@ -160,7 +168,7 @@ class GoalCaller:
         self._client = ActionClient(node, action_type, name, callback_group=group)
         self._action_type = action_type
         self._cancel_timeout = cancel_timeout
-        self._servers_changed: Callable[[], None] | None = None
+        self._watch: _ServerWatch | None = None
         self._probe = node.create_client(
             action_type.Impl.GetResultService, f'{name}/_action/get_result', callback_group=group
         )
@@ -223,19 +231,18 @@ class GoalCaller:
         if not handle.accepted:
             return GoalEnd('rejected', None)
         wake = Interrupt()
-        lost = threading.Event()
-        self._servers_changed = lambda: self._ask_for(handle, lost, wake)
         ended = handle.get_result_async()
         ended.add_done_callback(lambda _future: wake.set())
         remove = interrupt.subscribe(wake.set) if interrupt is not None else None
+        watch = self._watch = _ServerWatch(wake)
         try:
-            wake.wait(result_timeout)
+            lost = self._wait_for_end(handle, ended, watch, result_timeout, interrupt)
         finally:
-            self._servers_changed = None
+            self._watch = None
             if remove is not None:
                 remove()
         if not ended.done():
-            if lost.is_set():
+            if lost:
                 raise Unavailable(f'{what}: the server went away before the goal ended')
             self._cancel(handle, ended)
             if interrupt is not None and interrupt.is_set():
@@ -252,30 +259,59 @@ class GoalCaller:
         handle.cancel_goal_async()
         done.wait(self._cancel_timeout)
 
-    def _on_matched(self, _info: Any) -> None:
-        changed = self._servers_changed
-        if changed is not None:
-            changed()
+    def _on_matched(self, info: Any) -> None:
+        watch = self._watch
+        if watch is not None:
+            watch.servers = info.current_count
+            watch.doubt_until = time.monotonic() + DOUBT_SECONDS
+            watch.wake.set()
 
-    def _ask_for(self, handle: Any, lost: threading.Event, wake: Interrupt) -> None:
-        """Ask whether a server is there that knows the goal; runs in the executor's thread."""
+    def _wait_for_end(
+        self,
+        handle: Any,
+        ended: Future,
+        watch: _ServerWatch,
+        result_timeout: float | None,
+        interrupt: Interrupt | None,
+    ) -> bool:
+        """Wait for the goal's end, its deadline or the interrupt; True when the server is lost."""
+        deadline = math.inf if result_timeout is None else time.monotonic() + result_timeout
+        while not ended.done() and not (interrupt is not None and interrupt.is_set()):
+            now = time.monotonic()
+            if watch.servers == 0 or watch.forgotten:
+                return True
+            if now >= deadline:
+                break
+            in_doubt = now < watch.doubt_until
+            if in_doubt:
+                self._ask_for(handle, watch)
+            limit = min(deadline, now + PROBE_PERIOD if in_doubt else math.inf)
+            watch.wake.wait(None if limit == math.inf else limit - now)
+            watch.wake.clear()
+        return False
 
-        def give_up() -> None:
-            lost.set()
-            wake.set()
-
-        if not self._probe.service_is_ready():
-            give_up()
-            return
+    def _ask_for(self, handle: Any, watch: _ServerWatch) -> None:
+        """Ask for the goal's result once more: a server that does not know it says so at once."""
         request = self._action_type.Impl.GetResultService.Request()
         request.goal_id = handle.goal_id
 
         def answered(future: Future) -> None:
             response = future.result()
             if response is not None and response.status == GoalStatus.STATUS_UNKNOWN:
-                give_up()
+                watch.forgotten = True
+                watch.wake.set()
 
         self._probe.call_async(request).add_done_callback(answered)
+
+
+class _ServerWatch:
+    """What is known of the server while a goal runs; `wake` is raised on each change."""
+
+    def __init__(self, wake: Interrupt) -> None:
+        self.wake = wake
+        self.servers: int | None = None
+        self.doubt_until = 0.0
+        self.forgotten = False
 
 
 def _cancel_when_accepted(sent: Future) -> None:

@@ -26,7 +26,7 @@ def in_thread(work):
         except Exception as error:
             outcome.append((None, error))
 
-    thread = threading.Thread(target=body)
+    thread = threading.Thread(target=body, daemon=True)
     thread.start()
 
     def end():
@@ -56,8 +56,8 @@ def test_service_call_brings_the_answer(graph, server):
 
 
 def test_service_call_ends_without_a_server(graph):
-    with pytest.raises(Unavailable, match='service ask: no server'):
-        ServiceCaller(graph.node, Trigger, 'ask').call(Trigger.Request(), timeout=0.05)
+    with pytest.raises(Unavailable, match='service nowhere: no server'):
+        ServiceCaller(graph.node, Trigger, 'nowhere').call(Trigger.Request(), timeout=0.05)
 
 
 def test_service_call_ends_by_interrupt_and_by_deadline(graph, server):
@@ -217,8 +217,8 @@ def test_server_that_goes_away_in_the_middle_is_noticed(graph, server):
 
 
 def test_no_action_server(graph):
-    with pytest.raises(Unavailable, match='action follow_path: no server'):
-        GoalCaller(graph.node, FollowPath, 'follow_path').run(follow(1), accept_timeout=0.05)
+    with pytest.raises(Unavailable, match='action nowhere: no server'):
+        GoalCaller(graph.node, FollowPath, 'nowhere').run(follow(1), accept_timeout=0.05)
 
 
 def test_clock_wait_follows_simulated_time(graph):
