@@ -1,0 +1,12 @@
+#!/usr/bin/env python3
+"""Sets the project up and runs it; see `python3 launch.py --help`."""
+
+import sys
+
+if sys.version_info < (3, 11):  # noqa: UP036 - an older Python is told, not met with a traceback
+    sys.exit('launch.py: Python 3.11, 3.12 or 3.13 is needed, this is ' + sys.version.split()[0])
+
+from launcher.commands import main
+
+if __name__ == '__main__':
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,45 @@
+"""What a supervised process runs: one node, or several on one executor.
+
+    python child.py PARENT_PID TARGET[,TARGET...] [ROS arguments]
+
+with TARGET as `name=module:Class`. Started as a file, so it imports nothing of the launcher.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import importlib
+import os
+import signal
+import sys
+
+PR_SET_PDEATHSIG = 1  # linux/prctl.h
+
+
+def end_with_parent(parent: int) -> None:
+    """Has the kernel end this process when its launcher dies, however that happens."""
+    if sys.platform == 'linux' and parent:
+        ctypes.CDLL(None, use_errno=True).prctl(PR_SET_PDEATHSIG, signal.SIGTERM, 0, 0, 0)
+        if os.getppid() != parent:  # it died before the call
+            sys.exit(1)
+
+
+def main(argv: list[str]) -> int:
+    parent, targets, *arguments = argv
+    end_with_parent(int(parent))
+    parsed = []
+    for target in targets.split(','):
+        name, _, place = target.partition('=')
+        module, _, class_name = place.partition(':')
+        parsed.append((name, module, class_name))
+    sys.argv = [parsed[0][0], *arguments]
+    if len(parsed) == 1:
+        return int(importlib.import_module(parsed[0][1]).main(arguments) or 0)
+    from surveillance_runtime.node import run_nodes
+
+    classes = [getattr(importlib.import_module(module), name) for _, module, name in parsed]
+    return run_nodes(classes, arguments)
+
+
+if __name__ == '__main__':
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,267 @@
+"""The command line of `launch.py`."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import signal
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import NoReturn
+
+from launcher import graph, system
+from launcher.environment import CHECKOUT, Environment, SetupError, clean_environ
+
+EXIT_BAD_INPUT = 2
+EXIT_INTERRUPTED = 130
+
+# Commands that belong to a package: module and function, which takes the arguments and returns
+# the exit code.
+PACKAGE_COMMANDS = {
+    'map': ('surveillance_simulation.map_command', 'check a place and draw it as a picture'),
+    'detect': ('surveillance_perception.detect_command', 'find markers in pictures'),
+    'check-behaviour': (
+        'surveillance_behaviour.check_command',
+        'check the state machines and draw them',
+    ),
+}
+
+_DESCRIPTION = """\
+Sets the project up when that is needed, then runs it. Without a command: every node as its own
+process, patrolling until Ctrl-C."""
+_EXAMPLES = """\
+commands (each has its own --help):
+  run                       the default
+  node NAME [ROS args]      one node by itself in this terminal
+  list                      the nodes
+  setup                     only the set-up
+  test [pytest args]        the test suite
+  lint                      formatting, lint and type checks
+"""
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser whose errors are one line, like those of all the rest."""
+
+    def error(self, message: str) -> NoReturn:
+        raise ValueError(f'{message} (see {self.prog} --help)')
+
+
+def _names(text: str) -> list[str]:
+    return [name for name in text.replace(' ', '').split(',') if name]
+
+
+def _seconds(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 0.0 < value < 1e9:
+        raise argparse.ArgumentTypeError(f'{text!r} is not a positive number of seconds')
+    return value
+
+
+def _shared_options() -> argparse.ArgumentParser:
+    """Options of `run` and of `node`."""
+    parser = Parser(add_help=False)
+    parser.add_argument('--map', type=Path, metavar='FILE', help='the place, a file of config/')
+    parser.add_argument('--params', type=Path, metavar='FILE', help='further node parameters')
+    parser.add_argument(
+        '--log-level', choices=('debug', 'info', 'warn', 'error', 'fatal'), type=str.lower
+    )
+    parser.add_argument('--namespace', metavar='NAME', help='of all nodes, for a second robot')
+    parser.add_argument('--domain', type=int, metavar='N', help='ROS domain, 0 to 101')
+    parser.add_argument('--behaviour', choices=graph.BEHAVIOURS, default='surveillance')
+    return parser
+
+
+def make_parser() -> argparse.ArgumentParser:
+    """The parser of the whole command line."""
+    package_lines = ''.join(
+        f'  {name:<25} {purpose}\n' for name, (_, purpose) in PACKAGE_COMMANDS.items()
+    )
+    parser = Parser(
+        prog='launch.py',
+        description=_DESCRIPTION,
+        epilog=_EXAMPLES + package_lines,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        parents=[_shared_options()],
+    )
+    parser.add_argument(
+        '--mode',
+        choices=graph.MODES,
+        type=str.upper,
+        help=f'how the controllers work (default {graph.DEFAULT_MODE})',
+    )
+    parser.add_argument('--for', dest='seconds', type=_seconds, metavar='SECONDS')
+    parser.add_argument('--composed', action='store_true', help='all nodes in one process')
+    parser.add_argument(
+        '--only', type=_names, default=[], metavar='NODE,...', help='start these nodes alone'
+    )
+    parser.add_argument(
+        '--without', type=_names, default=[], metavar='NODE,...', help='these run elsewhere'
+    )
+    return parser
+
+
+def main(argv: Sequence[str]) -> int:
+    """Runs one command and returns its exit code."""
+    try:
+        return _dispatch(list(argv))
+    except (system.MissingError, SetupError, ValueError) as error:
+        print(f'launch.py: {error}', file=sys.stderr)
+        return EXIT_BAD_INPUT
+    except KeyboardInterrupt:
+        print('\nlaunch.py: interrupted; the next start goes on from here', file=sys.stderr)
+        return EXIT_INTERRUPTED
+
+
+def _dispatch(argv: list[str]) -> int:
+    commands: dict[str, Callable[[list[str]], int]] = {
+        'run': _run,
+        'node': _node,
+        'list': _list,
+        'setup': _setup,
+        'test': _test,
+        'lint': _lint,
+    }
+    if argv and argv[0] in commands:
+        return commands[argv[0]](argv[1:])
+    if argv and argv[0] in PACKAGE_COMMANDS:
+        return _package_command(argv[0], argv[1:])
+    if argv and not argv[0].startswith('-'):
+        known = ', '.join((*commands, *PACKAGE_COMMANDS))
+        raise ValueError(f'unknown command {argv[0]!r}: expected one of {known}')
+    return _run(argv)
+
+
+def _run(argv: list[str]) -> int:
+    options = make_parser().parse_args(argv)
+    graph.select('RANDOM', only=options.only, without=options.without)
+    _enter(['run', *argv])
+    from launcher.mission import Run, run_mission
+
+    # From here on the supervisor takes signals; one that comes after its end changes nothing.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    return run_mission(
+        CHECKOUT,
+        Run(
+            mode=options.mode,
+            behaviour=options.behaviour,
+            place=options.map,
+            parameters=options.params,
+            composed=options.composed,
+            only=options.only,
+            without=options.without,
+            log_level=options.log_level,
+            namespace=options.namespace,
+            domain=options.domain,
+            seconds=options.seconds,
+        ),
+    )
+
+
+def _node(argv: list[str]) -> int:
+    parser = Parser(
+        prog='launch.py node',
+        description='Runs one node in this terminal, with the parameters of config/.',
+        parents=[_shared_options()],
+    )
+    parser.add_argument('name', metavar='NAME', help='see launch.py list')
+    parser.add_argument('rest', nargs=argparse.REMAINDER, metavar='ROS arguments')
+    options = parser.parse_args(argv)
+    node = graph.find(options.name)
+    _enter(['node', *argv])
+    from launcher.mission import Run, command, node_environ, parameter_files, ros_arguments
+
+    run = Run(
+        behaviour=options.behaviour,
+        place=options.map,
+        parameters=options.params,
+        log_level=options.log_level,
+        namespace=options.namespace,
+        domain=options.domain,
+    )
+    run.check()
+    arguments = [*ros_arguments(parameter_files(CHECKOUT, run), run), '--', *options.rest]
+    words = command([node], arguments, 0)
+    os.execve(words[0], words, node_environ(run))
+
+
+def _list(argv: list[str]) -> int:
+    Parser(prog='launch.py list', description='Names the nodes.').parse_args(argv)
+    width = max(len(node.name) for node in graph.NODES)
+    for package in dict.fromkeys(node.package for node in graph.NODES):
+        print(package)
+        for node in graph.NODES:
+            if node.package == package:
+                print(f'  {node.name:<{width}}  {node.purpose}')
+    return 0
+
+
+def _setup(argv: list[str]) -> int:
+    Parser(prog='launch.py setup', description='Only the set-up.').parse_args(argv)
+    environment = _environment(())
+    if environment is not None:
+        environment.prepare()
+        print(f'ready: {environment.python}')
+    return 0
+
+
+def _test(argv: list[str]) -> int:
+    _enter(['test', *argv])
+    spread = any(a.startswith(('-n', '--numprocesses', '--pdb', '-p')) for a in argv)
+    _exec(['-m', 'pytest', *([] if spread else ['-n', '2']), *argv])
+    return 0
+
+
+def _lint(argv: list[str]) -> int:
+    Parser(prog='launch.py lint', description='Ruff and mypy.').parse_args(argv)
+    _enter(['lint'], extras=('lint',))
+    import subprocess
+
+    code = 0
+    for words in (['ruff', 'check'], ['ruff', 'format', '--check'], ['mypy']):
+        print('+', *words, flush=True)
+        done = subprocess.run([sys.executable, '-m', *words], cwd=CHECKOUT, check=False)
+        code = code or done.returncode
+    return code
+
+
+def _package_command(name: str, argv: list[str]) -> int:
+    _enter([name, *argv])
+    import importlib
+
+    module = importlib.import_module(PACKAGE_COMMANDS[name][0])
+    return int(module.main(argv) or 0)
+
+
+def _environment(extras: Sequence[str]) -> Environment | None:
+    """The environment to run in; None where an installed ROS with this workspace is active."""
+    if system.sourced_ros():
+        if system.sourced_workspace():
+            return None
+        raise system.MissingError(
+            'ROS 2 Jazzy is active in this shell, but this workspace is not built. Build it:\n'
+            f'{system.colcon_advice(CHECKOUT)}\nor use a shell without ROS.'
+        )
+    return Environment(CHECKOUT, ('test', *extras))
+
+
+def _enter(argv: list[str], extras: Sequence[str] = ()) -> None:
+    """Goes on in the project's environment: sets it up, then becomes a process of it."""
+    environment = _environment(extras)
+    if environment is None:
+        return
+    environment.prepare()
+    if not environment.active():
+        words = [str(environment.python), str(CHECKOUT / 'launch.py'), *argv]
+        os.execve(words[0], words, clean_environ())
+
+
+def _exec(words: list[str]) -> None:
+    """Becomes another program of this environment, in the checkout."""
+    os.chdir(CHECKOUT)
+    sys.stdout.flush()
+    os.execv(sys.executable, [sys.executable, *words])

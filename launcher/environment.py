@@ -1,0 +1,269 @@
+"""The virtual environment of the checkout: made, finished after a cut-off, kept up to date.
+
+A set-up has three steps: the environment itself, the Python packages, the compiled interfaces. A
+journal in the environment says which are complete, so that the next run does only what is left.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import selectors
+import subprocess
+import sys
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from launcher import system
+from launcher.fingerprint import INTERFACES, Journal, current, requirements
+from launcher.progress import Step
+
+CHECKOUT = Path(__file__).resolve().parent.parent
+PACKAGES = (
+    'surveillance_runtime',
+    'surveillance_ontology',
+    'surveillance_behaviour',
+    'surveillance_controllers',
+    'surveillance_perception',
+    'surveillance_simulation',
+)
+VENV_STEP = 'virtual environment in .venv'
+PACKAGES_STEP = 'Python packages, ROS 2 Jazzy among them'
+INTERFACES_STEP = 'messages, services and actions'
+PATH_FILE = 'surveillance_checkout.pth'
+# What makes an interpreter of one ROS unfit to start one of another.
+_FOREIGN_ROS = ('PYTHONPATH', 'PYTHONHOME', 'AMENT_PREFIX_PATH', 'CMAKE_PREFIX_PATH', 'ROS_DISTRO')
+_BOOTSTRAP = '_ROS_WHEELS_BOOTSTRAP_COMPLETE'
+
+
+class SetupError(RuntimeError):
+    """The set-up did not go through; the message says where and why."""
+
+
+class Environment:
+    """The Python environment that the nodes of one checkout run in.
+
+    Args:
+        checkout: the folder with the packages.
+        extras: groups of optional dependencies from `pyproject.toml`, beside what is already there.
+    """
+
+    def __init__(self, checkout: Path = CHECKOUT, extras: Sequence[str] = ('test',)) -> None:
+        self.checkout = checkout
+        self.venv = checkout / '.venv'
+        self.python = self.venv / 'bin' / 'python'
+        self._wanted_extras = tuple(extras)
+
+    def active(self) -> bool:
+        """Whether this very process runs in the environment."""
+        return Path(sys.prefix).resolve() == self.venv.resolve()
+
+    def ready(self) -> bool:
+        """Whether the set-up is complete and made for the present sources; takes milliseconds."""
+        journal = Journal.read(self.venv)
+        return self.python.exists() and journal.fits(current(self.checkout, self._extras(journal)))
+
+    def prepare(self) -> None:
+        """Brings the environment up to date; does nothing when it is.
+
+        Raises:
+            MissingError: the machine lacks something that only its owner can give.
+            SetupError: a step failed.
+        """
+        if self.ready():
+            return
+        machine = system.Machine.here()
+        if reason := machine.why_no_wheels():
+            raise system.MissingError(system.no_wheels_advice(reason, self.checkout))
+        if missing := system.missing_packages():
+            system.install_packages(missing)
+            if still := system.missing_packages():
+                raise system.MissingError(f'still missing after installing: {" ".join(still)}')
+        with self._alone() as lock:
+            if not self.ready():  # another launch may have done it in the meantime
+                self._set_up(lock)
+
+    def _extras(self, journal: Journal) -> list[str]:
+        return sorted({*journal.extras, *self._wanted_extras})
+
+    def _set_up(self, lock: int) -> None:
+        journal = Journal.read(self.venv)
+        python = current(self.checkout, ()).python
+        # An interrupted pip can leave a package that looks installed and is not.
+        fresh = journal.working == PACKAGES_STEP or not self._usable(journal, python)
+        if fresh:
+            journal = Journal()
+        journal.extras = self._extras(journal)
+        wanted = current(self.checkout, journal.extras)
+        journal.python, journal.checkout = wanted.python, wanted.checkout
+        steps: list[tuple[str, Callable[[_Runner], None]]] = []
+        if fresh:
+            steps.append((VENV_STEP, self._make_venv))
+        if journal.packages != wanted.requirements:
+            needed = requirements(self.checkout, journal.extras)
+            steps.append((PACKAGES_STEP, lambda run: self._install_packages(run, needed)))
+        if journal.interfaces != wanted.interfaces or journal.working == INTERFACES_STEP:
+            steps.append((INTERFACES_STEP, self._install_interfaces))
+        print(f'Setting up {self.checkout.name}: once, and again after a change of dependencies.')
+        for number, (title, work) in enumerate(steps, 1):
+            if title != VENV_STEP:
+                journal.working = title
+                journal.write(self.venv)
+            work(_Runner(self, Step(number, len(steps), title), lock))
+            if title == PACKAGES_STEP:
+                journal.packages = wanted.requirements
+            elif title == INTERFACES_STEP:
+                journal.interfaces = wanted.interfaces
+        self._write_path_file()
+        journal.working = ''
+        journal.write(self.venv)
+
+    def _make_venv(self, run: _Runner) -> None:
+        run([_base_python(), '-m', 'venv', '--clear', str(self.venv)])
+
+    def _install_packages(self, run: _Runner, packages: list[str]) -> None:
+        run([*self._pip(), *packages])
+
+    def _install_interfaces(self, run: _Runner) -> None:
+        self._remove_half_installed(INTERFACES)
+        # -v shows the compiler's steps, which the progress display counts.
+        options = ['--no-deps', '--force-reinstall', '-v']
+        run([*self._pip(), *options, str(self.checkout / INTERFACES)])
+
+    def _pip(self) -> list[str]:
+        options = ['--disable-pip-version-check', '--no-input', '--progress-bar=off']
+        return [str(self.python), '-m', 'pip', 'install', *options]
+
+    def _usable(self, journal: Journal, python: str) -> bool:
+        """Whether the environment has a working pip and stands on this interpreter."""
+        if not self.python.exists() or journal.python not in ('', python):
+            return False
+        answer = subprocess.run(
+            [str(self.python), '-c', 'import pip, sys; print(sys.version_info[:2])'],
+            env=clean_environ(),
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            text=True,
+            check=False,
+        )
+        return answer.returncode == 0 and answer.stdout.strip() == str(sys.version_info[:2])
+
+    def _site_packages(self) -> Path:
+        version = f'python{sys.version_info.major}.{sys.version_info.minor}'
+        return self.venv / 'lib' / version / 'site-packages'
+
+    def _write_path_file(self) -> None:
+        """Makes the packages importable where they lie: an edit needs no installation."""
+        lines = [str(self.checkout / package) for package in PACKAGES]
+        (self._site_packages() / PATH_FILE).write_text('\n'.join(lines) + '\n', encoding='utf-8')
+
+    def _remove_half_installed(self, package: str) -> None:
+        """Takes away the record of a package that was not installed to its end."""
+        for record in self._site_packages().glob(f'{package}-*.dist-info'):
+            if not (record / 'RECORD').exists():
+                for path in record.iterdir():
+                    path.unlink()
+                record.rmdir()
+
+    @contextmanager
+    def _alone(self) -> Iterator[int]:
+        """Holds the checkout's set-up lock; waits while another launch has it."""
+        # The folder itself is the lock: no lock file is left behind.
+        lock = os.open(self.checkout, os.O_RDONLY)
+        try:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                print('Another set-up of this checkout is at work: waiting for it.', flush=True)
+                fcntl.flock(lock, fcntl.LOCK_EX)
+            yield lock
+        finally:
+            os.close(lock)
+
+
+class _Runner:
+    """Runs the command of one step, its output going to the progress display.
+
+    The command inherits the lock, so that the pip of a killed launcher still keeps others out.
+    """
+
+    def __init__(self, environment: Environment, step: Step, lock: int) -> None:
+        self._checkout = environment.checkout
+        self._log = environment.venv / 'setup.log'
+        self._step = step
+        self._lock = lock
+
+    def __call__(self, command: list[str]) -> None:
+        output: deque[str] = deque(maxlen=400)
+        with self._step:
+            process = subprocess.Popen(
+                command,
+                env=clean_environ(),
+                cwd=self._checkout,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
+                pass_fds=[self._lock],
+            )
+            try:
+                output.extend(_lines(process, self._step))
+                code = process.wait()
+            except BaseException:
+                process.terminate()
+                process.wait()
+                raise
+            if code != 0:
+                raise SetupError(self._failure(list(output)))
+
+    def _failure(self, output: list[str]) -> str:
+        if self._log.parent.is_dir():
+            self._log.write_text('\n'.join(output) + '\n', encoding='utf-8')
+        errors = [line.strip() for line in output if line.lower().lstrip().startswith('error')]
+        reason = (errors or [line.strip() for line in output if line.strip()] or ['no output'])[-1]
+        if any(word in line for line in output for word in ('NewConnectionError', 'resolve')):
+            reason += ' (is this machine online?)'
+        return f'the set-up stopped: {reason} (more in {self._log}); the next start goes on'
+
+
+def clean_environ() -> dict[str, str]:
+    """This process's environment without what belongs to another ROS or virtual environment."""
+    environ = dict(os.environ)
+    if environ.pop(_BOOTSTRAP, None):
+        environ.pop('LD_LIBRARY_PATH', None)
+    for name in (*_FOREIGN_ROS, 'VIRTUAL_ENV'):
+        environ.pop(name, None)
+    libraries = environ.get('LD_LIBRARY_PATH', '').split(os.pathsep)
+    if any(path.startswith('/opt/ros/') for path in libraries):
+        kept = [path for path in libraries if path and not path.startswith('/opt/ros/')]
+        environ['LD_LIBRARY_PATH'] = os.pathsep.join(kept)
+    return environ
+
+
+def _base_python() -> str:
+    """The interpreter that a new environment is made from, also when this one is in a venv."""
+    return str(getattr(sys, '_base_executable', sys.executable))
+
+
+def _lines(process: subprocess.Popen[bytes], step: Step) -> Iterator[str]:
+    """The lines that a process prints, while the step's clock is kept going."""
+    assert process.stdout is not None
+    rest = b''
+    with selectors.DefaultSelector() as selector:
+        selector.register(process.stdout, selectors.EVENT_READ)
+        while True:
+            if not selector.select(timeout=0.25):
+                step.tick()
+                continue
+            chunk = os.read(process.stdout.fileno(), 65536)
+            if not chunk:
+                break
+            *lines, rest = (rest + chunk).split(b'\n')
+            for line in lines:
+                text = line.decode('utf-8', 'replace').rstrip()
+                step.feed(text)
+                yield text
+    if rest:
+        yield rest.decode('utf-8', 'replace')
+    process.stdout.close()

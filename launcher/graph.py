@@ -1,0 +1,186 @@
+"""The nodes of the robot: where each one lives, what it is for, and which of them a run starts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+MODES = ('SIMULATED', 'RANDOM', 'MANUAL')
+DEFAULT_MODE = 'RANDOM'
+BEHAVIOURS = ('surveillance', 'patrol')
+
+
+class SelectionError(ValueError):
+    """A node name on the command line that the graph does not have."""
+
+
+@dataclass(frozen=True)
+class Node:
+    """One node of the graph.
+
+    Attributes:
+        name: the node's ROS name, its executable's name and its name in the log.
+        package: the ROS package, which is also the Python package.
+        class_name: the node's class in `<package>.<name>_node`.
+        purpose: one line for `launch.py list`.
+        console: the first word of the operator's commands in MANUAL mode, empty without a console.
+    """
+
+    name: str
+    package: str
+    class_name: str
+    purpose: str
+    console: str = ''
+
+    @property
+    def module(self) -> str:
+        return f'{self.package}.{self.name}_node'
+
+
+# In start order: what the first decision waits for comes first, so that it is ready first.
+NODES = (
+    Node(
+        'robot_behavior',
+        'surveillance_behaviour',
+        'RobotBehavior',
+        'the state machine that patrols',
+    ),
+    Node(
+        'armor_server',
+        'surveillance_ontology',
+        'ArmorServer',
+        'ontologies and their reasoner, behind the ARMOR interface',
+    ),
+    Node(
+        'ontology_map_builder',
+        'surveillance_ontology',
+        'OntologyMapBuilder',
+        'loads the ontology and builds the map in it',
+    ),
+    Node(
+        'battery_controller',
+        'surveillance_controllers',
+        'BatteryController',
+        'the battery: level, low warning, recharge',
+        console='battery',
+    ),
+    Node(
+        'planner_controller',
+        'surveillance_controllers',
+        'PlannerController',
+        'paths between points and to places',
+        console='plan',
+    ),
+    Node(
+        'motion_controller',
+        'surveillance_controllers',
+        'MotionController',
+        'follows a path with the base',
+        console='move',
+    ),
+    Node(
+        'reasoner',
+        'surveillance_behaviour',
+        'ReasonerNode',
+        'answers which place comes next',
+    ),
+    Node(
+        'initial_state',
+        'surveillance_behaviour',
+        'InitialState',
+        'looks around for markers and builds the ontology from them',
+    ),
+    Node(
+        'simulator',
+        'surveillance_simulation',
+        'Simulator',
+        'the simulated place: base, lidar, arm, camera, doors',
+    ),
+    Node(
+        'aruco_detector',
+        'surveillance_perception',
+        'ArucoDetector',
+        'finds ArUco markers in the camera picture',
+    ),
+    Node(
+        'marker_server',
+        'surveillance_perception',
+        'MarkerServer',
+        'tells what place a marker stands for',
+    ),
+    Node(
+        'arm_controller',
+        'surveillance_perception',
+        'ArmController',
+        'moves the arm that carries the camera',
+    ),
+    Node(
+        'video_source',
+        'surveillance_perception',
+        'VideoSource',
+        'a webcam, a video or pictures as the camera topic',
+    ),
+)
+BY_NAME = {node.name: node for node in NODES}
+
+_ALWAYS = (
+    'robot_behavior',
+    'armor_server',
+    'ontology_map_builder',
+    'battery_controller',
+    'planner_controller',
+    'motion_controller',
+)
+_OF_PATROL = (
+    'reasoner',
+    'initial_state',
+    'simulator',
+    'aruco_detector',
+    'marker_server',
+    'arm_controller',
+)
+
+
+def find(name: str) -> Node:
+    """The node called `name`.
+
+    Raises:
+        SelectionError: there is no such node.
+    """
+    try:
+        return BY_NAME[name]
+    except KeyError:
+        raise SelectionError(
+            f'unknown node {name!r}: expected one of {", ".join(BY_NAME)}'
+        ) from None
+
+
+def select(
+    mode: str,
+    behaviour: str = 'surveillance',
+    only: Iterable[str] = (),
+    without: Iterable[str] = (),
+) -> tuple[Node, ...]:
+    """The nodes that a run starts, in start order.
+
+    Args:
+        mode: one of `MODES`; SIMULATED adds the simulator.
+        behaviour: one of `BEHAVIOURS`; patrol adds what learns the place from its markers.
+        only: if not empty, exactly these nodes, also ones that the mode would not start.
+        without: nodes to leave out, because they run elsewhere.
+
+    Raises:
+        SelectionError: an unknown name, or nothing is left to start.
+    """
+    wanted = {find(name).name for name in only}
+    left_out = {find(name).name for name in without}
+    if not wanted:
+        wanted = set(_ALWAYS)
+        if behaviour == 'patrol':
+            wanted.update(_OF_PATROL)
+        if mode == 'SIMULATED':
+            wanted.add('simulator')
+    chosen = tuple(node for node in NODES if node.name in wanted - left_out)
+    if not chosen:
+        raise SelectionError('no node is left to start: check --only and --without')
+    return chosen

@@ -1,0 +1,120 @@
+"""One log for all processes: time, the node's name, the text; coloured on a terminal."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import sys
+from collections.abc import Sequence
+from datetime import datetime
+from pathlib import Path
+from typing import TextIO
+
+# What the nodes are told to print, so that severity and origin can be read back from a line.
+ROS_FORMAT = '[{severity}] [{name}] {message}'
+_ROS_LINE = re.compile(r'\[(DEBUG|INFO|WARN|ERROR|FATAL)\] \[([\w./~-]+)\] ?(.*)')
+_ESCAPES = re.compile(r'\x1b\[[0-9;?]*[ -/]*[@-~]')
+_SEVERITY_COLOURS = {'WARN': '33', 'ERROR': '31', 'FATAL': '1;31', 'DEBUG': '2'}
+_NODE_COLOURS = ('36', '32', '35', '34', '96', '92', '95', '94')
+LAUNCHER = 'launch'
+
+
+class MergedLog:
+    """Writes what the processes print, one line at a time.
+
+    Args:
+        stream: where the lines go; None is standard output, looked up anew for each line, so that a
+            prompt that shares the terminal can take it over.
+        names: the names that will come, for the width of the column and the colours.
+        colour: None decides by the stream: a terminal and no NO_COLOR.
+        path: a file that gets the same lines without colours.
+    """
+
+    def __init__(
+        self,
+        stream: TextIO | None,
+        names: Sequence[str],
+        colour: bool | None = None,
+        path: Path | None = None,
+    ) -> None:
+        self._stream = stream
+        self.broken = False
+        self._names = frozenset(names)
+        self._width = max(map(len, (*names, LAUNCHER)))
+        self._colours = {n: _NODE_COLOURS[i % len(_NODE_COLOURS)] for i, n in enumerate(names)}
+        self._colours[LAUNCHER] = '1'
+        if colour is None:
+            colour = (stream or sys.stdout).isatty() and not os.environ.get('NO_COLOR')
+        self._colour = colour
+        self._file = path.open('a', encoding='utf-8') if path is not None else None
+
+    def say(self, text: str) -> None:
+        """A line of the launcher's own."""
+        self._write(LAUNCHER, '', text)
+
+    def warn(self, text: str) -> None:
+        self._write(LAUNCHER, 'WARN', text)
+
+    def error(self, text: str) -> None:
+        self._write(LAUNCHER, 'ERROR', text)
+
+    def line(self, process: str, raw: str) -> None:
+        """A line that `process` printed."""
+        # A progress bar redraws its line: only what it ended with belongs into a log.
+        text = raw.rstrip().rsplit('\r', 1)[-1]
+        if match := _ROS_LINE.match(_ESCAPES.sub('', text)):
+            severity, origin, message = match.groups()
+            name = origin.rsplit('.', 1)[-1]
+            if name in self._names:
+                self._write(name, severity, message)
+            else:
+                self._write(process, severity, f'{origin}: {message}')
+        elif text:
+            self._write(process, '', text)
+
+    def plain(self, text: str) -> None:
+        """A block of text without time and name, such as the summary."""
+        self._emit(text, text)
+
+    def close(self) -> None:
+        if self._file is not None:
+            self._file.close()
+            self._file = None
+
+    def _write(self, name: str, severity: str, text: str) -> None:
+        clock = datetime.now().strftime('%H:%M:%S.%f')[:-3]
+        word = '' if severity in ('', 'INFO') else f'{severity}: '
+        plain = f'{clock} {name:<{self._width}} | {word}{_ESCAPES.sub("", text)}'
+        if self._colour:
+            shade = _SEVERITY_COLOURS.get(severity, '')
+            body = f'\x1b[{shade}m{word}{text}\x1b[0m' if shade else text
+            shown = (
+                f'\x1b[2m{clock}\x1b[0m \x1b[{self._colours.get(name, "0")}m'
+                f'{name:<{self._width}}\x1b[0m | {body}'
+            )
+        else:
+            shown = plain
+        self._emit(shown, plain)
+
+    def _emit(self, shown: str, plain: str) -> None:
+        if self._file is not None:
+            self._file.write(plain + '\n')
+            self._file.flush()
+        if self.broken:
+            return
+        stream = self._stream or sys.stdout
+        try:
+            stream.write(shown + '\n')
+            stream.flush()
+        except (BrokenPipeError, ValueError):
+            self.broken = True
+            _discard(stream)
+
+
+def _discard(stream: TextIO) -> None:
+    """Sends what is still buffered nowhere: at its exit, Python would fail to write it."""
+    with contextlib.suppress(OSError, ValueError):
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, stream.fileno())
+        os.close(nowhere)

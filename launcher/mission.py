@@ -1,0 +1,272 @@
+"""One run of the robot: which processes it needs, with which parameters, and what it sums up to.
+
+Imported in the project's environment only: the packages read their own places and records.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from launcher import graph
+from launcher.log import ROS_FORMAT, MergedLog
+from launcher.supervisor import Program, Supervisor
+from surveillance_behaviour import mission_record
+from surveillance_ontology.parameter_file import ParameterFileError
+from surveillance_ontology.place import read_place
+
+CHILD = Path(__file__).with_name('child.py')
+PLACES = {'surveillance': 'seven_rooms.yaml', 'patrol': 'patrol_world.yaml'}
+RECORD = 'mission.jsonl'
+COMPOSED = 'composed'
+LOG_LEVELS = ('debug', 'info', 'warn', 'error', 'fatal')
+_NAMESPACE = re.compile(r'/?[A-Za-z]\w*(/[A-Za-z]\w*)*\Z', re.ASCII)
+MAX_DOMAIN = 101
+"""The highest ROS domain whose ports lie below those that Linux gives to clients."""
+
+
+class RunError(ValueError):
+    """What was asked for cannot be run: one line that says why."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """What the command line asks for.
+
+    Attributes:
+        mode: one of `graph.MODES`, or None for the default one.
+        behaviour: one of `graph.BEHAVIOURS`.
+        place: file that describes the place, None for the behaviour's own.
+        parameters: further parameter file, None for none.
+        composed: all nodes in one process.
+        only, without: names of nodes, see `graph.select`.
+        log_level: one of `LOG_LEVELS`, None for ROS's own choice.
+        namespace: of all nodes, None for none.
+        domain: ROS domain, None for the environment's.
+        seconds: how long to run, None until stopped.
+    """
+
+    mode: str | None = None
+    behaviour: str = 'surveillance'
+    place: Path | None = None
+    parameters: Path | None = None
+    composed: bool = False
+    only: Sequence[str] = ()
+    without: Sequence[str] = ()
+    log_level: str | None = None
+    namespace: str | None = None
+    domain: int | None = None
+    seconds: float | None = None
+
+    def check(self) -> None:
+        """Looks at everything that can be wrong before a process is started.
+
+        Raises:
+            RunError: a value cannot be used.
+        """
+        if self.namespace is not None and not _NAMESPACE.match(self.namespace):
+            raise RunError(
+                f'--namespace {self.namespace!r}: expected letters, digits and _ like robot1'
+            )
+        if self.domain is not None and not 0 <= self.domain <= MAX_DOMAIN:
+            raise RunError(f'--domain {self.domain}: expected a number from 0 to {MAX_DOMAIN}')
+        if self.composed and self.mode == 'MANUAL':
+            raise RunError(
+                '--composed with --mode MANUAL: the consoles need processes of their own'
+            )
+        if self.place is not None:
+            try:
+                read_place(self.place)
+            except ParameterFileError as error:
+                raise RunError(f'--map {error}') from None
+        if self.parameters is not None:
+            check_parameter_file(self.parameters)
+
+    def nodes(self) -> tuple[graph.Node, ...]:
+        return graph.select(
+            self.mode or graph.DEFAULT_MODE, self.behaviour, self.only, self.without
+        )
+
+
+def check_parameter_file(path: Path) -> None:
+    """Makes sure that a file has the form of ROS parameters and names nodes that exist.
+
+    Raises:
+        RunError: one line with the file and what is wrong in it.
+    """
+    try:
+        content = yaml.safe_load(path.read_text(encoding='utf-8'))
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else 'not UTF-8 text'
+        raise RunError(f'--params {path}: {reason}') from None
+    except yaml.YAMLError as error:
+        mark = getattr(error, 'problem_mark', None)
+        where = f':{mark.line + 1}' if mark is not None else ''
+        problem = getattr(error, 'problem', None) or str(error).splitlines()[0]
+        raise RunError(f'--params {path}{where}: not valid YAML: {problem}') from None
+    if not isinstance(content, dict):
+        raise RunError(f"--params {path}: expected 'NODE: ros__parameters: ...', got no mapping")
+    for key, section in content.items():
+        name = str(key).rsplit('/', 1)[-1]
+        if name not in graph.BY_NAME and name not in ('*', '**'):
+            raise RunError(
+                f'--params {path}: no node is called {key!r}, '
+                f'expected /** or one of {", ".join(graph.BY_NAME)}'
+            )
+        body = section.get('ros__parameters') if isinstance(section, dict) else None
+        if not isinstance(body, dict):
+            raise RunError(
+                f"--params {path}: expected 'ros__parameters:' with a mapping in {key!r}"
+            )
+
+
+def parameter_files(checkout: Path, run: Run) -> list[Path]:
+    """The files that every node gets, in ROS's order: a later one wins."""
+    config = checkout / 'config'
+    place = run.place or config / PLACES[run.behaviour]
+    files = [config / 'parameters.yaml', place]
+    if run.parameters is not None:
+        files.append(run.parameters)
+    return [path.resolve() for path in files]
+
+
+def ros_arguments(files: Sequence[Path], run: Run) -> list[str]:
+    """The ROS arguments that all nodes of a run share."""
+    arguments = ['--ros-args']
+    for path in files:
+        arguments += ['--params-file', str(path)]
+    if run.namespace is not None:
+        arguments += ['-r', f'__ns:=/{run.namespace.strip("/")}']
+    if run.log_level is not None:
+        arguments += ['--log-level', run.log_level]
+    return arguments
+
+
+def node_environ(run: Run, logs: Path | None = None) -> dict[str, str]:
+    """The environment of a node's process."""
+    environ = dict(os.environ)
+    if run.domain is not None:
+        environ['ROS_DOMAIN_ID'] = str(run.domain)
+    # Shared memory that a killed process leaves behind hides later nodes of the same domain.
+    environ.setdefault('FASTDDS_BUILTIN_TRANSPORTS', 'UDPv4')
+    if logs is not None:
+        environ['PYTHONUNBUFFERED'] = '1'
+        environ['RCUTILS_CONSOLE_OUTPUT_FORMAT'] = ROS_FORMAT
+        environ['RCUTILS_COLORIZED_OUTPUT'] = '0'
+        environ.setdefault('ROS_LOG_DIR', str(logs))
+    return environ
+
+
+def command(nodes: Sequence[graph.Node], arguments: Sequence[str], parent: int) -> list[str]:
+    """The command of one process that holds `nodes`; it ends with `parent`, unless that is 0."""
+    targets = ','.join(f'{n.name}={n.module}:{n.class_name}' for n in nodes)
+    return [sys.executable, '-P', str(CHILD), str(parent), targets, *arguments]
+
+
+def make_folder(checkout: Path) -> Path:
+    """A new folder for what the run leaves behind: its log, its parameters, its record."""
+    stamp = time.strftime('%Y%m%d-%H%M%S')
+    for suffix in ('', *(f'-{number}' for number in range(2, 100))):
+        folder = checkout / 'runs' / (stamp + suffix)
+        try:
+            folder.mkdir(parents=True)
+        except FileExistsError:
+            continue
+        except OSError as error:
+            raise RunError(f'{folder}: cannot be made: {error.strerror}') from None
+        return folder
+    raise RunError(f'{folder}: a hundred runs began in this second')
+
+
+def write_own_parameters(folder: Path, run: Run) -> Path:
+    """Writes what the command line says as parameters, for the nodes that it concerns."""
+    own: dict[str, dict[str, Any]] = {
+        'robot_behavior': {'behaviour': run.behaviour, 'record': str(folder / RECORD)}
+    }
+    # A mode that was asked for counts more than one in the user's file, the default one less.
+    if run.mode or 'execution_mode' not in (run.parameters or Path(os.devnull)).read_text():
+        for node in graph.NODES:
+            if node.console:
+                own[node.name] = {'execution_mode': run.mode or graph.DEFAULT_MODE}
+    return _write_parameters(folder / 'launch.yaml', own)
+
+
+def _write_parameters(path: Path, of_nodes: Mapping[str, Mapping[str, Any]]) -> Path:
+    # `/**/name` is the node in any namespace. JSON is YAML too, and quotes safely.
+    content = {f'/**/{name}': {'ros__parameters': of_nodes[name]} for name in of_nodes}
+    path.write_text(json.dumps(content, indent=1) + '\n', encoding='utf-8')
+    return path
+
+
+def run_mission(checkout: Path, run: Run) -> int:
+    """Starts the nodes, supervises them until the end, prints the summary; returns the exit code.
+
+    Raises:
+        RunError, graph.SelectionError: what was asked for cannot be run.
+    """
+    run.check()
+    nodes = run.nodes()
+    folder = make_folder(checkout)
+    files = [*parameter_files(checkout, run), write_own_parameters(folder, run)]
+    arguments = ros_arguments(files, run)
+    environ = node_environ(run, folder / 'ros')
+    manual = run.mode == 'MANUAL'
+    if run.composed:
+        programs = [Program(COMPOSED, command(nodes, arguments, os.getpid()), environ)]
+    else:
+        programs = [
+            Program(
+                node.name,
+                command([node], arguments, os.getpid()),
+                environ,
+                takes_input=manual and bool(node.console),
+            )
+            for node in nodes
+        ]
+    names = [*(node.name for node in nodes), *([COMPOSED] if run.composed else [])]
+    log = MergedLog(None, names, path=folder / 'launch.log')
+    log.say(
+        f'{run.behaviour} in mode {run.mode or graph.DEFAULT_MODE}, '
+        f'place {files[1].name}, '
+        f'ROS domain {environ.get("ROS_DOMAIN_ID", "0")}, files in {_short(folder)}'
+    )
+    supervisor = Supervisor(programs, log)
+    console = None
+    if manual:
+        from launcher.console import OperatorConsole
+
+        console = OperatorConsole(supervisor, [n for n in nodes if n.console], log)
+        console.start()
+    code = supervisor.run(run.seconds)
+    if console is not None:
+        console.stop()
+    if any(node.name == 'robot_behavior' for node in nodes):
+        log.plain(summary(folder / RECORD))
+    log.close()
+    return code
+
+
+def summary(record: Path) -> str:
+    """The mission's summary as text; says so when there is none."""
+    if not record.exists():
+        return 'Mission: nothing was recorded.'
+    try:
+        return str(mission_record.summarize(mission_record.read(record)))
+    except mission_record.RecordError as error:
+        return f'Mission: {error}'
+
+
+def _short(path: Path) -> str:
+    try:
+        return str(path.relative_to(Path.cwd()))
+    except ValueError:
+        return str(path)

@@ -1,0 +1,89 @@
+"""Shows how a set-up comes on: one live line per step on a terminal, plain lines elsewhere."""
+
+from __future__ import annotations
+
+import re
+import sys
+import time
+from types import TracebackType
+from typing import TextIO
+
+_BUILD_STEP = re.compile(r'\[(\d+)/(\d+)\]')
+_PIP_STEP = re.compile(
+    r'(Collecting|Downloading|Building wheels? for|Installing build dependencies|'
+    r'Installing collected packages|Getting requirements)\s*:?\s*(\S*)'
+)
+_PLAIN_EVERY = 15.0
+
+
+def describe(line: str) -> str:
+    """What a line of pip's or of the build's output says about progress, empty when nothing."""
+    if build := _BUILD_STEP.search(line):
+        done, total = int(build[1]), int(build[2])
+        return f'compiling {done}/{total}'
+    if step := _PIP_STEP.match(line.strip()):
+        verb = step[1]
+        if verb == 'Downloading':
+            return f'downloading {step[2].rsplit("/", 1)[-1].split("-", 1)[0]}'
+        if verb == 'Collecting':
+            return f'looking for {step[2]}'
+        if verb == 'Installing collected packages':
+            return 'installing'
+        if verb.startswith('Building'):
+            return f'building {step[2]}'
+        return 'fetching build tools'
+    return ''
+
+
+class Step:
+    """One step of the set-up: `with Step(1, 3, 'Python packages') as step: step.feed(line)`."""
+
+    def __init__(self, number: int, total: int, title: str, stream: TextIO | None = None) -> None:
+        self._stream = sys.stdout if stream is None else stream
+        self._live = self._stream.isatty()
+        self._head = f'[{number}/{total}] {title}'
+        self._detail = ''
+        self._shown = 0.0
+
+    def __enter__(self) -> Step:
+        self._start = self._shown = time.monotonic()
+        if self._live:
+            self._draw('...')
+        else:
+            self._print(f'{self._head} ...')
+        return self
+
+    def feed(self, line: str) -> None:
+        """Takes one line of the step's output."""
+        if detail := describe(line):
+            self._detail = detail
+        self.tick()
+
+    def tick(self) -> None:
+        """Redraws; called about four times a second also when there is no output."""
+        now = time.monotonic()
+        if self._live:
+            self._draw(f'{now - self._start:4.0f} s  {self._detail}')
+        elif now - self._shown >= _PLAIN_EVERY:
+            self._shown = now
+            self._print(f'{self._head}: {now - self._start:.0f} s, {self._detail}')
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        word = 'done in' if kind is None else 'stopped after'
+        line = f'{self._head}: {word} {time.monotonic() - self._start:.0f} s'
+        if self._live:
+            self._stream.write('\r\x1b[K')
+        self._print(line)
+
+    def _draw(self, text: str) -> None:
+        self._stream.write(f'\r\x1b[K{self._head} {text}'[:110])
+        self._stream.flush()
+
+    def _print(self, text: str) -> None:
+        self._stream.write(text + '\n')
+        self._stream.flush()

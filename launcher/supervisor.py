@@ -1,0 +1,298 @@
+"""Child processes under supervision: started, their output merged, restarted, stopped together.
+
+One thread, one `selectors` loop: output, input, deaths and signals all arrive as readable file
+descriptors, pauses and deadlines as the loop's timeout.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import selectors
+import signal
+import socket
+import subprocess
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from launcher.log import MergedLog
+
+PAUSES = (0.5, 1.0, 2.0, 4.0, 8.0, 15.0, 30.0)
+"""Seconds before the first, second, ... restart in a row; the last one is kept."""
+STEADY_AFTER = 20.0
+"""A process that ran this long, in seconds, starts again from the first pause."""
+STOP_WITHIN = 2.5
+"""Seconds that a process has for its clean-up before it is killed."""
+EXIT_UNUSABLE = 2
+"""The exit code with which a node says that its configuration does not let it start."""
+_LONGEST_LINE = 64 * 1024
+_STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+@dataclass(frozen=True)
+class Program:
+    """A process to run: its name in the log, its command, and whether it reads commands."""
+
+    name: str
+    command: Sequence[str]
+    environ: Mapping[str, str]
+    takes_input: bool = False
+
+
+@dataclass
+class Child:
+    """A program's present process and its history."""
+
+    program: Program
+    process: subprocess.Popen[bytes] | None = None
+    started: float = 0.0
+    restart_at: float | None = None
+    deaths: int = 0
+    killed: bool = False
+    rest: bytes = field(default=b'', repr=False)
+
+    @property
+    def running(self) -> bool:
+        return self.process is not None
+
+
+class Supervisor:
+    """Runs programs until told to stop.
+
+    Args:
+        programs: in start order.
+        log: where their output goes.
+        pauses: seconds before a restart, see `PAUSES`.
+    """
+
+    def __init__(
+        self, programs: Sequence[Program], log: MergedLog, pauses: Sequence[float] = PAUSES
+    ) -> None:
+        self.children = {program.name: Child(program) for program in programs}
+        self._log = log
+        self._pauses = tuple(pauses)
+        self._selector = selectors.DefaultSelector()
+        self._stopping_since: float | None = None
+        self._code = 0
+
+    def read_from(self, descriptor: int, on_line: Callable[[str], None]) -> None:
+        """Calls `on_line` for each line that can be read from a descriptor until its end."""
+        rest = b''
+
+        def take() -> None:
+            nonlocal rest
+            try:
+                chunk = os.read(descriptor, 65536)
+            except OSError:
+                chunk = b''
+            *lines, rest = (rest + chunk).split(b'\n')
+            if not chunk:
+                self._selector.unregister(descriptor)
+                lines = [rest] if rest else []
+            for line in lines:
+                on_line(line.decode('utf-8', 'replace'))
+
+        self._selector.register(descriptor, selectors.EVENT_READ, take)
+
+    def send(self, name: str, line: str) -> bool:
+        """Writes a line to a program's input; whether somebody is there to read it."""
+        process = self.children[name].process
+        if process is None or process.stdin is None:
+            return False
+        try:
+            process.stdin.write(line.encode() + b'\n')
+            process.stdin.flush()
+        except OSError:
+            return False
+        return True
+
+    def stop(self, code: int = 0) -> None:
+        """Begins to end every process; `run` returns when all are gone."""
+        if self._stopping_since is None:
+            self._stopping_since = time.monotonic()
+            self._code = code
+            for child in reversed(self.children.values()):
+                child.restart_at = None
+                if child.process is not None:
+                    child.process.terminate()
+
+    def run(self, seconds: float | None = None) -> int:
+        """Starts everything and returns the exit code when everything has ended.
+
+        Args:
+            seconds: stop after this time; None runs until a signal or until every program ended.
+        """
+        end = None if seconds is None else time.monotonic() + seconds
+        with self._signals():
+            for child in self.children.values():
+                self._start(child)
+            while any(child.running or child.restart_at for child in self.children.values()):
+                for key, _ in self._selector.select(self._timeout(end)):
+                    key.data()
+                self._reap()
+                self._keep_time(end)
+            self._log.say('every process has ended')
+        self._selector.close()
+        return self._code
+
+    def _start(self, child: Child) -> None:
+        child.restart_at = None
+        child.rest = b''
+        child.process = process = subprocess.Popen(
+            child.program.command,
+            env=child.program.environ,
+            stdin=subprocess.PIPE if child.program.takes_input else subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            # Ctrl-C in the terminal reaches the launcher alone, which then ends each child once.
+            start_new_session=True,
+        )
+        child.started = time.monotonic()
+        assert process.stdout is not None
+        os.set_blocking(process.stdout.fileno(), False)
+        if process.stdin is not None:
+            os.set_blocking(process.stdin.fileno(), False)
+        self._selector.register(
+            process.stdout, selectors.EVENT_READ, lambda: self._read(child, process)
+        )
+        self._log.say(f'started {child.program.name} (process {process.pid})')
+
+    def _read(self, child: Child, process: subprocess.Popen[bytes]) -> bool:
+        """Takes what a process printed; whether there may be more."""
+        assert process.stdout is not None
+        try:
+            chunk = os.read(process.stdout.fileno(), 65536)
+        except BlockingIOError:
+            return False
+        *lines, child.rest = (child.rest + chunk).split(b'\n')
+        if not chunk:
+            self._selector.unregister(process.stdout)
+        if child.rest and (not chunk or len(child.rest) > _LONGEST_LINE):
+            lines.append(child.rest)
+            child.rest = b''
+        for line in lines:
+            self._log.line(child.program.name, line.decode('utf-8', 'replace'))
+        return bool(chunk)
+
+    def _reap(self) -> None:
+        for child in self.children.values():
+            process = child.process
+            if process is None or not _has_ended(process):
+                continue
+            _kill_group(process.pid)
+            code = process.wait()
+            self._close(child, process)
+            child.process = None
+            self._after_death(child, code)
+
+    def _close(self, child: Child, process: subprocess.Popen[bytes]) -> None:
+        """Takes what a dead process still printed, then lets its pipes go."""
+        assert process.stdout is not None
+        # A process that left its group may hold the pipe open: its end is not waited for.
+        if process.stdout in self._selector.get_map():
+            while self._read(child, process):
+                pass
+        if process.stdout in self._selector.get_map():
+            self._selector.unregister(process.stdout)
+        for stream in (process.stdout, process.stdin):
+            if stream is not None:
+                with contextlib.suppress(OSError):
+                    stream.close()
+
+    def _after_death(self, child: Child, code: int) -> None:
+        name = child.program.name
+        lived = time.monotonic() - child.started
+        if self._stopping_since is not None:
+            if code not in (0, -signal.SIGTERM) and not child.killed:
+                self._log.warn(f'{name} ended with {describe_exit(code)}')
+            return
+        if code == 0:
+            self._log.say(f'{name} has ended by itself')
+            return
+        if code == EXIT_UNUSABLE and not child.deaths:
+            self._log.error(f'{name} cannot start as it is configured: stopping')
+            self.stop(EXIT_UNUSABLE)
+            return
+        child.deaths = 1 if lived >= STEADY_AFTER else child.deaths + 1
+        pause = self._pauses[min(child.deaths, len(self._pauses)) - 1]
+        child.restart_at = time.monotonic() + pause
+        self._log.warn(f'{name} died ({describe_exit(code)}): starting it again in {pause:g} s')
+
+    def _timeout(self, end: float | None) -> float | None:
+        times = [child.restart_at for child in self.children.values() if child.restart_at]
+        if self._stopping_since is not None:
+            if not all(child.killed for child in self.children.values() if child.running):
+                times.append(self._stopping_since + STOP_WITHIN)
+        elif end is not None:
+            times.append(end)
+        return max(0.0, min(times) - time.monotonic()) if times else None
+
+    def _keep_time(self, end: float | None) -> None:
+        now = time.monotonic()
+        if self._log.broken:
+            self.stop()
+        if end is not None and now >= end and self._stopping_since is None:
+            self._log.say('the time is over: stopping')
+            self.stop()
+        for child in self.children.values():
+            if child.restart_at is not None and now >= child.restart_at:
+                self._start(child)
+            if (
+                child.process is not None
+                and not child.killed
+                and self._stopping_since is not None
+                and now >= self._stopping_since + STOP_WITHIN
+            ):
+                self._log.warn(f'{child.program.name} did not end in time: killed')
+                child.killed = True
+                _kill_group(child.process.pid)
+
+    @contextlib.contextmanager
+    def _signals(self) -> Iterator[None]:
+        """Turns stop signals and deaths of children into events of the loop."""
+        reader, writer = socket.socketpair()
+        reader.setblocking(False)
+        writer.setblocking(False)
+
+        def on_signal() -> None:
+            for number in reader.recv(4096):
+                if number in _STOP_SIGNALS and self._stopping_since is None:
+                    self._log.say(f'{signal.Signals(number).name}: stopping')
+                    self.stop()
+
+        def nothing(_number: int, _frame: object) -> None:
+            pass
+
+        before = {s: signal.signal(s, nothing) for s in (*_STOP_SIGNALS, signal.SIGCHLD)}
+        wakeup = signal.set_wakeup_fd(writer.fileno(), warn_on_full_buffer=False)
+        self._selector.register(reader, selectors.EVENT_READ, on_signal)
+        try:
+            yield
+        finally:
+            signal.set_wakeup_fd(wakeup)
+            for number, handler in before.items():
+                signal.signal(number, handler)
+            reader.close()
+            writer.close()
+
+
+def describe_exit(code: int) -> str:
+    """An exit code in words, e.g. `killed by SIGKILL` or `exit code 1`."""
+    if code < 0:
+        try:
+            return f'killed by {signal.Signals(-code).name}'
+        except ValueError:
+            return f'killed by signal {-code}'
+    return f'exit code {code}'
+
+
+def _has_ended(process: subprocess.Popen[bytes]) -> bool:
+    """Whether a child is dead; it is not reaped, so that its group's number stays taken."""
+    options = os.WEXITED | os.WNOHANG | os.WNOWAIT
+    return os.waitid(os.P_PID, process.pid, options) is not None
+
+
+def _kill_group(group: int) -> None:
+    with contextlib.suppress(ProcessLookupError, PermissionError):
+        os.killpg(group, signal.SIGKILL)

@@ -1,0 +1,169 @@
+"""What the machine offers: wheels for its processor, an installed ROS 2, compiler and headers.
+
+Looks before anything is changed, so that a set-up either goes through or ends at once with the one
+command that is missing.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import platform
+import shutil
+import subprocess
+import sys
+import sysconfig
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+ROS_PREFIX = Path('/opt/ros/jazzy')
+WHEEL_PYTHONS = ((3, 11), (3, 12), (3, 13))
+
+COLCON_STEPS = """\
+  mkdir -p ~/surveillance_ws/src && ln -s {checkout} ~/surveillance_ws/src/surveillance
+  cd ~/surveillance_ws && source /opt/ros/jazzy/setup.bash
+  colcon build && source install/setup.bash
+  ros2 launch surveillance_behaviour surveillance.launch.py"""
+
+
+class MissingError(RuntimeError):
+    """The machine lacks something; the message says what, and the command that brings it."""
+
+
+@dataclass(frozen=True)
+class Machine:
+    """What decides how this machine gets its ROS."""
+
+    system: str
+    processor: str
+    libc: str
+    python: tuple[int, int]
+
+    @classmethod
+    def here(cls) -> Machine:
+        return cls(
+            platform.system(),
+            platform.machine(),
+            platform.libc_ver()[0],
+            (sys.version_info.major, sys.version_info.minor),
+        )
+
+    def why_no_wheels(self) -> str:
+        """Why the ROS wheels do not fit this machine, empty when they do."""
+        if self.system != 'Linux' or self.processor not in ('x86_64', 'AMD64'):
+            return f'there are no ROS 2 wheels for {self.system} on {self.processor}'
+        if self.libc != 'glibc':
+            return 'the ROS 2 wheels need glibc, which this Linux does not use'
+        if self.python not in WHEEL_PYTHONS:
+            return (
+                f'there are no ROS 2 wheels for Python {self.python[0]}.{self.python[1]}: '
+                'run launch.py with Python 3.11, 3.12 or 3.13'
+            )
+        return ''
+
+
+def sourced_ros(environ: Mapping[str, str] | None = None) -> bool:
+    """Whether a ROS 2 Jazzy is active in this shell."""
+    environ = os.environ if environ is None else environ
+    return environ.get('ROS_DISTRO') == 'jazzy' and bool(environ.get('AMENT_PREFIX_PATH'))
+
+
+def sourced_workspace() -> bool:
+    """Whether this very interpreter imports ROS and the compiled interfaces already."""
+    return all(
+        importlib.util.find_spec(name) is not None
+        for name in ('rclpy', 'surveillance_interfaces', 'surveillance_behaviour')
+    )
+
+
+def colcon_advice(checkout: Path) -> str:
+    """The commands that build and run the project on an installed ROS 2 Jazzy."""
+    return COLCON_STEPS.format(checkout=checkout)
+
+
+def no_wheels_advice(reason: str, checkout: Path, ros_prefix: Path = ROS_PREFIX) -> str:
+    """What to do on a machine that the wheels do not fit."""
+    if ros_prefix.exists():
+        return f'{reason}, but ROS 2 Jazzy is installed. Build with it:\n{colcon_advice(checkout)}'
+    return (
+        f'{reason}, and no ROS 2 Jazzy is installed.\nInstall ROS 2 Jazzy '
+        '(Ubuntu 24.04: https://docs.ros.org/en/jazzy/Installation.html; macOS and others: '
+        'https://robostack.github.io), then:\n' + colcon_advice(checkout)
+    )
+
+
+def missing_packages() -> list[str]:
+    """The Debian packages without which the set-up would fail half-way."""
+    major, minor = sys.version_info[:2]
+    versioned = f'python{major}.{minor}'
+    system_python = Path('/usr/bin/python3')
+    if system_python.exists() and system_python.resolve().name == versioned:
+        versioned = 'python3'
+    missing = []
+    if importlib.util.find_spec('venv') is None or importlib.util.find_spec('ensurepip') is None:
+        missing.append(f'{versioned}-venv')
+    if not Path(sysconfig.get_config_var('INCLUDEPY'), 'Python.h').exists():
+        missing.append(f'{versioned}-dev')
+    if not any(shutil.which(compiler) for compiler in ('g++', 'c++', 'clang++')):
+        missing.append('g++')
+    return missing
+
+
+def install_packages(packages: Sequence[str]) -> None:
+    """Installs Debian packages with apt, where that needs no password.
+
+    Raises:
+        MissingError: there is no apt, no right to use it, or it failed.
+    """
+    names = ' '.join(packages)
+    if shutil.which('apt-get') is None:
+        raise MissingError(
+            f'this machine lacks what Debian calls {names}: install them with its package manager '
+            '(a C++ compiler, the headers of Python, its venv module), then start again'
+        )
+    prefix = _privilege()
+    if prefix is None:
+        raise MissingError(
+            'a few system packages are missing. Type this, then start again:\n'
+            f'  sudo apt-get install -y {names}'
+        )
+    print(f'installing system packages: {names}', flush=True)
+    environ = {**os.environ, 'DEBIAN_FRONTEND': 'noninteractive'}
+    for command in (['update'], ['install', '-y', '--no-install-recommends', *packages]):
+        done = subprocess.run(
+            [*prefix, 'apt-get', '-q', *command],
+            env=environ,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            errors='replace',
+            check=False,
+        )
+        # A repository that does not answer is no reason to stop: the packages may come from others.
+        if done.returncode != 0 and command[0] == 'install':
+            tail = '\n'.join(done.stdout.strip().splitlines()[-4:])
+            raise MissingError(
+                f'apt-get could not install {names}:\n{tail}\nInstall them, then start again:\n'
+                f'  sudo apt-get install -y {names}'
+            )
+    # Modules looked for before they were installed are remembered as absent.
+    importlib.invalidate_caches()
+
+
+def _privilege() -> list[str] | None:
+    """What to write before apt-get: nothing for root, sudo when it asks no password, else None."""
+    if os.geteuid() == 0:
+        return []
+    if shutil.which('sudo') is not None:
+        answer = subprocess.run(
+            ['sudo', '-n', 'true'],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            check=False,
+        )
+        if answer.returncode == 0:
+            return ['sudo', '-n', 'env', 'DEBIAN_FRONTEND=noninteractive']
+    return None

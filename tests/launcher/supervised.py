@@ -1,0 +1,23 @@
+"""A supervisor over small scripts, for the tests: python supervised.py NAME=SCRIPT ..."""
+
+from __future__ import annotations
+
+import os
+import sys
+
+from launcher.log import MergedLog
+from launcher.supervisor import Program, Supervisor
+
+seconds = float(os.environ['SECONDS_TO_RUN']) if 'SECONDS_TO_RUN' in os.environ else None
+programs = []
+for argument in sys.argv[1:]:
+    name, _, script = argument.partition('=')
+    command = [sys.executable, '-u', '-c', script]
+    programs.append(Program(name, command, os.environ, takes_input=True))
+supervisor = Supervisor(
+    programs, MergedLog(None, [p.name for p in programs], colour=False), pauses=(0.01, 0.02)
+)
+supervisor.read_from(
+    0, lambda line: print('sent', supervisor.send(*line.split(' ', 1)), flush=True)
+)
+sys.exit(supervisor.run(seconds))

@@ -1,0 +1,47 @@
+from __future__ import annotations
+
+import pytest
+
+from launcher.commands import main, make_parser
+from launcher.graph import NODES
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'wrong'),
+    [
+        (['fly'], "unknown command 'fly'"),
+        (['--mode', 'fast'], "invalid choice: 'FAST'"),
+        (['--only', 'armor'], "unknown node 'armor'"),
+        (['--without', 'armor_server,nobody'], "unknown node 'nobody'"),
+        (['node', 'nobody'], "unknown node 'nobody'"),
+        (['--for', 'ever'], "'ever' is not a positive number of seconds"),
+        (['--for', '-3'], '-3'),
+        (['--domain', 'x'], 'domain'),
+        (['--log-level', 'loud'], 'loud'),
+        (['--behaviour', 'dance'], 'dance'),
+        (['list', 'nodes'], 'nodes'),
+        (['--speed', '9'], '--speed'),
+    ],
+)
+def test_a_wrong_command_line_is_one_line_and_exit_code_2(arguments, wrong, capsys):
+    assert main(arguments) == 2
+    error = capsys.readouterr().err
+    assert error.count('\n') == 1
+    assert error.startswith('launch.py: ')
+    assert wrong in error
+
+
+def test_list_names_every_node(capsys):
+    assert main(['list']) == 0
+    output = capsys.readouterr().out
+    assert all(node.name in output and node.package in output for node in NODES)
+
+
+def test_the_options_of_a_run():
+    options = make_parser().parse_args(
+        ['--mode', 'manual', '--for', '2.5', '--without', 'armor_server,reasoner', '--composed']
+    )
+    assert options.mode == 'MANUAL'
+    assert options.seconds == 2.5
+    assert options.without == ['armor_server', 'reasoner']
+    assert options.composed

@@ -1,0 +1,62 @@
+from __future__ import annotations
+
+import io
+import re
+
+import pytest
+
+from launcher.log import MergedLog
+
+
+@pytest.fixture
+def stream():
+    return io.StringIO()
+
+
+def body(text):
+    """Lines without the time in front."""
+    return [re.sub(r'^\d\d:\d\d:\d\d\.\d{3} ', '', line) for line in text.splitlines()]
+
+
+def test_a_ros_line_shows_its_node_and_severity(stream):
+    log = MergedLog(stream, ['armor_server', 'robot_behavior'])
+    log.line('armor_server', '[INFO] [armor_server] ready')
+    log.line('armor_server', '[WARN] [robot1.armor_server] slow')
+    log.line('armor_server', '[ERROR] [rmw_fastrtps] no network')
+    log.say('started')
+    assert body(stream.getvalue()) == [
+        'armor_server   | ready',
+        'armor_server   | WARN: slow',
+        'armor_server   | ERROR: rmw_fastrtps: no network',
+        'launch         | started',
+    ]
+
+
+def test_a_process_of_several_nodes_is_shown_by_node(stream):
+    log = MergedLog(stream, ['one', 'two', 'composed'])
+    log.line('composed', '[INFO] [two] hello')
+    assert body(stream.getvalue()) == ['two      | hello']
+
+
+def test_a_redrawn_line_shows_what_it_ended_with(stream):
+    log = MergedLog(stream, ['battery'])
+    log.line('battery', 'charging 10 %\rcharging 100 %')
+    log.line('battery', '')
+    assert body(stream.getvalue()) == ['battery | charging 100 %']
+
+
+def test_colours_are_for_the_stream_and_not_for_the_file(stream, tmp_path):
+    log = MergedLog(stream, ['one'], colour=True, path=tmp_path / 'log')
+    log.line('one', '[ERROR] [one] \x1b[1mbroken\x1b[0m')
+    log.plain('the end')
+    log.close()
+    assert '\x1b[31m' in stream.getvalue()
+    written = (tmp_path / 'log').read_text()
+    assert '\x1b' not in written
+    assert body(written) == ['one    | ERROR: broken', 'the end']
+
+
+def test_no_colour_without_a_terminal(stream):
+    log = MergedLog(stream, ['one'])
+    log.warn('look')
+    assert '\x1b' not in stream.getvalue()

@@ -1,0 +1,51 @@
+from __future__ import annotations
+
+import contextlib
+import io
+
+import pytest
+
+from launcher.progress import Step, describe
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+@pytest.mark.parametrize(
+    ('line', 'shown'),
+    [
+        ('  [12/266] Building C object CMakeFiles/x.dir/y.c.o', 'compiling 12/266'),
+        ('Collecting numpy>=1.26', 'looking for numpy>=1.26'),
+        ('  Downloading numpy-2.1.0-cp311-manylinux.whl (16.8 MB)', 'downloading numpy'),
+        ('  Downloading https://host/a/owlready2-0.50.tar.gz', 'downloading owlready2'),
+        ('Installing collected packages: a, b', 'installing'),
+        ('Building wheels for collected packages: owlready2', 'building collected'),
+        ('  Installing build dependencies: started', 'fetching build tools'),
+        ('something else', ''),
+    ],
+)
+def test_what_a_line_of_output_tells(line, shown):
+    assert describe(line) == shown
+
+
+def test_a_step_on_a_terminal_redraws_one_line():
+    stream = Terminal()
+    with Step(1, 3, 'packages', stream) as step:
+        step.feed('Collecting numpy')
+    assert stream.getvalue().count('\n') == 1
+    assert '\r' in stream.getvalue()
+    assert 'looking for numpy' in stream.getvalue()
+    assert '[1/3] packages: done in' in stream.getvalue()
+
+
+def test_a_step_elsewhere_prints_a_line_at_its_start_and_its_end():
+    stream = io.StringIO()
+    with contextlib.suppress(RuntimeError), Step(2, 3, 'interfaces', stream) as step:
+        step.feed('[1/2] compiling')
+        raise RuntimeError
+    assert stream.getvalue().splitlines() == [
+        '[2/3] interfaces ...',
+        '[2/3] interfaces: stopped after 0 s',
+    ]

@@ -1,0 +1,163 @@
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from launcher.supervisor import describe_exit
+from tests.launcher.conftest import ROOT, gone
+
+DRIVER = str(Path(__file__).with_name('supervised.py'))
+ENVIRON = {**os.environ, 'PYTHONPATH': str(ROOT)}
+WAIT = 'import signal; print("up", flush=True); signal.pause()'
+STUBBORN = (
+    'import signal\n'
+    'for s in (signal.SIGTERM, signal.SIGINT): signal.signal(s, signal.SIG_IGN)\n'
+    'print("up", flush=True)\n'
+    'while True: signal.pause()'
+)
+PARENT = (
+    'import subprocess, sys, signal\n'
+    'child = subprocess.Popen([sys.executable, "-c", "import signal; signal.pause()"])\n'
+    'print("grandchild", child.pid, flush=True)\n'
+    'signal.pause()'
+)
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_stop_signal_ends_all_and_counts_as_wanted(start, number):
+    launch = start(DRIVER, f'one={WAIT}', f'two={WAIT}', environ=ENVIRON)
+    pids = [int(launch.until(rf'started {n} \(process (\d+)\)')[1]) for n in ('one', 'two')]
+    launch.until(r'one +\| up')
+    launch.until(r'two +\| up')
+    code, seconds = launch.end(number)
+    assert code == 0
+    assert seconds < 3
+    assert gone(pids, 0)
+    assert f'{number.name}: stopping' in '\n'.join(launch.lines)
+
+
+def test_a_child_that_heeds_no_signal_is_killed_within_three_seconds(start):
+    launch = start(DRIVER, f'deaf={STUBBORN}', f'grown={PARENT}', environ=ENVIRON)
+    deaf = int(launch.until(r'started deaf \(process (\d+)\)')[1])
+    launch.until(r'deaf +\| up')
+    grandchild = int(launch.until(r'grandchild (\d+)')[1])
+    launch.process.send_signal(signal.SIGINT)
+    launch.until('stopping')
+    code, seconds = launch.end(signal.SIGINT)  # a second Ctrl-C changes nothing
+    assert code == 0
+    assert seconds < 3
+    assert gone([deaf, grandchild], 1)
+    assert 'deaf did not end in time: killed' in '\n'.join(launch.lines)
+    assert 'Traceback' not in '\n'.join(launch.lines)
+
+
+def test_a_child_that_dies_comes_back_and_the_rest_goes_on(start):
+    launch = start(DRIVER, f'one={WAIT}', f'two={WAIT}', environ=ENVIRON)
+    first = int(launch.until(r'started one \(process (\d+)\)')[1])
+    launch.until(r'one +\| up')
+    seen = len(launch.lines)
+    os.kill(first, signal.SIGKILL)
+    launch.until(r'one died \(killed by SIGKILL\): starting it again in 0.01 s', after=seen)
+    second = int(launch.until(r'started one \(process (\d+)\)', after=seen)[1])
+    assert second != first
+    launch.until(r'one +\| up', after=seen)
+    assert launch.end(signal.SIGINT)[0] == 0
+    assert sum('started two' in line for line in launch.lines) == 1
+
+
+def test_pauses_grow_while_a_child_keeps_dying(start):
+    launch = start(DRIVER, 'one=import sys; sys.exit(3)', environ=ENVIRON)
+    launch.until(r'died \(exit code 3\): starting it again in 0.01 s')
+    launch.until(r'starting it again in 0.02 s')
+    assert launch.end(signal.SIGTERM)[0] == 0
+
+
+def test_a_child_that_cannot_be_configured_ends_the_launch(start):
+    bad = 'print("cannot start: level is -1"); raise SystemExit(2)'
+    launch = start(DRIVER, f'one={WAIT}', f'two={bad}', environ=ENVIRON)
+    assert launch.end()[0] == 2
+    output = '\n'.join(launch.lines)
+    assert 'cannot start: level is -1' in output
+    assert 'two cannot start as it is configured' in output
+    assert 'starting it again' not in output
+
+
+def test_a_child_that_ends_by_itself_is_left_alone(start):
+    launch = start(DRIVER, 'one=print("bye", end="")', environ=ENVIRON)
+    assert launch.end()[0] == 0
+    assert any(line.endswith('| bye') for line in launch.lines)
+    assert sum('started one' in line for line in launch.lines) == 1
+
+
+def test_a_line_of_input_reaches_the_named_child(start):
+    echo = 'import sys\nfor line in sys.stdin: print("got", line.strip(), flush=True)'
+    launch = start(DRIVER, f'one={echo}', f'two={echo}', environ=ENVIRON)
+    launch.write('two battery set 15')
+    launch.until(r'two +\| got battery set 15')
+    launch.until('sent True')
+    assert launch.process.stdin is not None
+    launch.process.stdin.close()  # the end of input ends nothing
+    assert launch.end(signal.SIGINT)[0] == 0
+
+
+def test_the_time_to_run_ends_the_launch(start):
+    environ = {**ENVIRON, 'SECONDS_TO_RUN': '0.3'}
+    launch = start(DRIVER, f'one={WAIT}', environ=environ)
+    assert launch.end()[0] == 0
+    assert 'the time is over' in '\n'.join(launch.lines)
+
+
+def test_a_reader_that_goes_away_ends_the_launch():
+    chatty = 'while True: print("x" * 1000, flush=True)'
+    with subprocess.Popen(
+        [sys.executable, DRIVER, f'one={chatty}'],
+        env=ENVIRON,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as launch:
+        assert launch.stdout is not None
+        match = re.search(r'process (\d+)', launch.stdout.readline())
+        assert match is not None
+        launch.stdout.close()
+        assert launch.wait(10) == 0
+    assert gone([int(match[1])], 0)
+
+
+def test_children_end_with_a_launcher_that_is_killed(start):
+    child = str(ROOT / 'launcher' / 'child.py')
+    script = (
+        'import os, subprocess, sys\n'
+        f'subprocess.run([sys.executable, "-P", {child!r}, str(os.getpid()), '
+        '"x=tests.launcher.waiting_node:X", "--ros-args"])'
+    )
+    launch = start('-c', script, environ=ENVIRON)
+    launch.until('up with --ros-args')
+    children = Path(f'/proc/{launch.process.pid}/task/{launch.process.pid}/children')
+    pids = [int(pid) for pid in children.read_text().split()]
+    assert len(pids) == 1
+    launch.end(signal.SIGKILL)
+    assert gone(pids, 5)
+
+
+def test_a_child_whose_launcher_is_gone_already_does_not_start():
+    child = str(ROOT / 'launcher' / 'child.py')
+    done = subprocess.run(
+        [sys.executable, '-P', child, '1', 'x=tests.launcher.waiting_node:X'],
+        env=ENVIRON,
+        timeout=20,
+        check=False,
+    )
+    assert done.returncode == 1
+
+
+def test_exit_codes_in_words():
+    assert describe_exit(1) == 'exit code 1'
+    assert describe_exit(-9) == 'killed by SIGKILL'
+    assert describe_exit(-99) == 'killed by signal 99'

@@ -1,0 +1,47 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from launcher.system import Machine, no_wheels_advice, sourced_ros
+
+HERE = Machine('Linux', 'x86_64', 'glibc', (3, 12))
+CHECKOUT = Path('/somewhere/surveillance')
+
+
+def test_wheels_fit_the_machines_they_were_built_for():
+    assert HERE.why_no_wheels() == ''
+
+
+@pytest.mark.parametrize(
+    ('machine', 'reason'),
+    [
+        (Machine('Linux', 'aarch64', 'glibc', (3, 12)), 'Linux on aarch64'),
+        (Machine('Darwin', 'arm64', '', (3, 12)), 'Darwin on arm64'),
+        (Machine('Linux', 'x86_64', '', (3, 12)), 'glibc'),
+        (Machine('Linux', 'x86_64', 'glibc', (3, 14)), 'Python 3.14'),
+    ],
+)
+def test_where_none_fit_it_is_said_why(machine, reason):
+    assert reason in machine.why_no_wheels()
+
+
+def test_without_wheels_and_ros_the_advice_is_to_install_it(tmp_path):
+    advice = no_wheels_advice('no wheels', CHECKOUT, tmp_path / 'none')
+    assert 'no ROS 2 Jazzy is installed' in advice
+    assert 'https://docs.ros.org/en/jazzy/Installation.html' in advice
+    assert 'colcon build' in advice
+
+
+def test_without_wheels_but_with_ros_the_advice_is_to_build(tmp_path):
+    advice = no_wheels_advice('no wheels', CHECKOUT, tmp_path)
+    assert 'ROS 2 Jazzy is installed' in advice
+    assert f'ln -s {CHECKOUT}' in advice
+    assert 'ros2 launch surveillance_behaviour surveillance.launch.py' in advice
+
+
+def test_a_sourced_jazzy_is_seen():
+    assert sourced_ros({'ROS_DISTRO': 'jazzy', 'AMENT_PREFIX_PATH': '/opt/ros/jazzy'})
+    assert not sourced_ros({'ROS_DISTRO': 'humble', 'AMENT_PREFIX_PATH': '/opt/ros/humble'})
+    assert not sourced_ros({})
