@@ -1,0 +1,172 @@
+"""The set-up on a small project: nothing to download, and interfaces that build at once."""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from launcher.environment import clean_environ
+from launcher.fingerprint import INTERFACES, JOURNAL
+from tests.launcher.conftest import ROOT
+
+# A build backend that needs nothing and waits, when told to, for the test to go on.
+BACKEND = """
+import os, zipfile
+NAME = 'surveillance_interfaces-1'
+def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
+    if 'FAIL_BUILD' in os.environ:
+        raise SystemExit('error: no compiler today')
+    if 'HOLD_BUILD' in os.environ:
+        with open(os.environ['HOLD_BUILD'], 'w') as reached:
+            reached.write('x')
+        with open(os.environ['HOLD_BUILD'] + '.go') as go:
+            go.read()
+    with zipfile.ZipFile(os.path.join(wheel_directory, NAME + '-py3-none-any.whl'), 'w') as wheel:
+        with open('source.py') as source:
+            wheel.writestr('surveillance_interfaces.py', source.read())
+        info = NAME + '.dist-info/'
+        about = ['Metadata-Version: 2.1', 'Name: surveillance_interfaces', 'Version: 1']
+        wheel.writestr(info + 'METADATA', '\\n'.join(about))
+        about = ['Wheel-Version: 1.0', 'Root-Is-Purelib: true', 'Tag: py3-none-any']
+        wheel.writestr(info + 'WHEEL', '\\n'.join(about))
+        names = [*wheel.namelist(), info + 'RECORD']
+        wheel.writestr(info + 'RECORD', ''.join(f'{name},,\\n' for name in names))
+    return NAME + '-py3-none-any.whl'
+"""
+BUILD = """
+[build-system]
+requires = []
+build-backend = "backend"
+backend-path = ["."]
+"""
+PROJECT = """
+[project]
+dependencies = ["pip"]
+[project.optional-dependencies]
+test = []
+"""
+PREPARE = """
+import sys
+from pathlib import Path
+from launcher.environment import Environment, SetupError
+environment = Environment(Path(sys.argv[1]))
+try:
+    environment.prepare()
+except SetupError as error:
+    sys.exit(str(error))
+print('ready', environment.ready())
+"""
+
+
+@pytest.fixture(scope='module')
+def checkout(tmp_path_factory):
+    folder = tmp_path_factory.mktemp('checkout')
+    (folder / 'pyproject.toml').write_text(PROJECT)
+    interfaces = folder / INTERFACES
+    interfaces.mkdir()
+    (interfaces / 'pyproject.toml').write_text(BUILD)
+    (interfaces / 'backend.py').write_text(BACKEND)
+    (interfaces / 'source.py').write_text('VALUE = 1\n')
+    return folder
+
+
+def environ(**more: str) -> dict[str, str]:
+    return {**clean_environ(), 'PYTHONPATH': str(ROOT), **more}
+
+
+def prepare(checkout: Path, **more: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, '-c', PREPARE, str(checkout)],
+        env=environ(**more),
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+
+
+def value(checkout: Path) -> str:
+    python = checkout / '.venv' / 'bin' / 'python'
+    code = 'import surveillance_interfaces as i; print(i.VALUE)'
+    return subprocess.check_output([python, '-c', code], env=environ(), text=True).strip()
+
+
+def test_a_set_up_from_nothing_to_an_edit(checkout, start):
+    # A build that fails says why in one line, and the environment is not taken as finished.
+    failed = prepare(checkout, FAIL_BUILD='1')
+    assert failed.returncode == 1
+    assert failed.stderr.count('\n') == 1
+    assert 'the set-up stopped' in failed.stderr
+    assert 'setup.log' in failed.stderr
+    assert 'no compiler today' in (checkout / '.venv' / 'setup.log').read_text()
+
+    # The next run goes on where it stopped: the interfaces alone are left.
+    done = prepare(checkout)
+    assert 'ready True' in done.stdout, done.stderr
+    assert '[1/1] messages' in done.stdout
+    assert value(checkout) == '1'
+
+    # Nothing changed: nothing is done, and nothing is said.
+    assert prepare(checkout).stdout == 'ready True\n'
+
+    # Cut off in the middle of a build by SIGKILL: the next run waits for what still builds, then
+    # finishes the work.
+    (checkout / INTERFACES / 'source.py').write_text('VALUE = 2\n')
+    reached = checkout / 'reached'
+    os.mkfifo(reached)
+    os.mkfifo(f'{reached}.go')
+    cut = start('-c', PREPARE, str(checkout), environ=environ(HOLD_BUILD=str(reached)))
+    with reached.open() as signal_of_build:
+        assert signal_of_build.read() == 'x'
+    cut.end(signal.SIGKILL)
+    assert json.loads((checkout / '.venv' / JOURNAL).read_text())['working'].startswith('messages')
+    following = start('-u', '-c', PREPARE, str(checkout), environ=environ())
+    following.until('Another set-up of this checkout is at work')
+    with open(f'{reached}.go', 'w') as go:
+        go.write('x')
+    following.until('ready True')
+    assert following.end()[0] == 0
+    assert value(checkout) == '2'
+
+    # Cut off while packages were installed: what is there cannot be trusted and is made anew.
+    journal = json.loads((checkout / '.venv' / JOURNAL).read_text())
+    journal['working'] = 'Python packages, ROS 2 Jazzy among them'
+    (checkout / '.venv' / JOURNAL).write_text(json.dumps(journal))
+    (checkout / '.venv' / 'left-over').touch()
+    renewed = prepare(checkout)
+    assert '[1/3] virtual environment' in renewed.stdout
+    assert 'ready True' in renewed.stdout
+    assert not (checkout / '.venv' / 'left-over').exists()
+
+
+def test_half_an_environment_without_pip_is_made_anew(tmp_path, checkout):
+    # What Debian leaves behind when its python3-venv is missing.
+    if not (checkout / '.venv').exists():
+        prepare(checkout)
+    for path in (checkout / '.venv').glob('lib/*/site-packages/pip*'):
+        path.rename(tmp_path / path.name)
+    (checkout / '.venv' / JOURNAL).unlink()
+    assert '[1/3] virtual environment' in prepare(checkout).stdout
+
+
+def test_two_set_ups_at_once_are_one_after_the_other(checkout, start):
+    lock = os.open(checkout, os.O_RDONLY)
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        (checkout / INTERFACES / 'source.py').write_text('VALUE = 3\n')
+        both = [start('-u', '-c', PREPARE, str(checkout), environ=environ()) for _ in range(2)]
+        for one in both:
+            one.until('Another set-up of this checkout is at work')
+    finally:
+        os.close(lock)
+    for one in both:
+        one.until('ready True')
+    # One did the work, the other saw that it was done.
+    assert sum('[1/1] messages' in line for one in both for line in one.lines) == 2

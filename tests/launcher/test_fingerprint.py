@@ -1,0 +1,75 @@
+from __future__ import annotations
+
+import pytest
+
+from launcher.fingerprint import INTERFACES, Fingerprint, Journal, current, requirements
+
+PROJECT = """
+[project]
+dependencies = ["one==1"]
+[project.optional-dependencies]
+test = ["two"]
+lint = ["three"]
+"""
+
+
+@pytest.fixture
+def checkout(tmp_path):
+    (tmp_path / 'pyproject.toml').write_text(PROJECT)
+    (tmp_path / INTERFACES / 'msg').mkdir(parents=True)
+    (tmp_path / INTERFACES / 'msg' / 'A.msg').write_text('int32 a\n')
+    return tmp_path
+
+
+def test_requirements_are_the_projects_with_those_of_the_extras(checkout):
+    assert requirements(checkout, ['test']) == ['one==1', 'two']
+    assert requirements(checkout, ['lint', 'test']) == ['one==1', 'three', 'two']
+
+
+def test_a_change_of_an_interface_shows(checkout):
+    before = current(checkout, ['test'])
+    (checkout / INTERFACES / 'msg' / 'A.msg').write_text('int64 a\n')
+    after = current(checkout, ['test'])
+    assert after.interfaces != before.interfaces
+    assert after.requirements == before.requirements
+
+
+def test_a_renamed_interface_shows(checkout):
+    before = current(checkout, ['test'])
+    (checkout / INTERFACES / 'msg' / 'A.msg').rename(checkout / INTERFACES / 'msg' / 'B.msg')
+    assert current(checkout, ['test']).interfaces != before.interfaces
+
+
+def test_a_change_of_a_dependency_shows_and_one_elsewhere_does_not(checkout):
+    before = current(checkout, ['test'])
+    file = checkout / 'pyproject.toml'
+    file.write_text(file.read_text() + '[tool.x]\ny = 1\n')
+    assert current(checkout, ['test']) == before
+    file.write_text(file.read_text().replace('one==1', 'one==2'))
+    assert current(checkout, ['test']).requirements != before.requirements
+
+
+def test_what_a_build_leaves_behind_does_not_show(checkout):
+    before = current(checkout, ['test'])
+    (checkout / INTERFACES / 'build').mkdir()
+    (checkout / INTERFACES / 'build' / 'made').write_text('x')
+    assert current(checkout, ['test']) == before
+
+
+def test_a_journal_fits_only_the_sources_it_was_made_for_and_only_when_finished(tmp_path):
+    journal = Journal('3.12 /usr', '/here', ['test'], 'p', 'i', '')
+    fingerprint = Fingerprint('3.12 /usr', '/here', 'p', 'i')
+    journal.write(tmp_path)
+    assert Journal.read(tmp_path) == journal
+    assert journal.fits(fingerprint)
+    assert not journal.fits(Fingerprint('3.13 /usr', '/here', 'p', 'i'))
+    assert not journal.fits(Fingerprint('3.12 /usr', '/there', 'p', 'i'))
+    journal.working = 'packages'
+    assert not journal.fits(fingerprint)
+
+
+@pytest.mark.parametrize('content', ['', '{', '[]', '{"unknown": 1}', '\x00'])
+def test_a_broken_journal_counts_as_none(content, tmp_path):
+    Journal('x').write(tmp_path)
+    next(tmp_path.iterdir()).write_text(content)
+    assert Journal.read(tmp_path) == Journal()
