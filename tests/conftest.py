@@ -88,6 +88,10 @@ class Graph:
     def remove(self, node: Any) -> None:
         """Stop and destroy one node, as when its process ends."""
         node.stop()
+        self.drop(node)
+
+    def drop(self, node: Any) -> None:
+        """Destroy one node without a goodbye, as when its process is killed."""
         self._spinner.executor.remove_node(node)
         self._nodes.remove(node)
         done = threading.Event()

@@ -24,6 +24,7 @@ from rclpy.node import Node
 from rclpy.qos import qos_profile_action_status_default
 from rclpy.task import Future
 
+from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.waiting import Interrupt
 
 DISCOVERY_PERIOD = 0.02
@@ -166,6 +167,8 @@ class GoalCaller:
         self._node = node
         group = ReentrantCallbackGroup()
         self._client = ActionClient(node, action_type, name, callback_group=group)
+        if isinstance(node, PatrolNode):
+            node.own(self._client)
         self._action_type = action_type
         self._cancel_timeout = cancel_timeout
         self._watch: _ServerWatch | None = None

@@ -108,6 +108,7 @@ class GoalServer:
             cancel_callback=self._cancel,
             result_timeout=RESULT_KEPT,
         )
+        node.own(self._server)
         node.stopping.subscribe(self._stop)
 
     def _accepted(self, handle: Any) -> None:

@@ -14,7 +14,7 @@ import sys
 import threading
 import traceback
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, Protocol
 
 import rclpy
 import yaml
@@ -45,6 +45,13 @@ class StartError(Exception):
     """The node cannot start; the message is one line that says why."""
 
 
+class Destroyable(Protocol):
+    """A part of a node that must be taken down by hand."""
+
+    def destroy(self) -> None:
+        """Leave the ROS graph."""
+
+
 class PatrolNode(Node):  # type: ignore[misc]
     """A node with checked parameters and threads that end with it.
 
@@ -60,6 +67,7 @@ class PatrolNode(Node):  # type: ignore[misc]
         self._specs: dict[str, ParameterSpec] = {}
         self._on_change: dict[str, Callable[[Any], None]] = {}
         self._threads: list[threading.Thread] = []
+        self._owned: list[Destroyable] = []
         super().__init__(name, **node_options)
         self.add_on_set_parameters_callback(self._check_parameters)
         self.add_post_set_parameters_callback(self._tell_parameters)
@@ -168,6 +176,16 @@ class PatrolNode(Node):  # type: ignore[misc]
         self._threads.append(thread)
         thread.start()
         return thread
+
+    def own(self, entity: Destroyable) -> None:
+        """Have an entity destroyed with the node: rclpy forgets action servers and clients."""
+        self._owned.append(entity)
+
+    def destroy_node(self) -> None:
+        """Take the node out of the graph; only when no executor spins it any more."""
+        while self._owned:
+            self._owned.pop().destroy()
+        super().destroy_node()
 
     def fail(self, reason: str) -> None:
         """End the node's process with an error: the node cannot go on, and says why."""

@@ -206,11 +206,7 @@ def test_server_that_goes_away_in_the_middle_is_noticed(graph, server):
     caller = GoalCaller(graph.node, FollowPath, 'follow_path')
     end = in_thread(lambda: caller.run(follow(1), accept_timeout=5.0))
     graph.until(lambda: runs)
-    server.stopping.subscribe = lambda _callback: None  # as by SIGKILL: no goodbye to goals
-    server.get_logger().debug('going')
-    graph._spinner.executor.remove_node(server)
-    graph._nodes.remove(server)
-    graph._spinner.executor.create_task(server.destroy_node)
+    graph.drop(server)
     with pytest.raises(Unavailable, match='went away'):
         end()
     runs[0].interrupt.set()
