@@ -61,7 +61,9 @@ def read_parameter_file(path: str | Path, node: str = '/**') -> ParameterFile:
     root = _compose(path)
     entries = _Entries(path)
     if not isinstance(root, yaml.MappingNode):
-        raise ParameterFileError(f"{path}:1: expected '{node}: ros__parameters: ...', got no mapping")
+        raise ParameterFileError(
+            f"{path}:1: expected '{node}: ros__parameters: ...', got no mapping"
+        )
     top = entries.children(root)
     if node not in top:
         found = ', '.join(top) or 'nothing'

@@ -174,9 +174,7 @@ class Place:
         return replace(self, closed=closed)
 
 
-def make_place(
-    rooms: Any, room_positions: Any, robot_room: Any, recharge_rooms: Any = ()
-) -> Place:
+def make_place(rooms: Any, room_positions: Any, robot_room: Any, recharge_rooms: Any = ()) -> Place:
     """Check a description and make the `Place` of it.
 
     Args:
@@ -283,9 +281,7 @@ def _check_graph(place: Place) -> None:
     for door, sides in place.doors.items():
         where = ('map', sides[0])
         if len(sides) == 1:
-            raise PlaceError(
-                where, f"door '{door}' is in only one place, {sides[0]}; expected two"
-            )
+            raise PlaceError(where, f"door '{door}' is in only one place, {sides[0]}; expected two")
         if len(sides) > 2:
             raise PlaceError(
                 where, f"door '{door}' is in {len(sides)} places, {', '.join(sides)}; expected two"

@@ -1,0 +1,97 @@
+"""Facts in short form, as people write them: ``URGENT(R3)``, ``visitedAt(R3, "5"^^xsd:long)``.
+
+The same form with ``?`` for any argument is a pattern: ``URGENT(?)``, ``canReach(Robot1, ?)``.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from surveillance_ontology.armor.rendering import render_literal
+from surveillance_ontology.axioms import (
+    Axiom,
+    ClassAssertion,
+    DataPropertyAssertion,
+    ObjectPropertyAssertion,
+    SameIndividual,
+    local_name,
+)
+
+SAME_AS = 'owl:sameAs'
+ANY = '?'
+_FORM = re.compile(r'\s*([^\s(),"]+)\s*\((.*)\)\s*\Z', re.DOTALL)
+_PART = re.compile(r'\s*("(?:[^"\\]|\\.)*"[^\s,]*|[^\s,"]+)\s*', re.DOTALL)
+
+
+@dataclass(frozen=True, slots=True)
+class ShortFact:
+    """A fact by local names, or a pattern of facts.
+
+    Attributes:
+        predicate: Local name of the class or property, or `SAME_AS`.
+        arguments: Local names of individuals, a rendered literal, or `ANY` in a pattern.
+    """
+
+    predicate: str
+    arguments: tuple[str, ...]
+
+    def __str__(self) -> str:
+        return f'{self.predicate}({", ".join(self.arguments)})'
+
+    def matches(self, fact: ShortFact) -> bool:
+        """Tell whether a fact fits this pattern."""
+        return (
+            self.predicate in (ANY, fact.predicate)
+            and len(self.arguments) == len(fact.arguments)
+            and all(
+                wanted in (ANY, argument)
+                for wanted, argument in zip(self.arguments, fact.arguments, strict=True)
+            )
+        )
+
+
+def parse_fact(text: str) -> ShortFact:
+    """Read ``predicate(argument)`` or ``predicate(argument, argument)``; ``?`` stands for any.
+
+    Raises:
+        ValueError: The text has another form.
+    """
+    expected = f'{text[:80]!r}: expected CLASS(individual) or property(individual, value)'
+    match = _FORM.match(text)
+    if match is None:
+        raise ValueError(expected)
+    arguments: list[str] = []
+    rest = match[2]
+    while True:
+        part = _PART.match(rest)
+        if part is None:
+            raise ValueError(expected)
+        arguments.append(part[1])
+        rest = rest[part.end() :]
+        if not rest:
+            break
+        if rest[0] != ',':
+            raise ValueError(expected)
+        rest = rest[1:]
+    if len(arguments) > 2:
+        raise ValueError(expected)
+    return ShortFact(match[1], tuple(arguments))
+
+
+def short_facts(axiom: Axiom) -> Sequence[ShortFact]:
+    """The short forms of an assertion; empty for any other axiom."""
+    if isinstance(axiom, ClassAssertion):
+        if isinstance(axiom.cls, str):
+            return (ShortFact(local_name(axiom.cls), (local_name(axiom.individual),)),)
+    elif isinstance(axiom, ObjectPropertyAssertion):
+        names = (local_name(axiom.subject), local_name(axiom.object))
+        return (ShortFact(local_name(axiom.prop), names),)
+    elif isinstance(axiom, DataPropertyAssertion):
+        value = render_literal(axiom.literal)
+        return (ShortFact(local_name(axiom.prop), (local_name(axiom.subject), value)),)
+    elif isinstance(axiom, SameIndividual):
+        first, *others = sorted(map(local_name, axiom.individuals))
+        return tuple(ShortFact(SAME_AS, (first, other)) for other in others)
+    return ()

@@ -1,0 +1,288 @@
+"""The directives that change an ontology, each as a function from the reference to a list of changes.
+
+They do not apply anything: buffering, the journal and reasoning are the service's business. Missing
+entities come into being by being named.
+"""
+
+from __future__ import annotations
+
+from surveillance_ontology.armor.changes import (
+    AddAxiom,
+    Change,
+    RemoveAxiom,
+    RemoveEntity,
+    RenameEntity,
+)
+from surveillance_ontology.armor.reference import Reference
+from surveillance_ontology.armor.table import (
+    CLS,
+    DAT,
+    IND,
+    NEW,
+    OBJ,
+    OLD,
+    TYPE,
+    VALUE,
+    Argument,
+    Read,
+    manipulation,
+)
+from surveillance_ontology.axioms import (
+    NOTHING,
+    THING,
+    ClassAssertion,
+    ClassExpression,
+    DataPropertyAssertion,
+    DifferentIndividuals,
+    DisjointClasses,
+    EquivalentClasses,
+    Literal,
+    ObjectIntersectionOf,
+    ObjectMinCardinality,
+    ObjectPropertyAssertion,
+    SubClassOf,
+)
+
+_OTHER = Argument('value individual', Read.INDIVIDUAL)
+_NEW_IND = Argument('new individual', Read.INDIVIDUAL)
+_OLD_IND = Argument('old individual', Read.INDIVIDUAL)
+_SUPER = Argument('superclass', Read.CLASS)
+_COUNT = Argument('cardinality', Read.NUMBER)
+_FILLER = Argument('value class', Read.CLASS)
+
+
+def _renamed(read: Read) -> tuple[Argument, Argument]:
+    return Argument('old name', read), Argument('new name', read)
+
+
+@manipulation('ADD IND', IND, summary='Makes an individual known, as an instance of owl:Thing.')
+def _add_ind(_: Reference, ind: str) -> list[Change]:
+    return [AddAxiom(ClassAssertion(THING, ind))]
+
+
+@manipulation('ADD IND CLASS', IND, CLS, summary='Asserts that an individual is of a class.')
+def _add_ind_class(_: Reference, ind: str, cls: str) -> list[Change]:
+    return [AddAxiom(ClassAssertion(cls, ind))]
+
+
+@manipulation('ADD CLASS', CLS, summary='Makes a class known, as a subclass of owl:Thing.')
+def _add_class(_: Reference, cls: str) -> list[Change]:
+    return [AddAxiom(SubClassOf(cls, THING))]
+
+
+@manipulation('ADD CLASS CLASS', CLS, _SUPER, summary='Makes a class a subclass of another.')
+def _add_class_class(_: Reference, cls: str, above: str) -> list[Change]:
+    return [AddAxiom(SubClassOf(cls, above))]
+
+
+@manipulation(
+    'ADD DATAPROP IND',
+    *(DAT, IND, TYPE, VALUE),
+    summary='Adds a value to a data property of an individual; what it has already stays.',
+    verb='added to',
+)
+def _add_dataprop(_: Reference, prop: str, ind: str, value: Literal) -> list[Change]:
+    return [AddAxiom(DataPropertyAssertion(prop, ind, value))]
+
+
+@manipulation(
+    'ADD OBJECTPROP IND',
+    *(OBJ, IND, _OTHER),
+    summary='Relates an individual to another; what it is related to already stays.',
+)
+def _add_objectprop(_: Reference, prop: str, ind: str, other: str) -> list[Change]:
+    return [AddAxiom(ObjectPropertyAssertion(prop, ind, other))]
+
+
+@manipulation(
+    'ADD CARDINALITY MIN|ADD MIN CARDINALITY',
+    *(CLS, OBJ, _COUNT, _FILLER),
+    summary='States that each instance of a class is related to so many of another class at least.',
+    differs='Both orders of the specifications are accepted: the manual has the one, the code the '
+    'other.',
+)
+def _add_min(_: Reference, cls: str, prop: str, count: int, filler: str) -> list[Change]:
+    return [AddAxiom(SubClassOf(cls, ObjectMinCardinality(count, prop, filler)))]
+
+
+@manipulation(
+    'DISJOINT IND',
+    IND,
+    rest=1,
+    summary='States that the individuals are different, each from each.',
+)
+def _disjoint_ind(_: Reference, *inds: str) -> list[Change]:
+    return _different(inds)
+
+
+@manipulation(
+    'DISJOINT IND CLASS',
+    CLS,
+    summary='States that the instances of a class, asserted and derived so far, are different. '
+    'Reason before it.',
+)
+def _disjoint_ind_class(ref: Reference, cls: str) -> list[Change]:
+    return _different(tuple(ref.kb.instances(cls)))
+
+
+def _different(inds: tuple[str, ...]) -> list[Change]:
+    members = frozenset(inds)
+    return [AddAxiom(DifferentIndividuals(members))] if len(members) > 1 else []
+
+
+@manipulation(
+    'DISJOINT CLASS', CLS, rest=1, summary='States that no two of the classes share an instance.'
+)
+def _disjoint_class(_: Reference, *classes: str) -> list[Change]:
+    return _disjoint(classes)
+
+
+@manipulation(
+    'DISJOINT CLASS CLASS',
+    CLS,
+    summary='States that no two subclasses of a class, direct or not, share an instance.',
+    differs='owl:Nothing is left out of the axiom, in which it says nothing.',
+)
+def _disjoint_class_class(ref: Reference, cls: str) -> list[Change]:
+    return _disjoint(tuple(ref.kb.subclasses(cls) - {NOTHING}))
+
+
+def _disjoint(classes: tuple[str, ...]) -> list[Change]:
+    members = tuple(sorted(set(classes)))
+    return [AddAxiom(DisjointClasses(members))] if len(members) > 1 else []
+
+
+@manipulation(
+    'MAKE EQUIVALENT CLASS|MAKE EQUIVALENT',
+    CLS,
+    summary='Turns all that a class is asserted to be a subclass of into its definition.',
+)
+def _make_equivalent(ref: Reference, cls: str) -> list[Change]:
+    above = [
+        axiom
+        for axiom in ref.kb.axioms_about(cls)
+        if isinstance(axiom, SubClassOf) and axiom.sub == cls and axiom.sup != THING
+    ]
+    if not above:
+        return []
+    parts: tuple[ClassExpression, ...] = tuple(sorted((axiom.sup for axiom in above), key=repr))
+    whole = parts[0] if len(parts) == 1 else ObjectIntersectionOf(parts)
+    return [
+        *(RemoveAxiom(axiom) for axiom in above),
+        AddAxiom(EquivalentClasses((cls, whole))),
+    ]
+
+
+@manipulation(
+    'REMOVE IND',
+    IND,
+    summary='Removes an individual with all that is asserted of it.',
+    differs='A statement that it and others are different goes on to hold for the others; ARMOR '
+    'removes the whole statement.',
+)
+def _remove_ind(_: Reference, ind: str) -> list[Change]:
+    return [RemoveEntity('individual', ind)]
+
+
+@manipulation('REMOVE IND CLASS', IND, CLS, summary='Retracts that an individual is of a class.')
+def _remove_ind_class(_: Reference, ind: str, cls: str) -> list[Change]:
+    return [RemoveAxiom(ClassAssertion(cls, ind))]
+
+
+@manipulation(
+    'REMOVE CLASS',
+    CLS,
+    summary='Removes a class with all that is asserted of it.',
+    differs='ARMOR only retracts that it is a subclass of owl:Thing, which changes nothing.',
+)
+def _remove_class(_: Reference, cls: str) -> list[Change]:
+    return [RemoveEntity('class', cls)]
+
+
+@manipulation('REMOVE CLASS CLASS', CLS, _SUPER, summary='Retracts a subclass relation.')
+def _remove_class_class(_: Reference, cls: str, above: str) -> list[Change]:
+    return [RemoveAxiom(SubClassOf(cls, above))]
+
+
+@manipulation(
+    'REMOVE DATAPROP IND',
+    *(DAT, IND, TYPE, VALUE),
+    summary='Retracts a value of a data property. Value and type must be those asserted, else '
+    'nothing happens.',
+    verb='removed from',
+)
+def _remove_dataprop(_: Reference, prop: str, ind: str, value: Literal) -> list[Change]:
+    return [RemoveAxiom(DataPropertyAssertion(prop, ind, value))]
+
+
+@manipulation(
+    'REMOVE OBJECTPROP IND',
+    *(OBJ, IND, _OTHER),
+    summary='Retracts a relation; nothing happens when it is not asserted.',
+)
+def _remove_objectprop(_: Reference, prop: str, ind: str, other: str) -> list[Change]:
+    return [RemoveAxiom(ObjectPropertyAssertion(prop, ind, other))]
+
+
+@manipulation(
+    'REPLACE DATAPROP IND',
+    *(DAT, IND, TYPE, NEW, OLD),
+    summary='Retracts the old value and adds the new one. With a wrong old value both stay.',
+    type_error_succeeds=False,
+    verb='replaced from',
+)
+def _replace_dataprop(
+    _: Reference, prop: str, ind: str, new: Literal, old: Literal
+) -> list[Change]:
+    return [
+        RemoveAxiom(DataPropertyAssertion(prop, ind, old)),
+        AddAxiom(DataPropertyAssertion(prop, ind, new)),
+    ]
+
+
+@manipulation(
+    'REPLACE OBJECTPROP IND',
+    *(OBJ, IND, _NEW_IND, _OLD_IND),
+    summary='Retracts the relation to the old individual and adds that to the new one.',
+)
+def _replace_objectprop(_: Reference, prop: str, ind: str, new: str, old: str) -> list[Change]:
+    return [
+        RemoveAxiom(ObjectPropertyAssertion(prop, ind, old)),
+        AddAxiom(ObjectPropertyAssertion(prop, ind, new)),
+    ]
+
+
+@manipulation(
+    'RENAME IND',
+    *_renamed(Read.INDIVIDUAL),
+    summary='Gives an individual another name everywhere; merges it with one that has the name.',
+)
+def _rename_ind(_: Reference, old: str, new: str) -> list[Change]:
+    return [RenameEntity('individual', old, new)]
+
+
+@manipulation(
+    'RENAME CLASS',
+    *_renamed(Read.CLASS),
+    summary='Gives a class another name everywhere; merges it with one that has the name.',
+)
+def _rename_class(_: Reference, old: str, new: str) -> list[Change]:
+    return [RenameEntity('class', old, new)]
+
+
+@manipulation(
+    'RENAME DATAPROP',
+    *_renamed(Read.DATA_PROPERTY),
+    summary='Gives a data property another name everywhere; merges it with one that has the name.',
+)
+def _rename_dataprop(_: Reference, old: str, new: str) -> list[Change]:
+    return [RenameEntity('data_property', old, new)]
+
+
+@manipulation(
+    'RENAME OBJECTPROP',
+    *_renamed(Read.OBJECT_PROPERTY),
+    summary='Gives an object property another name everywhere; merges it with one that has the name.',
+)
+def _rename_objectprop(_: Reference, old: str, new: str) -> list[Change]:
+    return [RenameEntity('object_property', old, new)]

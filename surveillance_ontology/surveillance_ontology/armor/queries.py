@@ -1,0 +1,187 @@
+"""The directives that ask: each a function from the reference to a response.
+
+Answers are sorted, since ARMOR leaves their order open. What is asked about and not known to the
+ontology is named in the description of an otherwise empty answer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+
+from surveillance_ontology.armor.facts import SAME_AS, parse_fact
+from surveillance_ontology.armor.protocol import DirectiveError, DirectiveResponse
+from surveillance_ontology.armor.reference import Reference
+from surveillance_ontology.armor.rendering import parse_entity, parse_rendered, render_entity
+from surveillance_ontology.armor.rendering import render_literal as _literal
+from surveillance_ontology.armor.restrictions import describe
+from surveillance_ontology.armor.table import CLS, DAT, IND, OBJ, flag, query, text
+from surveillance_ontology.axioms import (
+    NOTHING,
+    ClassAssertion,
+    DataPropertyAssertion,
+    ObjectPropertyAssertion,
+    SameIndividual,
+    local_name,
+)
+from surveillance_ontology.knowledge_base import Fact
+
+
+def _entities(iris: Iterable[str]) -> list[str]:
+    return sorted(map(render_entity, iris))
+
+
+def _answer(objects: list[str], ref: Reference, *asked: tuple[str, str]) -> DirectiveResponse:
+    """Answer with objects; when there are none, say which of the entities asked about is unknown."""
+    note = ''
+    if not objects:
+        unknown = [
+            f'{kind.replace("_", " ")} {render_entity(iri)}'
+            for kind, iri in asked
+            if not ref.kb.is_known(kind, iri)
+        ]
+        if unknown:
+            note = f'{ref.name} has no {" and no ".join(unknown)}'
+    return DirectiveResponse(queried_objects=objects, error_description=note)
+
+
+@query(
+    'QUERY IND',
+    IND,
+    summary='All types of an individual except owl:Thing; without any, success is false and the '
+    'exit code 0.',
+)
+def _types(ref: Reference, ind: str) -> DirectiveResponse:
+    response = _answer(_entities(ref.kb.types(ind)), ref, ('individual', ind))
+    response.success = bool(response.queried_objects)
+    if not response.success and not response.error_description:
+        response.error_description = f'{render_entity(ind)} is of no class but owl:Thing'
+    return response
+
+
+@query('QUERY IND CLASS', CLS, summary='All individuals of a class, asserted and derived.')
+def _instances(ref: Reference, cls: str) -> DirectiveResponse:
+    return _answer(_entities(ref.kb.instances(cls)), ref, ('class', cls))
+
+
+@query('QUERY DATAPROP IND', DAT, IND, summary='The values of a data property of an individual.')
+def _data_values(ref: Reference, prop: str, ind: str) -> DirectiveResponse:
+    values = sorted(map(_literal, ref.kb.data_values(prop, ind)))
+    return _answer(values, ref, ('data_property', prop), ('individual', ind))
+
+
+@query('QUERY OBJECTPROP IND', OBJ, IND, summary='What an individual is related to by a property.')
+def _object_values(ref: Reference, prop: str, ind: str) -> DirectiveResponse:
+    values = _entities(ref.kb.object_values(prop, ind))
+    return _answer(values, ref, ('object_property', prop), ('individual', ind))
+
+
+@query(
+    'QUERY CLASS IND',
+    IND,
+    flag('bottom', 'false'),
+    summary='The types of an individual. With bottom the short name of one type that has no '
+    'subclass.',
+    differs='The second argument may be left out. Of several bottom types the first by name is '
+    'given; ARMOR picks any.',
+)
+def _classes(ref: Reference, ind: str, bottom: bool) -> DirectiveResponse:
+    types = ref.kb.types(ind)
+    if not bottom:
+        return _answer(_entities(types), ref, ('individual', ind))
+    lowest = sorted(local_name(cls) for cls in types if not ref.kb.subclasses(cls) - {NOTHING})
+    return _answer(lowest[:1], ref, ('individual', ind))
+
+
+@query(
+    'QUERY CLASS CLASS',
+    CLS,
+    summary='All classes below a class, direct and indirect, owl:Nothing among them.',
+)
+def _subclasses(ref: Reference, cls: str) -> DirectiveResponse:
+    below = _entities(ref.kb.subclasses(cls) | {NOTHING})
+    response = DirectiveResponse(queried_objects=below)
+    if not ref.kb.is_known('class', cls):
+        response.error_description = f'{ref.name} has no class {render_entity(cls)}'
+    return response
+
+
+@query(
+    'QUERY CLASS RESTRICTIONS',
+    CLS,
+    summary='What a class is defined by, one text for each definition.',
+)
+def _restrictions(ref: Reference, cls: str) -> DirectiveResponse:
+    described = [describe(cls, definition) for definition in ref.kb.equivalents(cls)]
+    return _answer(sorted(filter(None, described)), ref, ('class', cls))
+
+
+@query('QUERY IND DATAPROP', IND, summary='The data properties of which an individual has a value.')
+def _data_properties(ref: Reference, ind: str) -> DirectiveResponse:
+    return _answer(_entities(ref.kb.data_properties_of(ind)), ref, ('individual', ind))
+
+
+@query(
+    'QUERY IND OBJECTPROP', IND, summary='The object properties of which an individual has a value.'
+)
+def _object_properties(ref: Reference, ind: str) -> DirectiveResponse:
+    return _answer(_entities(ref.kb.object_properties_of(ind)), ref, ('individual', ind))
+
+
+@query(
+    'QUERY EXPLAIN',
+    text('fact'),
+    native=False,
+    summary='Why a fact holds, written as `URGENT(R3)`, `canReach(Robot1, R1)` or '
+    '`owl:sameAs(a, b)`: first an English sentence, then the derivation as a tree.',
+)
+def _explain(ref: Reference, fact: str) -> DirectiveResponse:
+    explanation = ref.kb.explain(_full_fact(ref, fact))
+    if explanation is None:
+        return DirectiveResponse(
+            success=False, error_description=f'{fact} is neither asserted nor derived in {ref.name}'
+        )
+    return DirectiveResponse(queried_objects=[explanation.sentence(), explanation.tree()])
+
+
+@query(
+    'QUERY EXPLAIN INCONSISTENCY',
+    native=False,
+    summary='Why the ontology contradicts itself, in the form of QUERY EXPLAIN; nothing when it does '
+    'not.',
+)
+def _explain_inconsistency(ref: Reference) -> DirectiveResponse:
+    explanation = ref.kb.explain_inconsistency()
+    if explanation is None:
+        return DirectiveResponse(error_description=f'{ref.name} is consistent')
+    return DirectiveResponse(queried_objects=[explanation.sentence(), explanation.tree()])
+
+
+@query(
+    'QUERY UNSUPPORTED',
+    native=False,
+    summary='What the ontology holds that the reasoner does not use, one sentence each.',
+)
+def _unsupported(ref: Reference) -> DirectiveResponse:
+    return DirectiveResponse(queried_objects=list(ref.kb.unsupported))
+
+
+def _full_fact(ref: Reference, text: str) -> Fact:
+    try:
+        short = parse_fact(text)
+        read: Callable[[str], str] = lambda name: parse_entity(name, ref.kb.iri)  # noqa: E731
+        if len(short.arguments) == 1:
+            return ClassAssertion(read(short.predicate), read(short.arguments[0]))
+        subject, value = short.arguments
+        if short.predicate in (SAME_AS, 'sameAs'):
+            return SameIndividual(frozenset((read(subject), read(value))))
+        prop = read(short.predicate)
+        if value.startswith('"'):
+            return DataPropertyAssertion(prop, read(subject), parse_rendered(value))
+        if ref.kb.is_known('data_property', prop):
+            values = ref.kb.data_values(prop, read(subject))
+            for literal in sorted(values, key=_literal):
+                if literal.lexical == value:
+                    return DataPropertyAssertion(prop, read(subject), literal)
+        return ObjectPropertyAssertion(prop, read(subject), read(value))
+    except ValueError as error:
+        raise DirectiveError(f'QUERY EXPLAIN: argument fact {error}') from None

@@ -1,0 +1,349 @@
+"""The directive service: several ontologies under reference names, and what directives do to them.
+
+    service = ArmorService()
+    service.execute(DirectiveRequest('me', 'map', 'LOAD', 'FILE', '', (path, iri, 'false', '', 'true')))
+    service.execute(DirectiveRequest('me', 'map', 'QUERY', 'IND', 'CLASS', ('ROOM',))).queried_objects
+
+Threads may share a service: each reference has a lock, held for one directive, or for a whole batch.
+Nothing that a client sends makes it raise.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+from surveillance_ontology.armor import (  # noqa: F401 - the modules fill the table
+    manipulations,
+    queries,
+    utilities,
+)
+from surveillance_ontology.armor.changes import Change
+from surveillance_ontology.armor.directive_log import DirectiveLog
+from surveillance_ontology.armor.loading import load_document
+from surveillance_ontology.armor.paths import SafePaths
+from surveillance_ontology.armor.protocol import (
+    DirectiveError,
+    DirectiveRequest,
+    DirectiveResponse,
+    ExitCode,
+    ListResponse,
+)
+from surveillance_ontology.armor.reference import NOBODY, Reference
+from surveillance_ontology.armor.rendering import shown
+from surveillance_ontology.armor.settings import Settings
+from surveillance_ontology.armor.table import Directive, Kind, look_up
+from surveillance_ontology.knowledge_base import Changes
+from surveillance_ontology.owl_writing import write_ontology
+
+LONG_BACKLOG = 500
+"""Changes since the last reasoning from which on REASON counts as slow."""
+LONG_ARGUMENTS = 1000
+Watcher = Callable[[str, Changes], None]
+
+
+class ArmorService:
+    """Carries out directives.
+
+    Args:
+        settings: What is allowed.
+        screen: Writes a line of LOG SCREEN.
+        warn: Told in one line of what went wrong inside and of what a client should know.
+    """
+
+    def __init__(
+        self,
+        settings: Settings | None = None,
+        screen: Callable[[str], None] = print,
+        warn: Callable[[str], None] = print,
+    ) -> None:
+        self.settings = settings or Settings()
+        self.paths = SafePaths(self.settings.directories, self.settings.read_only_directories)
+        self.log = DirectiveLog(screen)
+        self._warn = warn
+        self._references: dict[str, Reference] = {}
+        self._registry = threading.Lock()
+        self._loading = threading.Lock()
+        self._watchers: list[Watcher] = []
+
+    def execute(self, request: DirectiveRequest) -> DirectiveResponse:
+        """Carry out one directive; never raises for what a client sent."""
+        return self._guarded(request, self._execute)
+
+    def execute_at_once(self, request: DirectiveRequest) -> DirectiveResponse | None:
+        """Carry out a directive that will be quick.
+
+        Returns:
+            The response; None when it may take long or would have to wait for another thread. Then
+            nothing was done, and the caller takes it to `execute` on a thread that may block.
+        """
+        directive = _peek(request)
+        if directive is not None and (directive.slow or len(request.args) > LONG_ARGUMENTS):
+            return None
+        ref = self._references.get(request.reference_name)
+        if ref is None:
+            return self.execute(request)
+        if not ref.lock.acquire(blocking=False):
+            return None
+        try:
+            if ref.backlog > LONG_BACKLOG and directive is not None and directive.kind.may_reason:
+                return None
+            return self.execute(request)
+        finally:
+            ref.lock.release()
+
+    def execute_list(self, requests: Sequence[DirectiveRequest]) -> ListResponse:
+        """Carry out directives in order; no other client's directive comes in between.
+
+        A failure does not end the batch: each directive has its own answer.
+        """
+        if len(requests) > self.settings.max_batch:
+            problem = f'{len(requests)} directives in a list, at most {self.settings.max_batch}'
+            refusal = DirectiveResponse(False, exit_code=205, error_description=problem)
+            return ListResponse(False, False, [refusal])
+        names = sorted({request.reference_name for request in requests})
+        with contextlib.ExitStack() as locks:
+            for name in names:
+                if ref := self._references.get(name):
+                    locks.enter_context(ref.lock)
+            responses = [self.execute(request) for request in requests]
+        return ListResponse(
+            success=all(response.success for response in responses),
+            is_consistent=responses[-1].is_consistent if responses else False,
+            responses=responses,
+        )
+
+    def watch(self, watcher: Watcher) -> Callable[[], None]:
+        """Tell a watcher of every change of asserted and derived facts, with the reference's name.
+
+        It is called inside the directive that caused the change and must be quick.
+
+        Returns:
+            A function that ends the watching.
+        """
+        self._watchers.append(watcher)
+        return lambda: self._watchers.remove(watcher)
+
+    def names(self) -> list[str]:
+        """The names of all references."""
+        return sorted(self._references)
+
+    def reference(self, name: str) -> Reference:
+        """Find a reference.
+
+        Raises:
+            DirectiveError: 205, naming those there are.
+        """
+        ref = self._references.get(name)
+        if ref is None:
+            loaded = ', '.join(map(shown, self.names()[:10])) or 'none'
+            raise DirectiveError(f'unknown reference {shown(name)}; loaded: {loaded}')
+        return ref
+
+    @contextlib.contextmanager
+    def locked(self, name: str) -> Iterator[Reference]:
+        """Hold a reference's lock.
+
+        Raises:
+            DirectiveError: 205, there is no such reference.
+        """
+        while True:
+            ref = self.reference(name)
+            with ref.lock:
+                if not ref.dropped:
+                    yield ref
+                    return
+
+    def load(
+        self,
+        request: DirectiveRequest,
+        source: str,
+        iri: str,
+        buffered: bool,
+        reasoner: str,
+        lazy: bool,
+        *,
+        web: bool = False,
+    ) -> DirectiveResponse:
+        """Do LOAD; see the table."""
+        name = request.reference_name
+        again = DirectiveResponse(error_description=f'{name} is loaded already')
+        if self._rebuffer(name, buffered):
+            return again
+        with self._loading:
+            if name not in self._references:
+                ref, notes = load_document(
+                    name, source, iri, reasoner, self.paths, self.settings, web=web
+                )
+                ref.buffered_manipulation, ref.buffered_reasoner = buffered, lazy
+                self._register(ref)
+                for note in notes:
+                    self._warn(f'{name}: {note}')
+                return DirectiveResponse(error_description='; '.join(notes))
+        self._rebuffer(name, buffered)
+        return again
+
+    def _rebuffer(self, name: str, buffered: bool) -> bool:
+        if name not in self._references:
+            return False
+        with contextlib.suppress(DirectiveError), self.locked(name) as ref:
+            ref.buffer(buffered)
+            return True
+        return False
+
+    def _register(self, ref: Reference) -> None:
+        ref.kb.subscribe(lambda changes: self._tell(ref.name, changes))
+        with self._registry:
+            self._references[ref.name] = ref
+
+    def _tell(self, name: str, changes: Changes) -> None:
+        for watcher in tuple(self._watchers):
+            watcher(name, changes)
+
+    def drop(self, name: str) -> None:
+        """Do DROP."""
+        with contextlib.suppress(DirectiveError), self.locked(name) as ref:
+            ref.dropped = True
+            with self._registry:
+                del self._references[name]
+
+    def mount(self, request: DirectiveRequest) -> DirectiveResponse:
+        """Do MOUNT.
+
+        Raises:
+            DirectiveError: 203, the reference is unknown or another client is mounted.
+        """
+        client, name = request.client_name, request.reference_name
+        if name not in self._references:
+            raise DirectiveError(
+                f'{client} cannot be mounted on {name}. Unknown reference.', ExitCode.MOUNT_REFUSED
+            )
+        with self.locked(name) as ref:
+            if not ref.is_free_for(client):
+                raise DirectiveError(
+                    f'{client} cannot be mounted on {name}. Another client is already mounted on it.',
+                    ExitCode.MOUNT_REFUSED,
+                )
+            note = f'{client} is mounted already' if ref.mounted == client != NOBODY else ''
+            ref.mounted = client
+        return DirectiveResponse(error_description=note)
+
+    def unmount(self, request: DirectiveRequest) -> DirectiveResponse:
+        """Do UNMOUNT.
+
+        Raises:
+            DirectiveError: 205, there is no such reference.
+        """
+        with self.locked(request.reference_name) as ref:
+            if ref.mounted != request.client_name:
+                note = f'{request.client_name} is not mounted on {ref.name}'
+                return DirectiveResponse(error_description=note)
+            ref.mounted = NOBODY
+        return DirectiveResponse()
+
+    def save(self, name: str, path: str, *, inferences: bool) -> None:
+        """Do SAVE and SAVE INFERENCE.
+
+        Raises:
+            DirectiveError: 205, the path is not allowed or cannot be written.
+        """
+        with self.locked(name) as ref:
+            target = path or str(ref.origin.file or '')
+            if not target:
+                raise DirectiveError(
+                    f'SAVE: {name} was loaded from {ref.origin.path}; expected a path'
+                )
+            axioms = list(ref.kb.axioms())
+            if inferences:
+                axioms = list(dict.fromkeys([*axioms, *ref.kb.facts()]))
+            form = ref.origin.format
+        try:
+            write_ontology(axioms, ref.kb.iri, self.paths.to_write(target), form)
+        except OSError as error:
+            raise DirectiveError(f'SAVE: {target}: {error.strerror}') from None
+
+    def _guarded(
+        self, request: DirectiveRequest, run: Callable[[DirectiveRequest], DirectiveResponse]
+    ) -> DirectiveResponse:
+        try:
+            response = run(request)
+        except DirectiveError as error:
+            response = DirectiveResponse(
+                success=error.success,
+                timeout=error.timeout,
+                exit_code=int(error.exit_code),
+                error_description=error.description,
+            )
+        except Exception as error:
+            problem = f'{request.words}: internal error, {type(error).__name__}: {error}'
+            problem = ' '.join(problem.split())
+            self._warn(problem)
+            response = DirectiveResponse(False, exit_code=205, error_description=problem)
+        ref = self._references.get(request.reference_name)
+        if ref is not None:
+            response.is_consistent = ref.kb.consistent
+        if self.log.enabled:
+            self.log.write(request, response)
+        return response
+
+    def _execute(self, request: DirectiveRequest) -> DirectiveResponse:
+        if not request.reference_name:
+            raise DirectiveError(
+                'Invalid request. No reference name specified.', ExitCode.NO_REFERENCE_NAME
+            )
+        directive = look_up(request)
+        self._check_size(request)
+        if directive.kind is Kind.UTILITY:
+            _check_name(request.reference_name)
+            values = directive.read(request.args, '')
+            response: DirectiveResponse = directive.run(self, request, *values)
+            return response
+        if directive.slow:
+            ref = self.reference(request.reference_name)
+            response = directive.run(self, ref, *self._values(directive, request, ref))
+            return response
+        with self.locked(request.reference_name) as ref:
+            if directive.kind is Kind.QUERY:
+                response = directive.run(ref, *self._values(directive, request, ref))
+                return response
+            if self.settings.enforce_mount and not ref.is_free_for(request.client_name):
+                raise DirectiveError(
+                    f'{request.client_name} cannot connect to {ref.name}. '
+                    'Another client is already mounted on it.',
+                    ExitCode.REFERENCE_BUSY,
+                )
+            if directive.kind is Kind.CONTROL:
+                directive.run(ref)
+            else:
+                changes: list[Change] = directive.run(ref, *self._values(directive, request, ref))
+                ref.submit(changes)
+            return DirectiveResponse()
+
+    def _values(self, directive: Directive, request: DirectiveRequest, ref: Reference) -> list[Any]:
+        return directive.read(request.args, ref.kb.iri, narrow_doubles=self.settings.narrow_doubles)
+
+    def _check_size(self, request: DirectiveRequest) -> None:
+        args = request.args
+        if len(args) > self.settings.max_arguments:
+            raise DirectiveError(f'{len(args)} arguments, at most {self.settings.max_arguments}')
+        characters = sum(map(len, args))
+        if characters > self.settings.max_characters:
+            raise DirectiveError(
+                f'{characters} characters of arguments, at most {self.settings.max_characters}'
+            )
+
+
+def _peek(request: DirectiveRequest) -> Directive | None:
+    try:
+        return look_up(request)
+    except DirectiveError:
+        return None
+
+
+def _check_name(name: str) -> None:
+    if len(name) > 256 or not name.isprintable():
+        raise DirectiveError(
+            f'reference name {shown(name)}: expected at most 256 printable characters'
+        )

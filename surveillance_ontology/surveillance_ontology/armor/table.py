@@ -1,0 +1,287 @@
+"""The table of directives: what each is called, what it takes, what it does.
+
+One entry drives everything: dispatch, reading of arguments, error messages and the documentation.
+Entries are made with the decorators `manipulation`, `query` and `utility` in the modules of the same
+names. A new command is one decorated function.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any
+
+from surveillance_ontology.armor.protocol import DirectiveError, DirectiveRequest, ExitCode
+from surveillance_ontology.armor.rendering import (
+    TYPES,
+    parse_entity,
+    parse_literal,
+    shown,
+    unsupported_type,
+)
+
+MAX_CARDINALITY = 2**31 - 1
+
+
+class Kind(Enum):
+    """What a directive may touch."""
+
+    MANIPULATION = 'manipulation'
+    """Changes the ontology: subject to mounting, buffering and the journal."""
+    CONTROL = 'control'
+    """Applies what waits: as a manipulation, but it adds nothing."""
+    QUERY = 'query'
+    UTILITY = 'utility'
+
+    @property
+    def may_reason(self) -> bool:
+        """Whether such a directive can bring the derived facts up to date."""
+        return self in (Kind.MANIPULATION, Kind.CONTROL)
+
+
+class Read(Enum):
+    """How an argument is read."""
+
+    INDIVIDUAL = 'individual'
+    CLASS = 'class'
+    OBJECT_PROPERTY = 'object property'
+    DATA_PROPERTY = 'data property'
+    TYPE = 'type'
+    """A word of `rendering.TYPES`; the values behind it are read by it, itself it is not passed."""
+    VALUE = 'value'
+    NUMBER = 'number'
+    FLAG = 'flag'
+    TEXT = 'text'
+
+
+ENTITY_KINDS = {
+    Read.INDIVIDUAL: 'individual',
+    Read.CLASS: 'class',
+    Read.OBJECT_PROPERTY: 'object_property',
+    Read.DATA_PROPERTY: 'data_property',
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Argument:
+    """One argument of a directive.
+
+    Attributes:
+        name: Its name in messages and documentation.
+        read: How it is read.
+        default: What a missing argument stands for; None: it must be given.
+    """
+
+    name: str
+    read: Read
+    default: str | None = None
+
+
+@dataclass(frozen=True)
+class Directive:
+    """One row of the table.
+
+    Attributes:
+        command: For example ``QUERY``.
+        primary: For example ``SPARQL``, or empty.
+        secondary: For example ``FORMATTED``, or empty.
+        kind: What it may touch.
+        arguments: What it takes; further arguments are ignored, as ARMOR does.
+        run: What it does; see the decorators.
+        summary: One sentence or two for the documentation.
+        differs: How and why it differs from ARMOR 2.2, for the documentation.
+        rest: The last argument may be repeated, at least this many times; 0: not repeated.
+        slow: It may take long and must not run where other directives wait.
+        native: It stands in ARMOR 2.2 too.
+        type_error_succeeds: An unsupported type is answered with success, as ARMOR does.
+        verb: How ARMOR words what did not happen then.
+    """
+
+    command: str
+    primary: str
+    secondary: str
+    kind: Kind
+    arguments: tuple[Argument, ...]
+    run: Callable[..., Any]
+    summary: str
+    differs: str = ''
+    rest: int = 0
+    slow: bool = False
+    native: bool = True
+    type_error_succeeds: bool = True
+    verb: str = ''
+
+    @property
+    def words(self) -> str:
+        """Command and specifications, one blank between."""
+        return ' '.join(word for word in (self.command, self.primary, self.secondary) if word)
+
+    @property
+    def required(self) -> int:
+        """How many arguments must be given."""
+        given = [argument for argument in self.arguments if argument.default is None]
+        return len(given) + max(self.rest - 1, 0)
+
+    @property
+    def signature(self) -> str:
+        """The arguments' names for messages and documentation; optional ones in brackets."""
+        names = [a.name if a.default is None else f'[{a.name}]' for a in self.arguments]
+        return ', '.join(names) + (', ...' if self.rest else '')
+
+    def read(self, args: Sequence[str], base: str, *, narrow_doubles: bool = False) -> list[Any]:
+        """Read the arguments of a request.
+
+        Args:
+            args: As they came.
+            base: IRI of the ontology, for local names.
+            narrow_doubles: Store DOUBLE as xsd:float.
+
+        Returns:
+            One value for each argument except the types; defaults filled in.
+
+        Raises:
+            DirectiveError: Too few, or one that cannot be read; names the argument.
+        """
+        if len(args) < self.required:
+            wanted = f'{"at least " if self.rest else ""}{self.required}'
+            raise DirectiveError(
+                f'{self.words}: expected {wanted} argument{"s" if self.required != 1 else ""} '
+                f'({self.signature}), got {len(args)}'
+            )
+        values: list[Any] = []
+        type_word = ''
+        for index, argument in enumerate(self.arguments):
+            text = args[index] if index < len(args) else argument.default
+            assert text is not None
+            if argument.read is Read.TYPE:
+                type_word = self._type(text, args)
+                continue
+            values.append(self._one(argument, text, base, type_word, narrow_doubles))
+        if self.rest:
+            last = self.arguments[-1]
+            for text in args[len(self.arguments) :]:
+                values.append(self._one(last, text, base, type_word, narrow_doubles))
+        return values
+
+    def _one(self, argument: Argument, text: str, base: str, type_word: str, narrow: bool) -> Any:
+        try:
+            if argument.read in ENTITY_KINDS:
+                return parse_entity(text, base)
+            if argument.read is Read.VALUE:
+                return parse_literal(type_word, text, narrow_doubles=narrow)
+            if argument.read is Read.NUMBER:
+                return _number(text)
+            if argument.read is Read.FLAG:
+                return text.lower() == 'true'
+        except ValueError as error:
+            raise DirectiveError(f'{self.words}: argument {argument.name} {error}') from None
+        return text
+
+    def _type(self, text: str, args: Sequence[str]) -> str:
+        word = text.upper()
+        if word not in TYPES:
+            raise unsupported_type(
+                text, args[0], self.verb, args[1], success=self.type_error_succeeds
+            )
+        return word
+
+
+def _number(text: str) -> int:
+    if not text.isascii() or not text.isdigit() or len(text) > 10 or int(text) > MAX_CARDINALITY:
+        raise ValueError(f'{shown(text)} is not a number, expected 0 to {MAX_CARDINALITY}')
+    return int(text)
+
+
+TABLE: dict[tuple[str, str, str], Directive] = {}
+"""Every directive under its capital words; filled by the modules `manipulations`, `queries`, ..."""
+
+
+def look_up(request: DirectiveRequest) -> Directive:
+    """Find the directive that a request names.
+
+    Raises:
+        DirectiveError: 202 without a command, 205 when there is no such directive.
+    """
+    key = (request.command.upper(), request.primary.upper(), request.secondary.upper())
+    directive = TABLE.get(key)
+    if directive is None:
+        if not request.command:
+            raise DirectiveError('Invalid request. No command specified.', ExitCode.NO_COMMAND)
+        raise DirectiveError(
+            'Malformed command. No Command/Specs combination match found. '
+            f'Please check your service requests and retry. Got {_echo(request)}.'
+        )
+    return directive
+
+
+def _echo(request: DirectiveRequest) -> str:
+    return ' '.join(
+        shown(word, 40) for word in (request.command, request.primary, request.secondary)
+    )
+
+
+def _enter(kind: Kind, words: str, arguments: Sequence[Argument], **properties: Any) -> Any:
+    def enter(run: Callable[..., Any]) -> Callable[..., Any]:
+        for spelling in words.split('|'):
+            command, primary, secondary, *_ = (*spelling.split(), '', '')
+            directive = Directive(
+                command, primary, secondary, kind, tuple(arguments), run, **properties
+            )
+            key = (command, primary, secondary)
+            if key in TABLE:
+                raise ValueError(f'{directive.words} stands twice in the table')
+            TABLE[key] = directive
+        return run
+
+    return enter
+
+
+def manipulation(words: str, *arguments: Argument, **properties: Any) -> Any:
+    """Enter a manipulation: ``run(reference, *values) -> list of changes``.
+
+    Args:
+        words: Command and specifications; other spellings of the same behind ``|``.
+        arguments: What it takes.
+        properties: Further fields of `Directive`.
+    """
+    return _enter(Kind.MANIPULATION, words, arguments, **properties)
+
+
+def query(words: str, *arguments: Argument, **properties: Any) -> Any:
+    """Enter a query: ``run(reference, *values) -> response``; see `manipulation`.
+
+    ``is_consistent`` is filled in afterwards. A slow query is run without the reference's lock, which it
+    takes itself for as short as it can.
+    """
+    return _enter(Kind.QUERY, words, arguments, **properties)
+
+
+def control(words: str, **properties: Any) -> Any:
+    """Enter APPLY or REASON: ``run(reference)``; see `manipulation`."""
+    return _enter(Kind.CONTROL, words, (), **properties)
+
+
+def utility(words: str, *arguments: Argument, **properties: Any) -> Any:
+    """Enter a utility: ``run(service, request, *values) -> response``; see `manipulation`."""
+    return _enter(Kind.UTILITY, words, arguments, **properties)
+
+
+IND = Argument('individual', Read.INDIVIDUAL)
+CLS = Argument('class', Read.CLASS)
+OBJ = Argument('property', Read.OBJECT_PROPERTY)
+DAT = Argument('property', Read.DATA_PROPERTY)
+TYPE = Argument('type', Read.TYPE)
+VALUE = Argument('value', Read.VALUE)
+NEW = Argument('new value', Read.VALUE)
+OLD = Argument('old value', Read.VALUE)
+
+
+def text(name: str, default: str | None = None) -> Argument:
+    """An argument that is passed as it came."""
+    return Argument(name, Read.TEXT, default)
+
+
+def flag(name: str, default: str | None = None) -> Argument:
+    """An argument that is on for ``true`` in any case and off for anything else."""
+    return Argument(name, Read.FLAG, default)
