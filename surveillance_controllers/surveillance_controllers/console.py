@@ -53,7 +53,7 @@ class Console:
     ) -> None:
         self._name = name
         self._on_line = on_line
-        self._completer = _WordCompleter(completions)
+        self._completer = WordCompleter(completions)
         self._source = sys.stdin if source is None else source
         self._terminal = terminal
         self._stopped = False
@@ -152,13 +152,16 @@ class Console:
             _exit_prompt(self._session)
 
 
-class _WordCompleter(Completer):
+class WordCompleter(Completer):
+    """Proposes to prompt_toolkit the words that a function gives for the text so far."""
+
     def __init__(self, completions: Callable[[str], list[str]]) -> None:
         self._completions = completions
 
     def get_completions(
         self, document: Document, complete_event: CompleteEvent
     ) -> Iterable[Completion]:
+        """The words that can stand where the last one is being typed."""
         text = document.text_before_cursor
         typed = '' if not text or text[-1].isspace() else text.split()[-1]
         for word in self._completions(text):

@@ -156,7 +156,7 @@ def _read_points(text: str) -> tuple[Point3, ...]:
 
 HELP = Command(('help',), (), 'List the commands.')
 STATUS = Command(('status',), (), 'Show the request that waits for a command, if there is one.')
-EXIT = Command(('exit',), (), 'Stop this node.')
+EXIT = Command(('exit',), (), "Stop this console's node.")
 BUILT_IN = (HELP, STATUS, EXIT)
 """Commands every console has."""
 

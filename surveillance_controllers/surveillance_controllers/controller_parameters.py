@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields
 
 from surveillance_controllers.battery_model import BatteryParameters
 from surveillance_controllers.battery_use import Pose
+from surveillance_controllers.polyline import Points
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError
 
@@ -172,5 +173,133 @@ def battery_settings(
             maximum=60.0,
             read_only=True,
         ),
+        console=reads_console(node),
+    )
+
+
+def peer_timeout(node: PatrolNode) -> float:
+    """Declares `peer_timeout`."""
+    timeout: float = node.parameter(
+        'peer_timeout',
+        10.0,
+        'How long map and ontology may take to appear and answer, s of real time.',
+        minimum=0.1,
+        maximum=3600.0,
+        read_only=True,
+    )
+    return timeout
+
+
+@dataclass(frozen=True)
+class Environment:
+    """The limits within which the planner plans, metres, world frame."""
+
+    x_min: float
+    x_max: float
+    y_min: float
+    y_max: float
+
+    def contains(self, point: Sequence[float] | Points) -> bool:
+        """Whether a point lies within the limits."""
+        return bool(self.x_min <= point[0] <= self.x_max and self.y_min <= point[1] <= self.y_max)
+
+    def __str__(self) -> str:
+        return f'[{self.x_min:g}, {self.x_max:g}, {self.y_min:g}, {self.y_max:g}]'
+
+
+def _limits(values: Sequence[float]) -> str | None:
+    good = len(values) == 4 and values[0] < values[1] and values[2] < values[3]
+    return None if good else 'four numbers [x_min, x_max, y_min, y_max], each pair rising'
+
+
+@dataclass(frozen=True)
+class PlannerSettings:
+    """What `planner_controller` is told by its parameters; units as declared."""
+
+    environment: Environment
+    via_point_count: int
+    via_point_delay: float
+    random_seed: int
+    peer_timeout: float
+    console: bool
+
+    def spacing(self, length: float) -> float:
+        """The distance of the via points of a path of `length` metres, metres."""
+        return max(length, 1e-6) / (self.via_point_count - 1)
+
+
+def planner_settings(node: PatrolNode) -> PlannerSettings:
+    """Declares the parameters of `planner_controller`.
+
+    Raises:
+        ParameterError: A value is of the wrong type or out of range.
+    """
+    limits = node.parameter(
+        'environment_size',
+        [-1000.0, 1000.0, -1000.0, 1000.0],
+        'Limits of the place: [x_min, x_max, y_min, y_max], metres, world frame.',
+        check=_limits,
+        read_only=True,
+    )
+    return PlannerSettings(
+        environment=Environment(*limits),
+        via_point_count=node.parameter(
+            'via_point_count',
+            10,
+            'How many via points motion/planner returns, both ends included.',
+            minimum=2,
+            maximum=10_000,
+            read_only=True,
+        ),
+        via_point_delay=node.parameter(
+            'via_point_delay',
+            0.1,
+            'Time between two feedbacks of motion/planner, s.',
+            minimum=0.0,
+            maximum=60.0,
+            read_only=True,
+        ),
+        random_seed=random_seed(node),
+        peer_timeout=peer_timeout(node),
+        console=reads_console(node),
+    )
+
+
+@dataclass(frozen=True)
+class MotionSettings:
+    """What `motion_controller` is told by its parameters; units as declared."""
+
+    feedback_period: float
+    place_reach: float
+    random_seed: int
+    peer_timeout: float
+    console: bool
+
+
+def motion_settings(node: PatrolNode) -> MotionSettings:
+    """Declares the parameters of `motion_controller`.
+
+    Raises:
+        ParameterError: A value is of the wrong type or out of range.
+    """
+    return MotionSettings(
+        feedback_period=node.parameter(
+            'feedback_period',
+            0.2,
+            'Time between two feedbacks on the way, s.',
+            minimum=0.01,
+            maximum=60.0,
+            read_only=True,
+        ),
+        place_reach=node.parameter(
+            'place_reach',
+            2.0,
+            'MANUAL and RANDOM: the robot is in the nearest place within this distance, m.',
+            minimum=0.0,
+            maximum=1000.0,
+            read_only=True,
+        ),
+        random_seed=random_seed(node),
+        peer_timeout=peer_timeout(node),
         console=reads_console(node),
     )

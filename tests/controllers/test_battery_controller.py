@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import itertools
-import os
-from collections.abc import Iterator
-from typing import Any, TextIO
+from typing import Any
 
 import pytest
 from geometry_msgs.msg import PoseWithCovarianceStamped
@@ -19,38 +17,12 @@ from surveillance_runtime.calls import ServiceCaller
 from surveillance_runtime.qos import STATE_QOS
 
 
-class Operator:
-    """Types lines into a controller's pipe."""
-
-    def __init__(self) -> None:
-        read, write = os.pipe()
-        self.source: TextIO = os.fdopen(read)
-        self._keyboard: TextIO = os.fdopen(write, 'w')
-
-    def type(self, line: str) -> None:
-        print(line, file=self._keyboard, flush=True)
-
-    def hang_up(self) -> None:
-        self._keyboard.close()
-
-    def close(self) -> None:
-        self.source.close()
-        self._keyboard.close()
-
-
-@pytest.fixture
-def operator() -> Iterator[Operator]:
-    operator = Operator()
-    yield operator
-    operator.close()
-
-
 def values(messages: list[Any]) -> list[Any]:
     return [message.data for message in messages]
 
 
 def test_manual_commands_set_the_level_and_the_low_state(
-    graph: Any, operator: Operator, capfd: Any
+    graph: Any, operator: Any, capfd: Any
 ) -> None:
     node = graph.add(
         BatteryController,
@@ -72,7 +44,7 @@ def test_manual_commands_set_the_level_and_the_low_state(
     assert node.failure is None
 
 
-def test_a_repeated_low_level_is_not_published_again(graph: Any, operator: Operator) -> None:
+def test_a_repeated_low_level_is_not_published_again(graph: Any, operator: Any) -> None:
     graph.add(BatteryController, {'execution_mode': 'MANUAL'}, console_source=operator.source)
     levels = graph.listen(UInt8, 'battery_level', STATE_QOS)
     lows = graph.listen(Bool, 'state/battery_low', STATE_QOS)
@@ -83,7 +55,7 @@ def test_a_repeated_low_level_is_not_published_again(graph: Any, operator: Opera
     assert values(lows) == [False, True]
 
 
-def test_end_of_input_leaves_the_node_at_work(graph: Any, operator: Operator) -> None:
+def test_end_of_input_leaves_the_node_at_work(graph: Any, operator: Any) -> None:
     graph.add(BatteryController, {'execution_mode': 'MANUAL'}, console_source=operator.source)
     operator.hang_up()
     levels = graph.listen(UInt8, 'battery_level', STATE_QOS)
@@ -97,7 +69,7 @@ def test_end_of_input_leaves_the_node_at_work(graph: Any, operator: Operator) ->
     assert answer.answer.startswith("'move' is no command: expected 'battery'")
 
 
-def test_exit_ends_the_node_without_a_failure(graph: Any, operator: Operator) -> None:
+def test_exit_ends_the_node_without_a_failure(graph: Any, operator: Any) -> None:
     node = graph.add(
         BatteryController, {'execution_mode': 'MANUAL'}, console_source=operator.source
     )

@@ -1,0 +1,129 @@
+"""The node `motion_controller`: moves the robot.
+
+Actions: `follow_path` along a path, and `motion/controller` through via points into a place, whose
+visit it then notes in the ontology. How the robot moves is the execution mode's matter: as the
+operator says (MANUAL), by chance (RANDOM), or as the base drives (SIMULATED).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, TextIO
+
+import numpy as np
+
+from surveillance_controllers import conversions, polyline, request_texts, stimuli
+from surveillance_controllers.console_commands import MOTION, ParsedCommand
+from surveillance_controllers.controller_parameters import execution_mode, motion_settings
+from surveillance_controllers.map_knowledge import MapKnowledge, UnknownPlace
+from surveillance_controllers.operator_console import OperatorConsole
+from surveillance_controllers.operator_desk import OperatorDesk
+from surveillance_controllers.polyline import Points
+from surveillance_controllers.stimulus_motion import glide, points_passed
+from surveillance_interfaces.action import Control, FollowPath
+from surveillance_runtime.calls import CallFailed
+from surveillance_runtime.goals import GoalAborted, GoalRun, GoalServer
+from surveillance_runtime.node import PatrolNode, run_node
+
+
+class MotionController(PatrolNode):
+    """Moves the robot along paths.
+
+    Args:
+        console_source: Where the operator's lines come from; standard input unless given.
+    """
+
+    def __init__(self, console_source: TextIO | None = None, **node_options: Any) -> None:
+        super().__init__('motion_controller', **node_options)
+        self._mode = execution_mode(self)
+        self._settings = motion_settings(self)
+        self._draw = stimuli.generator(self._settings.random_seed)
+        self._knowledge = MapKnowledge(self, self._settings.peer_timeout)
+        self._desk: OperatorDesk[tuple[float, float]] = OperatorDesk(self._announce)
+        self._console = OperatorConsole(self, MOTION, self._carry_out, lambda: self._desk.status)
+        GoalServer(self, FollowPath, 'follow_path', self._follow_path)
+        GoalServer(self, Control, 'motion/controller', self._control)
+        self.get_logger().info(f'{self._mode} mode')
+        if self._mode == 'MANUAL' and self._settings.console:
+            self._console.open(console_source)
+
+    def _announce(self, text: str) -> None:
+        self._console.announce(text)
+
+    def _carry_out(self, command: ParsedCommand) -> str:
+        seconds, delta = command.values
+        assert isinstance(seconds, float)
+        assert isinstance(delta, float)
+        self._desk.answer((seconds, delta))
+        return f'Moving for {seconds:g} s.'
+
+    def _follow_path(self, goal: Any, run: GoalRun) -> FollowPath.Result:
+        def report(position: Points) -> None:
+            run.feedback(FollowPath.Feedback(position=conversions.point_from(position)))
+
+        path = _checked(goal.path)
+        end = self._move(path, run, report, 'follow a path')
+        return FollowPath.Result(position=conversions.point_from(end))
+
+    def _control(self, goal: Any, run: GoalRun) -> Control.Result:
+        path = _checked(goal.point_set)
+        passed = 0
+        total = polyline.length(path)
+
+        def report(position: Points) -> None:
+            nonlocal passed
+            ahead = polyline.length([position, *path[passed:]])
+            now_passed = max(passed, points_passed(path, total - ahead))
+            if now_passed > passed:
+                passed = now_passed
+                point = conversions.point_from(path[passed - 1])
+                run.feedback(Control.Feedback(reached_point=point))
+
+        end = self._move(path, run, report, 'move through via points')
+        result = Control.Result(reached_point=conversions.point_from(end))
+        if not run.interrupt.is_set():
+            try:
+                self._note_visit(end, run)
+            except (CallFailed, UnknownPlace) as error:
+                raise GoalAborted(f'the visit could not be noted: {error}', result) from error
+        return result
+
+    def _note_visit(self, end: Points, run: GoalRun) -> None:
+        places = self._knowledge.places(run.interrupt)
+        gaps = {name: float(np.linalg.norm(end - at)) for name, at in places.items()}
+        nearest = min(gaps, key=lambda name: gaps[name], default=None)
+        if nearest is None or gaps[nearest] > self._settings.place_reach:
+            raise UnknownPlace(
+                f'the robot stopped at {request_texts.point(end)}: expected a place within '
+                f'{self._settings.place_reach:g} m'
+                + (f', {nearest} is {gaps[nearest]:.2f} m away' if nearest else '')
+            )
+        self._knowledge.record_visit(nearest, run.now(), run.interrupt)
+
+    def _move(
+        self, path: Points, run: GoalRun, report: Callable[[Points], None], what: str
+    ) -> Points:
+        if self._mode == 'MANUAL':
+            answer = self._desk.ask(request_texts.move_request(what, path), run.interrupt)
+            if answer is None:
+                raise GoalAborted(f'{what}: withdrawn before the operator answered')
+            seconds, delta = answer
+        else:
+            seconds, delta = stimuli.move(self._draw)
+        end = stimuli.reached(self._draw, path[-1], delta)
+        return glide(path, seconds, end, run, report, self._settings.feedback_period)
+
+
+def _checked(points: Sequence[Any]) -> Points:
+    """The points of a goal as an array; aborts the goal when it has none that can be followed."""
+    path = conversions.array_from_points(points)
+    if len(path) == 0:
+        raise GoalAborted('no points, expected at least one')
+    if not np.isfinite(path).all():
+        raise GoalAborted('a point is not finite')
+    return path
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Runs the node until it is stopped."""
+    return run_node(MotionController, args)

@@ -1,0 +1,110 @@
+"""The node `planner_controller`: computes paths.
+
+Actions: `compute_path` between two points, and `motion/planner` from where the robot is to a place,
+as equally spaced via points. Where a path comes from is the execution mode's matter: the operator
+(MANUAL), chance (RANDOM), or the map with its walls, doors and obstacles (SIMULATED).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, TextIO
+
+import numpy as np
+
+from surveillance_controllers import conversions, polyline, request_texts, stimuli
+from surveillance_controllers.console_commands import PLANNER, ParsedCommand, Point3
+from surveillance_controllers.controller_parameters import execution_mode, planner_settings
+from surveillance_controllers.map_knowledge import MapKnowledge, UnknownPlace
+from surveillance_controllers.operator_console import OperatorConsole
+from surveillance_controllers.operator_desk import OperatorDesk
+from surveillance_controllers.polyline import Points
+from surveillance_interfaces.action import ComputePath, Plan
+from surveillance_runtime.calls import CallFailed
+from surveillance_runtime.goals import GoalAborted, GoalRun, GoalServer
+from surveillance_runtime.node import PatrolNode, run_node
+
+
+class PlannerController(PatrolNode):
+    """Answers where to drive.
+
+    Args:
+        console_source: Where the operator's lines come from; standard input unless given.
+    """
+
+    def __init__(self, console_source: TextIO | None = None, **node_options: Any) -> None:
+        super().__init__('planner_controller', **node_options)
+        self._mode = execution_mode(self)
+        self._settings = planner_settings(self)
+        self._draw = stimuli.generator(self._settings.random_seed)
+        self._knowledge = MapKnowledge(self, self._settings.peer_timeout)
+        self._desk: OperatorDesk[tuple[Point3, ...]] = OperatorDesk(self._announce)
+        self._console = OperatorConsole(self, PLANNER, self._carry_out, lambda: self._desk.status)
+        GoalServer(self, ComputePath, 'compute_path', self._compute_path)
+        GoalServer(self, Plan, 'motion/planner', self._plan)
+        self.get_logger().info(f'{self._mode} mode')
+        if self._mode == 'MANUAL' and self._settings.console:
+            self._console.open(console_source)
+
+    def _announce(self, text: str) -> None:
+        self._console.announce(text)
+
+    def _carry_out(self, command: ParsedCommand) -> str:
+        (points,) = command.values
+        assert isinstance(points, tuple)
+        self._desk.answer(points)
+        return f'A path with {len(points)} points between start and goal.'
+
+    def _compute_path(self, goal: Any, run: GoalRun) -> ComputePath.Result:
+        start, end = conversions.array_from_points([goal.start, goal.goal])
+        path = self._path(start, end, run, 'compute a path')
+        return ComputePath.Result(path=conversions.points_from_array(path))
+
+    def _plan(self, goal: Any, run: GoalRun) -> Plan.Result:
+        try:
+            target = self._knowledge.position(goal.target, run.interrupt)
+            start = self._start(run)
+        except (CallFailed, UnknownPlace) as error:
+            raise GoalAborted(f'no way to {goal.target!r}: {error}') from error
+        for what, point in (('the robot', start), (f'place {goal.target!r}', target)):
+            if not self._settings.environment.contains(point):
+                raise GoalAborted(
+                    f'{what} is at {request_texts.point(point)}: expected within '
+                    f'environment_size {self._settings.environment}'
+                )
+        if self._mode == 'RANDOM':
+            path = np.array([start, target])
+        else:
+            path = self._path(start, target, run, f'plan the way to {goal.target}')
+        spacing = self._settings.spacing(polyline.length(path))
+        via_points = conversions.points_from_array(polyline.equally_spaced(path, spacing))
+        for count in range(1, len(via_points) + 1):
+            run.feedback(Plan.Feedback(via_points=via_points[:count]))
+            if not run.sleep(self._settings.via_point_delay):
+                break
+        return Plan.Result(via_points=via_points)
+
+    def _start(self, run: GoalRun) -> Points:
+        place = self._knowledge.robot_place(run.interrupt)
+        return self._knowledge.position(place, run.interrupt)
+
+    def _path(self, start: Points, goal: Points, run: GoalRun, what: str) -> Points:
+        if not (np.isfinite(start).all() and np.isfinite(goal).all()):
+            raise GoalAborted(
+                f'{what} from {request_texts.point(start)} to {request_texts.point(goal)}: '
+                'expected finite coordinates'
+            )
+        between: Sequence[Point3] | None
+        if self._mode == 'MANUAL':
+            text = request_texts.path_request(what, start, goal)
+            between = self._desk.ask(text, run.interrupt)
+            if between is None:
+                raise GoalAborted(f'{what}: withdrawn before the operator answered')
+        else:
+            between = stimuli.via_points(self._draw)
+        return np.array([start, *between, goal])
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Runs the node until it is stopped."""
+    return run_node(PlannerController, args)

@@ -1,0 +1,99 @@
+"""The consoles: on a terminal with editing and completion, from a pipe, and one for all
+controllers."""
+
+from __future__ import annotations
+
+import threading
+from typing import Any
+
+from prompt_toolkit.completion import CompleteEvent
+from prompt_toolkit.document import Document
+from prompt_toolkit.input import create_pipe_input
+from prompt_toolkit.output import DummyOutput
+from std_msgs.msg import UInt8
+
+from surveillance_controllers.battery_controller_node import BatteryController
+from surveillance_controllers.console import Console, WordCompleter
+from surveillance_controllers.console_commands import BATTERY, Grammar
+from surveillance_controllers.console_node import ConsoleNode
+from surveillance_controllers.planner_controller_node import PlannerController
+from surveillance_runtime.qos import STATE_QOS
+
+
+def test_a_terminal_edits_lines_until_the_end_of_input() -> None:
+    lines: list[str] = []
+    with create_pipe_input() as keyboard:
+        console = Console('test', lines.append, lambda _: [], terminal=(keyboard, DummyOutput()))
+        keyboard.send_text('battery sett\x7f 15\r')
+        keyboard.send_text('lost\x15exit\r')
+        keyboard.send_text('\x04')
+        assert console.run() == 'end of input'
+    assert lines == ['battery set 15', 'exit']
+
+
+def test_completion_replaces_the_word_being_typed() -> None:
+    completer = WordCompleter(Grammar(BATTERY).completions)
+
+    def proposed(text: str) -> list[tuple[str, int]]:
+        found = completer.get_completions(Document(text), CompleteEvent())
+        return [(c.text, c.start_position) for c in found]
+
+    assert proposed('bat') == [('battery', -3)]
+    assert proposed('battery ') == [('offset', 0), ('set', 0)]
+
+
+def test_control_c_at_the_prompt_interrupts() -> None:
+    with create_pipe_input() as keyboard:
+        console = Console('test', print, lambda _: [], terminal=(keyboard, DummyOutput()))
+        keyboard.send_text('\x03')
+        assert console.run() == 'interrupted'
+
+
+def test_a_terminal_console_can_be_stopped_while_it_waits() -> None:
+    with create_pipe_input() as keyboard:
+        first = threading.Event()
+        endings: list[str] = []
+        console = Console(
+            'test', lambda _: first.set(), lambda _: [], terminal=(keyboard, DummyOutput())
+        )
+        thread = threading.Thread(target=lambda: endings.append(console.run()))
+        thread.start()
+        keyboard.send_text('x\r')
+        assert first.wait(5)
+        console.stop()
+        thread.join(5)
+        assert endings == ['stopped']
+        console.stop()
+
+
+def test_a_pipe_gives_its_last_line_also_without_an_end(operator: Any) -> None:
+    lines: list[str] = []
+    console = Console('test', lines.append, lambda _: [], source=operator.source)
+    operator.type('one\n\ntwo')
+    print('three', end='', file=operator._keyboard, flush=True)
+    operator.hang_up()
+    assert console.run() == 'end of input'
+    assert lines == ['one', '', 'two', 'three']
+
+
+def test_one_console_addresses_every_controller(graph: Any, operator: Any, capfd: Any) -> None:
+    silent = {'execution_mode': 'MANUAL', 'console': False}
+    graph.add(BatteryController, silent)
+    graph.add(PlannerController, silent)
+    levels = graph.listen(UInt8, 'battery_level', STATE_QOS)
+    node = graph.add(ConsoleNode, {'peer_timeout': 0.5}, console_source=operator.source)
+    operator.type('battery set 42')
+    graph.until(lambda: levels and levels[-1].data == 42)
+    operator.type('plan set []')
+    operator.type('move 1 0')
+    operator.type('jump')
+    operator.type('exit')
+    assert node.failed.wait(5)
+    assert node.failure is None
+    shown = capfd.readouterr().out
+    assert 'The battery is at 42 %.' in shown
+    assert 'no request is waiting: expected one before this command' in shown
+    assert (
+        'motion_controller does not answer: service motion_controller/command: no server' in shown
+    )
+    assert "'jump' is no command: expected 'battery', 'plan', 'move'" in shown
