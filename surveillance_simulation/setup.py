@@ -17,6 +17,8 @@ setup(
     description='Stand-in for robot hardware and Gazebo: camera, arm, base, lidar and time.',
     license='Apache-2.0',
     entry_points={
-        'console_scripts': [],
+        'console_scripts': [
+            'simulator = surveillance_simulation.simulator_node:main',
+        ],
     },
 )

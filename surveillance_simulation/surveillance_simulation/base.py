@@ -99,9 +99,9 @@ class Base:
         self._since_command += dt
         if self._since_command > self.model.command_timeout:
             self._wanted = (0.0, 0.0)
-        wanted_speed, wanted_turn = self._wanted
-        if not (wanted_speed or wanted_turn or self.speed or self.turn_speed):
+        if not self.is_moving:
             return
+        wanted_speed, wanted_turn = self._wanted
         change = self.model.acceleration * dt
         turn_change = self.model.turn_acceleration * dt
         self.speed += min(max(wanted_speed - self.speed, -change), change)
@@ -125,6 +125,11 @@ class Base:
         self.travelled += abs(distance)
         self.turned += abs(turn)
         self._count(distance, turn)
+
+    @property
+    def is_moving(self) -> bool:
+        """Whether the base moves, or is told to."""
+        return bool(any(self._wanted) or self.speed or self.turn_speed)
 
     def push(self, dx: float, dy: float, dyaw: float) -> float:
         """Push the robot sideways, unseen by its wheels, as far as the way is free.

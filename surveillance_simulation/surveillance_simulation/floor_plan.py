@@ -92,6 +92,7 @@ class FloorPlan:
         walls: Walls by name, uncut.
         doors: Doors by name.
         markers: Markers by name.
+        marker_size: Side of a marker's black square, metres.
         marker_dictionary: OpenCV's name of the markers' dictionary.
         station: Pose of the charging station, metres and rad.
     """
@@ -100,6 +101,7 @@ class FloorPlan:
     walls: Mapping[str, Wall]
     doors: Mapping[str, Door]
     markers: Mapping[str, Marker]
+    marker_size: float
     marker_dictionary: str
     station: Pose
 
@@ -133,6 +135,7 @@ class FloorPlan:
             walls=walls,
             doors=doors,
             markers=markers,
+            marker_size=size,
             marker_dictionary=_name(
                 parameters.get('marker_dictionary', 'DICT_5X5_100'), 'marker_dictionary'
             ),
@@ -180,6 +183,8 @@ class FloorPlan:
         self._check_markers()
 
     def _check_markers(self) -> None:
+        if self.marker_size <= 0:
+            raise WorldError(f'{self.marker_size:g} m: expected more than 0', 'marker_size')
         seen: dict[int, str] = {}
         for name, marker in self.markers.items():
             if marker.id in seen:
@@ -189,8 +194,6 @@ class FloorPlan:
                     name,
                 )
             seen[marker.id] = name
-            if marker.size <= 0:
-                raise WorldError(f'{marker.size:g} m: expected more than 0', 'marker_size')
             if not 0.0 <= marker.z <= WALL_HEIGHT:
                 raise WorldError(
                     f'height {marker.z:g} m: expected 0 to {WALL_HEIGHT:g} m, as high as the walls',

@@ -26,7 +26,11 @@ class Renderer:
     """Takes pictures of one world with one camera, keeping what does not change between them."""
 
     def __init__(self, world: World, camera: Camera, supersampling: int = 2) -> None:
-        """Prepare pictures, drawn at `supersampling` times the camera's resolution."""
+        """Prepare pictures, drawn at `supersampling` times the camera's resolution.
+
+        Raises:
+            TextureError: A marker's dictionary or id does not exist.
+        """
         self._world = world
         self._camera = camera
         self._factor = supersampling
@@ -40,28 +44,33 @@ class Renderer:
         self._faces: list[Face] = []
         self._version = -1
         self._shrunk: dict[tuple[int, int, int], Texture] = {}
+        self.refresh()
 
     def render(
         self, camera_pose: Array, conditions: Conditions, rng: np.random.Generator
     ) -> Picture:
-        """Return a picture (rows, columns, 3) in RGB.
+        """Return a picture (rows, columns, 3) in RGB of the world as it was at `refresh`.
 
         Args:
             camera_pose: Transform (4, 4) from the camera's optical frame to the world, metres.
             conditions: Light, noise and blur.
             rng: Source of the noise.
+        """
+        return expose(self.ideal(camera_pose), conditions, rng)
+
+    def refresh(self) -> None:
+        """Take over what has changed in the world since the last time.
 
         Raises:
             TextureError: A marker's dictionary or id does not exist.
         """
-        return expose(self.ideal(camera_pose), conditions, rng)
-
-    def ideal(self, camera_pose: Array) -> npt.NDArray[np.float32]:
-        """Return the picture (rows, columns, 3) before light, noise and blur."""
         if self._version != self._world.version:
             self._faces = faces_of(self._world)
             self._version = self._world.version
             self._shrunk.clear()
+
+    def ideal(self, camera_pose: Array) -> npt.NDArray[np.float32]:
+        """Return the picture (rows, columns, 3) before light, noise and blur."""
         width, height = self._size
         colours = np.empty((height, width, 3), np.uint8)
         colours[:] = _CEILING

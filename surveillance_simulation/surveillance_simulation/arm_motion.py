@@ -1,0 +1,153 @@
+"""The arm's motors: they follow one trajectory at a time, within the joints' limits.
+
+Between two points a joint moves on the cubic that meets their positions and velocities (Hermite's
+form, as joint_trajectory_controller does), or on a straight line when no velocities are given. A
+new trajectory starts from where the arm is at that moment.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from surveillance_runtime.robot_arm import Arm, Array
+
+_TOLERANCE = 1e-6
+
+
+class TrajectoryError(ValueError):
+    """A trajectory that the arm cannot follow; the message is one line."""
+
+
+@dataclass(frozen=True)
+class TrajectoryPoint:
+    """Where the joints are to be at a time.
+
+    Attributes:
+        time: Seconds from the trajectory's start.
+        positions: Positions in the order of the trajectory's joint names, rad.
+        velocities: Velocities likewise, rad/s; empty when not given.
+    """
+
+    time: float
+    positions: tuple[float, ...]
+    velocities: tuple[float, ...] = ()
+
+
+class ArmMotion:
+    """The arm's joints in time."""
+
+    def __init__(self, arm: Arm) -> None:
+        """Put the arm at rest in its home position."""
+        self._arm = arm
+        self._times = np.array([0.0])
+        self._positions: Array = np.array([arm.home])
+        self._velocities: Array | None = None
+
+    @property
+    def arm(self) -> Arm:
+        """The arm that moves."""
+        return self._arm
+
+    def follow(self, names: Sequence[str], points: Sequence[TrajectoryPoint], now: float) -> None:
+        """Leave the present trajectory and follow another; without points, stop where it is.
+
+        Args:
+            names: The joints that the trajectory moves; the others stay where they are.
+            points: Where the joints are to be, by rising time.
+            now: Time of the start, seconds.
+
+        Raises:
+            TrajectoryError: A joint is unknown or named twice, a point has the wrong number of
+                values or one that is not finite or beyond a limit, or the times do not rise.
+        """
+        self._check(names, points)
+        start = self.positions(now)
+        velocity = self.velocities(now)
+        column = [self._arm.names.index(name) for name in names]
+        times, positions, velocities = [now], [start], [velocity]
+        for point in points:
+            row = positions[-1].copy()
+            row[column] = point.positions
+            speed = np.zeros_like(row)
+            speed[column] = point.velocities or 0.0
+            if point.time == 0.0:
+                # The controller's own record of the start; the arm is where it is.
+                continue
+            times.append(now + point.time)
+            positions.append(row)
+            velocities.append(speed)
+        smooth = bool(points) and all(point.velocities for point in points)
+        self._times = np.array(times)
+        self._positions = np.array(positions)
+        self._velocities = np.array(velocities) if smooth else None
+
+    def positions(self, now: float) -> Array:
+        """Return the joints' positions (n,) at a time, rad."""
+        return self._at(now)[0]
+
+    def velocities(self, now: float) -> Array:
+        """Return the joints' velocities (n,) at a time, rad/s."""
+        return self._at(now)[1]
+
+    def is_moving(self, now: float) -> bool:
+        """Tell whether the trajectory has not ended."""
+        return bool(now < self._times[-1])
+
+    def _at(self, now: float) -> tuple[Array, Array]:
+        after = int(np.searchsorted(self._times, now, side='right'))
+        if after == 0 or after == len(self._times):
+            row = self._positions[min(after, len(self._times) - 1)]
+            return row.copy(), np.zeros_like(row)
+        span = self._times[after] - self._times[after - 1]
+        share = (now - self._times[after - 1]) / span
+        first, last = self._positions[after - 1], self._positions[after]
+        if self._velocities is None:
+            return first + share * (last - first), (last - first) / span
+        first_speed, last_speed = self._velocities[after - 1], self._velocities[after]
+        square, cube = share**2, share**3
+        position = (
+            (2 * cube - 3 * square + 1) * first
+            + (cube - 2 * square + share) * span * first_speed
+            + (3 * square - 2 * cube) * last
+            + (cube - square) * span * last_speed
+        )
+        velocity = (
+            6 * (square - share) / span * (first - last)
+            + (3 * square - 4 * share + 1) * first_speed
+            + (3 * square - 2 * share) * last_speed
+        )
+        return np.clip(position, self._arm.lower, self._arm.upper), velocity
+
+    def _check(self, names: Sequence[str], points: Sequence[TrajectoryPoint]) -> None:
+        known = self._arm.names
+        for name in names:
+            if name not in known:
+                raise TrajectoryError(f"no joint '{name}': expected {', '.join(known)}")
+        if len(set(names)) != len(names):
+            raise TrajectoryError(f'joint named twice in {", ".join(names)}')
+        reached = -math.inf
+        limits = {joint.name: (joint.lower, joint.upper) for joint in self._arm.joints}
+        for number, point in enumerate(points, start=1):
+            if len(point.positions) != len(names) or len(point.velocities) not in (0, len(names)):
+                raise TrajectoryError(
+                    f'point {number}: {len(point.positions)} positions and '
+                    f'{len(point.velocities)} velocities for {len(names)} joints'
+                )
+            if not all(map(math.isfinite, (point.time, *point.positions, *point.velocities))):
+                raise TrajectoryError(f'point {number}: expected finite numbers')
+            if point.time < 0 or point.time <= reached:
+                raise TrajectoryError(
+                    f'point {number}: time {point.time:g} s: expected more than the point before'
+                )
+            reached = point.time
+            for name, position in zip(names, point.positions, strict=True):
+                lower, upper = limits[name]
+                if not lower - _TOLERANCE <= position <= upper + _TOLERANCE:
+                    raise TrajectoryError(
+                        f'point {number}: {name} at {position:g} rad: '
+                        f'expected {lower:g} to {upper:g}'
+                    )

@@ -1,0 +1,206 @@
+"""Messages from what the simulation computes, and the other way round. No node, no clock."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+import numpy.typing as npt
+from builtin_interfaces.msg import Duration, Time
+from geometry_msgs.msg import Pose, PoseStamped, PoseWithCovarianceStamped, TransformStamped
+from nav_msgs.msg import OccupancyGrid, Odometry
+from sensor_msgs.msg import CameraInfo, Image, JointState, LaserScan
+from trajectory_msgs.msg import JointTrajectory
+
+from surveillance_interfaces.msg import DoorStates
+from surveillance_interfaces.srv import SetMarker
+from surveillance_simulation.arm_motion import TrajectoryPoint
+from surveillance_simulation.camera import Camera, Picture
+from surveillance_simulation.floor_plan import Marker
+from surveillance_simulation.floor_plan import Pose as PlanePose
+from surveillance_simulation.lidar import LidarModel
+from surveillance_simulation.occupancy_grid import Grid
+from surveillance_simulation.world import World
+
+
+def time_to_ros(seconds: float) -> Time:
+    """Convert seconds since the clock's start to a time message."""
+    nanoseconds = round(seconds * 1e9)
+    return Time(sec=nanoseconds // 10**9, nanosec=nanoseconds % 10**9)
+
+
+def duration_from_ros(duration: Duration) -> float:
+    """Convert a duration message to seconds."""
+    return float(duration.sec) + float(duration.nanosec) / 1e9
+
+
+def pose_to_ros(pose: PlanePose) -> Pose:
+    """Convert a pose in the plane (metres, rad) to a pose message."""
+    message = Pose()
+    message.position.x, message.position.y = float(pose[0]), float(pose[1])
+    message.orientation.z = math.sin(pose[2] / 2)
+    message.orientation.w = math.cos(pose[2] / 2)
+    return message
+
+
+def pose_from_ros(message: Pose) -> PlanePose:
+    """Convert a pose message to the pose in the plane (metres, rad) that it projects to."""
+    turn = message.orientation
+    yaw = math.atan2(2.0 * (turn.w * turn.z + turn.x * turn.y), 1.0 - 2.0 * (turn.y**2 + turn.z**2))
+    return message.position.x, message.position.y, yaw
+
+
+def stamped_pose_to_ros(pose: PlanePose, frame: str, stamp: Time) -> PoseStamped:
+    """Convert a pose in the plane to a stamped pose message."""
+    message = PoseStamped(pose=pose_to_ros(pose))
+    message.header.frame_id, message.header.stamp = frame, stamp
+    return message
+
+
+def uncertain_pose_to_ros(
+    pose: PlanePose, frame: str, stamp: Time, deviation: float, turn_deviation: float
+) -> PoseWithCovarianceStamped:
+    """Convert a pose in the plane and its standard deviations (metres, rad) to a message."""
+    message = PoseWithCovarianceStamped()
+    message.header.frame_id, message.header.stamp = frame, stamp
+    message.pose.pose = pose_to_ros(pose)
+    message.pose.covariance = _covariance(deviation, turn_deviation)
+    return message
+
+
+def odometry_to_ros(
+    pose: PlanePose, speed: float, turn_speed: float, frame: str, child: str, stamp: Time
+) -> Odometry:
+    """Convert odometry (metres, rad, m/s, rad/s) to a message."""
+    message = Odometry(child_frame_id=child)
+    message.header.frame_id, message.header.stamp = frame, stamp
+    message.pose.pose = pose_to_ros(pose)
+    message.pose.covariance = _covariance(0.02, 0.02)
+    message.twist.twist.linear.x = float(speed)
+    message.twist.twist.angular.z = float(turn_speed)
+    message.twist.covariance = _covariance(0.02, 0.02)
+    return message
+
+
+def transform_to_ros(pose: PlanePose, frame: str, child: str, stamp: Time) -> TransformStamped:
+    """Convert the pose of a frame in another one to a transform message."""
+    message = TransformStamped(child_frame_id=child)
+    message.header.frame_id, message.header.stamp = frame, stamp
+    message.transform.translation.x, message.transform.translation.y = pose[0], pose[1]
+    message.transform.rotation = pose_to_ros(pose).orientation
+    return message
+
+
+def scan_to_ros(
+    ranges: npt.NDArray[np.float32], lidar: LidarModel, frame: str, stamp: Time
+) -> LaserScan:
+    """Convert distances (rays,) in metres to a message."""
+    increment = 2.0 * math.pi / lidar.rays
+    message = LaserScan(
+        angle_min=-math.pi,
+        angle_max=math.pi - increment,
+        angle_increment=increment,
+        range_min=lidar.range_min,
+        range_max=lidar.range_max,
+    )
+    message.header.frame_id, message.header.stamp = frame, stamp
+    message.ranges.frombytes(ranges.astype(np.float32).tobytes())
+    return message
+
+
+def scan_from_ros(message: LaserScan) -> npt.NDArray[np.float32]:
+    """Convert a message to its distances (rays,) in metres."""
+    return np.array(message.ranges, dtype=np.float32)
+
+
+def grid_to_ros(grid: Grid, frame: str, stamp: Time) -> OccupancyGrid:
+    """Convert a map to a message."""
+    message = OccupancyGrid()
+    message.header.frame_id, message.header.stamp = frame, stamp
+    message.info.map_load_time = stamp
+    message.info.resolution = float(grid.resolution)
+    message.info.height, message.info.width = grid.cells.shape
+    message.info.origin = pose_to_ros((*grid.origin, 0.0))
+    message.data.frombytes(grid.cells.tobytes())
+    return message
+
+
+def grid_from_ros(message: OccupancyGrid) -> Grid:
+    """Convert a message to a map; its origin's turn is not looked at."""
+    info = message.info
+    cells = np.array(message.data, dtype=np.int8).reshape(info.height, info.width)
+    return Grid(cells, float(info.resolution), (info.origin.position.x, info.origin.position.y))
+
+
+def joints_to_ros(
+    names: Sequence[str], positions: Iterable[float], velocities: Iterable[float], stamp: Time
+) -> JointState:
+    """Convert joint positions (rad) and velocities (rad/s) to a message."""
+    message = JointState(
+        name=list(names),
+        position=[float(each) for each in positions],
+        velocity=[float(each) for each in velocities],
+    )
+    message.header.stamp = stamp
+    return message
+
+
+def trajectory_from_ros(message: JointTrajectory) -> tuple[list[str], list[TrajectoryPoint]]:
+    """Convert a message to joint names and the points of their trajectory."""
+    points = [
+        TrajectoryPoint(
+            duration_from_ros(point.time_from_start),
+            tuple(point.positions),
+            tuple(point.velocities),
+        )
+        for point in message.points
+    ]
+    return list(message.joint_names), points
+
+
+def image_to_ros(picture: Picture, frame: str, stamp: Time) -> Image:
+    """Convert an RGB picture (rows, columns, 3) to a message."""
+    rows, columns, channels = picture.shape
+    message = Image(
+        height=rows, width=columns, encoding='rgb8', is_bigendian=0, step=columns * channels
+    )
+    message.header.frame_id, message.header.stamp = frame, stamp
+    message.data.frombytes(np.ascontiguousarray(picture).tobytes())
+    return message
+
+
+def camera_info_to_ros(camera: Camera, frame: str, stamp: Time) -> CameraInfo:
+    """Convert a camera without distortion to a message."""
+    matrix = camera.matrix
+    message = CameraInfo(
+        height=camera.height,
+        width=camera.width,
+        distortion_model='plumb_bob',
+        d=[0.0] * 5,
+        k=matrix.ravel().tolist(),
+        r=np.eye(3).ravel().tolist(),
+        p=np.hstack([matrix, np.zeros((3, 1))]).ravel().tolist(),
+    )
+    message.header.frame_id, message.header.stamp = frame, stamp
+    return message
+
+
+def doors_to_ros(world: World) -> DoorStates:
+    """Convert the doors of a world to a message."""
+    closed = world.closed_doors
+    return DoorStates(
+        open=[name for name in world.plan.doors if name not in closed], closed=sorted(closed)
+    )
+
+
+def marker_from_ros(request: SetMarker.Request, size: float) -> Marker:
+    """Convert the request to hang a marker; its side (metres) is that of the place's markers."""
+    return Marker(request.name, int(request.id), request.x, request.y, request.z, request.yaw, size)
+
+
+def _covariance(deviation: float, turn_deviation: float) -> npt.NDArray[np.float64]:
+    covariance = np.zeros(36)
+    covariance[[0, 7]] = deviation**2
+    covariance[35] = turn_deviation**2
+    return covariance

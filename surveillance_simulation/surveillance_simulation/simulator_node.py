@@ -1,0 +1,95 @@
+"""The node `simulator`: the robot's hardware and the place around it, on ROS topics."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import Twist
+from rclpy.clock import Clock as RclpyClock
+from rclpy.clock import ClockType
+from trajectory_msgs.msg import JointTrajectory
+
+from surveillance_runtime.node import PatrolNode, StartError, run_node
+from surveillance_simulation import conversions, simulator_parameters
+from surveillance_simulation.arm_motion import TrajectoryError
+from surveillance_simulation.camera_feed import CameraFeed
+from surveillance_simulation.fault_services import FaultServices
+from surveillance_simulation.floor_plan import WorldError
+from surveillance_simulation.pace import Pace
+from surveillance_simulation.robot import Robot
+from surveillance_simulation.sensor_feed import SensorFeed
+from surveillance_simulation.textures import TextureError
+from surveillance_simulation.world import World
+
+
+class Simulator(PatrolNode):
+    """Moves the robot on in time, obeys its commands and publishes what its sensors measure."""
+
+    def __init__(self, **node_options: Any) -> None:
+        super().__init__('simulator', **node_options)
+        seed = self.parameter('random_seed', 0, 'Seed of all noise: the same seed, the same run.')
+        pace = simulator_parameters.pace(self)
+        try:
+            world = World.from_parameters(simulator_parameters.place(self))
+        except WorldError as error:
+            raise StartError(f'simulator: {error}') from None
+        self._robot = Robot(
+            world,
+            simulator_parameters.base(self),
+            simulator_parameters.lidar(self),
+            rng=np.random.default_rng(seed),
+        )
+        self._changing = threading.RLock()
+        self._drives_clock = pace.speed != 1.0 or bool(self.get_parameter('use_sim_time').value)
+        self._pace = Pace(pace, time.monotonic())
+        self._sensors = SensorFeed(self, self._robot, drives_clock=self._drives_clock)
+        try:
+            self._camera = CameraFeed(self, self._robot, seed, self._changing, self._stamp)
+        except TextureError as error:
+            raise StartError(f'simulator: {error}') from None
+        FaultServices(self, self._robot, self._changing, self._sensors.tell_doors)
+        self.create_subscription(Twist, 'cmd_vel', self._on_command, 1)
+        self.create_subscription(JointTrajectory, 'arm/joint_trajectory', self._on_trajectory, 1)
+        steady = RclpyClock(clock_type=ClockType.STEADY_TIME)
+        self._sensors.publish(self._stamp())
+        self._timer = self.create_timer(pace.period, self._tick, clock=steady)
+
+    def _stamp(self) -> Time:
+        if self._drives_clock:
+            return conversions.time_to_ros(self._robot.time)
+        return self.get_clock().now().to_msg()
+
+    def _tick(self) -> None:
+        with self._changing:
+            passed = self._pace.due(
+                self._robot.time, time.monotonic(), moving=self._robot.is_moving
+            )
+            if not passed:
+                return
+            self._robot.advance(passed)
+        self._sensors.publish(self._stamp())
+        self._camera.tick()
+
+    def _on_command(self, message: Twist) -> None:
+        speed, turn_speed = message.linear.x, message.angular.z
+        with self._changing:
+            self._robot.base.command(speed, turn_speed)
+            self._pace.command(self._robot.base.is_moving, self._robot.time, time.monotonic())
+
+    def _on_trajectory(self, message: JointTrajectory) -> None:
+        names, points = conversions.trajectory_from_ros(message)
+        try:
+            with self._changing:
+                self._robot.arm.follow(names, points, self._robot.time)
+        except TrajectoryError as error:
+            self.get_logger().error(f'arm/joint_trajectory: {error}')
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the node."""
+    return run_node(Simulator, args)
