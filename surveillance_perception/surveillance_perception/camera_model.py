@@ -1,0 +1,78 @@
+"""A pinhole camera: the numbers that turn metres in front of the lens into pixels.
+
+Frame: the optical frame of REP-103 (x right, y down, z forward). Pixel centres have integer
+coordinates, as in OpenCV.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class CameraModel:
+    """Intrinsic parameters of a camera.
+
+    Attributes:
+        width: Picture width in pixels.
+        height: Picture height in pixels.
+        matrix: (3, 3) camera matrix K.
+        distortion: (n,) coefficients in OpenCV's order; empty or zeros mean a rectified picture.
+    """
+
+    width: int
+    height: int
+    matrix: Array
+    distortion: Array = field(default_factory=lambda: np.zeros(5))
+
+    def __post_init__(self) -> None:
+        if self.width <= 0 or self.height <= 0:
+            raise ValueError(f'a picture of {self.width}x{self.height} pixels has no area')
+        if self.matrix.shape != (3, 3) or not np.isfinite(self.matrix).all():
+            raise ValueError('the camera matrix must be 3x3 finite numbers')
+        if self.matrix[0, 0] <= 0 or self.matrix[1, 1] <= 0:
+            raise ValueError(
+                f'focal lengths must be positive, got {self.matrix[0, 0]:g} and '
+                f'{self.matrix[1, 1]:g}: the camera is not calibrated'
+            )
+
+    @classmethod
+    def from_field_of_view(cls, width: int, height: int, horizontal: float) -> CameraModel:
+        """A distortion-free camera from its horizontal field of view.
+
+        Args:
+            width: Picture width in pixels.
+            height: Picture height in pixels.
+            horizontal: Horizontal field of view in radians, between 0 and pi.
+
+        Raises:
+            ValueError: The field of view is not between 0 and pi.
+        """
+        if not 0.0 < horizontal < math.pi:
+            raise ValueError(f'field of view must lie between 0 and pi rad, got {horizontal:g}')
+        focal = width / 2.0 / math.tan(horizontal / 2.0)
+        matrix = np.array(
+            [[focal, 0.0, (width - 1) / 2.0], [0.0, focal, (height - 1) / 2.0], [0.0, 0.0, 1.0]]
+        )
+        return cls(width, height, matrix)
+
+    @property
+    def horizontal_field_of_view(self) -> float:
+        """Horizontal field of view in radians."""
+        return 2.0 * math.atan(self.width / 2.0 / float(self.matrix[0, 0]))
+
+    @property
+    def vertical_field_of_view(self) -> float:
+        """Vertical field of view in radians."""
+        return 2.0 * math.atan(self.height / 2.0 / float(self.matrix[1, 1]))
+
+    def project(self, points: Array) -> Array:
+        """Pixels (n, 2) of points (n, 3) in the optical frame, ignoring distortion."""
+        homogeneous = points @ self.matrix.T
+        return np.asarray(homogeneous[:, :2] / homogeneous[:, 2:])

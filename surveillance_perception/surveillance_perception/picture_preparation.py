@@ -1,0 +1,87 @@
+"""What a picture needs before markers are looked for: grey, stretched when dark, smoothed when noisy."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+Grey = npt.NDArray[np.uint8]
+
+_DARK_LEVEL = 90
+_STRETCHED_LEVEL = 200.0
+_LARGEST_GAIN = 16.0
+_QUIET = 4.0
+_SMOOTHING = 1.2
+# the second difference of white noise in both directions has 6 times its deviation (Immerkaer,
+# "Fast noise variance estimation", CVIU 64(2), 1996); 0.6745 turns a median into a deviation
+_SECOND_DIFFERENCE = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], np.float32)
+_MEDIAN_TO_DEVIATION = 1.0 / (6.0 * 0.6745)
+
+
+@dataclass(frozen=True)
+class PreparedPicture:
+    """A picture as the detector works on it.
+
+    Attributes:
+        grey: (height, width) stretched grey levels.
+        smooth: The same with its noise averaged out.
+        noise: Standard deviation of the noise in `smooth`, grey levels.
+    """
+
+    grey: Grey
+    smooth: Grey
+    noise: float
+
+
+def prepare(picture: npt.NDArray[np.uint8]) -> PreparedPicture:
+    """Prepare a picture of grey levels (height, width) or BGR (height, width, 3).
+
+    Raises:
+        ValueError: The picture is empty, not of 8 bits, or of another shape.
+    """
+    grey = grey_of(picture)
+    brightest = _quantile(grey, 0.99)
+    if brightest < _DARK_LEVEL:
+        gain = min(_STRETCHED_LEVEL / max(brightest, 1), _LARGEST_GAIN)
+        grey = cv2.convertScaleAbs(grey, alpha=gain)
+    noise = _noise(grey)
+    if noise <= _QUIET:
+        return PreparedPicture(grey, grey, noise)
+    smooth = cv2.GaussianBlur(grey, (0, 0), _SMOOTHING)
+    return PreparedPicture(grey, smooth, noise / (2.0 * _SMOOTHING * np.sqrt(np.pi)))
+
+
+def grey_of(picture: npt.NDArray[np.uint8]) -> Grey:
+    """Grey levels of a grey or BGR picture.
+
+    Raises:
+        ValueError: The picture is empty, not of 8 bits, or of another shape.
+    """
+    if picture.dtype != np.uint8:
+        raise ValueError(f'pictures must have 8 bits a channel, got {picture.dtype}')
+    if picture.ndim == 3 and picture.shape[2] == 3 and picture.size:
+        return np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
+    if picture.ndim != 2 or not picture.size:
+        shape = 'x'.join(str(side) for side in picture.shape)
+        raise ValueError(f'a picture of shape {shape} is neither grey nor BGR')
+    return np.ascontiguousarray(picture)
+
+
+def _quantile(grey: Grey, share: float) -> int:
+    histogram = cv2.calcHist([grey], [0], None, [256], [0, 256]).ravel()
+    return int(np.searchsorted(np.cumsum(histogram), share * grey.size))
+
+
+def _noise(grey: Grey) -> float:
+    """Deviation of the noise, from strips of 8 rows: a fifth of the picture is enough."""
+    starts = range(0, grey.shape[0] - 7, 40)
+    strips = [
+        cv2.filter2D(grey[start : start + 8], cv2.CV_32F, _SECOND_DIFFERENCE)[1:-1]
+        for start in starts
+    ]
+    if not strips:
+        return 0.0
+    return float(np.median(np.abs(np.concatenate(strips)))) * _MEDIAN_TO_DEVIATION

@@ -1,0 +1,106 @@
+"""Reading grey levels of a picture under many homographies at once.
+
+Marker coordinates: a marker's black square spans [-1, 1] in x (right) and y (down). A homography
+takes them to pixels, pixel centres having integer coordinates.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+Patches = npt.NDArray[np.float32]
+Grey = npt.NDArray[np.uint8]
+
+_TO_UNIT_SQUARE = np.array([[0.5, 0.0, 0.5], [0.0, 0.5, 0.5], [0.0, 0.0, 1.0]])
+_CORNERS = np.array([[-1.0, -1.0, 1.0], [1.0, -1.0, 1.0], [1.0, 1.0, 1.0], [-1.0, 1.0, 1.0]])
+_LAST_LEVEL = 5
+
+
+class PicturePyramid:
+    """A grey picture and its halves, so that a large marker is read from few averaged pixels."""
+
+    def __init__(self, picture: Grey) -> None:
+        self._levels = [picture]
+
+    def sample(self, homographies: Array, grid: Array, levels: npt.NDArray[np.int64]) -> Patches:
+        """Grey levels under homographies, linearly interpolated.
+
+        Args:
+            homographies: (m, 3, 3).
+            grid: (3, n) homogeneous marker coordinates.
+            levels: (m,) how often the picture is halved before it is read.
+
+        Returns:
+            (m, n) grey levels; outside the picture those of its edge.
+        """
+        points = homographies @ grid
+        depth = points[:, 2]
+        depth = np.where(np.abs(depth) < 1e-6, 1e-6, depth)
+        x, y = points[:, 0] / depth, points[:, 1] / depth
+        first = int(levels[0]) if len(levels) else 0
+        if (levels == first).all():
+            return self._read(x, y, first)
+        patches = np.empty(x.shape, np.float32)
+        for level in np.unique(levels):
+            chosen = levels == level
+            patches[chosen] = self._read(x[chosen], y[chosen], int(level))
+        return patches
+
+    def _read(self, x: Array, y: Array, level: int) -> Patches:
+        while len(self._levels) <= level:
+            last = self._levels[-1]
+            size = (max(1, last.shape[1] // 2), max(1, last.shape[0] // 2))
+            self._levels.append(cv2.resize(last, size, interpolation=cv2.INTER_AREA))
+        scale = 2.0**level
+        sampled = cv2.remap(
+            self._levels[level],
+            ((x + 0.5) / scale - 0.5).astype(np.float32),
+            ((y + 0.5) / scale - 0.5).astype(np.float32),
+            cv2.INTER_LINEAR,
+            borderMode=cv2.BORDER_REPLICATE,
+        )
+        return sampled.astype(np.float32)
+
+
+def levels_for(homographies: Array, cells: int, cell_pixels: float) -> npt.NDArray[np.int64]:
+    """How often to halve the picture so that a cell is at most `cell_pixels` wide."""
+    side = np.linalg.norm(jacobians_of(homographies), axis=1).min(axis=1) * 2.0 / cells
+    level = np.floor(np.log2(np.maximum(side / cell_pixels, 1e-3))) + 1
+    return np.clip(level, 0, _LAST_LEVEL).astype(np.int64)
+
+
+def homographies_of(quads: Array) -> Array:
+    """Homographies (m, 3, 3) from marker coordinates to quads (m, 4, 2), clockwise.
+
+    Closed form of a square's projection (Heckbert, "Fundamentals of texture mapping and image
+    warping", 1989, section 2.2.3).
+    """
+    p0, p1, p2, p3 = (quads[:, index] for index in range(4))
+    d1, d2, total = p1 - p2, p3 - p2, p0 - p1 + p2 - p3
+    determinant = d1[:, 0] * d2[:, 1] - d2[:, 0] * d1[:, 1]
+    determinant = np.where(np.abs(determinant) < 1e-9, 1e-9, determinant)
+    g = (total[:, 0] * d2[:, 1] - d2[:, 0] * total[:, 1]) / determinant
+    h = (d1[:, 0] * total[:, 1] - total[:, 0] * d1[:, 1]) / determinant
+    result = np.empty((len(quads), 3, 3))
+    result[:, :2, 0] = p1 - p0 + g[:, None] * p1
+    result[:, :2, 1] = p3 - p0 + h[:, None] * p3
+    result[:, :2, 2] = p0
+    result[:, 2] = np.stack([g, h, np.ones_like(g)], axis=1)
+    result = result @ _TO_UNIT_SQUARE
+    return np.asarray(result / result[:, 2:, 2:])
+
+
+def corners_of(homographies: Array) -> Array:
+    """Corners (m, 4, 2) of the black square in pixels, clockwise from marker (-1, -1)."""
+    points = homographies @ _CORNERS.T
+    return np.asarray((points[:, :2] / points[:, 2:]).transpose(0, 2, 1))
+
+
+def jacobians_of(homographies: Array) -> Array:
+    """Pixels per marker unit (m, 2, 2) at the marker's centre."""
+    depth = homographies[:, 2, 2][:, None, None]
+    centre = homographies[:, :2, 2:] / depth
+    return np.asarray((homographies[:, :2, :2] - centre * homographies[:, 2:, :2]) / depth)

@@ -1,0 +1,154 @@
+"""Four-sided dark outlines in a grey picture: where a marker could be.
+
+A marker's black border is one dark blob on its white margin, so its outline is found by local
+thresholding and the convex hull of each dark blob is cut down to the smallest quadrilateral around
+it. Hulls survive what breaks polygon approximation on small and oblique markers: the corners are a
+few tenths of a pixel wrong, which `template_fit` repairs, but they are there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+Quads = npt.NDArray[np.float64]
+Grey = npt.NDArray[np.uint8]
+
+_MAX_HULL_CORNERS = 14
+_MIN_SOLIDITY = 0.5
+_MAX_GROWTH = 1.6
+
+
+def dark_masks(picture: Grey, window: int, contrast: float, bridges: tuple[int, ...]) -> list[Grey]:
+    """Masks (height, width) of what is darker than its neighbourhood.
+
+    Args:
+        picture: (height, width) grey levels.
+        window: Side in pixels of the neighbourhood, odd.
+        contrast: How many grey levels darker.
+        bridges: Lengths in pixels of gaps to close along columns, and along rows, each in a mask
+            of its own: a marker seen at a flat angle has a border thinner than a pixel, which
+            breaks at white rows of its code.
+    """
+    dark = cv2.adaptiveThreshold(
+        picture, 255, cv2.ADAPTIVE_THRESH_MEAN_C, cv2.THRESH_BINARY_INV, window, contrast
+    )
+    masks = [dark]
+    for length in bridges:
+        for shape in ((length, 1), (1, length)):
+            masks.append(cv2.morphologyEx(dark, cv2.MORPH_CLOSE, np.ones(shape, np.uint8)))
+    return masks
+
+
+def quads_around(
+    mask: Grey, *, min_length: float = 8.0, min_width: float = 2.0, min_area: float = 12.0
+) -> Quads:
+    """Quadrilaterals around the blobs of a mask that do not touch its edge.
+
+    Args:
+        mask: (height, width), blobs are not 0.
+        min_length: Longer side in pixels of the smallest blob's upright box.
+        min_width: Shorter side of it.
+        min_area: Area in pixels of the smallest blob's hull.
+
+    Returns:
+        (n, 4, 2) corners in pixels, clockwise as seen.
+    """
+    contours, _ = cv2.findContours(mask, cv2.RETR_LIST, cv2.CHAIN_APPROX_SIMPLE)
+    height, width = mask.shape
+    found = []
+    for contour in contours:
+        if len(contour) < 4:
+            continue
+        left, top, across, down = cv2.boundingRect(contour)
+        if max(across, down) < min_length or min(across, down) < min_width:
+            continue
+        if left == 0 or top == 0 or left + across == width or top + down == height:
+            continue
+        # outer outlines run the other way round than the outlines of holes
+        area = -cv2.contourArea(contour, oriented=True)
+        if area <= 0:
+            continue
+        hull = cv2.convexHull(contour)
+        hull_area = cv2.contourArea(hull)
+        if hull_area < min_area or area < _MIN_SOLIDITY * hull_area:
+            continue
+        quad = _smallest_quad(hull)
+        if quad is None or _area(quad) > _MAX_GROWTH * hull_area:
+            continue
+        found.append(quad)
+    if not found:
+        return np.zeros((0, 4, 2))
+    return _clockwise(np.array(found))
+
+
+def distinct(quads: Quads, distance: float) -> npt.NDArray[np.int64]:
+    """Indices of the quads whose corners do not lie within `distance` pixels of an earlier one's."""
+    kept: list[int] = []
+    for index, quad in enumerate(quads):
+        others = quads[kept]
+        gaps = [np.abs(np.roll(quad, turn, axis=0) - others).max(axis=(1, 2)) for turn in range(4)]
+        if not (np.min(gaps, axis=0) < distance).any():
+            kept.append(index)
+    return np.array(kept, dtype=np.int64)
+
+
+def _clockwise(quads: Quads) -> Quads:
+    first, second = quads[:, 1] - quads[:, 0], quads[:, 2] - quads[:, 1]
+    reversed_ = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0] < 0
+    quads[reversed_] = quads[reversed_, ::-1]
+    return quads
+
+
+def _area(corners: Sequence[tuple[float, float]]) -> float:
+    total = 0.0
+    for (x, y), (next_x, next_y) in zip(corners, [*corners[1:], corners[0]], strict=True):
+        total += x * next_y - next_x * y
+    return abs(total) / 2.0
+
+
+def _smallest_quad(hull: npt.NDArray[np.int32]) -> list[tuple[float, float]] | None:
+    tolerance = max(0.7, 0.01 * cv2.arcLength(hull, True))
+    reduced = cv2.approxPolyDP(hull, tolerance, True)
+    if len(reduced) < 4:
+        reduced = hull
+    if not 4 <= len(reduced) <= _MAX_HULL_CORNERS:
+        return None
+    corners: list[tuple[float, float]] = [(float(x), float(y)) for x, y in reduced[:, 0]]
+    while len(corners) > 4:
+        cheapest: tuple[float, int, tuple[float, float]] | None = None
+        for index in range(len(corners)):
+            cut = _without_edge(corners, index)
+            if cut is not None and (cheapest is None or cut[0] < cheapest[0]):
+                cheapest = (cut[0], index, cut[1])
+        if cheapest is None:
+            return None
+        _, index, apex = cheapest
+        corners[index] = apex
+        del corners[(index + 1) % len(corners)]
+    return corners
+
+
+def _without_edge(
+    corners: list[tuple[float, float]], index: int
+) -> tuple[float, tuple[float, float]] | None:
+    """Added area and the new corner when the edge from `index` to the next one is dropped."""
+    count = len(corners)
+    before, start = corners[index - 1], corners[index]
+    end, after = corners[(index + 1) % count], corners[(index + 2) % count]
+    in_x, in_y = start[0] - before[0], start[1] - before[1]
+    out_x, out_y = end[0] - after[0], end[1] - after[1]
+    edge_x, edge_y = end[0] - start[0], end[1] - start[1]
+    determinant = in_x * out_y - in_y * out_x
+    if abs(determinant) < 1e-9:
+        return None
+    along = (edge_x * out_y - edge_y * out_x) / determinant
+    apex = (start[0] + along * in_x, start[1] + along * in_y)
+    beyond = (apex[0] - end[0]) * out_x + (apex[1] - end[1]) * out_y
+    if along < 0 or beyond < -1e-9:
+        return None
+    area = abs((apex[0] - start[0]) * edge_y - (apex[1] - start[1]) * edge_x) / 2.0
+    return area, apex
