@@ -107,6 +107,9 @@ def make_parser() -> argparse.ArgumentParser:
 
 def main(argv: Sequence[str]) -> int:
     """Runs one command and returns its exit code."""
+    # A set-up that is told to end has to take its compilers along.
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.default_int_handler)
     try:
         return _dispatch(list(argv))
     except (system.MissingError, SetupError, ValueError) as error:

@@ -71,14 +71,22 @@ class OperatorConsole:
         supervisor: holds the controllers; lines reach it on its own thread, through a pipe.
         controllers: the nodes with a console that this run starts.
         log: where answers go.
+        reader: the program that reads every line by itself; None hands each to its controller.
     """
 
-    def __init__(self, supervisor: Supervisor, controllers: Sequence[Node], log: MergedLog) -> None:
+    def __init__(
+        self,
+        supervisor: Supervisor,
+        controllers: Sequence[Node],
+        log: MergedLog,
+        reader: str | None = None,
+    ) -> None:
         self._supervisor = supervisor
         self._controllers = controllers
         self._log = log
-        reader, self._writer = os.pipe()
-        supervisor.read_from(reader, self._on_line)
+        self._reader = reader
+        source, self._writer = os.pipe()
+        supervisor.read_from(source, self._on_line)
         self._console = Console(
             'patrol', self._forward, lambda text: completions(text, controllers)
         )
@@ -103,6 +111,8 @@ class OperatorConsole:
 
     def _on_line(self, line: str) -> None:
         routed = route(line, self._controllers)
+        if self._reader is not None and not routed.ends:
+            routed = Routed((self._reader,), line)
         for answer in routed.message.splitlines():
             self._log.say(answer)
         if routed.ends:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import fcntl
 import os
 import selectors
+import signal
 import subprocess
 import sys
 from collections import deque
@@ -206,12 +207,14 @@ class _Runner:
                 stdout=subprocess.PIPE,
                 stderr=subprocess.STDOUT,
                 pass_fds=[self._lock],
+                start_new_session=True,
             )
             try:
                 output.extend(_lines(process, self._step))
                 code = process.wait()
             except BaseException:
-                process.terminate()
+                # With all that it started: compilers would go on without anybody to wait for them.
+                os.killpg(process.pid, signal.SIGTERM)
                 process.wait()
                 raise
             if code != 0:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 MODES = ('SIMULATED', 'RANDOM', 'MANUAL')
 DEFAULT_MODE = 'RANDOM'
 BEHAVIOURS = ('surveillance', 'patrol')
+CONSOLE = 'console'
 
 
 class SelectionError(ValueError):
@@ -77,6 +78,12 @@ NODES = (
         'MotionController',
         'follows a path with the base',
         console='move',
+    ),
+    Node(
+        CONSOLE,
+        'surveillance_controllers',
+        'ConsoleNode',
+        'one prompt for the three controllers in MANUAL mode',
     ),
     Node(
         'reasoner',

@@ -79,10 +79,6 @@ class Run:
             )
         if self.domain is not None and not 0 <= self.domain <= MAX_DOMAIN:
             raise RunError(f'--domain {self.domain}: expected a number from 0 to {MAX_DOMAIN}')
-        if self.composed and self.mode == 'MANUAL':
-            raise RunError(
-                '--composed with --mode MANUAL: the consoles need processes of their own'
-            )
         if self.place is not None:
             try:
                 read_place(self.place)
@@ -92,9 +88,18 @@ class Run:
             check_parameter_file(self.parameters)
 
     def nodes(self) -> tuple[graph.Node, ...]:
-        return graph.select(
+        chosen = graph.select(
             self.mode or graph.DEFAULT_MODE, self.behaviour, self.only, self.without
         )
+        return (*chosen, graph.find(graph.CONSOLE)) if self.one_console else chosen
+
+    @property
+    def one_console(self) -> bool:
+        """Whether a node reads the operator's lines for all controllers.
+
+        In processes of their own each controller reads its own input, which the launcher fills.
+        """
+        return self.composed and self.mode == 'MANUAL'
 
 
 def check_parameter_file(path: Path) -> None:
@@ -196,7 +201,10 @@ def write_own_parameters(folder: Path, run: Run) -> Path:
     if run.mode or 'execution_mode' not in (run.parameters or Path(os.devnull)).read_text():
         for node in graph.NODES:
             if node.console:
-                own[node.name] = {'execution_mode': run.mode or graph.DEFAULT_MODE}
+                own[node.name] = {
+                    'execution_mode': run.mode or graph.DEFAULT_MODE,
+                    'console': not run.one_console,
+                }
     return _write_parameters(folder / 'launch.yaml', own)
 
 
@@ -221,7 +229,8 @@ def run_mission(checkout: Path, run: Run) -> int:
     environ = node_environ(run, folder / 'ros')
     manual = run.mode == 'MANUAL'
     if run.composed:
-        programs = [Program(COMPOSED, command(nodes, arguments, os.getpid()), environ)]
+        words = command(nodes, arguments, os.getpid())
+        programs = [Program(COMPOSED, words, environ, takes_input=manual)]
     else:
         programs = [
             Program(
@@ -244,7 +253,8 @@ def run_mission(checkout: Path, run: Run) -> int:
     if manual:
         from launcher.console import OperatorConsole
 
-        console = OperatorConsole(supervisor, [n for n in nodes if n.console], log)
+        reader = COMPOSED if run.one_console else None
+        console = OperatorConsole(supervisor, [n for n in nodes if n.console], log, reader)
         console.start()
     code = supervisor.run(run.seconds)
     if console is not None:

@@ -41,6 +41,10 @@ JOIN_SECONDS = 2.0
 """How long a stopping node waits for each of its threads, seconds."""
 
 
+EXIT_CANNOT_START = 2
+"""The exit code of a node whose configuration does not let it start."""
+
+
 class StartError(Exception):
     """The node cannot start; the message is one line that says why."""
 
@@ -243,7 +247,8 @@ def run_node(factory: Callable[[], PatrolNode], args: Sequence[str] | None = Non
         args: Command line without the program's name; None takes `sys.argv`.
 
     Returns:
-        The exit code: 0 for a wanted stop, 1 when the node failed or could not start.
+        The exit code: 0 for a wanted stop, 1 when the node failed, `EXIT_CANNOT_START` when its
+        configuration does not let it start, so that starting it again would not help.
     """
     return run_nodes([factory], args)
 
@@ -266,7 +271,7 @@ def run_nodes(
         rclpy.init(args=argv, signal_handler_options=SignalHandlerOptions.NO)
     except Exception as error:
         print(f'cannot start: {_one_line(error)}', file=sys.stderr)
-        return 1
+        return EXIT_CANNOT_START
     nodes: list[PatrolNode] = []
     spinner = ExecutorThread()
     code = 0
@@ -279,7 +284,7 @@ def run_nodes(
         ended.wait()
     except (ParameterError, StartError) as error:
         print(f'cannot start: {_one_line(error)}', file=sys.stderr)
-        code = 1
+        code = EXIT_CANNOT_START
     finally:
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, signal.SIG_IGN)

@@ -146,6 +146,6 @@ def test_process_with_a_bad_parameter_says_so_in_one_line(arguments, complaint):
         text=True,
         timeout=20,
     )
-    assert run.returncode == 1
+    assert run.returncode == 2
     assert run.stderr.count('\n') == 1
     assert complaint in run.stderr
