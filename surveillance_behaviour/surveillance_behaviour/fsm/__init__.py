@@ -5,7 +5,9 @@
 
 from __future__ import annotations
 
+from surveillance_behaviour.fsm.concurrence import Concurrence
 from surveillance_behaviour.fsm.container import Container
+from surveillance_behaviour.fsm.engine import RESUME
 from surveillance_behaviour.fsm.exceptions import (
     InvalidConstructionError,
     InvalidStateError,
@@ -16,6 +18,7 @@ from surveillance_behaviour.fsm.exceptions import (
     SmachError,
 )
 from surveillance_behaviour.fsm.interface import CBInterface, cb_interface, has_smach_interface
+from surveillance_behaviour.fsm.iterator import Iterator
 from surveillance_behaviour.fsm.log import (
     logdebug,
     logerr,
@@ -24,6 +27,7 @@ from surveillance_behaviour.fsm.log import (
     reset_loggers,
     set_loggers,
 )
+from surveillance_behaviour.fsm.sequence import Sequence
 from surveillance_behaviour.fsm.shutdown import is_shutdown, set_shutdown_check
 from surveillance_behaviour.fsm.state import CBState, State
 from surveillance_behaviour.fsm.state_machine import StateMachine
@@ -31,18 +35,22 @@ from surveillance_behaviour.fsm.user_data import Remapper, UserData
 from surveillance_behaviour.fsm.waiting import Clock, Interrupt, WallClock
 
 __all__ = [
+    'RESUME',
     'CBInterface',
     'CBState',
     'Clock',
+    'Concurrence',
     'Container',
     'Interrupt',
     'InvalidConstructionError',
     'InvalidStateError',
     'InvalidTransitionError',
     'InvalidUserCodeError',
+    'Iterator',
     'MissingKeyError',
     'PreemptIgnoredError',
     'Remapper',
+    'Sequence',
     'SmachError',
     'State',
     'StateMachine',

@@ -1,44 +1,100 @@
-"""The table a machine runs on: one node per state, with its view of userdata and its targets."""
+"""What a running container is made of: nodes, exits, the frame of one execution, its history."""
 
 from __future__ import annotations
 
-from typing import Any
+import itertools
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 from surveillance_behaviour.fsm.state import State
+
+if TYPE_CHECKING:
+    from surveillance_behaviour.fsm.limits import Limits
+    from surveillance_behaviour.fsm.run import Strand
+
+LOWEST = float('-inf')
+"""The priority of ordinary work, below that of every interrupt."""
+
+
+class _Suspended:
+    """What a container returns when its parent put it aside with its history kept."""
+
+    def __repr__(self) -> str:
+        return 'SUSPENDED'
+
+
+SUSPENDED: Any = _Suspended()
 
 
 class Exit:
     """Where a transition leaves the container."""
 
-    __slots__ = ('execute', 'label')
+    __slots__ = ('label',)
 
     is_exit = True
+    priority = LOWEST
 
     def __init__(self, label: str) -> None:
         self.label = label
 
 
+RESUME = 'RESUME'
+"""Target of an interrupt's outcome: go on where the interrupt came."""
+
+RESUMPTION = Exit(RESUME)
+
+
 class Node:
-    """One state of a machine as the loop needs it.
+    """One state of a container as the loop needs it.
 
     Attributes:
         label: The state's label in its container.
         state: The state.
-        execute: What runs it.
+        enter: What runs it; the state's own `execute` as a rule.
+        execute: What the loop calls: `enter`, within the state's limits if it has any.
+        make_view: Makes a view.
         view: The state's view of the container's userdata.
         targets: Where each outcome leads.
+        limits: Time limits and retries, if it has any.
+        priority: Of an interrupt's branch; `LOWEST` for ordinary states.
     """
 
-    __slots__ = ('execute', 'label', 'state', 'targets', 'view')
+    __slots__ = (
+        'enter',
+        'execute',
+        'label',
+        'limits',
+        'make_view',
+        'priority',
+        'state',
+        'targets',
+        'view',
+    )
 
     is_exit = False
 
-    def __init__(self, label: str, state: State, view: Any) -> None:
+    def __init__(
+        self, label: str, state: State, make_view: Callable[[], Any], priority: float = LOWEST
+    ) -> None:
         self.label = label
         self.state = state
-        self.execute = state.execute
-        self.view = view
-        self.targets: dict[str | None, Node | Exit] = {}
+        self.enter: Callable[[Any], Any] = state.execute
+        self.execute: Callable[[Any], Any] = self.enter
+        self.make_view = make_view
+        self.view = make_view()
+        self.targets: dict[Any, Node | Exit] = {SUSPENDED: self}
+        self.limits: Limits | None = None
+        self.priority = priority
+
+    def revoke(self) -> None:
+        """Cut the view in use off the userdata, and make a new one for the next execution."""
+        self.view._revoke()
+        self.view = self.make_view()
+
+
+Trace = Callable[[tuple[Any, ...]], object]
+"""Takes (path, from, outcome, to, time, duration, userdata, kind) of one transition."""
 
 
 class Frame:
@@ -46,17 +102,137 @@ class Frame:
 
     The thread that executes writes `current` first and looks at `attention` after; a thread that
     wants something raises `attention` first and looks at `current` after. So one of the two always
-    sees the other, and the loop needs no lock.
+    sees the other, and the loop needs no lock. Everything else is touched under the run's condition
+    only.
 
     Attributes:
+        container: Whose execution it is.
+        strand: The thread of execution it belongs to.
+        path: The container's path.
         current: The node that executes, or the exit that was taken.
         attention: Something beside the next state wants to be looked at.
-        preempted: The node whose state was last asked to stop.
+        stale: The machine went on without the thread that runs this frame.
+        preempted: The node whose state was last asked to stop because of a preempt.
+        cut: The node whose state was asked to stop because of an interrupt.
+        suspending: The parent wants the container put aside.
+        saved: Where to go on after each of the interrupts under way.
+        forced: An outcome to take in place of the one the current state returns.
+        parent_ud: The parent's userdata.
+        trace: Where transitions are reported.
+        now: The trace's clock.
+        since: When the current state was entered, on the trace's clock.
+        items: An iterator's items that are left.
+        repeat: The current state is executed again where it was cut short.
+        index: How many items an iterator has begun.
     """
 
-    __slots__ = ('attention', 'current', 'preempted')
+    __slots__ = (
+        'attention',
+        'container',
+        'current',
+        'cut',
+        'forced',
+        'index',
+        'items',
+        'now',
+        'parent_ud',
+        'path',
+        'preempted',
+        'repeat',
+        'saved',
+        'since',
+        'stale',
+        'strand',
+        'suspending',
+        'trace',
+    )
 
-    def __init__(self, current: Node | Exit) -> None:
+    def __init__(
+        self, container: Any, strand: Strand, path: str, current: Node | Exit, parent_ud: Any
+    ) -> None:
+        self.container = container
+        self.strand = strand
+        self.path = path
         self.current = current
+        self.parent_ud = parent_ud
         self.attention = True
+        self.stale = False
         self.preempted: Node | None = None
+        self.cut: Node | None = None
+        self.suspending = False
+        self.saved: list[Node | Exit] = []
+        self.forced: str | None = None
+        self.trace: Trace | None = strand.run.trace
+        self.now = strand.run.now
+        self.since = self.now() if self.trace is not None else 0.0
+        self.items: Any = None
+        self.index = 0
+        self.repeat = False
+
+    def successor(self) -> Frame:
+        """A copy for the thread that takes this execution over."""
+        frame = Frame(self.container, self.strand, self.path, self.current, self.parent_ud)
+        for name in (
+            'preempted',
+            'cut',
+            'suspending',
+            'forced',
+            'since',
+            'items',
+            'index',
+            'repeat',
+        ):
+            setattr(frame, name, getattr(self, name))
+        frame.saved = list(self.saved)
+        return frame
+
+    @property
+    def wanted(self) -> bool:
+        """Whether somebody wants the current state to end."""
+        return bool(
+            self.container._preempt_requested
+            or self.cut is not None
+            or self.suspending
+            or self.forced is not None
+        )
+
+
+@dataclass
+class History:
+    """Where a container that was put aside goes on.
+
+    Attributes:
+        current: Label of the state, or of the outcome when `leaving`.
+        leaving: `current` is an outcome of the container.
+        saved: Of the interrupts under way, where each goes on: (label, leaving).
+        index: How many items an iterator had begun, the current one included.
+        outcomes: Of a concurrence's children that had ended.
+    """
+
+    current: str = ''
+    leaving: bool = False
+    saved: list[tuple[str, bool]] = field(default_factory=list)
+    index: int = 0
+    outcomes: dict[str, str] = field(default_factory=dict)
+    # An iterator suspended in this process goes on with its own generator.
+    items: Any = None
+
+
+@dataclass
+class Branch:
+    """An interrupt declared on a container.
+
+    Attributes:
+        label: Its name.
+        state: What runs when it is raised.
+        priority: It cuts work of lower priority short.
+        transitions: From the state's outcomes to `RESUME`, labels or outcomes of the container.
+        remapping: From the state's userdata keys to the container's.
+    """
+
+    label: str
+    state: State
+    priority: float
+    transitions: dict[str, str]
+    remapping: dict[str, str]
+    order: int = field(default_factory=itertools.count().__next__)

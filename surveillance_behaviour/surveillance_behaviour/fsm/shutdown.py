@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-_check: Callable[[], bool] | None = None
+check: Callable[[], bool] | None = None
+"""What was set with `set_shutdown_check`."""
 
 
 def is_shutdown() -> bool:
     """Whether the check set with `set_shutdown_check` says that the program is shutting down."""
-    return _check is not None and bool(_check())
+    return check is not None and bool(check())
 
 
 def set_shutdown_check(cb: Callable[[], bool] | None) -> None:
@@ -18,10 +19,5 @@ def set_shutdown_check(cb: Callable[[], bool] | None) -> None:
     Args:
         cb: Called between any two states; None takes the check away.
     """
-    global _check
-    _check = cb
-
-
-def shutdown_checked() -> bool:
-    """Whether there is a check at all, so that machines without one skip the call."""
-    return _check is not None
+    global check
+    check = cb

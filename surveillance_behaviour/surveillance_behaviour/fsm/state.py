@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 from surveillance_behaviour.fsm.interface import has_smach_interface
+from surveillance_behaviour.fsm.this_thread import this_thread
 from surveillance_behaviour.fsm.waiting import WALL_CLOCK, Clock, Interrupt
 
 # Guards the preempt flags of all states: it is held for a few instructions, on preempts and waits
@@ -33,7 +34,10 @@ class State:
     _preempt_requested: bool = False
     _fsm_interrupt: Interrupt | None = None
     _fsm_clock: Clock = WALL_CLOCK
-    _fsm_progress: dict[str, float] | None = None
+    _fsm_progress: dict[str, Any] | None = None
+    _fsm_waiting: tuple[str, float] | None = None
+    _fsm_left: threading.Event | None = None
+    _fsm_registrations: ClassVar[list[int]] = [0]
 
     def __init__(
         self,
@@ -62,6 +66,7 @@ class State:
     def register_outcomes(self, new_outcomes: Iterable[str]) -> None:
         """Add outcomes."""
         self._outcomes = self._outcomes.union(new_outcomes)
+        self._fsm_registrations[0] += 1
 
     def get_registered_outcomes(self) -> tuple[str, ...]:
         """The outcomes the state may return."""
@@ -72,10 +77,12 @@ class State:
         keys = tuple(keys)
         self._input_keys = self._input_keys.union(keys)
         self._output_keys = self._output_keys.union(keys)
+        self._fsm_registrations[0] += 1
 
     def register_input_keys(self, keys: Iterable[str]) -> None:
         """Add keys that are read."""
         self._input_keys = self._input_keys.union(keys)
+        self._fsm_registrations[0] += 1
 
     def get_registered_input_keys(self) -> tuple[str, ...]:
         """The userdata keys the state reads."""
@@ -84,6 +91,7 @@ class State:
     def register_output_keys(self, keys: Iterable[str]) -> None:
         """Add keys that are written."""
         self._output_keys = self._output_keys.union(keys)
+        self._fsm_registrations[0] += 1
 
     def get_registered_output_keys(self) -> tuple[str, ...]:
         """The userdata keys the state writes."""
@@ -125,18 +133,32 @@ class State:
             True when the full time passed, False when a preempt ended the wait.
         """
         clock = self._fsm_clock
-        kept = self._fsm_progress if progress is not None else None
-        before = kept.get(str(progress), 0.0) if kept is not None else 0.0
+        before = self.progress.get(progress, 0.0) if progress is not None else 0.0
         start = clock.now() - before
+        if progress is not None:
+            self._fsm_waiting = (progress, start)
         while True:
             interrupt = self._armed_interrupt()
             finished = clock.sleep(max(0.0, start + seconds - clock.now()), interrupt)
             # A preempt that was serviced meanwhile may wake a wait it was not meant for.
             if finished or self._preempt_requested:
                 break
-        if kept is not None:
-            kept[str(progress)] = seconds if finished else clock.now() - start
+        if progress is not None:
+            self._fsm_waiting = None
+            self.progress[progress] = seconds if finished else clock.now() - start
         return finished
+
+    @property
+    def progress(self) -> dict[str, Any]:
+        """How far the state has come: kept while an interrupt cuts it short, and in checkpoints.
+
+        A state that can go on where it was writes JSON values here and looks at them when it is
+        executed. Any other end of the state empties it.
+        """
+        if self._fsm_progress is None:
+            self._fsm_progress = {}
+            note_progress()
+        return self._fsm_progress
 
     @property
     def interrupt(self) -> Interrupt:
@@ -161,6 +183,13 @@ class State:
             self._preempt_requested = False
             if self._fsm_interrupt is not None:
                 self._fsm_interrupt.clear()
+
+
+def note_progress() -> None:
+    """Have the loop look at the state that executes here when it ends: it has progress."""
+    strand = this_thread.strand
+    if strand is not None and strand.stack:
+        strand.stack[-1].attention = True
 
 
 class CBState(State):

@@ -2,27 +2,19 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from surveillance_behaviour.fsm import log
-from surveillance_behaviour.fsm.container import Container, describe
-from surveillance_behaviour.fsm.engine import Exit, Frame, Node
-from surveillance_behaviour.fsm.exceptions import (
-    InvalidStateError,
-    InvalidTransitionError,
-    InvalidUserCodeError,
-    SmachError,
-)
+from surveillance_behaviour.fsm.driven import DrivenContainer
+from surveillance_behaviour.fsm.engine import Exit, Node
+from surveillance_behaviour.fsm.exceptions import InvalidStateError, InvalidTransitionError
 from surveillance_behaviour.fsm.interface import has_smach_interface
-from surveillance_behaviour.fsm.shutdown import is_shutdown, shutdown_checked
+from surveillance_behaviour.fsm.limits import TIMEOUT, Limits, limited, make_limits
 from surveillance_behaviour.fsm.state import State
-from surveillance_behaviour.fsm.user_data import Remapper, UserData, undeclared_write
-from surveillance_behaviour.fsm.waiting import WALL_CLOCK, Clock
+from surveillance_behaviour.fsm.user_data import UserData
 
 
-class StateMachine(Container):
+class StateMachine(DrivenContainer):
     """A finite state machine.
 
     States are added inside ``with machine:`` by `add`. A transition leads from an outcome to the
@@ -52,9 +44,7 @@ class StateMachine(Container):
         self._initial_state_label: str | None = None
         self._last_added_label: str | None = None
         self._connector_outcomes: list[str] = []
-        self._frame: Frame | None = None
-        self._condition = threading.Condition(threading.RLock())
-        self._clock: Clock = WALL_CLOCK
+        self._limits: dict[str, Limits] = {}
 
     # Construction.
 
@@ -65,6 +55,11 @@ class StateMachine(Container):
         transitions: Mapping[str, str | None] | None = None,
         remapping: Mapping[str, str] | None = None,
         constants: Mapping[str, Any] | None = None,
+        *,
+        timeout: float | None = None,
+        deadline: float | None = None,
+        retry: int = 0,
+        retry_on: Iterable[str] = ('aborted',),
     ) -> State:
         """Add a state to the open machine.
 
@@ -74,6 +69,14 @@ class StateMachine(Container):
             transitions: From the state's outcomes to labels or to outcomes of the machine.
             remapping: From the state's userdata keys to the machine's.
             constants: Values for input keys of the state that come from no userdata.
+            timeout: Seconds of the machine's clock after which the state is asked to stop. Its
+                outcome is then ``timeout`` if `transitions` binds that, else ``aborted``, else
+                ``preempted``.
+            deadline: Seconds after which the machine goes on without the state, with the same
+                outcome.
+            retry: How often the state is executed again when it ran out of time or ended with one
+                of `retry_on`.
+            retry_on: See `retry`.
 
         Returns:
             The state.
@@ -84,7 +87,8 @@ class StateMachine(Container):
             InvalidTransitionError: `transitions` binds an outcome the state does not have.
         """
         machine = StateMachine._currently_opened_container()
-        return machine._add(label, state, transitions, remapping, constants)
+        limits = (timeout, deadline, retry, tuple(retry_on))
+        return machine._add(label, state, transitions, remapping, constants, limits)
 
     @staticmethod
     def add_auto(
@@ -93,8 +97,12 @@ class StateMachine(Container):
         connector_outcomes: Iterable[str],
         transitions: Mapping[str, str | None] | None = None,
         remapping: Mapping[str, str] | None = None,
+        **limits: Any,
     ) -> State:
-        """Add a state that goes on to the next state added, for each of `connector_outcomes`."""
+        """Add a state that goes on to the next state added, for each of `connector_outcomes`.
+
+        `transitions` that bind one of them have precedence. For the rest see `add`.
+        """
         machine = StateMachine._currently_opened_container()
         connectors = list(connector_outcomes)
         unknown = [name for name in connectors if name not in state.get_registered_outcomes()]
@@ -103,7 +111,7 @@ class StateMachine(Container):
                 f"State '{machine._path_of(label)}' cannot be connected by {unknown}: its outcomes "
                 f'are {sorted(state.get_registered_outcomes())}'
             )
-        machine._add(label, state, transitions, remapping, None)
+        StateMachine.add(label, state, transitions, remapping, **limits)
         machine._last_added_label = label
         machine._connector_outcomes = connectors
         return state
@@ -115,8 +123,9 @@ class StateMachine(Container):
         transitions: Mapping[str, str | None] | None,
         remapping: Mapping[str, str] | None,
         constants: Mapping[str, Any] | None,
+        limits: tuple[float | None, float | None, int, tuple[str, ...]],
     ) -> State:
-        if label in self._states:
+        if label in self._states or label in self._branches:
             raise InvalidStateError(
                 f"State '{self._path_of(label)}' is already there: a label names one state"
             )
@@ -125,7 +134,11 @@ class StateMachine(Container):
                 f"State '{self._path_of(label)}' must be an instance of State, not {state!r}"
             )
         bound = dict(transitions or {})
-        self.check_state_spec(label, state, bound)
+        made = make_limits(self._path_of(label), state, bound, *limits)
+        declared = {k: v for k, v in bound.items() if made is None or k != TIMEOUT}
+        self.check_state_spec(label, state, declared)
+        if made is not None:
+            self._limits[label] = made
         group = self._group_transitions() if self.is_opened() else {}
         for outcome in state.get_registered_outcomes():
             bound.setdefault(outcome, group.get(outcome))
@@ -133,11 +146,12 @@ class StateMachine(Container):
         self._transitions[label] = bound
         self._remappings[label] = dict(remapping or {})
         self._constants[label] = dict(constants or {})
+        self._table_version += 1
         if self._initial_state_label is None:
             self._initial_state_label = label
         if self._last_added_label is not None:
             for outcome in self._connector_outcomes:
-                if self._transitions[self._last_added_label][outcome] is None:
+                if not self._transitions[self._last_added_label][outcome]:
                     self._transitions[self._last_added_label][outcome] = label
             self._last_added_label = None
             self._connector_outcomes = []
@@ -176,186 +190,33 @@ class StateMachine(Container):
                         f"outcome '{outcome}' of state '{label}' leads to '{target}', which is "
                         'neither a state nor an outcome of the machine'
                     )
+        faults += self._branch_faults()
         if faults:
             raise InvalidTransitionError(
                 f"State machine '{self._fsm_path}' cannot run: {'; '.join(faults)} (states: "
                 f'{sorted(self._states)}, outcomes: {sorted(outcomes)})'
             )
 
-    # Settings.
+    # The table.
 
-    def set_clock(self, clock: Clock) -> None:
-        """Give the machine and everything inside the clock that `State.wait` waits on."""
-        self._clock = clock
-        self._fsm_clock = clock
+    def _initial_label(self) -> str:
+        return str(self._initial_state_label)
 
-    def set_name(self, name: str) -> None:
-        """Name the machine as paths begin with it."""
-        self._fsm_path = name
-
-    # Running.
-
-    def execute(self, parent_ud: Any = None) -> str | None:
-        """Run from the initial state to an outcome.
-
-        Args:
-            parent_ud: Userdata that input keys come from and output keys go to.
-
-        Returns:
-            The outcome; None when the shutdown check ended the run.
-
-        Raises:
-            InvalidTransitionError: The machine cannot run, or a state returned an outcome that it
-                does not have.
-            InvalidUserCodeError: A state raised an exception.
-            InvalidStateError: The machine is running already.
-        """
-        if self._frame is not None:
-            raise InvalidStateError(f"State machine '{self._fsm_path}' is running already")
-        self.check_consistency()
-        nodes = self._compile()
-        initial = nodes[str(self._initial_state_label)]
-        self._copy_input_keys(parent_ud, self.userdata)
-        frame = Frame(initial)
-        self._frame = frame
-        try:
-            if log.chatty():
-                log.loginfo(
-                    f"State machine '{self._fsm_path}' starts in '{initial.label}' with userdata "
-                    f'{sorted(self.userdata.keys())}'
-                )
-            self.call_start_cbs()
-            outcome = self._drive(frame, initial)
-        finally:
-            with self._condition:
-                self._frame = None
-                self._condition.notify_all()
-        self._copy_output_keys(self.userdata, parent_ud)
-        return outcome
-
-    def _compile(self) -> dict[str, Node]:
-        nodes: dict[str, Node] = {}
+    def _make_table(self) -> dict[str, Node]:
+        table = {
+            label: self._node(label, state, self._remappings[label], self._constants[label])
+            for label, state in self._states.items()
+        }
         exits = {outcome: Exit(outcome) for outcome in self.get_registered_outcomes()}
-        for label, state in self._states.items():
-            view = Remapper(
-                self.userdata,
-                state.get_registered_input_keys(),
-                state.get_registered_output_keys(),
-                self._remappings[label],
-                self._constants[label],
-                self._path_of(label),
-            )
-            nodes[label] = Node(label, state, view)
-            if isinstance(state, Container):
-                state._fsm_path = self._path_of(label)
-            if isinstance(state, StateMachine):
-                state.set_clock(self._clock)
-            elif isinstance(state, State):
-                state._fsm_clock = self._clock
         for label, transitions in self._transitions.items():
-            targets = nodes[label].targets
+            node = table[label]
             for outcome, target in transitions.items():
                 name = target or outcome
-                targets[outcome] = nodes[name] if name in nodes else exits[name]
-        return nodes
-
-    def _drive(self, frame: Frame, node: Node) -> str | None:
-        self._attend(frame, None, None, node)
-        while True:
-            if shutdown_checked() and is_shutdown():
-                return None
-            try:
-                outcome = node.execute(node.view)
-            except SmachError:
-                raise
-            except Exception as error:
-                raise self._child_error(node, error) from error
-            try:
-                target = node.targets[outcome]
-            except (KeyError, TypeError):
-                raise self._undeclared_outcome(node, outcome) from None
-            frame.current = target
-            if frame.attention:
-                self._attend(frame, node, outcome, target)
-            if target.is_exit:
-                return target.label
-            node = target  # type: ignore[assignment]
-
-    def _attend(
-        self, frame: Frame, left: Node | None, outcome: str | None, target: Node | Exit
-    ) -> None:
-        """Do what a transition brings beside the next state: words, callbacks, preempts."""
-        chatty = log.chatty()
-        if left is not None and chatty:
-            verb = 'ends' if target.is_exit else 'goes on'
-            log.loginfo(
-                f"State machine '{self._fsm_path}' {verb}: '{left.label}' : '{outcome}' --> "
-                f"'{target.label}'"
-            )
-        with self._condition:
-            frame.attention = False
-            if self._preempt_requested:
-                self._pass_preempt_on(frame, left, target)
-            if chatty or self._transition_cbs or self._termination_cbs or self._preempt_requested:
-                frame.attention = True
-        if left is None:
-            return
-        if target.is_exit:
-            self.call_termination_cbs([left.label], target.label)
-        else:
-            self.call_transition_cbs()
-
-    def _pass_preempt_on(self, frame: Frame, left: Node | None, target: Node | Exit) -> None:
-        """Carry a pending preempt over a transition, as SMACH does.
-
-        A state that acknowledged the preempt has served it for the machine; otherwise the next
-        state is asked, and at an exit the machine's own flag stays up for its parent to see.
-        """
-        asked = frame.preempted
-        if asked is not None and asked is left:
-            if not asked.state.preempt_requested():
-                frame.preempted = None
-                self.service_preempt()
-                return
-            asked.state.recall_preempt()
-        frame.preempted = None
-        if isinstance(target, Node):
-            frame.preempted = target
-            target.state.request_preempt()
-
-    def request_preempt(self) -> None:
-        """Ask the machine to stop: the request reaches the state that runs at once."""
-        super().request_preempt()
-        with self._condition:
-            frame = self._frame
-            if frame is None:
-                return
-            frame.attention = True
-            current = frame.current
-            if isinstance(current, Node) and frame.preempted is not current:
-                frame.preempted = current
-                current.state.request_preempt()
-
-    # Errors.
-
-    def _path_of(self, label: str) -> str:
-        return f'{self._fsm_path}/{label}'
-
-    def _child_error(self, node: Node, error: Exception) -> SmachError:
-        path = self._path_of(node.label)
-        undeclared = undeclared_write(node.view, error)
-        if undeclared is not None:
-            return undeclared
-        return InvalidUserCodeError(
-            f"State '{path}' of type {type(node.state).__name__} raised {describe(error)}"
-        )
-
-    def _undeclared_outcome(self, node: Node, outcome: object) -> InvalidTransitionError:
-        returned = 'None instead of an outcome' if outcome is None else f"outcome '{outcome}'"
-        return InvalidTransitionError(
-            f"State '{self._path_of(node.label)}' of type {type(node.state).__name__} returned "
-            f'{returned}: its outcomes are {sorted(node.state.get_registered_outcomes())}'
-        )
+                node.targets[outcome] = table.get(name) or exits[name]
+            node.limits = self._limits.get(label)
+            if node.limits is not None:
+                node.execute = limited(self._path_of(label), node, node.limits)
+        return table
 
     # The container's interface.
 
@@ -397,13 +258,6 @@ class StateMachine(Container):
         if userdata is not None:
             self.userdata.update(userdata)
 
-    def get_active_states(self) -> list[str]:
-        """The label of the state that runs; empty when none does."""
-        frame = self._frame
-        if frame is None or frame.current.is_exit:
-            return []
-        return [frame.current.label]
-
     def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
         """All transitions as (outcome, from label, to label or outcome)."""
         return [
@@ -411,7 +265,3 @@ class StateMachine(Container):
             for label, transitions in self._transitions.items()
             for outcome, target in transitions.items()
         ]
-
-    def is_running(self) -> bool:
-        """Whether the machine is executing."""
-        return self._frame is not None

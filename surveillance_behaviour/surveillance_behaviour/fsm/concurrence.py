@@ -1,0 +1,541 @@
+"""The concurrence: all children at the same time, one outcome made of theirs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Sequence as LabelSequence
+from typing import Any
+
+from surveillance_behaviour.fsm import log
+from surveillance_behaviour.fsm.active import ActiveContainer, forget, stop_for_now
+from surveillance_behaviour.fsm.container import describe
+from surveillance_behaviour.fsm.engine import (
+    RESUME,
+    SUSPENDED,
+    Branch,
+    Exit,
+    Frame,
+    History,
+    Node,
+)
+from surveillance_behaviour.fsm.exceptions import (
+    InvalidStateError,
+    InvalidTransitionError,
+    InvalidUserCodeError,
+    SmachError,
+)
+from surveillance_behaviour.fsm.interface import has_smach_interface
+from surveillance_behaviour.fsm.limits import Limits, limited, make_limits
+from surveillance_behaviour.fsm.run import LeftBehind, Strand, keep_out, supervise
+from surveillance_behaviour.fsm.state import State
+from surveillance_behaviour.fsm.user_data import Remapper, UserData, undeclared_write
+from surveillance_behaviour.fsm.waiting import Interrupt
+
+Outcomes = dict[str, str | None]
+ChildTerminationCallback = Callable[[Outcomes], bool | Iterable[str] | None]
+OutcomeCallback = Callable[[Outcomes], str | None]
+
+_TOGETHER = Exit('')
+
+
+class Concurrence(ActiveContainer):
+    """Executes all its states at the same time and ends when all have ended.
+
+    Args:
+        outcomes: What the concurrence may end with.
+        default_outcome: The outcome when nothing else decides.
+        input_keys: Keys copied from the parent's userdata on entry.
+        output_keys: Keys copied to the parent's userdata on exit.
+        outcome_map: From an outcome of the concurrence to the outcomes of states that bring it
+            about. Of several that hold, the one that names most states wins, the last of equals.
+        outcome_cb: Given the outcomes of all states by label; decides if it returns an outcome.
+        child_termination_cb: Called whenever a state ends, with the outcomes by label (None for
+            those that run). True stops all others; a list of labels stops those.
+
+    Raises:
+        InvalidStateError: The outcome policy names outcomes that are not declared.
+    """
+
+    _fsm_bounds_itself = True
+
+    def __init__(
+        self,
+        outcomes: Iterable[str],
+        default_outcome: str,
+        input_keys: Iterable[str] = (),
+        output_keys: Iterable[str] = (),
+        outcome_map: Mapping[str, Mapping[str, str]] | None = None,
+        outcome_cb: OutcomeCallback | None = None,
+        child_termination_cb: ChildTerminationCallback | None = None,
+    ) -> None:
+        super().__init__(outcomes, input_keys, output_keys)
+        self._states: dict[str, State] = {}
+        self._remappings: dict[str, dict[str, str]] = {}
+        self._limits: dict[str, Limits] = {}
+        self._default_outcome = default_outcome
+        self._outcome_map = {key: dict(value) for key, value in (outcome_map or {}).items()}
+        self._outcome_cb = outcome_cb
+        self._child_termination_cb = child_termination_cb
+        self._child_outcomes: Outcomes = {}
+        self._wakeup = Interrupt()
+        self._strands: dict[str, Strand] = {}
+        self._nodes: dict[str, Node] = {}
+        faults = []
+        for outcome in (default_outcome, *self._outcome_map):
+            if outcome not in self._outcomes:
+                faults.append(f'{outcome!r} is not one of its outcomes {sorted(self._outcomes)}')
+        for name, callback in (
+            ('outcome_cb', outcome_cb),
+            ('child_termination_cb', child_termination_cb),
+        ):
+            if callback is not None and not callable(callback):
+                faults.append(f'{name} {callback!r} cannot be called')
+        if faults:
+            raise InvalidStateError(
+                f'The outcome policy of a Concurrence is wrong: {"; ".join(faults)}'
+            )
+
+    @staticmethod
+    def add(
+        label: str,
+        state: State,
+        remapping: Mapping[str, str] | None = None,
+        *,
+        timeout: float | None = None,
+        deadline: float | None = None,
+        retry: int = 0,
+        retry_on: Iterable[str] = ('aborted',),
+    ) -> State:
+        """Add a state to the open concurrence.
+
+        Args:
+            label: The state's name in the concurrence.
+            state: The state.
+            remapping: From the state's userdata keys to the concurrence's.
+            timeout: See `StateMachine.add`.
+            deadline: See `StateMachine.add`.
+            retry: See `StateMachine.add`.
+            retry_on: See `StateMachine.add`.
+
+        Raises:
+            InvalidConstructionError: No concurrence is open.
+            InvalidStateError: The label is taken, or the state is none.
+        """
+        concurrence = Concurrence._currently_opened_container()
+        path = concurrence._path_of(label)
+        if label in concurrence._states or label in concurrence._branches:
+            raise InvalidStateError(f"State '{path}' is already there: a label names one state")
+        if not has_smach_interface(state) or not callable(getattr(state, 'execute', None)):
+            raise InvalidStateError(f"State '{path}' must be an instance of State, not {state!r}")
+        limits = make_limits(path, state, {}, timeout, deadline, retry, retry_on)
+        if limits is not None:
+            concurrence._limits[label] = limits
+        concurrence._states[label] = state
+        concurrence._remappings[label] = dict(remapping or {})
+        return state
+
+    def check_consistency(self) -> None:
+        """Raise `InvalidTransitionError` when the outcome map does not fit the states."""
+        faults = [] if self._states else ['it has no states']
+        for outcome, wanted in self._outcome_map.items():
+            for label, child_outcome in wanted.items():
+                state = self._states.get(label)
+                if state is None:
+                    faults.append(f"outcome '{outcome}' asks for state '{label}', which it lacks")
+                elif child_outcome not in state.get_registered_outcomes():
+                    faults.append(
+                        f"outcome '{outcome}' asks for '{child_outcome}' of state '{label}', whose "
+                        f'outcomes are {sorted(state.get_registered_outcomes())}'
+                    )
+        faults += self._branch_faults()
+        if faults:
+            raise InvalidTransitionError(
+                f"Concurrence '{self._fsm_path}' cannot run: {'; '.join(faults)}"
+            )
+
+    def _has_limits(self) -> bool:
+        return bool(self._limits) or any(
+            isinstance(state, ActiveContainer) and state._has_limits()
+            for state in self._states.values()
+        )
+
+    # Running.
+
+    def _enter(self, strand: Strand, parent_ud: Any) -> Any:
+        self._fsm_path = strand.path_inside()
+        self.check_consistency()
+        run = strand.run
+        frame = Frame(self, strand, self._fsm_path, _TOGETHER, parent_ud)
+        with run.condition:
+            if self._frame is not None:
+                raise InvalidStateError(f"'{self._fsm_path}' is running already")
+            self._frame = frame
+        strand.push(frame)
+        history, self._fsm_history = self._fsm_history, None
+        try:
+            if history is None:
+                self._copy_input_keys(parent_ud, self.userdata)
+            with run.condition:
+                self._child_outcomes = dict.fromkeys(self._states)
+                if history is not None:
+                    self._child_outcomes.update(history.outcomes)
+            if log.chatty():
+                log.loginfo(f"'{self._fsm_path}' starts {sorted(self._states)} together")
+            if history is None:
+                self.call_start_cbs()
+            outcome = self._run_children(frame)
+            if outcome is not SUSPENDED:
+                self.call_termination_cbs(list(self._states), outcome)
+                self._copy_output_keys(self.userdata, parent_ud)
+            return outcome
+        finally:
+            with run.condition:
+                strand.pop(frame)
+                if self._frame is frame:
+                    self._frame = None
+                run.condition.notify_all()
+
+    def _run_children(self, frame: Frame) -> Any:
+        """Run children, and interrupts in between, until there is an outcome."""
+        while True:
+            with frame.strand.run.condition:
+                branch = self._next_branch(frame)
+            if branch is None:
+                self._start_children(frame)
+                error = self._await_children(frame)
+                if error is not None:
+                    raise error
+                with frame.strand.run.condition:
+                    if frame.suspending and not self._preempt_requested:
+                        self._fsm_history = History(outcomes=self._ended())
+                        return SUSPENDED
+                    if len(self._ended()) == len(self._states):
+                        break
+                continue
+            outcome = self._run_branch(frame, branch)
+            if outcome is not None:
+                return outcome
+        self._service_children()
+        return self._decide()
+
+    def _ended(self) -> dict[str, str]:
+        return {label: end for label, end in self._child_outcomes.items() if end is not None}
+
+    def _start_children(self, frame: Frame) -> None:
+        run = frame.strand.run
+        strands = {}
+        with run.condition:
+            frame.cut = None
+            for label, state in self._states.items():
+                if self._child_outcomes[label] is None:
+                    node = self._nodes[label] = self._node(label, state, run.clock)
+                    strand = strands[label] = Strand(run, self._path_of(label), self._wakeup)
+                    strand.begin_with(state, node)
+            self._strands = strands
+        self.call_transition_cbs()
+        for label, strand in strands.items():
+            node = self._nodes[label]
+            strand.start(lambda node=node: self._execute(node))  # type: ignore[misc]
+        with run.condition:
+            # What was asked before there was anybody to ask.
+            if self._preempt_requested:
+                self._stop(strands, State.request_preempt)
+            elif frame.suspending or self._urgent(frame):
+                self._cut(frame)
+
+    def _node(self, label: str, state: State, clock: Any) -> Node:
+        path = self._path_of(label)
+        remapping = self._remappings.get(label, {})
+
+        def make_view() -> Remapper:
+            return Remapper(
+                self.userdata,
+                state.get_registered_input_keys(),
+                state.get_registered_output_keys(),
+                remapping,
+                None,
+                path,
+            )
+
+        node = Node(label, state, make_view)
+        for outcome in state.get_registered_outcomes():
+            node.targets[outcome] = _TOGETHER
+        if isinstance(state, State):
+            state._fsm_clock = clock
+        left = getattr(state, '_fsm_left', None)
+        if left is not None and not left.is_set():
+            keep_out(node, left)
+        node.limits = self._limits.get(label)
+        if node.limits is not None:
+            node.targets.setdefault(node.limits.late_outcome, _TOGETHER)
+            node.execute = limited(path, node, node.limits)
+        return node
+
+    def _execute(self, node: Node) -> Any:
+        path = self._path_of(node.label)
+        try:
+            outcome = node.execute(node.view)
+        except SmachError:
+            raise
+        except Exception as error:
+            undeclared = undeclared_write(node.view, error)
+            raise undeclared or InvalidUserCodeError(
+                f"State '{path}' of type {type(node.state).__name__} raised {describe(error)}"
+            ) from error
+        if outcome not in node.targets:
+            returned = 'None instead of an outcome' if outcome is None else f'outcome {outcome!r}'
+            raise InvalidTransitionError(
+                f"State '{path}' of type {type(node.state).__name__} returned {returned}: its "
+                f'outcomes are {sorted(node.state.get_registered_outcomes())}'
+            )
+        return outcome
+
+    def _await_children(self, frame: Frame) -> BaseException | None:
+        """Watch the children until all have ended; the first error of one stops the others."""
+        run = frame.strand.run
+        running = dict(self._strands)
+        first_error: BaseException | None = None
+        while running:
+            supervise(run, list(running.values()), self._wakeup)
+            if frame.stale:
+                self._abandon(running)
+            for label in [label for label, strand in running.items() if strand.done]:
+                strand = running.pop(label)
+                if strand.error is not None:
+                    first_error = first_error or strand.error
+                    self._stop(running, State.request_preempt)
+                    continue
+                self._note_end(frame, label, strand.outcome)
+                if first_error is None:
+                    try:
+                        self._child_ended(running)
+                    except SmachError as error:
+                        first_error = error
+                        self._stop(running, State.request_preempt)
+        with run.condition:
+            self._strands = {}
+        return first_error
+
+    def _note_end(self, frame: Frame, label: str, outcome: Any) -> None:
+        state = self._states[label]
+        with frame.strand.run.condition:
+            if outcome is SUSPENDED:
+                return
+            if frame.cut is not None and not self._preempt_requested:
+                made_way = not state.preempt_requested() or outcome == 'preempted'
+                state.recall_preempt()
+                if made_way:
+                    return
+            if getattr(state, '_fsm_progress', None) is not None:
+                state._fsm_progress = None
+            self._child_outcomes[label] = outcome
+        if frame.trace is not None:
+            now = frame.now()
+            frame.trace(
+                (
+                    frame.path,
+                    label,
+                    outcome,
+                    '',
+                    now,
+                    now - frame.since,
+                    self.userdata._data.copy(),
+                    'ended',
+                )
+            )
+        if log.chatty():
+            log.loginfo(f"'{frame.path}': '{label}' ended with '{outcome}'")
+        self.call_transition_cbs()
+
+    def _child_ended(self, running: dict[str, Strand]) -> None:
+        if self._child_termination_cb is None:
+            return
+        try:
+            stop = self._child_termination_cb(dict(self._child_outcomes))
+        except Exception as error:
+            raise InvalidUserCodeError(
+                f"The child_termination_cb of '{self._fsm_path}' raised {describe(error)}"
+            ) from error
+        if stop is True:
+            self._stop(running, State.request_preempt)
+        elif stop:
+            labels = [stop] if isinstance(stop, str) else list(stop)
+            self._stop(
+                {label: strand for label, strand in running.items() if label in labels},
+                State.request_preempt,
+            )
+
+    def _stop(self, strands: Mapping[str, Strand], ask: Callable[[State], object]) -> None:
+        for label, strand in strands.items():
+            if not strand.done:
+                strand.asked()
+                state = self._states[label]
+                if ask is State.request_preempt:
+                    state.request_preempt()
+                else:
+                    ask(state)
+
+    def _abandon(self, running: Mapping[str, Strand]) -> None:
+        self._stop(running, State.request_preempt)
+        for strand in running.values():
+            strand.disown()
+        raise LeftBehind
+
+    def _service_children(self) -> None:
+        """Acknowledge the preempt if all children did; recall what they left pending."""
+        ignored = [label for label, state in self._states.items() if state.preempt_requested()]
+        for label in ignored:
+            self._states[label].recall_preempt()
+        if self._preempt_requested:
+            if ignored:
+                log.logwarn(f"'{self._fsm_path}': {ignored} did not acknowledge the preempt")
+            else:
+                self.service_preempt()
+
+    def _decide(self) -> str:
+        ends = dict(self._child_outcomes)
+        outcome, most = self._default_outcome, 0
+        for name, wanted in self._outcome_map.items():
+            if len(wanted) >= most and all(ends[label] == end for label, end in wanted.items()):
+                outcome, most = name, len(wanted)
+        if self._outcome_cb is not None:
+            try:
+                chosen = self._outcome_cb(ends)
+            except Exception as error:
+                raise InvalidUserCodeError(
+                    f"The outcome_cb of '{self._fsm_path}' raised {describe(error)}"
+                ) from error
+            if chosen:
+                if chosen not in self._outcomes:
+                    raise InvalidTransitionError(
+                        f"The outcome_cb of '{self._fsm_path}' returned {chosen!r}: the outcomes "
+                        f'are {sorted(self._outcomes)}'
+                    )
+                outcome = chosen
+        return outcome
+
+    # Preempts and interrupts.
+
+    def _fsm_woken(self) -> None:
+        self._wakeup.set()
+
+    def request_preempt(self) -> None:
+        """Ask all children that run to stop."""
+        super().request_preempt()
+        frame = self._frame
+        if frame is None:
+            return
+        with frame.strand.run.condition:
+            current = frame.current
+            if isinstance(current, Node):
+                frame.strand.asked()
+                current.state.request_preempt()
+            self._stop(self._strands, State.request_preempt)
+            frame.strand.run.condition.notify_all()
+
+    def _urgent(self, frame: Frame) -> bool:
+        return any(branch.priority > frame.current.priority for branch in self._fsm_raised)
+
+    def _interrupted(self) -> None:
+        frame = self._frame
+        if frame is not None and self._urgent(frame):
+            self._cut(frame)
+
+    def _suspend(self) -> None:
+        frame = self._frame
+        if frame is not None:
+            frame.suspending = True
+            self._cut(frame)
+
+    def _cut(self, frame: Frame) -> None:
+        current = frame.current
+        if isinstance(current, Node):
+            frame.cut = current
+            frame.strand.asked()
+            stop_for_now(current.state)
+        else:
+            frame.cut = frame.cut or next(iter(self._nodes.values()), None)
+            self._stop(self._strands, stop_for_now)
+
+    def _next_branch(self, frame: Frame) -> Branch | None:
+        if self._preempt_requested or not self._fsm_raised:
+            return None
+        branch = max(self._fsm_raised, key=lambda raised: raised.priority)
+        self._fsm_raised.remove(branch)
+        return branch
+
+    def _run_branch(self, frame: Frame, branch: Branch) -> Any:
+        """Run an interrupt's state; None to go on with the children."""
+        run = frame.strand.run
+        self._remappings[branch.label] = branch.remapping
+        node = self._node(branch.label, branch.state, run.clock)
+        node.priority = branch.priority
+        with run.condition:
+            frame.cut = None
+            frame.current = node
+            if self._preempt_requested:
+                branch.state.request_preempt()
+            elif frame.suspending or self._urgent(frame):
+                self._cut(frame)
+        outcome = self._execute(node)
+        with run.condition:
+            if frame.stale:
+                raise LeftBehind
+            frame.strand.heeded()
+            frame.current = _TOGETHER
+            served = not branch.state.preempt_requested() or outcome == 'preempted'
+            branch.state.recall_preempt()
+            if outcome is SUSPENDED or (frame.cut is node and served):
+                self._fsm_raised.append(branch)
+                if frame.suspending:
+                    self._fsm_history = History(outcomes=self._ended())
+                    return SUSPENDED
+                return None
+            forget(branch.state)
+        target = branch.transitions.get(outcome, RESUME)
+        if target == RESUME:
+            return None
+        for state in self._states.values():
+            forget(state)
+        return target
+
+    # The container's interface.
+
+    def __getitem__(self, key: str) -> State:
+        try:
+            return self._states[key]
+        except KeyError:
+            raise KeyError(
+                f"'{self._fsm_path}' has no state '{key}': its states are {sorted(self._states)}"
+            ) from None
+
+    def get_children(self) -> dict[str, State]:
+        """The states by label."""
+        return dict(self._states)
+
+    def get_initial_states(self) -> list[str]:
+        """The labels of all states."""
+        return list(self._states)
+
+    def set_initial_state(
+        self, initial_states: LabelSequence[str], userdata: UserData | None = None
+    ) -> None:
+        """Add to the concurrence's userdata; all states always begin."""
+        for label in initial_states:
+            self[label]
+        if userdata is not None:
+            self.userdata.update(userdata)
+
+    def get_active_states(self) -> list[str]:
+        """The labels of the states that run."""
+        if self._frame is None:
+            return []
+        return [label for label, outcome in self._child_outcomes.items() if outcome is None]
+
+    def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
+        """The outcome map as (child outcome, label, outcome)."""
+        return [
+            (child_outcome, label, outcome)
+            for outcome, wanted in self._outcome_map.items()
+            for label, child_outcome in wanted.items()
+        ]

@@ -1,0 +1,157 @@
+"""Watching and steering a root from outside: transitions, pausing, stepping, forced outcomes."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from surveillance_behaviour.fsm.engine import Node, Trace
+from surveillance_behaviour.fsm.exceptions import InvalidStateError, InvalidTransitionError
+
+if TYPE_CHECKING:
+    from surveillance_behaviour.fsm.run import Run
+
+
+class Control:
+    """What may be done to a root container from other threads, between runs too.
+
+    Attributes:
+        condition: The one condition of the machine.
+    """
+
+    def __init__(self, container: Any) -> None:
+        self.condition = threading.Condition(threading.RLock())
+        self._container = container
+        self._run: Run | None = None
+        self._paused = False
+        self._trace: Trace | None = None
+        self._left: list[tuple[str, threading.Thread]] = []
+
+    @property
+    def trace(self) -> Trace | None:
+        """Where transitions are reported."""
+        return self._trace
+
+    def set_trace(self, trace: Trace | None) -> None:
+        """Report every transition to `trace`, in the thread that makes it; None ends that.
+
+        Args:
+            trace: Takes one tuple per transition: path of the container, label of the state left,
+                outcome, label or outcome reached, time and duration of the state in seconds, a
+                shallow copy of the container's userdata, and the kind (``transition``, ``exit``,
+                ``interrupt``, ``resume``, ``forced``).
+        """
+        with self.condition:
+            self._trace = trace
+            if self._run is not None:
+                self._run.trace = trace
+                self._run.call_attention()
+
+    @property
+    def paused(self) -> bool:
+        """Whether no further state is entered."""
+        return self._paused
+
+    def pause(self) -> None:
+        """Enter no further state; the one that runs is not disturbed. A preempt goes through."""
+        self._set_paused(True)
+
+    def resume(self) -> None:
+        """Go on after a pause."""
+        self._set_paused(False)
+
+    def _set_paused(self, paused: bool) -> None:
+        with self.condition:
+            self._paused = paused
+            if self._run is not None:
+                self._run.paused = paused
+                self._run.steps = 0
+                self._run.call_attention()
+
+    def step(self) -> None:
+        """Enter one more state of a paused machine.
+
+        Raises:
+            InvalidStateError: The machine is not paused, or does not run.
+        """
+        with self.condition:
+            run = self._run
+            if run is None or not run.paused:
+                raise InvalidStateError(
+                    f"'{self._container._fsm_path}' cannot step: it is not "
+                    f'{"running" if run is None else "paused"}'
+                )
+            run.steps += 1
+            run.call_attention()
+
+    def force_outcome(self, path: str, outcome: str) -> None:
+        """End the state at `path` with `outcome`, whatever it returns itself.
+
+        Args:
+            path: Of a state that runs, or before which the machine is paused.
+            outcome: One of its outcomes.
+
+        Raises:
+            InvalidStateError: No such state is active.
+            InvalidTransitionError: It has no such outcome.
+        """
+        with self.condition:
+            frames = self._run.frames() if self._run is not None else []
+            active = {
+                f'{frame.path}/{frame.current.label}': frame
+                for frame in frames
+                if isinstance(frame.current, Node)
+            }
+            frame = active.get(path)
+            if frame is None:
+                raise InvalidStateError(
+                    f"State '{path}' is not active; the active ones are {sorted(active)}"
+                )
+            node = frame.current
+            assert isinstance(node, Node)
+            if outcome not in node.state.get_registered_outcomes():
+                raise InvalidTransitionError(
+                    f"State '{path}' cannot be forced to '{outcome}': its outcomes are "
+                    f'{sorted(node.state.get_registered_outcomes())}'
+                )
+            frame.forced = outcome
+            frame.attention = True
+            frame.strand.asked()
+            node.state.request_preempt()
+            self.condition.notify_all()
+
+    def active_paths(self) -> list[str]:
+        """Paths of all states that are active, containers included, outermost first."""
+        with self.condition:
+            frames = self._run.frames() if self._run is not None else []
+            return [
+                f'{frame.path}/{frame.current.label}'
+                for frame in frames
+                if isinstance(frame.current, Node)
+            ]
+
+    def left_behind(self) -> list[str]:
+        """Paths of states that the last run went on without and that are still running."""
+        with self.condition:
+            run = self._run
+            left = run.left_behind if run is not None else self._left
+            return [path for path, thread in left if thread.is_alive()]
+
+    @contextmanager
+    def begun(self, run: Run) -> Iterator[None]:
+        """Have `run` controlled while it lasts."""
+        with self.condition:
+            if self._run is not None:
+                raise InvalidStateError(f"'{self._container._fsm_path}' is running already")
+            run.paused = self._paused
+            run.trace = self._trace
+            self._run = run
+        try:
+            yield
+        finally:
+            with self.condition:
+                self._left = run.left_behind
+                self._run = None
+                self.condition.notify_all()
