@@ -130,12 +130,11 @@ class MarkerDetector:
     def _candidates(self, prepared: PreparedPicture, pyramid: PicturePyramid) -> Quads:
         settings = self.settings
         contrast = max(settings.contrast, 2.5 * prepared.noise)
-        found = []
+        masks = []
         for index, window in enumerate(settings.windows):
             bridges = settings.bridges if index == 0 else ()
-            for mask in dark_masks(prepared.smooth, window, contrast, bridges):
-                found.append(quads_around(mask, min_length=settings.min_length))
-        quads = np.concatenate(found)
+            masks += dark_masks(prepared.smooth, window, contrast, bridges)
+        quads = quads_around(masks, min_length=settings.min_length)
         if not len(quads):
             return quads
         correlation = self._ring.correlation(pyramid, homographies_of(quads), contrast)

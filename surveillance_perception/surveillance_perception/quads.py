@@ -8,7 +8,8 @@ few tenths of a pixel wrong, which `template_fit` repairs, but they are there.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterable, Sequence
 
 import cv2
 import numpy as np
@@ -44,12 +45,17 @@ def dark_masks(picture: Grey, window: int, contrast: float, bridges: tuple[int, 
 
 
 def quads_around(
-    mask: Grey, *, min_length: float = 8.0, min_width: float = 2.0, min_area: float = 12.0
+    masks: Iterable[Grey],
+    *,
+    min_length: float = 8.0,
+    min_width: float = 2.0,
+    min_area: float = 12.0,
 ) -> Quads:
-    """Quadrilaterals around the blobs of a mask that do not touch its edge.
+    """Quadrilaterals around the blobs of masks that do not touch the edge.
 
     Args:
-        mask: (height, width), blobs are not 0.
+        masks: Pictures (height, width), blobs are not 0. A blob with the same upright box and
+            area as one before is left out.
         min_length: Longer side in pixels of the smallest blob's upright box.
         min_width: Shorter side of it.
         min_area: Area in pixels of the smallest blob's hull.
@@ -57,32 +63,29 @@ def quads_around(
     Returns:
         (n, 4, 2) corners in pixels, clockwise as seen.
     """
-    contours, _ = cv2.findContours(mask, cv2.RETR_LIST, cv2.CHAIN_APPROX_SIMPLE)
-    height, width = mask.shape
     found = []
-    for contour in contours:
-        if len(contour) < 4:
-            continue
-        left, top, across, down = cv2.boundingRect(contour)
-        if max(across, down) < min_length or min(across, down) < min_width:
-            continue
-        if left == 0 or top == 0 or left + across == width or top + down == height:
-            continue
-        # outer outlines run the other way round than the outlines of holes
-        area = -cv2.contourArea(contour, oriented=True)
-        if area <= 0:
-            continue
-        hull = cv2.convexHull(contour)
-        hull_area = cv2.contourArea(hull)
-        if hull_area < min_area or area < _MIN_SOLIDITY * hull_area:
-            continue
-        quad = _smallest_quad(hull)
-        if quad is None or _area(quad) > _MAX_GROWTH * hull_area:
-            continue
-        found.append(quad)
-    if not found:
-        return np.zeros((0, 4, 2))
-    return _clockwise(np.array(found))
+    seen: set[tuple[float, ...]] = set()
+    for mask in masks:
+        contours, _ = cv2.findContours(mask, cv2.RETR_LIST, cv2.CHAIN_APPROX_SIMPLE)
+        height, width = mask.shape
+        for contour in contours:
+            if len(contour) < 4:
+                continue
+            left, top, across, down = cv2.boundingRect(contour)
+            if max(across, down) < min_length or min(across, down) < min_width:
+                continue
+            if left == 0 or top == 0 or left + across == width or top + down == height:
+                continue
+            # outer outlines run the other way round than the outlines of holes
+            area = -cv2.contourArea(contour, oriented=True)
+            blob = (left, top, across, down, area)
+            if area <= 0 or blob in seen:
+                continue
+            seen.add(blob)
+            quad = _quad_around(contour, area, min_area)
+            if quad is not None:
+                found.append(quad)
+    return _clockwise(np.array(found)) if found else np.zeros((0, 4, 2))
 
 
 def distinct(quads: Quads, distance: float) -> npt.NDArray[np.int64]:
@@ -94,6 +97,17 @@ def distinct(quads: Quads, distance: float) -> npt.NDArray[np.int64]:
         if not (np.min(gaps, axis=0) < distance).any():
             kept.append(index)
     return np.array(kept, dtype=np.int64)
+
+
+def _quad_around(
+    contour: npt.NDArray[np.int32], area: float, min_area: float
+) -> list[tuple[float, float]] | None:
+    hull = cv2.convexHull(contour)
+    hull_area = cv2.contourArea(hull)
+    if hull_area < min_area or area < _MIN_SOLIDITY * hull_area:
+        return None
+    quad = _smallest_quad(hull)
+    return quad if quad is not None and _area(quad) <= _MAX_GROWTH * hull_area else None
 
 
 def _clockwise(quads: Quads) -> Quads:
@@ -110,6 +124,7 @@ def _area(corners: Sequence[tuple[float, float]]) -> float:
     return abs(total) / 2.0
 
 
+# OpenCV's approxPolyN does the same from 4.11 on; this has to run with 4.10 too
 def _smallest_quad(hull: npt.NDArray[np.int32]) -> list[tuple[float, float]] | None:
     tolerance = max(0.7, 0.01 * cv2.arcLength(hull, True))
     reduced = cv2.approxPolyDP(hull, tolerance, True)
@@ -118,23 +133,25 @@ def _smallest_quad(hull: npt.NDArray[np.int32]) -> list[tuple[float, float]] | N
     if not 4 <= len(reduced) <= _MAX_HULL_CORNERS:
         return None
     corners: list[tuple[float, float]] = [(float(x), float(y)) for x, y in reduced[:, 0]]
+    cuts = [_without_edge(corners, index) for index in range(len(corners))]
     while len(corners) > 4:
-        cheapest: tuple[float, int, tuple[float, float]] | None = None
-        for index in range(len(corners)):
-            cut = _without_edge(corners, index)
-            if cut is not None and (cheapest is None or cut[0] < cheapest[0]):
-                cheapest = (cut[0], index, cut[1])
-        if cheapest is None:
+        index = min(range(len(corners)), key=lambda each: cuts[each][0])
+        area, apex = cuts[index]
+        if area == math.inf:
             return None
-        _, index, apex = cheapest
         corners[index] = apex
-        del corners[(index + 1) % len(corners)]
+        after = (index + 1) % len(corners)
+        del corners[after], cuts[after]
+        if after < index:
+            index -= 1
+        for each in range(index - 2, index + 2):
+            cuts[each % len(corners)] = _without_edge(corners, each % len(corners))
     return corners
 
 
 def _without_edge(
     corners: list[tuple[float, float]], index: int
-) -> tuple[float, tuple[float, float]] | None:
+) -> tuple[float, tuple[float, float]]:
     """Added area and the new corner when the edge from `index` to the next one is dropped."""
     count = len(corners)
     before, start = corners[index - 1], corners[index]
@@ -144,11 +161,11 @@ def _without_edge(
     edge_x, edge_y = end[0] - start[0], end[1] - start[1]
     determinant = in_x * out_y - in_y * out_x
     if abs(determinant) < 1e-9:
-        return None
+        return math.inf, start
     along = (edge_x * out_y - edge_y * out_x) / determinant
     apex = (start[0] + along * in_x, start[1] + along * in_y)
     beyond = (apex[0] - end[0]) * out_x + (apex[1] - end[1]) * out_y
     if along < 0 or beyond < -1e-9:
-        return None
+        return math.inf, start
     area = abs((apex[0] - start[0]) * edge_y - (apex[1] - start[1]) * edge_x) / 2.0
     return area, apex
