@@ -6,7 +6,7 @@ setup(
     name=package_name,
     version='0.1.0',
     packages=find_packages(),
-    package_data={'': ['py.typed']},
+    package_data={'': ['py.typed'], 'surveillance_ontology': ['data/*.owl']},
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/' + package_name]),
         ('share/' + package_name, ['package.xml']),
@@ -17,6 +17,9 @@ setup(
     description='ARMOR-compatible ontology service and reasoner in Python, and the map builder of the surveillance robot.',
     license='Apache-2.0',
     entry_points={
-        'console_scripts': [],
+        'console_scripts': [
+            'armor_server = surveillance_ontology.armor_server_node:main',
+            'ontology_map_builder = surveillance_ontology.ontology_map_builder_node:main',
+        ],
     },
 )

@@ -94,7 +94,7 @@ def decode(value: Any) -> Any:
 
 
 def apply_all(kb: KnowledgeBase, changes: Iterable[Change]) -> None:
-    """Carry out changes in order; retractions with the assertions behind them go in as one batch."""
+    """Carry out changes in order; retractions and the assertions behind them are one batch."""
     removed: list[Axiom] = []
     added: list[Axiom] = []
     for change in changes:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from datetime import datetime, timezone
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TextIO
 
@@ -70,7 +70,7 @@ class DirectiveLog:
         if self.on_screen:
             self._screen(line)
         if self._file is not None:
-            stamp = datetime.now(timezone.utc).isoformat(timespec='milliseconds')
+            stamp = datetime.now(UTC).isoformat(timespec='milliseconds')
             try:
                 self._file.write(f'{stamp} {line}\n')
                 self._file.flush()

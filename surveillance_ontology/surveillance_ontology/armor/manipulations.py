@@ -1,4 +1,4 @@
-"""The directives that change an ontology, each as a function from the reference to a list of changes.
+"""The directives that change an ontology, each as a list of changes.
 
 They do not apply anything: buffering, the journal and reasoning are the service's business. Missing
 entities come into being by being named.
@@ -282,7 +282,7 @@ def _rename_dataprop(_: Reference, old: str, new: str) -> list[Change]:
 @manipulation(
     'RENAME OBJECTPROP',
     *_renamed(Read.OBJECT_PROPERTY),
-    summary='Gives an object property another name everywhere; merges it with one that has the name.',
+    summary='Gives an object property another name everywhere; merges it with one that has it.',
 )
 def _rename_objectprop(_: Reference, old: str, new: str) -> list[Change]:
     return [RenameEntity('object_property', old, new)]

@@ -63,8 +63,8 @@ class DirectiveResponse:
         success: The directive did what it says.
         timeout: A query ran into its time limit.
         exit_code: See `ExitCode`.
-        error_description: One line; may also carry a remark when ``success`` holds, for example that
-            a class in a query is unknown.
+        error_description: One line; may also carry a remark when ``success`` holds, for example
+            that a class in a query is unknown.
         is_consistent: The ontology's state as of the last reasoning; False without a reference.
         queried_objects: ``<iri#Name>`` for entities, ``"value"^^xsd:type`` for literals.
         sparql_queried_objects: Variable and value of QUERY SPARQL FORMATTED, row after row.

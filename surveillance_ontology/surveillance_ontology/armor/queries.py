@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
-from surveillance_ontology.armor.facts import SAME_AS, parse_fact
+from surveillance_ontology.armor.facts import ANY, SAME_AS, ShortFact, parse_fact, short_facts
 from surveillance_ontology.armor.protocol import DirectiveError, DirectiveResponse
 from surveillance_ontology.armor.reference import Reference
 from surveillance_ontology.armor.rendering import parse_entity, parse_rendered, render_entity
@@ -31,7 +31,7 @@ def _entities(iris: Iterable[str]) -> list[str]:
 
 
 def _answer(objects: list[str], ref: Reference, *asked: tuple[str, str]) -> DirectiveResponse:
-    """Answer with objects; when there are none, say which of the entities asked about is unknown."""
+    """Answer with objects; when there are none, say which entity asked about is unknown."""
     note = ''
     if not objects:
         unknown = [
@@ -146,8 +146,7 @@ def _explain(ref: Reference, fact: str) -> DirectiveResponse:
 @query(
     'QUERY EXPLAIN INCONSISTENCY',
     native=False,
-    summary='Why the ontology contradicts itself, in the form of QUERY EXPLAIN; nothing when it does '
-    'not.',
+    summary='Why the ontology contradicts itself, in the form of QUERY EXPLAIN; else nothing.',
 )
 def _explain_inconsistency(ref: Reference) -> DirectiveResponse:
     explanation = ref.kb.explain_inconsistency()
@@ -163,6 +162,39 @@ def _explain_inconsistency(ref: Reference) -> DirectiveResponse:
 )
 def _unsupported(ref: Reference) -> DirectiveResponse:
     return DirectiveResponse(queried_objects=list(ref.kb.unsupported))
+
+
+@query(
+    'QUERY FACT',
+    text('pattern'),
+    native=False,
+    summary='Asserted and derived facts that match a pattern: `URGENT(?)`, `canReach(Robot1, ?)`, '
+    '`visitedAt(?, ?)`.',
+)
+def _facts(ref: Reference, pattern: str) -> DirectiveResponse:
+    try:
+        wanted = parse_fact(pattern)
+    except ValueError as error:
+        raise DirectiveError(f'QUERY FACT: argument pattern {error}') from None
+    found = {str(fact) for fact in _candidates(ref, wanted) if wanted.matches(fact)}
+    return DirectiveResponse(queried_objects=sorted(found))
+
+
+def _candidates(ref: Reference, wanted: ShortFact) -> Iterable[ShortFact]:
+    """Facts among which those that match a pattern are, without going through all if possible."""
+    name, arguments, kb = wanted.predicate, wanted.arguments, ref.kb
+    if ANY not in (name, arguments[0]) and name != SAME_AS:
+        predicate = parse_entity(name, kb.iri)
+        ind = parse_entity(arguments[0], kb.iri)
+        if len(arguments) == 1:
+            return (ShortFact(name, (local_name(ind),)),) if predicate in kb.types(ind) else ()
+        values = [local_name(other) for other in kb.object_values(predicate, ind)]
+        values += map(_literal, kb.data_values(predicate, ind))
+        return (ShortFact(name, (local_name(ind), value)) for value in values)
+    if name != ANY and len(arguments) == 1:
+        members = kb.instances(parse_entity(name, kb.iri))
+        return (ShortFact(name, (local_name(ind),)) for ind in members)
+    return (short for fact in kb.facts() for short in short_facts(fact))
 
 
 def _full_fact(ref: Reference, text: str) -> Fact:

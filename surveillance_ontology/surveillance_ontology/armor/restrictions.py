@@ -1,6 +1,6 @@
 """The text form in which ARMOR's QUERY CLASS RESTRICTIONS gives a class definition.
 
-``[C-DEFINITION_CLASS : CORRIDOR -> (LOCATION), C-DEFINITION_MIN_OBJECT : CORRIDOR -> hasDoor 2(DOOR)]``;
+``[C-DEFINITION_CLASS : ROOM -> (LOCATION), C-DEFINITION_SOME_OBJECT : ROOM -> hasDoor(DOOR)]``;
 named classes that stand inside a restriction are listed once more by themselves.
 """
 
@@ -68,16 +68,16 @@ def _atoms(name: str, part: ClassExpression) -> Iterator[str]:
         yield f'{head.format("SOME_DATA")}{_prop(part.prop)}({part.literal.lexical})'
     elif kind := _CARDINALITIES.get(type(part)):  # type: ignore[call-overload]
         filler = _filler(part)
-        yield f'{head.format(kind)}{_prop(part.prop)} {part.n}({_filler_text(filler)})'  # type: ignore[union-attr]
+        yield f'{head.format(kind)}{_prop(part.prop)} {part.n}({_filler_text(filler)})'
         yield from _nested(name, filler)
     elif kind := _VALUES.get(type(part)):  # type: ignore[call-overload]
         filler = _filler(part)
-        yield f'{head.format(kind)}{_prop(part.prop)}({_filler_text(filler)})'  # type: ignore[union-attr]
+        yield f'{head.format(kind)}{_prop(part.prop)}({_filler_text(filler)})'
         yield from _nested(name, filler)
 
 
 def _filler(part: object) -> ClassExpression | DataRange:
-    found: ClassExpression | DataRange = getattr(part, 'filler', None) or getattr(part, 'range')  # noqa: B009
+    found: ClassExpression | DataRange = getattr(part, 'filler', None) or part.range  # type: ignore[attr-defined]
     return found
 
 

@@ -1,10 +1,10 @@
 """The directive service: several ontologies under reference names, and what directives do to them.
 
     service = ArmorService()
-    service.execute(DirectiveRequest('me', 'map', 'LOAD', 'FILE', '', (path, iri, 'false', '', 'true')))
-    service.execute(DirectiveRequest('me', 'map', 'QUERY', 'IND', 'CLASS', ('ROOM',))).queried_objects
+    request = DirectiveRequest('me', 'map', 'QUERY', 'IND', 'CLASS', ('ROOM',))
+    service.execute(request).queried_objects
 
-Threads may share a service: each reference has a lock, held for one directive, or for a whole batch.
+Threads may share a service: each reference has a lock, held for one directive or for a whole batch.
 Nothing that a client sends makes it raise.
 """
 
@@ -41,7 +41,8 @@ from surveillance_ontology.owl_writing import write_ontology
 LONG_BACKLOG = 500
 """Changes since the last reasoning from which on REASON counts as slow."""
 LONG_ARGUMENTS = 1000
-Watcher = Callable[[str, Changes], None]
+Watcher = Callable[[str, Changes | None], None]
+"""Told of a reference's name and what changed in it; None: the reference was dropped."""
 
 
 class ArmorService:
@@ -116,7 +117,7 @@ class ArmorService:
         )
 
     def watch(self, watcher: Watcher) -> Callable[[], None]:
-        """Tell a watcher of every change of asserted and derived facts, with the reference's name.
+        """Tell a watcher of every change of asserted and derived facts.
 
         It is called inside the directive that caused the change and must be quick.
 
@@ -198,7 +199,7 @@ class ArmorService:
         with self._registry:
             self._references[ref.name] = ref
 
-    def _tell(self, name: str, changes: Changes) -> None:
+    def _tell(self, name: str, changes: Changes | None) -> None:
         for watcher in tuple(self._watchers):
             watcher(name, changes)
 
@@ -208,6 +209,7 @@ class ArmorService:
             ref.dropped = True
             with self._registry:
                 del self._references[name]
+            self._tell(name, None)
 
     def mount(self, request: DirectiveRequest) -> DirectiveResponse:
         """Do MOUNT.
@@ -223,7 +225,8 @@ class ArmorService:
         with self.locked(name) as ref:
             if not ref.is_free_for(client):
                 raise DirectiveError(
-                    f'{client} cannot be mounted on {name}. Another client is already mounted on it.',
+                    f'{client} cannot be mounted on {name}. '
+                    'Another client is already mounted on it.',
                     ExitCode.MOUNT_REFUSED,
                 )
             note = f'{client} is mounted already' if ref.mounted == client != NOBODY else ''
@@ -298,16 +301,13 @@ class ArmorService:
         if directive.kind is Kind.UTILITY:
             _check_name(request.reference_name)
             values = directive.read(request.args, '')
-            response: DirectiveResponse = directive.run(self, request, *values)
-            return response
+            return _response(directive.run(self, request, *values))
         if directive.slow:
             ref = self.reference(request.reference_name)
-            response = directive.run(self, ref, *self._values(directive, request, ref))
-            return response
+            return _response(directive.run(self, ref, *self._values(directive, request, ref)))
         with self.locked(request.reference_name) as ref:
             if directive.kind is Kind.QUERY:
-                response = directive.run(ref, *self._values(directive, request, ref))
-                return response
+                return _response(directive.run(ref, *self._values(directive, request, ref)))
             if self.settings.enforce_mount and not ref.is_free_for(request.client_name):
                 raise DirectiveError(
                     f'{request.client_name} cannot connect to {ref.name}. '
@@ -333,6 +333,11 @@ class ArmorService:
             raise DirectiveError(
                 f'{characters} characters of arguments, at most {self.settings.max_characters}'
             )
+
+
+def _response(result: Any) -> DirectiveResponse:
+    assert isinstance(result, DirectiveResponse)
+    return result
 
 
 def _peek(request: DirectiveRequest) -> Directive | None:

@@ -1,8 +1,8 @@
 """The table of directives: what each is called, what it takes, what it does.
 
 One entry drives everything: dispatch, reading of arguments, error messages and the documentation.
-Entries are made with the decorators `manipulation`, `query` and `utility` in the modules of the same
-names. A new command is one decorated function.
+Entries are made with the decorators `manipulation`, `query` and `utility` in the modules of the
+same names. A new command is one decorated function.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 from surveillance_ontology.armor.protocol import DirectiveError, DirectiveRequest, ExitCode
 from surveillance_ontology.armor.rendering import (
@@ -22,6 +22,14 @@ from surveillance_ontology.armor.rendering import (
 )
 
 MAX_CARDINALITY = 2**31 - 1
+Run = TypeVar('Run', bound=Callable[..., Any])
+
+
+class Enter(Protocol):
+    """A decorator that leaves the function as it is."""
+
+    def __call__(self, run: Run, /) -> Run:
+        """Enter the function in the table."""
 
 
 class Kind(Enum):
@@ -221,8 +229,8 @@ def _echo(request: DirectiveRequest) -> str:
     )
 
 
-def _enter(kind: Kind, words: str, arguments: Sequence[Argument], **properties: Any) -> Any:
-    def enter(run: Callable[..., Any]) -> Callable[..., Any]:
+def _enter(kind: Kind, words: str, arguments: Sequence[Argument], **properties: Any) -> Enter:
+    def enter(run: Run, /) -> Run:
         for spelling in words.split('|'):
             command, primary, secondary, *_ = (*spelling.split(), '', '')
             directive = Directive(
@@ -237,7 +245,7 @@ def _enter(kind: Kind, words: str, arguments: Sequence[Argument], **properties: 
     return enter
 
 
-def manipulation(words: str, *arguments: Argument, **properties: Any) -> Any:
+def manipulation(words: str, *arguments: Argument, **properties: Any) -> Enter:
     """Enter a manipulation: ``run(reference, *values) -> list of changes``.
 
     Args:
@@ -248,21 +256,21 @@ def manipulation(words: str, *arguments: Argument, **properties: Any) -> Any:
     return _enter(Kind.MANIPULATION, words, arguments, **properties)
 
 
-def query(words: str, *arguments: Argument, **properties: Any) -> Any:
+def query(words: str, *arguments: Argument, **properties: Any) -> Enter:
     """Enter a query: ``run(reference, *values) -> response``; see `manipulation`.
 
-    ``is_consistent`` is filled in afterwards. A slow query is run without the reference's lock, which it
-    takes itself for as short as it can.
+    ``is_consistent`` is filled in afterwards. A slow query is run without the reference's lock,
+    which it takes itself for as short as it can.
     """
     return _enter(Kind.QUERY, words, arguments, **properties)
 
 
-def control(words: str, **properties: Any) -> Any:
+def control(words: str, **properties: Any) -> Enter:
     """Enter APPLY or REASON: ``run(reference)``; see `manipulation`."""
     return _enter(Kind.CONTROL, words, (), **properties)
 
 
-def utility(words: str, *arguments: Argument, **properties: Any) -> Any:
+def utility(words: str, *arguments: Argument, **properties: Any) -> Enter:
     """Enter a utility: ``run(service, request, *values) -> response``; see `manipulation`."""
     return _enter(Kind.UTILITY, words, arguments, **properties)
 

@@ -23,14 +23,14 @@ _LOAD = (
     flag('buffered reasoner'),
 )
 _LOAD_SUMMARY = (
-    'Loads an ontology under the reference name. With buffered manipulation changes wait until APPLY '
-    'or REASON; with a buffered reasoner derived facts follow at REASON only. A name that is loaded '
-    'already stays as it is, except for the first flag.'
+    'Loads an ontology under the reference name. With buffered manipulation changes wait until '
+    'APPLY or REASON; with a buffered reasoner derived facts follow at REASON only. A name that is '
+    'loaded already stays as it is, except for the first flag.'
 )
 _LOAD_DIFFERS = (
-    'Only files in the allowed directories. A file that cannot be loaded leaves no reference behind. '
-    'What the reasoner does not support is named in the description. Switching buffering off applies '
-    'what waits.'
+    'Only files in the allowed directories. A file that cannot be loaded leaves no reference '
+    'behind. What the reasoner does not support is named in the description. Switching buffering '
+    'off applies what waits.'
 )
 _WEB_DIFFERS = 'Refused unless the parameter allow_web is set.'
 
@@ -117,8 +117,8 @@ def _drop(service: ArmorService, request: DirectiveRequest) -> DirectiveResponse
 @utility(
     'SAVE',
     text('path', ''),
-    summary='Writes the asserted axioms in the format that was loaded; an empty path stands for the '
-    'file that was loaded.',
+    summary='Writes the asserted axioms in the format that was loaded; an empty path stands for '
+    'the file that was loaded.',
     differs='Written beside the file and renamed, so that a crash leaves the old file whole.',
     slow=True,
 )
@@ -145,8 +145,8 @@ def _save_inference(
     'MOUNT',
     summary='From now on only this client may change the ontology; 203 when another is mounted or '
     'the reference is unknown.',
-    differs='Enforced, unless the parameter enforce_mount is off; ARMOR reports 102 and carries the '
-    'manipulation out.',
+    differs='Enforced, unless the parameter enforce_mount is off; ARMOR reports 102 and carries '
+    'the manipulation out.',
 )
 def _mount(service: ArmorService, request: DirectiveRequest) -> DirectiveResponse:
     return service.mount(request)
@@ -209,8 +209,8 @@ def _apply(ref: Reference) -> None:
 @control(
     'REASON',
     summary='Applies the changes that wait and brings the derived facts up to date.',
-    differs='Recovers from an inconsistent ontology once its cause is retracted; ARMOR does not with '
-    'buffering.',
+    differs='Recovers from an inconsistent ontology once its cause is retracted; ARMOR does not '
+    'with buffering.',
 )
 def _reason(ref: Reference) -> None:
     ref.reason()

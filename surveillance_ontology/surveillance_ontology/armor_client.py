@@ -1,0 +1,233 @@
+"""The ARMOR client for ROS nodes, and subscriptions to the facts of an ontology.
+
+    client = ArmorClient(node, 'planner', reference_name)
+    client.query.objectprop_b2_ind('canReach', 'Robot1')                      # in a worker thread
+    await client.query.objectprop_b2_ind.call_async('canReach', 'Robot1')     # in a callback
+
+Blocking calls wait while another thread spins the node's executor; in a callback they would wait
+for themselves, so there they must be awaited.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+
+from surveillance_interfaces.msg import FactChanges
+from surveillance_interfaces.srv import ArmorDirective, ArmorDirectiveList
+from surveillance_ontology.armor import client
+from surveillance_ontology.armor.client import (
+    ArmorServiceCallError,
+    ArmorServiceInternalError,
+    name_in,
+    value_in,
+)
+from surveillance_ontology.armor.fact_set import FactSet
+from surveillance_ontology.armor.facts import ShortFact
+from surveillance_ontology.armor.operations import Batch
+from surveillance_ontology.armor.protocol import DirectiveRequest, DirectiveResponse, ListResponse
+from surveillance_ontology.conversions import (
+    changes_from_ros,
+    request_to_ros,
+    response_from_ros,
+)
+from surveillance_runtime.calls import CallFailed, ServiceCaller
+from surveillance_runtime.waiting import Interrupt
+
+__all__ = [
+    'ArmorClient',
+    'ArmorServiceCallError',
+    'ArmorServiceInternalError',
+    'FactSubscription',
+    'RosTransport',
+    'name_in',
+    'value_in',
+]
+
+CHANGES_TOPIC = 'fact_changes'
+CHANGES_QOS = QoSProfile(
+    depth=100,
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.TRANSIENT_LOCAL,
+)
+
+
+class RosTransport:
+    """Brings directives to an armor server over its two services.
+
+    Args:
+        node: The node that calls; an executor must spin it.
+        service_name: The service for one directive.
+        serial_service_name: The service for batches.
+        timeout: Seconds for finding the server and for its answer together.
+        interrupt: Ends blocking calls early, for example the node's ``stopping``.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        service_name: str,
+        serial_service_name: str,
+        timeout: float,
+        interrupt: Interrupt | None = None,
+    ) -> None:
+        self._single = ServiceCaller(node, ArmorDirective, service_name)
+        self._serial = ServiceCaller(node, ArmorDirectiveList, serial_service_name)
+        self._interrupt = interrupt
+        self.timeout = timeout
+
+    def call(self, request: DirectiveRequest) -> DirectiveResponse:
+        """Carry out one directive and block until the answer."""
+        try:
+            answer = self._single.call(_one(request), self.timeout, self._interrupt)
+        except CallFailed as error:
+            raise ArmorServiceCallError(str(error)) from error
+        return response_from_ros(answer.armor_response)
+
+    def call_list(self, requests: Batch) -> ListResponse:
+        """Carry out a batch and block until the answer."""
+        try:
+            answer = self._serial.call(_many(requests), self.timeout, self._interrupt)
+        except CallFailed as error:
+            raise ArmorServiceCallError(str(error)) from error
+        return _list_from_ros(answer)
+
+    async def call_async(self, request: DirectiveRequest) -> DirectiveResponse:
+        """Carry out one directive."""
+        try:
+            answer = await self._single.call_async(_one(request), self.timeout)
+        except CallFailed as error:
+            raise ArmorServiceCallError(str(error)) from error
+        return response_from_ros(answer.armor_response)
+
+    async def call_list_async(self, requests: Batch) -> ListResponse:
+        """Carry out a batch."""
+        try:
+            answer = await self._serial.call_async(_many(requests), self.timeout)
+        except CallFailed as error:
+            raise ArmorServiceCallError(str(error)) from error
+        return _list_from_ros(answer)
+
+
+class ArmorClient(client.ArmorClient):
+    """A client of one reference of an armor server.
+
+    Args:
+        node: The node that calls; an executor must spin it.
+        client_id: Name of this client; matters for mounting only, several nodes may share it.
+        reference_name: The ontology that its directives mean.
+        service_name: The server's service for one directive.
+        serial_service_name: The server's service for batches.
+        timeout: Seconds for finding the server and for its answer together.
+        interrupt: Ends blocking calls early, for example the node's ``stopping``.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        client_id: str,
+        reference_name: str,
+        service_name: str = 'armor_interface_srv',
+        serial_service_name: str = 'armor_interface_serialized_srv',
+        timeout: float = 5.0,
+        interrupt: Interrupt | None = None,
+    ) -> None:
+        transport = RosTransport(node, service_name, serial_service_name, timeout, interrupt)
+        super().__init__(client_id, reference_name, transport)
+
+
+class FactSubscription:
+    """Keeps the facts that match a pattern, and tells of each that comes or goes.
+
+    It asks the server for the facts first and follows the server's change messages then; when it
+    missed some, or the server is another one, it asks again.
+
+    Args:
+        node: The node that subscribes; an executor must spin it.
+        armor: A client of the reference.
+        pattern: ``URGENT(?)``, ``canReach(Robot1, ?)``, ``visitedAt(?, ?)``.
+        callback: Called in the executor with a fact and whether it came (True) or went (False).
+
+    Raises:
+        ValueError: The pattern cannot be read.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        armor: client.ArmorClient,
+        pattern: str,
+        callback: Callable[[ShortFact, bool], None],
+    ) -> None:
+        self._set = FactSet(pattern)
+        self._node = node
+        self._armor = armor
+        self._callback = callback
+        self._asking = False
+        self._ask_again = False
+        self._subscription = node.create_subscription(
+            FactChanges,
+            CHANGES_TOPIC,
+            self._on_changes,
+            CHANGES_QOS,
+            event_callbacks=SubscriptionEventCallbacks(matched=self._on_matched),
+        )
+
+    @property
+    def facts(self) -> frozenset[ShortFact]:
+        """The facts that match now, as far as is known."""
+        return self._set.facts
+
+    def _on_matched(self, _status: Any) -> None:
+        self._resynchronise()
+
+    def _on_changes(self, msg: FactChanges) -> None:
+        if msg.reference_name != self._armor.reference_name:
+            return
+        told = self._set.follow(msg.sequence, changes_from_ros(msg))
+        if told is None or (told and self._asking):
+            self._resynchronise()
+        else:
+            self._tell(told)
+
+    def _resynchronise(self) -> None:
+        if self._asking:
+            self._ask_again = True
+            return
+        self._asking = True
+        self._node.executor.create_task(self._ask)
+
+    async def _ask(self) -> None:
+        try:
+            while True:
+                self._ask_again = False
+                facts = await self._armor.query.facts.call_async(str(self._set.pattern))
+                if not self._ask_again:
+                    break
+            self._tell(self._set.replace(facts))
+        except (ArmorServiceCallError, ArmorServiceInternalError) as error:
+            # The server's next message or its return brings the next attempt.
+            self._node.get_logger().warn(f'facts {self._set.pattern}: {error}')
+        finally:
+            self._asking = False
+
+    def _tell(self, changes: list[tuple[ShortFact, bool]]) -> None:
+        for fact, came in changes:
+            self._callback(fact, came)
+
+
+def _one(request: DirectiveRequest) -> Any:
+    return ArmorDirective.Request(armor_request=request_to_ros(request))
+
+
+def _many(requests: Batch) -> Any:
+    return ArmorDirectiveList.Request(armor_requests=[request_to_ros(r) for r in requests])
+
+
+def _list_from_ros(answer: Any) -> ListResponse:
+    responses = [response_from_ros(response) for response in answer.armor_responses]
+    return ListResponse(answer.success, answer.is_consistent, responses)
