@@ -1,3 +1,5 @@
+from glob import glob
+
 from setuptools import find_packages, setup
 
 package_name = 'surveillance_behaviour'
@@ -10,13 +12,18 @@ setup(
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/' + package_name]),
         ('share/' + package_name, ['package.xml']),
+        ('share/' + package_name + '/launch', glob('launch/*.launch.py')),
+        ('share/' + package_name + '/config', glob('../config/*.yaml')),
     ],
     zip_safe=True,
     maintainer='Surveillance robot maintainers',
     maintainer_email='surveillance@example.com',
-    description='SMACH-style state machine engine, patrol policies and the behaviour of the surveillance robot.',
+    description='SMACH-style state machine engine, patrol policies and the behaviour of the robot.',
     license='Apache-2.0',
     entry_points={
-        'console_scripts': [],
+        'console_scripts': [
+            'reasoner = surveillance_behaviour.reasoner_node:main',
+            'robot_behavior = surveillance_behaviour.robot_behavior_node:main',
+        ],
     },
 )
