@@ -110,7 +110,7 @@ def tour(situation: Situation, allowed: Sequence[str]) -> Scores:
     for place in allowed:
         start = graph.seconds(situation.place, place)
         longest, mean, target = min(
-            _wait_on_the_way(situation, way, start, begin)
+            _wait_on_the_way(situation, way, start, int(begin))
             for way in (steps, steps[::-1])
             for begin in np.flatnonzero(way == graph.index[place])
         )
@@ -165,8 +165,9 @@ def heuristic_cognitive(situation: Situation, allowed: Sequence[str]) -> Scores:
     graph = situation.graph
     here = graph.index[situation.place]
     far, idle = graph.distances[here], situation.idleness
-    if situation.target in graph.index and situation.target != situation.place:
-        goal = graph.index[situation.target]
+    kept = situation.target
+    if kept is not None and kept in graph.index and kept != situation.place:
+        goal = graph.index[kept]
     else:
         worth = _worth(idle, far)
         worth[here] = -np.inf
@@ -224,12 +225,14 @@ def cycle(situation: Situation, allowed: Sequence[str]) -> Scores:
 def _seconds_by_way_of(situation: Situation, place: str) -> NDArray[np.float64]:
     """Seconds to each place when the robot first goes to ``place``, shape (n,)."""
     graph = situation.graph
-    return graph.seconds(situation.place, place) + graph.distances[graph.index[place]]
+    seconds: NDArray[np.float64] = graph.distances[graph.index[place]]
+    return seconds + graph.seconds(situation.place, place)
 
 
 def _worth(idle: NDArray[np.float64], far: NDArray[np.float64]) -> NDArray[np.float64]:
     nearness: NDArray[np.float64] = 1.0 - far / max(float(far.max()), 1e-9)
-    return idle / max(float(idle.max()), 1e-9) + nearness
+    worth: NDArray[np.float64] = idle / max(float(idle.max()), 1e-9) + nearness
+    return worth
 
 
 def _leads_to(place: str, target: str) -> str:

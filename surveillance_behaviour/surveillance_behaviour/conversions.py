@@ -1,0 +1,63 @@
+"""Between this package's core types and messages; the only place that knows both."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from geometry_msgs.msg import Point as PointMessage
+
+from surveillance_behaviour.policy.situation import Decision
+from surveillance_behaviour.ports import Point
+from surveillance_interfaces.msg import Decision as DecisionMessage
+
+
+def point_from(message: PointMessage) -> Point:
+    """A point in metres."""
+    return (message.x, message.y, message.z)
+
+
+def point_message(point: Sequence[float]) -> PointMessage:
+    """A point from x, y and perhaps z, metres."""
+    x, y, z = (*(float(value) for value in point), 0.0)[:3]
+    return PointMessage(x=x, y=y, z=z)
+
+
+def points_from(messages: Iterable[PointMessage]) -> list[Point]:
+    """A path in metres."""
+    return [point_from(message) for message in messages]
+
+
+def point_messages(points: Iterable[Sequence[float]]) -> list[PointMessage]:
+    """A path as messages."""
+    return [point_message(point) for point in points]
+
+
+def decision_message(decision: Decision, sequence: int, stamp: Any) -> DecisionMessage:
+    """A decision, numbered and stamped."""
+    return DecisionMessage(
+        stamp=stamp,
+        sequence=sequence,
+        policy=decision.policy,
+        from_place=decision.from_place,
+        place=decision.place,
+        target=decision.target,
+        rule=decision.rule,
+        reason=decision.reason,
+        candidates=list(decision.scores),
+        scores=[float(value) for value in decision.scores.values()],
+    )
+
+
+def decision_from(message: DecisionMessage) -> Decision:
+    """A decision as it was published."""
+    return Decision(
+        time=message.stamp.sec + message.stamp.nanosec / 1e9,
+        from_place=message.from_place,
+        place=message.place,
+        target=message.target,
+        rule=message.rule,
+        policy=message.policy,
+        reason=message.reason,
+        scores=dict(zip(message.candidates, message.scores, strict=True)),
+    )

@@ -1,0 +1,264 @@
+"""What the states of both machines share: ports, settings, and the memory of the mission."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import random
+from dataclasses import dataclass, field
+
+from surveillance_behaviour.battery_gauge import BatteryGauge
+from surveillance_behaviour.chooser import ChoiceSettings, Chooser
+from surveillance_behaviour.fsm import Clock, Interrupt
+from surveillance_behaviour.mission_record import MissionRecord
+from surveillance_behaviour.policy.situation import Decision
+from surveillance_behaviour.ports import (
+    Announcer,
+    Knowledge,
+    Motion,
+    PeerError,
+    Places,
+    Point,
+    Routine,
+)
+from surveillance_behaviour.recovery import Failure, Recovery, RecoveryLimits, Step
+
+
+@dataclass
+class MissionSettings:
+    """The behaviour's parameters that are not about choosing.
+
+    Attributes:
+        choice: Those that are.
+        recovery: How patient it is.
+        arrival_tolerance: How far from its path's end a robot may stop and still have arrived, m.
+        goal_tolerance: How far from the goal a planner's path may end, m.
+        charge_stall_seconds: How long a level may stay the same while charging before the robot
+            drives to the station again; 0: for ever.
+    """
+
+    choice: ChoiceSettings = field(default_factory=ChoiceSettings)
+    recovery: RecoveryLimits = field(default_factory=RecoveryLimits)
+    arrival_tolerance: float = 1.0
+    goal_tolerance: float = 1.0
+    charge_stall_seconds: float = 300.0
+
+
+@dataclass
+class Ports:
+    """Whom the machines talk to; ``motion`` serves the first seed's, ``routine`` the second's."""
+
+    knowledge: Knowledge
+    places: Places
+    announcer: Announcer
+    motion: Motion | None = None
+    routine: Routine | None = None
+
+
+class Mission:
+    """The memory of a mission and the steps that several states take.
+
+    Args:
+        machine: Name of the machine, for the record.
+        settings: Parameters; may change while the mission runs.
+        ports: The peers.
+        gauge: The battery.
+        clock: The mission's clock, in seconds; also the machine's.
+        record: Where it is written down; None: nowhere.
+        generator: Chance, for the policies that need it.
+    """
+
+    def __init__(
+        self,
+        machine: str,
+        settings: MissionSettings,
+        ports: Ports,
+        gauge: BatteryGauge,
+        clock: Clock,
+        record: MissionRecord | None = None,
+        generator: random.Random | None = None,
+    ) -> None:
+        self.machine = machine
+        self.settings = settings
+        self.ports = ports
+        self.gauge = gauge
+        self.clock = clock
+        self.chooser = Chooser(settings.choice, ports.knowledge, ports.places, generator)
+        self.recovery = Recovery(settings.recovery)
+        self.place = ''
+        self.heading_to = ''
+        self.failure: Failure | None = None
+        self._record = record
+        self._started = False
+        self._warned = ''
+        gauge.watch(self._learn_draw)
+
+    # The way of the mission.
+
+    def begin(self, interrupt: Interrupt) -> None:
+        """Looks at the map for the first time, and says what is wrong with it.
+
+        Raises:
+            PeerError: The ontology cannot be asked.
+        """
+        self.ports.knowledge.set_urgency_threshold(
+            self.settings.choice.urgency_threshold, interrupt
+        )
+        situation = self.chooser.look(self.now(), interrupt)
+        self.place = situation.place
+        self.say(f'{len(situation.graph.places)} places to patrol, starting in {self.place}')
+        self.warn_about_threshold()
+        if not self._started:
+            self._started = True
+            self._write('start', machine=self.machine, place=self.place, places=self._places())
+
+    def _places(self) -> list[str]:
+        return list(self.chooser.graph.places)
+
+    def warn_about_threshold(self) -> None:
+        """Says once when no robot can keep to the threshold on this map."""
+        warning = self.chooser.warning()
+        if warning and warning != self._warned:
+            self.say(warning, warning=True)
+        self._warned = warning
+
+    def choose(self, interrupt: Interrupt) -> Decision:
+        """Charging first, then rules and policy; announces and records the decision.
+
+        Raises:
+            PeerError: The ontology cannot be asked.
+            NowhereToGoError: Nothing can be reached.
+        """
+        now = self.now()
+        situation = self.chooser.look(now, interrupt, self.recovery.avoided(now))
+        self.place = situation.place
+        why = self.why_charge(situation.reachable)
+        if why:
+            decision = self.chooser.choose_station(situation, why)
+        else:
+            decision = self.chooser.choose(situation)
+        self.heading_to = decision.place
+        self.ports.announcer.decision(decision)
+        self.note_decision(decision.place, decision.rule, decision.reason)
+        return decision
+
+    def note_decision(self, place: str, rule: str, reason: str) -> None:
+        """Records a decision, made here or by the reasoner."""
+        self._write('decision', place=place, rule=rule, reason=reason)
+
+    def arrived(self, place: str, distance: float) -> None:
+        """The robot is in ``place``, after ``distance`` metres."""
+        self.place = place
+        self.chooser.saw(place, self.now())
+        self.recovery.worked(place)
+        self.failure = None
+        self._write('visit', place=place, distance=distance)
+        self.say(f'arrived in {place}')
+
+    def charged(self, place: str, seconds: float) -> None:
+        """The battery was charged in ``place``."""
+        self.recovery.worked(charging(place))
+        self.failure = None
+        self._write('recharge', place=place, seconds=seconds)
+        self.say(f'charged in {place} to {self.level_text()}')
+
+    def ended(self) -> None:
+        """The mission was told to end."""
+        if self._started:
+            self._write('end')
+
+    # The battery.
+
+    def why_charge(self, reachable: tuple[str, ...] | None = None) -> str:
+        """Why the robot must charge now, as a sentence; empty: it need not."""
+        level = self.gauge.level
+        if self.gauge.low:
+            return f'the battery is low ({self.level_text()})'
+        if level is None:
+            return ''
+        required, words = self.chooser.required_level(self.place, reachable)
+        if level >= required:
+            return ''
+        return f'the battery is at {level:g} %, below {required:.1f} %: {words}'
+
+    def charged_enough(self) -> bool:
+        """Whether the robot may leave the station."""
+        level = self.gauge.level
+        enough = self.settings.choice.battery.stop_recharge
+        return level is not None and level >= enough and not self.gauge.low
+
+    def level_text(self) -> str:
+        """The charge in words."""
+        return 'level unknown' if self.gauge.level is None else f'{self.gauge.level:g} %'
+
+    def _learn_draw(self) -> None:
+        if self.gauge.level is not None:
+            self.chooser.draw.observe(self.now(), self.gauge.level)
+
+    # Failures.
+
+    def failed(self, what: str, reason: str, goal: str | None = None) -> None:
+        """Remembers, records and says what did not work."""
+        self.failure = Failure(what, reason, goal)
+        self._write('failure', what=what, reason=reason)
+        self.say(f'{what} failed: {reason}', warning=True)
+
+    def next_step(self, *, may_go_back: bool = True) -> Step:
+        """What to do about the last failure."""
+        assert self.failure is not None
+        return self.recovery.next_step(self.failure, self.now(), may_go_back=may_go_back)
+
+    # Small things.
+
+    def now(self) -> float:
+        """Seconds on the mission's clock."""
+        return self.clock.now()
+
+    def say(self, text: str, *, warning: bool = False) -> None:
+        """Announces something."""
+        self.ports.announcer.say(text, warning=warning)
+
+    def _write(self, name: str, **fields: object) -> None:
+        if self._record is not None:
+            self._record.write(name, self.now(), **fields)
+
+
+def charging(place: str) -> str:
+    """The name under which the recovery counts failures to charge in ``place``."""
+    return f'charging in {place}'
+
+
+def path_length(path: list[Point]) -> float:
+    """Length of a path, metres."""
+    return sum(math.dist(start, end) for start, end in itertools.pairwise(path))
+
+
+def check_path(path: list[Point], goal: Point | None, tolerance: float, peer: str) -> None:
+    """Refuses a path that leads nowhere, or elsewhere.
+
+    Raises:
+        PeerError: It is empty, not finite, or ends too far from ``goal``.
+    """
+    if not path:
+        raise PeerError(peer, 'the path has no points')
+    if not all(math.isfinite(value) for point in path for value in point):
+        raise PeerError(peer, 'the path has a point that is not finite')
+    if goal is not None and math.dist(path[-1][:2], goal[:2]) > tolerance:
+        raise PeerError(
+            peer,
+            f'the path ends {math.dist(path[-1][:2], goal[:2]):.2f} m from the goal, expected '
+            f'at most {tolerance:g} m',
+        )
+
+
+def check_arrival(end: Point, goal: Point, tolerance: float, peer: str) -> None:
+    """Refuses an arrival that is none.
+
+    Raises:
+        PeerError: The robot stopped too far from ``goal``.
+    """
+    away = math.dist(end[:2], goal[:2])
+    if not away <= tolerance:
+        raise PeerError(
+            peer, f'the robot stopped {away:.2f} m short, expected at most {tolerance:g} m'
+        )

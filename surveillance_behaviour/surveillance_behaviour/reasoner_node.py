@@ -1,0 +1,88 @@
+"""The node `reasoner`: answers `reason` with the place to visit next.
+
+It asks the ontology where the robot is, what it can reach and what is URGENT, and chooses by the
+same rules and policies as the surveillance machine. The decision is published with its reason.
+"""
+
+from __future__ import annotations
+
+import random
+import threading
+from collections.abc import Sequence
+from typing import Any
+
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.task import Future
+
+from surveillance_behaviour import behaviour_parameters
+from surveillance_behaviour.announcing import DecisionTopic
+from surveillance_behaviour.chooser import Chooser
+from surveillance_behaviour.fsm import Interrupt
+from surveillance_behaviour.policy.rules import NowhereToGoError
+from surveillance_behaviour.ports import InterruptedWaitError, PeerError
+from surveillance_behaviour.ros_ports import RosPlaces, ros_knowledge
+from surveillance_interfaces.msg import MissionStatus
+from surveillance_interfaces.srv import Reason
+from surveillance_runtime.node import PatrolNode, run_node
+from surveillance_runtime.qos import STATE_QOS
+from surveillance_runtime.waiting import ClockWait
+
+
+class Reasoner(PatrolNode):
+    """Chooses the next place on request."""
+
+    def __init__(self, **node_options: Any) -> None:
+        super().__init__('reasoner', **node_options)
+        settings = behaviour_parameters.choice_settings(self)
+        deadlines = behaviour_parameters.deadlines(self, ('answer', 'build'))
+        seed = behaviour_parameters.random_seed(self)
+        self._chooser = Chooser(
+            settings,
+            ros_knowledge(self, deadlines),
+            RosPlaces(self, deadlines),
+            random.Random(seed if seed >= 0 else None),
+        )
+        self._wait = ClockWait(self)
+        self._decisions = DecisionTopic(self)
+        self._avoided: frozenset[str] = frozenset()
+        self._turn = threading.Lock()
+        self._interrupt = Interrupt()
+        self.stopping.subscribe(self._interrupt.set)
+        self.create_subscription(MissionStatus, 'mission_status', self._on_status, STATE_QOS)
+        self.create_service(
+            Reason, 'reason', self._on_reason, callback_group=ReentrantCallbackGroup()
+        )
+
+    def _on_status(self, status: MissionStatus) -> None:
+        self._avoided = frozenset(status.avoided)
+
+    async def _on_reason(self, _request: Any, response: Any) -> Any:
+        chosen = Future()
+
+        def work() -> None:
+            with self._turn:
+                chosen.set_result(self._choose())
+            # A future that is set from another thread does not wake the executor.
+            self.executor.wake()
+
+        self.spawn(work, name='reason')
+        response.point = await chosen
+        return response
+
+    def _choose(self) -> str:
+        """The next place; empty when there is none, and the log says why."""
+        try:
+            situation = self._chooser.look(self._wait.now(), self._interrupt, self._avoided)
+            decision = self._chooser.choose(situation)
+        except (PeerError, NowhereToGoError) as error:
+            self.get_logger().warn(f'no place to name: {error}')
+            return ''
+        except InterruptedWaitError:
+            return ''
+        self._decisions.publish(decision)
+        return decision.place
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Runs the node until it is stopped."""
+    return run_node(Reasoner, args)

@@ -1,0 +1,127 @@
+"""What to do after a failure: another path, another place, back, or wait for help.
+
+The steps escalate. Whatever fails is tried again on another path; then its place is left alone
+for a while and another one is chosen; when that fails several times in a row, something is
+wrong with where the robot is, so it goes back to the last place it knows it was in; and when
+not even that helps, it waits for help. It never gives up: the pauses grow up to a limit, and
+after each the steps begin anew.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+
+class Step(StrEnum):
+    """What to do next; the values are the outcomes of the machines' recovery state."""
+
+    ANOTHER_PATH = 'another_path'
+    ANOTHER_PLACE = 'another_place'
+    GO_BACK = 'go_back'
+    WAIT_FOR_HELP = 'wait_for_help'
+
+
+@dataclass(frozen=True)
+class RecoveryLimits:
+    """How patient the recovery is.
+
+    Attributes:
+        path_tries: Times a place is tried before another one is.
+        place_tries: Places given up in a row before the robot goes back.
+        avoid_seconds: How long a place that was given up is left alone at first; doubled each
+            time it is given up again.
+        longest_avoid: The longest time a place is left alone, seconds.
+        help_seconds: The first pause while waiting for help; doubled each time.
+        longest_help: The longest such pause, seconds.
+    """
+
+    path_tries: int = 3
+    place_tries: int = 3
+    avoid_seconds: float = 60.0
+    longest_avoid: float = 600.0
+    help_seconds: float = 2.0
+    longest_help: float = 60.0
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Something did not work.
+
+    Attributes:
+        what: The state in which it happened.
+        reason: One line.
+        goal: The place that was not reached; None: the failure has nothing to do with a place.
+    """
+
+    what: str
+    reason: str
+    goal: str | None = None
+
+
+@dataclass
+class Recovery:
+    """Remembers what failed lately, and says what to do."""
+
+    limits: RecoveryLimits = field(default_factory=RecoveryLimits)
+    _tries: Counter[str] = field(default_factory=Counter)
+    _given_up: Counter[str] = field(default_factory=Counter)
+    _avoided_until: dict[str, float] = field(default_factory=dict)
+    _in_a_row: int = 0
+    _went_back: bool = False
+    _pauses: int = 0
+
+    def tries(self, goal: str) -> int:
+        """How often ``goal`` failed since it last worked or was given up."""
+        return self._tries[goal]
+
+    def next_step(self, failure: Failure, now: float, *, may_go_back: bool = True) -> Step:
+        """What to do after ``failure``.
+
+        Args:
+            failure: What happened.
+            now: Seconds on the mission's clock.
+            may_go_back: False when going back is what failed, or makes no sense.
+        """
+        goal = failure.goal
+        if goal is None:
+            return Step.WAIT_FOR_HELP
+        self._tries[goal] += 1
+        if self._tries[goal] < self.limits.path_tries:
+            return Step.ANOTHER_PATH
+        self._give_up(goal, now)
+        self._in_a_row += 1
+        if self._in_a_row < self.limits.place_tries:
+            return Step.ANOTHER_PLACE
+        if may_go_back and not self._went_back:
+            self._went_back = True
+            return Step.GO_BACK
+        return Step.WAIT_FOR_HELP
+
+    def _give_up(self, goal: str, now: float) -> None:
+        del self._tries[goal]
+        seconds = self.limits.avoid_seconds * 2.0 ** self._given_up[goal]
+        self._avoided_until[goal] = now + min(seconds, self.limits.longest_avoid)
+        self._given_up[goal] += 1
+
+    def avoided(self, now: float) -> frozenset[str]:
+        """Places that are left alone at present."""
+        return frozenset(place for place, until in self._avoided_until.items() if until > now)
+
+    def worked(self, goal: str | None = None) -> None:
+        """``goal`` was reached, or what has no place worked again."""
+        self._in_a_row = self._pauses = 0
+        self._went_back = False
+        if goal is not None:
+            for memory in (self._tries, self._given_up, self._avoided_until):
+                memory.pop(goal, None)
+
+    def pause(self) -> float:
+        """Seconds to wait for help now; after them all steps are open again."""
+        seconds = min(self.limits.help_seconds * 2.0**self._pauses, self.limits.longest_help)
+        self._pauses = min(self._pauses + 1, 30)
+        self._in_a_row = 0
+        self._went_back = False
+        self._tries.clear()
+        return seconds

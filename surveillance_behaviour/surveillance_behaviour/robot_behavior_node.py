@@ -1,0 +1,121 @@
+"""The node `robot_behavior`: runs one of the machines until it is told to stop.
+
+Subscribes `battery_level` and `state/battery_low`, publishes `decision` and `mission_status`, and
+calls the services and actions of the machine that `behaviour` names.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Sequence
+from typing import Any, cast
+
+from std_msgs.msg import Bool, UInt8
+
+from surveillance_behaviour import behaviour_parameters, conversions, fsm
+from surveillance_behaviour.announcing import DecisionTopic, RosAnnouncer
+from surveillance_behaviour.battery_gauge import BatteryGauge
+from surveillance_behaviour.machines import MACHINES
+from surveillance_behaviour.mission import Mission, Ports
+from surveillance_behaviour.mission_record import MissionRecord, RecordError
+from surveillance_behaviour.ros_ports import RosMotion, RosPlaces, RosRoutine, ros_knowledge
+from surveillance_interfaces.msg import Decision as DecisionMessage
+from surveillance_runtime.node import PatrolNode, StartError, run_node
+from surveillance_runtime.qos import STATE_QOS
+from surveillance_runtime.waiting import ClockWait
+
+
+class RobotBehavior(PatrolNode):
+    """The robot's behaviour, as a state machine on a thread of its own."""
+
+    def __init__(self, **node_options: Any) -> None:
+        super().__init__('robot_behavior', **node_options)
+        self._behaviour: str = self.parameter(
+            'behaviour',
+            'surveillance',
+            'Which machine runs: surveillance (compute_path, follow_path) or patrol (start, '
+            'reason, motion/planner, motion/controller, recharge).',
+            choices=tuple(MACHINES),
+            read_only=True,
+        )
+        settings = behaviour_parameters.mission_settings(self)
+        deadlines = behaviour_parameters.deadlines(self)
+        seed = behaviour_parameters.random_seed(self)
+        path: str = self.parameter(
+            'record', '', 'File that the mission is recorded in; empty: none.', read_only=True
+        )
+        self._record = _open_record(path)
+        patrols = self._behaviour == 'patrol'
+        gauge = BatteryGauge()
+        self._wait = ClockWait(self)
+        self._announcer = RosAnnouncer(self, None if patrols else DecisionTopic(self))
+        ports = Ports(
+            knowledge=ros_knowledge(self, deadlines),
+            places=RosPlaces(self, deadlines),
+            announcer=self._announcer,
+            motion=None if patrols else RosMotion(self, deadlines),
+            routine=RosRoutine(self, deadlines, gauge) if patrols else None,
+        )
+        self.mission = Mission(
+            self._behaviour,
+            settings,
+            ports,
+            gauge,
+            cast(fsm.Clock, self._wait),
+            self._record,
+            random.Random(seed if seed >= 0 else None),
+        )
+        self.machine = self._new_machine()
+        self.create_subscription(
+            UInt8, 'battery_level', lambda m: gauge.set_level(float(m.data)), STATE_QOS
+        )
+        self.create_subscription(
+            Bool, 'state/battery_low', lambda m: gauge.set_low(m.data), STATE_QOS
+        )
+        if patrols:
+            self.create_subscription(DecisionMessage, 'decision', self._on_decision, STATE_QOS)
+        self.spawn(self._run, name='machine')
+
+    def on_stop(self) -> None:
+        """Preempts the machine, so that what it started is cancelled while messages flow."""
+        self.machine.request_preempt()
+
+    def _new_machine(self) -> fsm.StateMachine:
+        machine = MACHINES[self._behaviour](self.mission)
+        self._announcer.attach(self.mission, machine)
+        return machine
+
+    def _run(self) -> None:
+        # Under use_sim_time nothing has a time before the first clock message.
+        if not self._wait.now() and not self._wait.sleep(1e-9, self.stopping):
+            return
+        try:
+            while not self.stopping.is_set():
+                try:
+                    self.machine.execute()
+                except fsm.SmachError as error:
+                    self._announcer.waiting_for_help(f'the machine broke: {error}')
+                    self._wait.sleep(self.mission.recovery.pause(), self.stopping)
+                    self.machine = self._new_machine()
+        finally:
+            self.mission.ended()
+            if self._record is not None:
+                self._record.close()
+
+    def _on_decision(self, message: DecisionMessage) -> None:
+        decision = conversions.decision_from(message)
+        self.mission.note_decision(decision.place, decision.rule, decision.reason)
+
+
+def _open_record(path: str) -> MissionRecord | None:
+    if not path:
+        return None
+    try:
+        return MissionRecord(path)
+    except RecordError as error:
+        raise StartError(f'parameter record: {error}') from None
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Runs the node until it is stopped."""
+    return run_node(RobotBehavior, args)

@@ -1,0 +1,80 @@
+"""Service calls and goals as the machines' ports have them: an answer, or an error of the ports."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, cast
+
+from surveillance_behaviour.fsm import Interrupt
+from surveillance_behaviour.ports import InterruptedWaitError, PeerError
+from surveillance_runtime import waiting
+from surveillance_runtime.calls import CallFailed, GoalCaller, Interrupted, ServiceCaller
+
+
+def call(caller: ServiceCaller, request: Any, deadline: float, interrupt: Interrupt) -> Any:
+    """Calls a service.
+
+    Args:
+        caller: The service.
+        request: The request message.
+        deadline: Seconds of steady time.
+        interrupt: Ends the wait.
+
+    Raises:
+        PeerError: No server, or no answer in time.
+        InterruptedWaitError: The interrupt was raised.
+    """
+    try:
+        return caller.call(request, deadline, _as_runtime(interrupt))
+    except Interrupted:
+        raise InterruptedWaitError from None
+    except CallFailed as error:
+        raise _peer_error(caller.name, error) from None
+
+
+def run(
+    caller: GoalCaller,
+    goal: Any,
+    accept_deadline: float,
+    result_deadline: float,
+    interrupt: Interrupt,
+    on_feedback: Callable[[Any], None] | None = None,
+) -> Any:
+    """Runs a goal to its result.
+
+    Args:
+        caller: The action.
+        goal: The goal message.
+        accept_deadline: Seconds of steady time until the goal is accepted.
+        result_deadline: Seconds of steady time for the result; 0: as long as the server lives.
+        interrupt: Ends the wait and cancels the goal.
+        on_feedback: Called with each feedback message.
+
+    Raises:
+        PeerError: No server, or the goal was rejected, aborted, or not done in time.
+        InterruptedWaitError: The interrupt was raised.
+    """
+    try:
+        end = caller.run(
+            goal,
+            accept_timeout=accept_deadline,
+            result_timeout=result_deadline or None,
+            interrupt=_as_runtime(interrupt),
+            on_feedback=on_feedback,
+        )
+    except Interrupted:
+        raise InterruptedWaitError from None
+    except CallFailed as error:
+        raise _peer_error(caller.name, error) from None
+    if end.status != 'succeeded':
+        raise PeerError(caller.name, f'the goal was {end.status}')
+    return end.result
+
+
+def _as_runtime(interrupt: Interrupt) -> waiting.Interrupt:
+    """The engine's interrupt has the methods that the calls use, but is a class of its own."""
+    return cast(waiting.Interrupt, interrupt)
+
+
+def _peer_error(name: str, error: CallFailed) -> PeerError:
+    return PeerError(name, str(error).partition(f'{name}: ')[2] or str(error))

@@ -1,0 +1,258 @@
+"""A robot, a map and an ontology as plain Python behind the machines' ports, with faults on demand.
+
+Time is a number that the clock moves on when the machine waits; a mission of hours takes
+milliseconds.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+from surveillance_behaviour.battery_gauge import BatteryGauge
+from surveillance_behaviour.fsm import Interrupt
+from surveillance_behaviour.mission import Mission, MissionSettings, Ports
+from surveillance_behaviour.mission_record import MissionRecord
+from surveillance_behaviour.policy.situation import Decision
+from surveillance_behaviour.ports import (
+    Beliefs,
+    InterruptedWaitError,
+    PeerError,
+    Point,
+    UnknownPlaceError,
+)
+
+SEVEN_ROOMS = {
+    'R1': ['D1'],
+    'R2': ['D2'],
+    'R3': ['D3'],
+    'R4': ['D4'],
+    'E': ['D6', 'D7'],
+    'C1': ['D1', 'D2', 'D5', 'D6'],
+    'C2': ['D3', 'D4', 'D5', 'D7'],
+}
+POSITIONS = {
+    'R1': (10.0, 5.0, 0.0),
+    'R2': (15.0, 5.0, 0.0),
+    'R3': (10.0, 15.0, 0.0),
+    'R4': (15.0, 15.0, 0.0),
+    'E': (5.0, 10.0, 0.0),
+    'C1': (10.0, 8.0, 0.0),
+    'C2': (10.0, 14.0, 0.0),
+}
+
+
+class ScriptedClock:
+    """Time that moves on by waiting; what is due on the way happens."""
+
+    def __init__(self) -> None:
+        self.time = 0.0
+        self.limit = math.inf
+        self.on_limit: Callable[[], None] = lambda: None
+        self._due: list[tuple[float, int, Callable[[], None]]] = []
+        self._count = itertools.count()
+
+    def now(self) -> float:
+        return self.time
+
+    def after(self, seconds: float, action: Callable[[], None]) -> None:
+        self._due.append((self.time + seconds, next(self._count), action))
+        self._due.sort(key=lambda entry: entry[:2])
+
+    def sleep(self, seconds: float, interrupt: Interrupt) -> bool:
+        end = self.time + max(0.0, seconds)
+        while not interrupt.is_set():
+            if self.time >= self.limit:
+                self.limit = math.inf
+                self.on_limit()
+                continue
+            if self._due and self._due[0][0] <= end:
+                due, _, action = self._due.pop(0)
+                self.time = max(self.time, due)
+                action()
+                continue
+            if end <= self.limit:
+                self.time = end
+                return True
+            self.time = self.limit
+        return False
+
+
+@dataclass
+class World:
+    """The robot's surroundings, and all of the machines' ports in one object.
+
+    Attributes:
+        rooms: Doors of each room.
+        faults: Called with the name of each port method before it works; may raise, or change the
+            world.
+        speed: Metres per second.
+        draw: Percent per second away from the station; there it charges with ``charge``.
+    """
+
+    rooms: dict[str, list[str]] = field(default_factory=lambda: dict(SEVEN_ROOMS))
+    positions: dict[str, Point] = field(default_factory=lambda: dict(POSITIONS))
+    start_place: str = 'E'
+    stations: tuple[str, ...] = ('E',)
+    speed: float = 1.0
+    draw: float = 0.0
+    charge: float = 2.0
+    faults: Callable[[str], None] = lambda call: None
+
+    def __post_init__(self) -> None:
+        self.clock = ScriptedClock()
+        self.gauge = BatteryGauge()
+        self.level = 100.0
+        self.gauge.set_level(self.level)
+        self.place = self.start_place
+        self.is_in = self.start_place
+        self.at: Point = self.positions[self.start_place]
+        self.closed: set[str] = set()
+        self.visited_at = dict.fromkeys(self.rooms, 0.0)
+        self.threshold = 0.0
+        self.built = True
+        self.stranded = 0
+        self.decisions: list[Decision] = []
+        self.said: list[str] = []
+        self.cries: list[str] = []
+        self.arrivals: list[tuple[float, str]] = []
+        self.calls: list[str] = []
+        self._tick()
+
+    # The battery.
+
+    def _tick(self) -> None:
+        self.clock.after(1.0, self._tick)
+        charging = math.dist(self.at, self.positions[self.stations[0]]) < 1.0
+        self.set_level(self.level + (self.charge if charging else -self.draw))
+
+    def set_level(self, level: float) -> None:
+        """Sets the charge, and notices a robot that has none away from the station."""
+        if level < 0.0 <= self.level:
+            self.stranded += 1
+        self.level = min(100.0, max(-1e-9, level))
+        self.gauge.set_level(float(max(0, round(self.level))))
+
+    # The ports.
+
+    def _call(self, name: str, interrupt: Interrupt) -> None:
+        self.calls.append(name)
+        self.faults(name)
+        if not self.clock.sleep(0.0, interrupt):
+            raise InterruptedWaitError
+
+    def neighbours(self, place: str) -> tuple[str, ...]:
+        """Where the open doors of a place lead."""
+        doors = set(self.rooms.get(place, ())) - self.closed
+        return tuple(
+            sorted(
+                other
+                for other, theirs in self.rooms.items()
+                if other != place and doors & set(theirs)
+            )
+        )
+
+    def urgent(self) -> set[str]:
+        """The places that went unvisited for longer than the threshold."""
+        now = int(self.clock.time)
+        return {p for p, seen in self.visited_at.items() if now - int(seen) > self.threshold}
+
+    def wait_until_built(self, interrupt: Interrupt) -> None:
+        self._call('wait_until_built', interrupt)
+
+    def set_urgency_threshold(self, seconds: float, interrupt: Interrupt) -> None:
+        self._call('set_urgency_threshold', interrupt)
+        self.threshold = seconds
+
+    def beliefs(self, classes: Sequence[str], now: float, interrupt: Interrupt) -> Beliefs:
+        self._call('beliefs', interrupt)
+        urgent = self.urgent()
+        members = {
+            place: frozenset(
+                ['ROOM']
+                + ['CORRIDOR'] * (len(doors) > 1)
+                + ['URGENT'] * (place in urgent and 'URGENT' in classes)
+            )
+            for place, doors in self.rooms.items()
+        }
+        return Beliefs(
+            place=self.is_in,
+            reachable=self.neighbours(self.is_in),
+            classes=members,
+            visited_at={place: float(int(self.visited_at[place])) for place in self.rooms},
+            connections={place: self.neighbours(place) for place in self.rooms},
+        )
+
+    def robot_place(self, interrupt: Interrupt) -> str:
+        self._call('robot_place', interrupt)
+        return self.is_in
+
+    def note_visit(self, place: str, now: float, interrupt: Interrupt) -> None:
+        self._call('note_visit', interrupt)
+        self.visited_at[place] = now
+
+    def note_arrival(self, before: str, place: str, now: float, interrupt: Interrupt) -> None:
+        self._call('note_arrival', interrupt)
+        self.is_in = place
+        self.visited_at[place] = now
+
+    def position(self, place: str, interrupt: Interrupt) -> Point:
+        self._call('position', interrupt)
+        if place not in self.positions or place not in self.rooms:
+            raise UnknownPlaceError('ontology_map/room_position', f'there is no place {place}')
+        return self.positions[place]
+
+    def plan(self, start: Point, goal: Point, interrupt: Interrupt) -> list[Point]:
+        self._call('plan', interrupt)
+        middle = tuple((a + b) / 2 for a, b in zip(start, goal, strict=True))
+        return [start, (middle[0], middle[1], middle[2]), goal]
+
+    def follow(self, path: Sequence[Point], interrupt: Interrupt) -> Point:
+        self._call('follow', interrupt)
+        for point in path:
+            seconds = math.dist(self.at, point) / self.speed
+            if not self.clock.sleep(seconds, interrupt):
+                raise InterruptedWaitError
+            self.at = point
+        self.place = min(self.rooms, key=lambda room: math.dist(self.positions[room], self.at))
+        self.arrivals.append((self.clock.time, self.place))
+        return self.at
+
+    def last_position(self) -> Point | None:
+        return self.at
+
+    def decision(self, decision: Decision) -> None:
+        self.decisions.append(decision)
+
+    def say(self, text: str, *, warning: bool = False) -> None:
+        self.said.append(text)
+
+    def waiting_for_help(self, reason: str) -> None:
+        self.cries.append(reason)
+
+    # The mission.
+
+    def mission(
+        self, settings: MissionSettings | None = None, record: MissionRecord | None = None
+    ) -> Mission:
+        """A mission in this world."""
+        ports = Ports(knowledge=self, places=self, announcer=self, motion=self)
+        return Mission(
+            'surveillance', settings or MissionSettings(), ports, self.gauge, self.clock, record
+        )
+
+
+def fails(
+    method: str, times: float = math.inf, reason: str = 'scripted fault'
+) -> Callable[[str], None]:
+    """A fault: the first ``times`` calls of a port method fail."""
+    left = [times]
+
+    def fault(call: str) -> None:
+        if call == method and left[0] > 0:
+            left[0] -= 1
+            raise PeerError(method, reason)
+
+    return fault
