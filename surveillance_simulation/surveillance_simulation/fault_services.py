@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -86,10 +87,12 @@ class FaultServices:
         return f'obstacle {request.name} is gone'
 
     def _push_robot(self, request: PushRobot.Request) -> str:
+        _check_finite(request.dx, request.dy, request.dyaw)
         way = self._robot.base.push(request.dx, request.dy, request.dyaw)
         return f'pushed by {way:.2f} m and {request.dyaw:.2f} rad'
 
     def _slip_odometry(self, request: SlipOdometry.Request) -> str:
+        _check_finite(request.dx, request.dy, request.dyaw)
         self._robot.base.slip(request.dx, request.dy, request.dyaw)
         return f'odometry slipped by ({request.dx:.2f}, {request.dy:.2f}) m, {request.dyaw:.2f} rad'
 
@@ -111,3 +114,8 @@ class FaultServices:
         return (
             f'marker {request.name} with id {request.id} hangs at ({marker.x:.2f}, {marker.y:.2f})'
         )
+
+
+def _check_finite(*numbers: float) -> None:
+    if not all(map(math.isfinite, numbers)):
+        raise WorldError(f'expected finite numbers, got {", ".join(map(str, numbers))}')

@@ -109,7 +109,7 @@ def marker_panel(dictionary: str, marker_id: int, state: str, cell: int = 24) ->
     sheet[inner, inner] = np.where(code > 127, _PAPER, _INK)
     side = len(sheet)
     if state == 'broken':
-        torn = np.array([[0, int(0.35 * side)], [int(0.62 * side), 0], [0, 0]])
+        torn = np.array([[0, int(0.7 * side)], [int(0.85 * side), 0], [0, 0]])
         cv2.fillConvexPoly(sheet, torn, 160)
     elif state == 'covered':
         sheet[:] = 176

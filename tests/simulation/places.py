@@ -1,0 +1,46 @@
+"""Places for the tests of the simulation."""
+
+from __future__ import annotations
+
+import copy
+from pathlib import Path
+from typing import Any
+
+from surveillance_simulation.world import World
+
+CONFIG = Path(__file__).parents[2] / 'config'
+
+TWO_ROOMS: dict[str, Any] = {
+    'map': {'A': ['D'], 'B': ['D']},
+    'room_positions': {'A': [1.0, 1.0], 'B': [5.0, 1.0]},
+    'robot_room': 'A',
+    'recharge_rooms': ['A'],
+    'walls': {
+        'south': [0.0, 0.0, 6.0, 0.0],
+        'east': [6.0, 0.0, 6.0, 2.0],
+        'north': [6.0, 2.0, 0.0, 2.0],
+        'west': [0.0, 2.0, 0.0, 0.0],
+        'between': [3.0, 0.0, 3.0, 2.0],
+    },
+    'doors': {'D': [3.0, 1.0, 1.5707963, 1.0]},
+    'markers': {'m1': [1.0, 0.06, 1.0, 1.0, 0.0]},
+    'station': [1.0, 1.0, 0.0],
+}
+"""Two rooms of 3 m x 2 m side by side, a door in the middle of the wall between them."""
+
+
+def changed(**sections: Any) -> dict[str, Any]:
+    """Return the two rooms with some entries replaced; `walls__south` is that below `walls`."""
+    parameters = copy.deepcopy(TWO_ROOMS)
+    for name, value in sections.items():
+        section, _, entry = name.partition('__')
+        if entry:
+            parameters[section][entry] = value
+        else:
+            parameters[section] = value
+    return parameters
+
+
+def two_rooms() -> World:
+    """Return the two rooms as a world."""
+    return World.from_parameters(TWO_ROOMS)
