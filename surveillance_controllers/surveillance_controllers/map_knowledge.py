@@ -5,22 +5,32 @@ Every method blocks for at most the peers' deadline, so it belongs on a worker t
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 from surveillance_controllers import conversions
 from surveillance_controllers.polyline import Points
 from surveillance_interfaces.srv import ReferenceName, RoomPosition
-from surveillance_runtime.calls import ServiceCaller
+from surveillance_ontology.armor.protocol import DirectiveRequest
+from surveillance_ontology.armor_client import (
+    ArmorClient,
+    ArmorServiceCallError,
+    ArmorServiceInternalError,
+    value_in,
+)
+from surveillance_runtime.calls import CallFailed, ServiceCaller
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.waiting import Interrupt
 
 ROBOT = 'Robot1'
 
 
-class UnknownPlace(LookupError):
-    """A place that the map does not have; the text names it."""
+class KnowledgeError(Exception):
+    """Map or ontology do not answer, or not what is needed; the text is one line."""
 
 
 class MapKnowledge:
-    """The map's places and the robot's whereabouts, as ontology and map builder know them.
+    """The map's places and the robot's whereabouts, as map builder and ontology know them.
 
     Args:
         node: The node that asks.
@@ -38,13 +48,13 @@ class MapKnowledge:
         """The point of a place that the robot can reach, shape (3,), metres, world frame.
 
         Raises:
-            UnknownPlace: The map has no such place.
-            CallFailed: The map does not answer.
+            KnowledgeError: The map has no such place, or does not answer.
         """
         request = RoomPosition.Request(room_name=place)
-        answer = self._positions.call(request, self._timeout, interrupt)
+        with _answered():
+            answer = self._positions.call(request, self._timeout, interrupt)
         if not answer.valid:
-            raise UnknownPlace(f'the map has no place {place!r}')
+            raise KnowledgeError(f'the map has no place {place!r}')
         point: Points = conversions.array_from_points([answer.position])[0]
         return point
 
@@ -52,22 +62,37 @@ class MapKnowledge:
         """Every place with its point.
 
         Raises:
-            CallFailed: Map or ontology do not answer.
+            KnowledgeError: Map or ontology do not answer.
         """
-        names = self._client(interrupt).query.ind_b2_class('LOCATION')
+        with _answered():
+            names = self._client(interrupt).query.ind_b2_class('LOCATION')
         return {name: self.position(name, interrupt) for name in sorted(names)}
+
+    def doors(self, interrupt: Interrupt) -> dict[str, set[str]]:
+        """The places that each door leads into, as the ontology has them now.
+
+        Raises:
+            KnowledgeError: The ontology does not answer.
+        """
+        with _answered():
+            armor = self._client(interrupt)
+            rooms_of: dict[str, set[str]] = {}
+            for place in armor.query.ind_b2_class('LOCATION'):
+                for door in armor.query.objectprop_b2_ind('hasDoor', place):
+                    rooms_of.setdefault(door, set()).add(place)
+        return rooms_of
 
     def robot_place(self, interrupt: Interrupt) -> str:
         """The place in which the ontology has the robot.
 
         Raises:
-            UnknownPlace: It has the robot in no place, or in several.
-            CallFailed: The ontology does not answer.
+            KnowledgeError: It has the robot in no place, or in several, or does not answer.
         """
-        found = self._client(interrupt).query.objectprop_b2_ind('isIn', ROBOT)
+        with _answered():
+            found = self._client(interrupt).query.objectprop_b2_ind('isIn', ROBOT)
         if len(found) != 1:
             what = f'several places: {", ".join(sorted(found))}' if found else 'no place'
-            raise UnknownPlace(f'the ontology has {ROBOT} in {what}')
+            raise KnowledgeError(f'the ontology has {ROBOT} in {what}')
         return str(found[0])
 
     def record_place(self, place: str, interrupt: Interrupt) -> bool:
@@ -77,16 +102,14 @@ class MapKnowledge:
             Whether the ontology had it elsewhere before.
 
         Raises:
-            CallFailed: The ontology does not answer.
+            KnowledgeError: The ontology does not answer.
         """
-        armor = self._client(interrupt)
-        before = armor.query.objectprop_b2_ind('isIn', ROBOT)
-        if before == [place]:
-            return False
-        for other in before:
-            armor.manipulation.remove_objectprop_from_ind('isIn', ROBOT, other)
-        armor.manipulation.add_objectprop_to_ind('isIn', ROBOT, place)
-        armor.utils.sync_buffered_reasoner()
+        with _answered():
+            armor = self._client(interrupt)
+            before = armor.query.objectprop_b2_ind('isIn', ROBOT)
+            if before == [place]:
+                return False
+            _carry_out(armor, _moved(armor, before, place))
         return True
 
     def record_visit(self, place: str, now: float, interrupt: Interrupt) -> None:
@@ -98,26 +121,50 @@ class MapKnowledge:
             interrupt: Ends the wait for the ontology.
 
         Raises:
-            CallFailed: The ontology does not answer.
+            KnowledgeError: The ontology does not answer.
         """
-        armor = self._client(interrupt)
         seconds = str(int(now))
-        self.record_place(place, interrupt)
-        for name, owner in (('now', ROBOT), ('visitedAt', place)):
-            for old in armor.query.dataprop_b2_ind(name, owner):
-                armor.manipulation.remove_dataprop_from_ind(name, owner, 'LONG', _lexical(old))
-            armor.manipulation.add_dataprop_to_ind(name, owner, 'LONG', seconds)
-        armor.utils.sync_buffered_reasoner()
+        with _answered():
+            armor = self._client(interrupt)
+            changes = _moved(armor, armor.query.objectprop_b2_ind('isIn', ROBOT), place)
+            for name, owner in (('now', ROBOT), ('visitedAt', place)):
+                for old in armor.query.dataprop_b2_ind(name, owner):
+                    old_value = str(value_in(old))
+                    changes.append(
+                        armor.request('REMOVE DATAPROP IND', name, owner, 'LONG', old_value)
+                    )
+                changes.append(armor.request('ADD DATAPROP IND', name, owner, 'LONG', seconds))
+            _carry_out(armor, changes)
 
     def _client(self, interrupt: Interrupt) -> ArmorClient:
-        from surveillance_ontology.armor_client import ArmorClient
-
         if self._armor is None:
             answer = self._names.call(ReferenceName.Request(), self._timeout, interrupt)
-            self._armor = ArmorClient(self._node, self._node.get_name(), answer.name)
+            self._armor = ArmorClient(
+                self._node,
+                self._node.get_name(),
+                answer.name,
+                timeout=self._timeout,
+                interrupt=self._node.stopping,
+            )
         return self._armor
 
 
-def _lexical(literal: str) -> str:
-    """The value of a literal as ARMOR renders it: `"15"^^xsd:long` gives `15`."""
-    return literal.split('"')[1] if '"' in literal else literal
+def _moved(armor: ArmorClient, before: list[str], place: str) -> list[DirectiveRequest]:
+    leave = [armor.request('REMOVE OBJECTPROP IND', 'isIn', ROBOT, old) for old in before]
+    return [*leave, armor.request('ADD OBJECTPROP IND', 'isIn', ROBOT, place)]
+
+
+def _carry_out(armor: ArmorClient, changes: list[DirectiveRequest]) -> None:
+    """Makes the changes as one, with no other client's in between, and lets the reasoner see
+    them."""
+    for response in armor.batch([*changes, armor.request('REASON')]).responses:
+        if not response.success:
+            raise KnowledgeError(f'the ontology refuses: {response.error_description}')
+
+
+@contextmanager
+def _answered() -> Iterator[None]:
+    try:
+        yield
+    except (CallFailed, ArmorServiceCallError, ArmorServiceInternalError) as error:
+        raise KnowledgeError(str(error)) from error

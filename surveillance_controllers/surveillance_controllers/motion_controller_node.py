@@ -15,13 +15,12 @@ import numpy as np
 from surveillance_controllers import conversions, polyline, request_texts, stimuli
 from surveillance_controllers.console_commands import MOTION, ParsedCommand
 from surveillance_controllers.controller_parameters import execution_mode, motion_settings
-from surveillance_controllers.map_knowledge import MapKnowledge, UnknownPlace
+from surveillance_controllers.map_knowledge import KnowledgeError, MapKnowledge
 from surveillance_controllers.operator_console import OperatorConsole
 from surveillance_controllers.operator_desk import OperatorDesk
 from surveillance_controllers.polyline import Points
 from surveillance_controllers.stimulus_motion import glide, points_passed
 from surveillance_interfaces.action import Control, FollowPath
-from surveillance_runtime.calls import CallFailed
 from surveillance_runtime.goals import GoalAborted, GoalRun, GoalServer
 from surveillance_runtime.node import PatrolNode, run_node
 
@@ -84,7 +83,7 @@ class MotionController(PatrolNode):
         if not run.interrupt.is_set():
             try:
                 self._note_visit(end, run)
-            except (CallFailed, UnknownPlace) as error:
+            except KnowledgeError as error:
                 raise GoalAborted(f'the visit could not be noted: {error}', result) from error
         return result
 
@@ -93,7 +92,7 @@ class MotionController(PatrolNode):
         gaps = {name: float(np.linalg.norm(end - at)) for name, at in places.items()}
         nearest = min(gaps, key=lambda name: gaps[name], default=None)
         if nearest is None or gaps[nearest] > self._settings.place_reach:
-            raise UnknownPlace(
+            raise KnowledgeError(
                 f'the robot stopped at {request_texts.point(end)}: expected a place within '
                 f'{self._settings.place_reach:g} m'
                 + (f', {nearest} is {gaps[nearest]:.2f} m away' if nearest else '')

@@ -15,12 +15,11 @@ import numpy as np
 from surveillance_controllers import conversions, polyline, request_texts, stimuli
 from surveillance_controllers.console_commands import PLANNER, ParsedCommand, Point3
 from surveillance_controllers.controller_parameters import execution_mode, planner_settings
-from surveillance_controllers.map_knowledge import MapKnowledge, UnknownPlace
+from surveillance_controllers.map_knowledge import KnowledgeError, MapKnowledge
 from surveillance_controllers.operator_console import OperatorConsole
 from surveillance_controllers.operator_desk import OperatorDesk
 from surveillance_controllers.polyline import Points
 from surveillance_interfaces.action import ComputePath, Plan
-from surveillance_runtime.calls import CallFailed
 from surveillance_runtime.goals import GoalAborted, GoalRun, GoalServer
 from surveillance_runtime.node import PatrolNode, run_node
 
@@ -64,7 +63,7 @@ class PlannerController(PatrolNode):
         try:
             target = self._knowledge.position(goal.target, run.interrupt)
             start = self._start(run)
-        except (CallFailed, UnknownPlace) as error:
+        except KnowledgeError as error:
             raise GoalAborted(f'no way to {goal.target!r}: {error}') from error
         for what, point in (('the robot', start), (f'place {goal.target!r}', target)):
             if not self._settings.environment.contains(point):

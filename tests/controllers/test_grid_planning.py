@@ -1,0 +1,168 @@
+"""Planning on a grid: paths that are free and short, and reasons where there is none."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from skimage.graph import MCP_Geometric
+
+from surveillance_controllers import polyline
+from surveillance_controllers.grid_map import GridMap, distance_to, drawn_lines
+from surveillance_controllers.grid_planning import GridPlanner, NoPath, PlanningParameters
+
+RESOLUTION = 0.05
+ROBOT = PlanningParameters(radius=0.2)
+
+
+def two_rooms(door: tuple[float, float] = (1.5, 2.5)) -> GridMap:
+    """Two rooms of 4 m x 4 m, side by side, joined by an opening between two heights (metres)."""
+    cells = np.zeros((80, 161), np.int8)
+    cells[0] = cells[-1] = cells[:, 0] = cells[:, -1] = 100
+    cells[:, 80] = 100
+    cells[int(door[0] / RESOLUTION) : int(door[1] / RESOLUTION), 80] = 0
+    return GridMap(cells, RESOLUTION, (0.0, 0.0))
+
+
+def true_clearance(grid: GridMap, path: np.ndarray) -> float:
+    """The least distance from points along a path to the occupied squares, by brute force."""
+    samples = polyline.equally_spaced(path, 0.02)
+    low = grid.centres_of(np.argwhere(~grid.free)) - RESOLUTION / 2
+    gap = np.maximum(low - samples[:, None], samples[:, None] - low - RESOLUTION)
+    return float(np.hypot(*np.moveaxis(np.maximum(gap, 0), -1, 0)).min())
+
+
+def test_a_path_goes_through_the_door_and_keeps_its_distance() -> None:
+    grid = two_rooms()
+    planner = GridPlanner(grid, ROBOT)
+    path = planner.plan((1, 3.5), (7, 3.5))
+    assert path[0] == pytest.approx([1, 3.5])
+    assert path[-1] == pytest.approx([7, 3.5])
+    assert planner.is_free(path)
+    assert true_clearance(grid, path) >= ROBOT.radius
+    at_door = path[np.argmin(np.abs(path[:, 0] - 4.02))]
+    assert at_door[1] == pytest.approx(2.0, abs=0.25)
+
+
+@pytest.mark.parametrize(
+    ('start', 'goal', 'text'),
+    [
+        ((1, 1), (4.02, 0.5), 'the goal (4.02, 0.50) lies inside a wall'),
+        ((1, 1), (9, 1), 'the goal (9.00, 1.00) lies outside of the map'),
+        ((1, 1), (3.9, 0.5), 'm from a wall: expected at least 0.25 m'),
+        ((0.02, 1), (7, 1), 'the start (0.02, 1.00) lies inside a wall'),
+        ((float('nan'), 1), (7, 1), 'the start (nan, 1.00) lies outside of the map'),
+    ],
+)
+def test_points_that_are_not_free_are_named(
+    start: tuple[float, float], goal: tuple[float, float], text: str
+) -> None:
+    with pytest.raises(NoPath) as caught:
+        GridPlanner(two_rooms(), ROBOT).plan(start, goal)
+    assert text in str(caught.value)
+
+
+def test_what_blocks_is_named_and_gone_when_it_is_taken_away() -> None:
+    planner = GridPlanner(two_rooms(), ROBOT)
+    planner.set_closed({'D1': (4.02, 1.5, 4.02, 2.5)})
+    with pytest.raises(NoPath, match='the closed door D1 is in the way'):
+        planner.plan((1, 1), (7, 1))
+    planner.set_closed({})
+    planner.set_obstacles([(4.1, y) for y in np.arange(1.5, 2.6, 0.05)])
+    with pytest.raises(NoPath, match=r'an obstacle at \(4\.10, .*\) is in the way'):
+        planner.plan((1, 1), (7, 1))
+    planner.set_obstacles([])
+    assert planner.is_free(planner.plan((1, 1), (7, 1)))
+
+
+def test_an_opening_that_is_too_narrow_is_a_wall() -> None:
+    with pytest.raises(NoPath, match='walls lie between them, with no opening wide enough'):
+        GridPlanner(two_rooms((2.0, 2.4)), ROBOT).plan((1, 1), (7, 1))
+
+
+def test_an_obstacle_on_the_way_is_driven_around() -> None:
+    planner = GridPlanner(two_rooms(), ROBOT)
+    straight = planner.plan((0.5, 2), (3, 2))
+    planner.set_obstacles([(1.75, 2.0)])
+    around = planner.plan((0.5, 2), (3, 2))
+    assert polyline.length(straight) == pytest.approx(2.5)
+    assert polyline.length(around) > 2.5
+    assert np.hypot(*(polyline.equally_spaced(around, 0.02) - (1.75, 2)).T).min() >= ROBOT.radius
+
+
+def test_a_robot_pushed_against_a_wall_finds_its_way_out() -> None:
+    planner = GridPlanner(two_rooms(), ROBOT)
+    path = planner.plan((0.2, 1), (3, 1))
+    assert path[0] == pytest.approx([0.2, 1])
+    assert planner.is_free(path[1:])
+
+
+@given(st.integers(0, 10_000))
+@settings(max_examples=25, deadline=None)
+def test_in_any_clutter_a_path_is_free_and_not_longer_than_the_grid_s(seed: int) -> None:
+    draw = np.random.default_rng(seed)
+    cells = np.zeros((60, 60), np.int8)
+    cells[0] = cells[-1] = cells[:, 0] = cells[:, -1] = 100
+    for _ in range(int(draw.integers(0, 14))):
+        row, column = draw.integers(0, 56, 2)
+        height, width = draw.integers(1, 12, 2)
+        cells[row : row + height, column : column + width] = 100
+    grid = GridMap(cells, RESOLUTION, (-1.0, 2.0))
+    robot = PlanningParameters(radius=0.1, margin=0.03, comfort=0.2)
+    planner = GridPlanner(grid, robot)
+    start, goal = (grid.centres_of(c)[0] for c in draw.integers(3, 57, (2, 2)))
+    assume((planner.clearance([start, goal]) > robot.radius + robot.margin).all())
+    try:
+        path = planner.plan(start, goal)
+    except NoPath as problem:
+        assert 'with no opening wide enough' in str(problem)  # noqa: PT017
+        return
+    assert path[0] == pytest.approx(start)
+    assert path[-1] == pytest.approx(goal)
+    assert true_clearance(grid, path) >= robot.radius
+    search = MCP_Geometric(planner._costs.cost)
+    cells_of = [tuple(c) for c in grid.cells_of([start, goal])]
+    search.find_costs(cells_of[:1], cells_of[1:])
+    on_grid = grid.centres_of(search.traceback(cells_of[1]))
+    assert polyline.length(path) <= polyline.length(on_grid) + 1e-6
+
+
+@given(st.tuples(*[st.floats(-3, 12)] * 2), st.tuples(*[st.floats(-3, 12)] * 2))
+@settings(max_examples=60, deadline=None)
+def test_any_two_points_give_a_free_path_or_a_reason(
+    start: tuple[float, float], goal: tuple[float, float]
+) -> None:
+    planner = TWO_ROOMS
+    try:
+        path = planner.plan(start, goal)
+    except NoPath as problem:
+        assert '\n' not in str(problem)  # noqa: PT017
+        return
+    assert path[-1] == pytest.approx(np.array(goal))
+    assert planner.is_free(path[1:])
+
+
+TWO_ROOMS = GridPlanner(two_rooms(), ROBOT)
+
+
+def test_distances_and_lines_on_a_grid() -> None:
+    grid = two_rooms()
+    distance = distance_to(grid.occupied, RESOLUTION)
+    assert distance[40, 1] == pytest.approx(RESOLUTION)
+    assert np.isinf(distance_to(np.zeros((3, 3), bool), 1.0)).all()
+    line = drawn_lines(grid, [(1, 1, 2, 1.6)])
+    assert line.any(axis=0)[20:40].all()
+    assert grid.interpolated(distance, grid.centres_of([(40, 1)])) == pytest.approx(RESOLUTION)
+
+
+@pytest.mark.parametrize(
+    ('cells', 'resolution', 'text'),
+    [
+        (np.zeros((0, 3), np.int8), 0.1, 'expected rows and columns'),
+        (np.zeros((3, 3), np.int8), 0.0, 'expected more than 0 m'),
+    ],
+)
+def test_maps_that_are_none_are_refused(cells: np.ndarray, resolution: float, text: str) -> None:
+    with pytest.raises(ValueError, match=text):
+        GridMap(cells, resolution, (0, 0))
