@@ -39,10 +39,10 @@ class RosAnnouncer:
 
     Args:
         node: The node that speaks.
-        decisions: Where decisions go; None when another node makes them.
+        decisions: Where decisions go.
     """
 
-    def __init__(self, node: PatrolNode, decisions: DecisionTopic | None) -> None:
+    def __init__(self, node: PatrolNode, decisions: DecisionTopic) -> None:
         self._node = node
         self._decisions = decisions
         self._lock = threading.Lock()
@@ -75,8 +75,7 @@ class RosAnnouncer:
 
     def decision(self, decision: Decision) -> None:
         """A place was chosen."""
-        if self._decisions is not None:
-            self._decisions.publish(decision)
+        self._decisions.publish(decision)
 
     def say(self, text: str, *, warning: bool = False) -> None:
         """Logs and publishes."""

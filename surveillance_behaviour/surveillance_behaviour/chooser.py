@@ -21,6 +21,9 @@ from surveillance_behaviour.ports import (
     UnknownPlaceError,
 )
 
+FORGOTTEN = 2.0
+"""Seconds by which the ontology and the robot may differ about a visit."""
+
 
 @dataclass
 class ChoiceSettings:
@@ -73,6 +76,7 @@ class Chooser:
         self._since: float | None = None
         self._target: str | None = None
         self._seen: dict[str, float] = {}
+        self._own: dict[str, float] = {}
 
     @property
     def graph(self) -> PatrolGraph:
@@ -87,11 +91,14 @@ class Chooser:
         Raises:
             PeerError: The ontology or the positions cannot be had, or do not fit together.
         """
-        beliefs = self._knowledge.beliefs(self.settings.rules.classes, now, interrupt)
-        graph = self._map_of(beliefs, interrupt)
         if self._since is None or now < self._since:
             self._since = now
             self._seen.clear()
+            self._own.clear()
+        beliefs = self._knowledge.beliefs(self.settings.rules.classes, now, interrupt)
+        if self._restore(beliefs, interrupt):
+            beliefs = self._knowledge.beliefs(self.settings.rules.classes, now, interrupt)
+        graph = self._map_of(beliefs, interrupt)
         for place, seconds in beliefs.visited_at.items():
             # The ontology counts whole seconds.
             if not seconds <= self._seen.get(place, -1.0) < seconds + 1.0:
@@ -108,6 +115,23 @@ class Chooser:
             target=self._target,
             avoided=avoided,
         )
+
+    def _restore(self, beliefs: Beliefs, interrupt: Interrupt) -> bool:
+        """Tells an ontology that was built anew when this robot was where; whether it had to.
+
+        The builder of a map counts all places as visited then. One place that was visited later
+        than the robot knows may be somebody's wish; most of them are not.
+        """
+        forgotten = {
+            place: seconds
+            for place, seconds in self._own.items()
+            if place != beliefs.place and beliefs.visited_at.get(place, 0.0) > seconds + FORGOTTEN
+        }
+        if len(forgotten) < 2 or 2 * len(forgotten) < len(self._own):
+            return False
+        for place, seconds in sorted(forgotten.items()):
+            self._knowledge.note_visit(place, seconds, interrupt)
+        return True
 
     def _map_of(self, beliefs: Beliefs, interrupt: Interrupt) -> PatrolGraph:
         positions = {}
@@ -145,7 +169,7 @@ class Chooser:
 
     def saw(self, place: str, now: float) -> None:
         """The robot was in ``place``; finer than the ontology's whole seconds."""
-        self._seen[place] = now
+        self._seen[place] = self._own[place] = now
         if place == self._target:
             self._target = None
 

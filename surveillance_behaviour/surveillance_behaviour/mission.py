@@ -11,10 +11,11 @@ from surveillance_behaviour.battery_gauge import BatteryGauge
 from surveillance_behaviour.chooser import ChoiceSettings, Chooser
 from surveillance_behaviour.fsm import Clock, Interrupt
 from surveillance_behaviour.mission_record import MissionRecord
-from surveillance_behaviour.policy.situation import Decision
+from surveillance_behaviour.policy.situation import Decision, Situation
 from surveillance_behaviour.ports import (
     Announcer,
     Knowledge,
+    LostRobotError,
     Motion,
     PeerError,
     Places,
@@ -35,6 +36,8 @@ class MissionSettings:
         goal_tolerance: How far from the goal a planner's path may end, m.
         charge_stall_seconds: How long a level may stay the same while charging before the robot
             drives to the station again; 0: for ever.
+        settle_seconds: How long the battery's topics may lag behind its `recharge` service,
+            seconds of real time.
     """
 
     choice: ChoiceSettings = field(default_factory=ChoiceSettings)
@@ -42,6 +45,7 @@ class MissionSettings:
     arrival_tolerance: float = 1.0
     goal_tolerance: float = 1.0
     charge_stall_seconds: float = 300.0
+    settle_seconds: float = 2.0
 
 
 @dataclass
@@ -89,7 +93,9 @@ class Mission:
         self.heading_to = ''
         self.failure: Failure | None = None
         self._record = record
-        self._started = False
+        self.astray = False
+        self._started: float | None = None
+        self._told_threshold: float | None = None
         self._warned = ''
         gauge.watch(self._learn_draw)
 
@@ -101,19 +107,42 @@ class Mission:
         Raises:
             PeerError: The ontology cannot be asked.
         """
-        self.ports.knowledge.set_urgency_threshold(
-            self.settings.choice.urgency_threshold, interrupt
-        )
-        situation = self.chooser.look(self.now(), interrupt)
-        self.place = situation.place
+        situation = self.look(interrupt)
         self.say(f'{len(situation.graph.places)} places to patrol, starting in {self.place}')
         self.warn_about_threshold()
-        if not self._started:
-            self._started = True
+        if self._started is None:
+            self._started = self.now()
             self._write('start', machine=self.machine, place=self.place, places=self._places())
 
     def _places(self) -> list[str]:
         return list(self.chooser.graph.places)
+
+    def look(self, interrupt: Interrupt) -> Situation:
+        """What the ontology says now; an ontology that lost the robot is told where it is.
+
+        Raises:
+            PeerError: The ontology cannot be asked.
+        """
+        knowledge, threshold = self.ports.knowledge, self.settings.choice.urgency_threshold
+        now = self.now()
+        if threshold != self._told_threshold:
+            knowledge.set_urgency_threshold(threshold, interrupt)
+            self._told_threshold = threshold
+        avoided = self.recovery.avoided(now)
+        try:
+            situation = self.chooser.look(now, interrupt, avoided)
+        except LostRobotError as error:
+            if not self.place:
+                raise
+            self.say(f'{error}; it was last in {self.place}', warning=True)
+            knowledge.note_arrival('', self.place, now, interrupt)
+            situation = self.chooser.look(now, interrupt, avoided)
+        except PeerError:
+            # The ontology that comes back may be another one.
+            self._told_threshold = None
+            raise
+        self.place = situation.place
+        return situation
 
     def warn_about_threshold(self) -> None:
         """Says once when no robot can keep to the threshold on this map."""
@@ -129,31 +158,57 @@ class Mission:
             PeerError: The ontology cannot be asked.
             NowhereToGoError: Nothing can be reached.
         """
-        now = self.now()
-        situation = self.chooser.look(now, interrupt, self.recovery.avoided(now))
-        self.place = situation.place
+        situation = self.look(interrupt)
         why = self.why_charge(situation.reachable)
         if why:
             decision = self.chooser.choose_station(situation, why)
         else:
             decision = self.chooser.choose(situation)
         self.heading_to = decision.place
+        self.warn_about_threshold()
         self.ports.announcer.decision(decision)
-        self.note_decision(decision.place, decision.rule, decision.reason)
+        self.note_decision(decision)
         return decision
 
-    def note_decision(self, place: str, rule: str, reason: str) -> None:
+    def choose_station(self, interrupt: Interrupt, why: str) -> Decision:
+        """The charging place to go to; announced, and recorded by whoever hears of it.
+
+        Raises:
+            PeerError: The ontology cannot be asked.
+            NowhereToGoError: None can be reached.
+        """
+        decision = self.chooser.choose_station(self.look(interrupt), why)
+        self.heading_to = decision.place
+        self.ports.announcer.decision(decision)
+        return decision
+
+    def note_decision(self, decision: Decision) -> None:
         """Records a decision, made here or by the reasoner."""
-        self._write('decision', place=place, rule=rule, reason=reason)
+        if self._started is not None and decision.time >= self._started:
+            self._write(
+                'decision', place=decision.place, rule=decision.rule, reason=decision.reason
+            )
+
+    def departs(self) -> None:
+        """The robot leaves the place it is in; until it arrives it may be anywhere."""
+        self.astray = True
 
     def arrived(self, place: str, distance: float) -> None:
         """The robot is in ``place``, after ``distance`` metres."""
         self.place = place
+        self.astray = False
         self.chooser.saw(place, self.now())
         self.recovery.worked(place)
         self.failure = None
         self._write('visit', place=place, distance=distance)
         self.say(f'arrived in {place}')
+
+    def came_back(self, distance: float) -> None:
+        """The robot is again where it was last known to be, after ``distance`` metres."""
+        self.astray = False
+        self.chooser.saw(self.place, self.now())
+        self._write('visit', place=self.place, distance=distance)
+        self.say(f'back in {self.place}')
 
     def charged(self, place: str, seconds: float) -> None:
         """The battery was charged in ``place``."""
@@ -164,7 +219,7 @@ class Mission:
 
     def ended(self) -> None:
         """The mission was told to end."""
-        if self._started:
+        if self._started is not None:
             self._write('end')
 
     # The battery.
@@ -181,11 +236,15 @@ class Mission:
             return ''
         return f'the battery is at {level:g} %, below {required:.1f} %: {words}'
 
+    def at_station(self) -> bool:
+        """Whether the robot is where it can charge, and did not leave half-way since."""
+        return self.place in self.settings.choice.recharge_rooms and not self.astray
+
     def charged_enough(self) -> bool:
         """Whether the robot may leave the station."""
         level = self.gauge.level
-        enough = self.settings.choice.battery.stop_recharge
-        return level is not None and level >= enough and not self.gauge.low
+        enough = level is None or level >= self.settings.choice.battery.stop_recharge
+        return enough and not self.gauge.low
 
     def level_text(self) -> str:
         """The charge in words."""

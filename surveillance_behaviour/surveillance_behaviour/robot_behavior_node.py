@@ -48,7 +48,7 @@ class RobotBehavior(PatrolNode):
         patrols = self._behaviour == 'patrol'
         gauge = BatteryGauge()
         self._wait = ClockWait(self)
-        self._announcer = RosAnnouncer(self, None if patrols else DecisionTopic(self))
+        self._announcer = RosAnnouncer(self, DecisionTopic(self))
         ports = Ports(
             knowledge=ros_knowledge(self, deadlines),
             places=RosPlaces(self, deadlines),
@@ -103,8 +103,7 @@ class RobotBehavior(PatrolNode):
                 self._record.close()
 
     def _on_decision(self, message: DecisionMessage) -> None:
-        decision = conversions.decision_from(message)
-        self.mission.note_decision(decision.place, decision.rule, decision.reason)
+        self.mission.note_decision(conversions.decision_from(message))
 
 
 def _open_record(path: str) -> MissionRecord | None:

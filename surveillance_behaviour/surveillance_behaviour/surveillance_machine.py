@@ -57,8 +57,8 @@ class ChooseRoomTask(fsm.State):
         if self.preempt_requested():
             self.service_preempt()
             return PREEMPTED
-        at_station = self.mission.place in self.mission.settings.choice.recharge_rooms
-        return 'recharge' if at_station and self.mission.why_charge() else 'explore'
+        must_charge = self.mission.at_station() and self.mission.why_charge()
+        return 'recharge' if must_charge else 'explore'
 
 
 class ExploreTask(fsm.State):
@@ -164,6 +164,7 @@ class Move(MissionState):
             leg = motion.plan(path[-1] if path else start, stop, interrupt)
             check_path(leg, stop, mission.settings.goal_tolerance, 'compute_path')
             path.extend(leg if not path else leg[1:])
+        mission.departs()
         end = motion.follow(path, interrupt)
         check_arrival(end, path[-1], mission.settings.arrival_tolerance, 'follow_path')
         return path_length(path)
@@ -205,7 +206,8 @@ class ReturnToLastPlace(Move):
         super().__init__(mission, 'returned')
 
     def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
-        self._drive(self.mission.place, self.mission.place, interrupt)
+        mission = self.mission
+        mission.came_back(self._drive(mission.place, mission.place, interrupt))
         return 'returned'
 
 

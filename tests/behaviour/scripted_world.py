@@ -12,9 +12,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from surveillance_behaviour.battery_gauge import BatteryGauge
+from surveillance_behaviour.chooser import Chooser
 from surveillance_behaviour.fsm import Interrupt
 from surveillance_behaviour.mission import Mission, MissionSettings, Ports
 from surveillance_behaviour.mission_record import MissionRecord
+from surveillance_behaviour.policy.rules import NowhereToGoError
 from surveillance_behaviour.policy.situation import Decision
 from surveillance_behaviour.ports import (
     Beliefs,
@@ -119,14 +121,14 @@ class World:
         self.cries: list[str] = []
         self.arrivals: list[tuple[float, str]] = []
         self.calls: list[str] = []
+        self.avoided: Callable[[], frozenset[str]] = frozenset
         self._tick()
 
     # The battery.
 
     def _tick(self) -> None:
         self.clock.after(1.0, self._tick)
-        charging = math.dist(self.at, self.positions[self.stations[0]]) < 1.0
-        self.set_level(self.level + (self.charge if charging else -self.draw))
+        self.set_level(self.level + (self.charge if self.docked() else -self.draw))
 
     def set_level(self, level: float) -> None:
         """Sets the charge, and notices a robot that has none away from the station."""
@@ -204,13 +206,21 @@ class World:
             raise UnknownPlaceError('ontology_map/room_position', f'there is no place {place}')
         return self.positions[place]
 
-    def plan(self, start: Point, goal: Point, interrupt: Interrupt) -> list[Point]:
+    def docked(self) -> bool:
+        """Whether the robot stands at a station."""
+        return any(math.dist(self.at, self.positions[place]) < 1.0 for place in self.stations)
+
+    def plan_path(self, start: Point, goal: Point, interrupt: Interrupt) -> list[Point]:
+        """Port of the first seed's planner."""
         self._call('plan', interrupt)
         middle = tuple((a + b) / 2 for a, b in zip(start, goal, strict=True))
         return [start, (middle[0], middle[1], middle[2]), goal]
 
     def follow(self, path: Sequence[Point], interrupt: Interrupt) -> Point:
         self._call('follow', interrupt)
+        return self._drive(path, interrupt)
+
+    def _drive(self, path: Sequence[Point], interrupt: Interrupt) -> Point:
         for point in path:
             seconds = math.dist(self.at, point) / self.speed
             if not self.clock.sleep(seconds, interrupt):
@@ -220,8 +230,35 @@ class World:
         self.arrivals.append((self.clock.time, self.place))
         return self.at
 
-    def last_position(self) -> Point | None:
-        return self.at
+    # The second seed's peers.
+
+    def start(self, interrupt: Interrupt) -> None:
+        self._call('start', interrupt)
+
+    def reason(self, interrupt: Interrupt) -> str:
+        self._call('reason', interrupt)
+        now = self.clock.time
+        situation = self.chooser.look(now, interrupt, self.avoided())
+        try:
+            decision = self.chooser.choose(situation)
+        except NowhereToGoError as error:
+            raise PeerError('reason', str(error)) from None
+        self.chooser.saw(situation.place, now)
+        self.decisions.append(decision)
+        return decision.place
+
+    def control(self, via_points: Sequence[Point], interrupt: Interrupt) -> Point:
+        self._call('control', interrupt)
+        end = self._drive(via_points, interrupt)
+        self.is_in = self.place
+        self.visited_at[self.place] = self.clock.time
+        return end
+
+    def recharge(self, interrupt: Interrupt) -> None:
+        self._call('recharge', interrupt)
+        while self.level < 100.0 and self.docked():
+            if not self.clock.sleep(1.0, interrupt):
+                raise InterruptedWaitError
 
     def decision(self, decision: Decision) -> None:
         self.decisions.append(decision)
@@ -238,10 +275,59 @@ class World:
         self, settings: MissionSettings | None = None, record: MissionRecord | None = None
     ) -> Mission:
         """A mission in this world."""
-        ports = Ports(knowledge=self, places=self, announcer=self, motion=self)
-        return Mission(
-            'surveillance', settings or MissionSettings(), ports, self.gauge, self.clock, record
+        settings = settings or MissionSettings(settle_seconds=0.0)
+        self.chooser = Chooser(settings.choice, self, self)
+        ports = Ports(
+            knowledge=self,
+            places=self,
+            announcer=self,
+            motion=ScriptedMotion(self),
+            routine=ScriptedRoutine(self),
         )
+        mission = Mission('scripted', settings, ports, self.gauge, self.clock, record)
+        self.avoided = lambda: mission.recovery.avoided(mission.now())
+        return mission
+
+
+@dataclass
+class ScriptedMotion:
+    """The first seed's planner and controller; a port of its own, as both seeds have a ``plan``."""
+
+    world: World
+
+    def plan(self, start: Point, goal: Point, interrupt: Interrupt) -> list[Point]:
+        return self.world.plan_path(start, goal, interrupt)
+
+    def follow(self, path: Sequence[Point], interrupt: Interrupt) -> Point:
+        return self.world.follow(path, interrupt)
+
+    def last_position(self) -> Point | None:
+        return self.world.at
+
+
+@dataclass
+class ScriptedRoutine:
+    """The second seed's peers."""
+
+    world: World
+
+    def start(self, interrupt: Interrupt) -> None:
+        self.world.start(interrupt)
+
+    def reason(self, interrupt: Interrupt) -> str:
+        return self.world.reason(interrupt)
+
+    def plan(self, target: str, interrupt: Interrupt) -> list[Point]:
+        world = self.world
+        if target not in world.rooms:
+            raise PeerError('motion/planner', f'there is no place {target}')
+        return world.plan_path(world.at, world.positions[target], interrupt)
+
+    def control(self, via_points: Sequence[Point], interrupt: Interrupt) -> Point:
+        return self.world.control(via_points, interrupt)
+
+    def recharge(self, interrupt: Interrupt) -> None:
+        self.world.recharge(interrupt)
 
 
 def fails(

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from surveillance_behaviour.mission_record import MissionRecord, RecordError, read, summarize
 
 
