@@ -9,6 +9,7 @@ from __future__ import annotations
 import queue
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from rclpy.callback_groups import ReentrantCallbackGroup
@@ -18,11 +19,13 @@ from rclpy.task import Future
 from surveillance_interfaces.msg import FactChanges
 from surveillance_interfaces.srv import ArmorDirective, ArmorDirectiveList
 from surveillance_ontology.armor.change_feed import ChangeFeed
+from surveillance_ontology.armor.journal import JournalError
 from surveillance_ontology.armor.service import ArmorService
 from surveillance_ontology.armor.settings import Settings
+from surveillance_ontology.armor.store import Store
 from surveillance_ontology.armor_client import CHANGES_QOS, CHANGES_TOPIC
 from surveillance_ontology.conversions import changes_to_ros, fill_response, request_from_ros
-from surveillance_runtime.node import PatrolNode, run_node
+from surveillance_runtime.node import PatrolNode, StartError, run_node
 
 WORKERS = 4
 """Threads for directives that may take long."""
@@ -34,7 +37,12 @@ class ArmorServer(PatrolNode):
     def __init__(self, **node_options: Any) -> None:
         super().__init__('armor_server', **node_options)
         log = self.get_logger()
-        self._service = ArmorService(self._settings(), screen=log.info, warn=log.warn)
+        settings, directory = self._settings(), self._store_directory()
+        try:
+            store = Store(Path(directory).expanduser()) if directory else None
+            self._service = ArmorService(settings, log.info, log.warn, store)
+        except JournalError as error:
+            raise StartError(f'{self.get_name()}: parameter store: {error}') from None
         self._feed = ChangeFeed(self._service, self._soon)
         self._work: queue.SimpleQueue[Callable[[], None] | None] = queue.SimpleQueue()
         self._publisher = self.create_publisher(
@@ -60,6 +68,7 @@ class ArmorServer(PatrolNode):
         """End the workers."""
         for _ in range(WORKERS):
             self._work.put(None)
+        self._service.close()
 
     def _settings(self) -> Settings:
         default = Settings()
@@ -97,6 +106,15 @@ class ArmorServer(PatrolNode):
                 maximum=3600.0,
             ),
         )
+
+    def _store_directory(self) -> str:
+        directory: str = self.parameter(
+            'store',
+            '',
+            'Directory in which references and their changes are kept over a restart; empty: none.',
+            read_only=True,
+        )
+        return directory
 
     async def _on_directive(self, request: Any, response: Any) -> Any:
         directive = request_from_ros(request.armor_request)

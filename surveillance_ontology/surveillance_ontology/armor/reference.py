@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import threading
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -47,6 +48,7 @@ class Reference:
         queue: Changes that wait.
         backlog: Changes since the last reasoning, queued ones included; a measure of its cost.
         revision: Counts what may have changed an answer, so that copies know when they are old.
+        serial: Tells this reference from any other of the same name.
         dropped: The name does not stand for it any more.
     """
 
@@ -60,6 +62,7 @@ class Reference:
     backlog: int = 0
     revision: int = 0
     dropped: bool = False
+    serial: int = field(default_factory=itertools.count().__next__)
     lock: threading.RLock = field(default_factory=threading.RLock)
 
     def submit(self, changes: list[Change]) -> None:
@@ -94,6 +97,13 @@ class Reference:
         self.revision += 1
         self.backlog = 0
         return self.kb.reason()
+
+    def restore(self, other: Reference) -> None:
+        """Take over the state of another reference of the same name."""
+        self.kb, self.queue, self.mounted = other.kb, other.queue, other.mounted
+        self.buffered_manipulation = other.buffered_manipulation
+        self.backlog = len(other.queue)
+        self.revision += 1
 
     def is_free_for(self, client: str) -> bool:
         """Tell whether a client may change the reference or mount on it."""

@@ -7,6 +7,7 @@ named classes that stand inside a restriction are listed once more by themselves
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 from surveillance_ontology.axioms import (
     ClassExpression,
@@ -53,7 +54,7 @@ def describe(cls: str, definition: ClassExpression) -> str:
     return f'[{", ".join(atoms)}]' if atoms else ''
 
 
-def _atoms(name: str, part: ClassExpression) -> Iterator[str]:
+def _atoms(name: str, part: Any) -> Iterator[str]:
     head = f'C-DEFINITION_{{}} : {name} -> '
     if isinstance(part, str):
         yield f'{head.format("CLASS")}({local_name(part)})'
@@ -66,11 +67,11 @@ def _atoms(name: str, part: ClassExpression) -> Iterator[str]:
         yield f'{head.format("SOME_OBJECT")}{_prop(part.prop)}({local_name(part.individual)})'
     elif isinstance(part, DataHasValue):
         yield f'{head.format("SOME_DATA")}{_prop(part.prop)}({part.literal.lexical})'
-    elif kind := _CARDINALITIES.get(type(part)):  # type: ignore[call-overload]
+    elif kind := _CARDINALITIES.get(type(part)):
         filler = _filler(part)
         yield f'{head.format(kind)}{_prop(part.prop)} {part.n}({_filler_text(filler)})'
         yield from _nested(name, filler)
-    elif kind := _VALUES.get(type(part)):  # type: ignore[call-overload]
+    elif kind := _VALUES.get(type(part)):
         filler = _filler(part)
         yield f'{head.format(kind)}{_prop(part.prop)}({_filler_text(filler)})'
         yield from _nested(name, filler)
@@ -92,7 +93,7 @@ def _filler_text(filler: ClassExpression | DataRange) -> str:
 
 def _nested(name: str, filler: ClassExpression | DataRange) -> Iterator[str]:
     if not type(filler).__name__.startswith('Data') and not _is_datatype(filler):
-        yield from _atoms(name, filler)  # type: ignore[arg-type]
+        yield from _atoms(name, filler)
 
 
 def _is_datatype(filler: ClassExpression | DataRange) -> bool:

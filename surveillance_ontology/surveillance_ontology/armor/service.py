@@ -12,16 +12,18 @@ from __future__ import annotations
 
 import contextlib
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 from surveillance_ontology.armor import (  # noqa: F401 - the modules fill the table
     manipulations,
     queries,
+    sparql_queries,
     utilities,
 )
 from surveillance_ontology.armor.changes import Change
 from surveillance_ontology.armor.directive_log import DirectiveLog
+from surveillance_ontology.armor.journal import JournalError
 from surveillance_ontology.armor.loading import load_document
 from surveillance_ontology.armor.paths import SafePaths
 from surveillance_ontology.armor.protocol import (
@@ -34,6 +36,8 @@ from surveillance_ontology.armor.protocol import (
 from surveillance_ontology.armor.reference import NOBODY, Reference
 from surveillance_ontology.armor.rendering import shown
 from surveillance_ontology.armor.settings import Settings
+from surveillance_ontology.armor.sparql import SparqlEngine
+from surveillance_ontology.armor.store import Store
 from surveillance_ontology.armor.table import Directive, Kind, look_up
 from surveillance_ontology.knowledge_base import Changes
 from surveillance_ontology.owl_writing import write_ontology
@@ -52,6 +56,10 @@ class ArmorService:
         settings: What is allowed.
         screen: Writes a line of LOG SCREEN.
         warn: Told in one line of what went wrong inside and of what a client should know.
+        store: Makes references durable; those it holds are there at once.
+
+    Raises:
+        JournalError: What is in the store cannot be read.
     """
 
     def __init__(
@@ -59,15 +67,20 @@ class ArmorService:
         settings: Settings | None = None,
         screen: Callable[[str], None] = print,
         warn: Callable[[str], None] = print,
+        store: Store | None = None,
     ) -> None:
         self.settings = settings or Settings()
         self.paths = SafePaths(self.settings.directories, self.settings.read_only_directories)
         self.log = DirectiveLog(screen)
+        self.sparql = SparqlEngine()
         self._warn = warn
         self._references: dict[str, Reference] = {}
         self._registry = threading.Lock()
         self._loading = threading.Lock()
         self._watchers: list[Watcher] = []
+        self._store = store
+        for ref in store.recover() if store else ():
+            self._register(ref)
 
     def execute(self, request: DirectiveRequest) -> DirectiveResponse:
         """Carry out one directive; never raises for what a client sent."""
@@ -102,19 +115,45 @@ class ArmorService:
         """
         if len(requests) > self.settings.max_batch:
             problem = f'{len(requests)} directives in a list, at most {self.settings.max_batch}'
-            refusal = DirectiveResponse(False, exit_code=205, error_description=problem)
-            return ListResponse(False, False, [refusal])
-        names = sorted({request.reference_name for request in requests})
-        with contextlib.ExitStack() as locks:
-            for name in names:
-                if ref := self._references.get(name):
-                    locks.enter_context(ref.lock)
-            responses = [self.execute(request) for request in requests]
+            return ListResponse(False, False, [_refusal(problem)])
+        names = {request.reference_name for request in requests}
+        with self._held(names) as held:
+            try:
+                with self._store.batch() if self._store else contextlib.nullcontext():
+                    responses = [self.execute(request) for request in requests]
+            except JournalError as error:
+                self._undo(held)
+                return ListResponse(False, False, [_refusal(f'nothing was done: {error}')])
         return ListResponse(
             success=all(response.success for response in responses),
             is_consistent=responses[-1].is_consistent if responses else False,
             responses=responses,
         )
+
+    def close(self) -> None:
+        """End helper processes and close files."""
+        self.sparql.close()
+        if self._store:
+            self._store.close()
+        self.log.close()
+
+    @contextlib.contextmanager
+    def _held(self, names: Iterable[str]) -> Iterator[list[Reference]]:
+        with contextlib.ExitStack() as locks:
+            found = [ref for name in sorted(names) if (ref := self._references.get(name))]
+            for ref in found:
+                locks.enter_context(ref.lock)
+            yield found
+
+    def _undo(self, held: Iterable[Reference]) -> None:
+        """Bring references back to what the store has of them."""
+        assert self._store is not None
+        durable = {ref.name: ref for ref in self._store.recover()}
+        for ref in held:
+            if kept := durable.get(ref.name):
+                ref.restore(kept)
+                self._follow(ref)
+                self._tell(ref.name, None)
 
     def watch(self, watcher: Watcher) -> Callable[[], None]:
         """Tell a watcher of every change of asserted and derived facts.
@@ -179,6 +218,8 @@ class ArmorService:
                     name, source, iri, reasoner, self.paths, self.settings, web=web
                 )
                 ref.buffered_manipulation, ref.buffered_reasoner = buffered, lazy
+                if self._store:
+                    self._store.loaded(ref)
                 self._register(ref)
                 for note in notes:
                     self._warn(f'{name}: {note}')
@@ -190,14 +231,19 @@ class ArmorService:
         if name not in self._references:
             return False
         with contextlib.suppress(DirectiveError), self.locked(name) as ref:
+            if self._store and ref.buffered_manipulation != buffered:
+                self._store.buffered(name, buffered)
             ref.buffer(buffered)
             return True
         return False
 
     def _register(self, ref: Reference) -> None:
-        ref.kb.subscribe(lambda changes: self._tell(ref.name, changes))
+        self._follow(ref)
         with self._registry:
             self._references[ref.name] = ref
+
+    def _follow(self, ref: Reference) -> None:
+        ref.kb.subscribe(lambda changes: self._tell(ref.name, changes))
 
     def _tell(self, name: str, changes: Changes | None) -> None:
         for watcher in tuple(self._watchers):
@@ -206,6 +252,8 @@ class ArmorService:
     def drop(self, name: str) -> None:
         """Do DROP."""
         with contextlib.suppress(DirectiveError), self.locked(name) as ref:
+            if self._store:
+                self._store.dropped(name)
             ref.dropped = True
             with self._registry:
                 del self._references[name]
@@ -230,6 +278,8 @@ class ArmorService:
                     ExitCode.MOUNT_REFUSED,
                 )
             note = f'{client} is mounted already' if ref.mounted == client != NOBODY else ''
+            if self._store and ref.mounted != client:
+                self._store.mounted(name, client)
             ref.mounted = client
         return DirectiveResponse(error_description=note)
 
@@ -243,6 +293,8 @@ class ArmorService:
             if ref.mounted != request.client_name:
                 note = f'{request.client_name} is not mounted on {ref.name}'
                 return DirectiveResponse(error_description=note)
+            if self._store:
+                self._store.mounted(ref.name, NOBODY)
             ref.mounted = NOBODY
         return DirectiveResponse()
 
@@ -279,11 +331,13 @@ class ArmorService:
                 exit_code=int(error.exit_code),
                 error_description=error.description,
             )
+        except JournalError as error:
+            response = _refusal(f'{request.words}: nothing was done: {error}')
         except Exception as error:
             problem = f'{request.words}: internal error, {type(error).__name__}: {error}'
             problem = ' '.join(problem.split())
             self._warn(problem)
-            response = DirectiveResponse(False, exit_code=205, error_description=problem)
+            response = _refusal(problem)
         ref = self._references.get(request.reference_name)
         if ref is not None:
             response.is_consistent = ref.kb.consistent
@@ -315,11 +369,17 @@ class ArmorService:
                     ExitCode.REFERENCE_BUSY,
                 )
             if directive.kind is Kind.CONTROL:
+                if self._store and ref.queue:
+                    self._store.flushed(ref.name)
                 directive.run(ref)
             else:
                 changes: list[Change] = directive.run(ref, *self._values(directive, request, ref))
+                if self._store and changes:
+                    self._store.changed(ref.name, changes)
                 ref.submit(changes)
-            return DirectiveResponse()
+        if self._store:
+            self._store.compact_if_large(lambda: self._held(self.names()), self._warn)
+        return DirectiveResponse()
 
     def _values(self, directive: Directive, request: DirectiveRequest, ref: Reference) -> list[Any]:
         return directive.read(request.args, ref.kb.iri, narrow_doubles=self.settings.narrow_doubles)
@@ -333,6 +393,11 @@ class ArmorService:
             raise DirectiveError(
                 f'{characters} characters of arguments, at most {self.settings.max_characters}'
             )
+
+
+def _refusal(problem: str) -> DirectiveResponse:
+    code = int(ExitCode.INVALID_COMMAND)
+    return DirectiveResponse(False, exit_code=code, error_description=problem)
 
 
 def _response(result: Any) -> DirectiveResponse:

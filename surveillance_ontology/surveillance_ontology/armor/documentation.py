@@ -1,0 +1,91 @@
+"""The part of the manual that follows from the table of directives: ``docs/armor.md``.
+
+    python -m surveillance_ontology.armor.documentation docs/armor.md
+
+rewrites what stands between the two marks of that file.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+
+from surveillance_ontology.armor import service  # noqa: F401 - fills the table
+from surveillance_ontology.armor.protocol import ExitCode
+from surveillance_ontology.armor.rendering import TYPES
+from surveillance_ontology.armor.table import TABLE, Kind
+
+BEGIN = '<!-- begin: written by surveillance_ontology.armor.documentation -->'
+END = '<!-- end -->'
+_TITLES = {
+    Kind.MANIPULATION: 'Manipulations',
+    Kind.CONTROL: 'Applying and reasoning',
+    Kind.QUERY: 'Queries',
+    Kind.UTILITY: 'References, files and logging',
+}
+_CODES = {
+    ExitCode.OK: 'done; also QUERY IND of an individual without a class (success is false)',
+    ExitCode.UNSUPPORTED_TYPE: 'a value type outside the table below; success is true for ADD and '
+    'REMOVE, false for REPLACE',
+    ExitCode.REFERENCE_BUSY: 'a change while another client is mounted',
+    ExitCode.NO_REFERENCE_NAME: 'no reference name, whatever the command',
+    ExitCode.NO_COMMAND: 'no command',
+    ExitCode.MOUNT_REFUSED: 'MOUNT while another client is mounted, or on an unknown reference',
+    ExitCode.NOT_IMPLEMENTED: 'defined by ARMOR, never sent',
+    ExitCode.INVALID_COMMAND: 'unknown command or reference; too few or wrong arguments; a file that '
+    'cannot be loaded or saved; the description says which',
+    ExitCode.SEVERAL_VALUES: 'raised by the client: one value was to be replaced and there are several',
+}
+
+
+def directives_text() -> str:
+    """The tables of directives, exit codes and value types, as Markdown."""
+    parts = []
+    for kind, title in _TITLES.items():
+        rows = [
+            (
+                f'`{directive.words}`' + ('' if directive.native else ' ★'),
+                directive.signature or '–',
+                directive.summary
+                + (f' *Differs from ARMOR 2.2: {directive.differs}*' if directive.differs else ''),
+            )
+            for directive in TABLE.values()
+            if directive.kind is kind
+        ]
+        parts.append(f'### {title}\n\n' + _table(('directive', 'arguments', 'what it does'), rows))
+    codes = [(str(int(code)), meaning) for code, meaning in _CODES.items()]
+    parts.append('### Exit codes\n\n' + _table(('code', 'when'), codes))
+    types = [(f'`{word}`', f'`xsd:{datatype}`') for word, datatype in TYPES.items()]
+    parts.append('### Value types\n\n' + _table(('type', 'stored as'), types))
+    return '\n\n'.join(parts)
+
+
+def updated(manual: str) -> str:
+    """The manual with the text between its marks written anew.
+
+    Raises:
+        ValueError: A mark is missing.
+    """
+    if BEGIN not in manual or END not in manual:
+        raise ValueError(f'expected the marks {BEGIN} and {END}')
+    head, _, rest = manual.partition(BEGIN)
+    _, _, tail = rest.partition(END)
+    return f'{head}{BEGIN}\n\n{directives_text()}\n\n{END}{tail}'
+
+
+def _table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
+    lines = [head, tuple('---' for _ in head), *rows]
+    return '\n'.join(
+        '| ' + ' | '.join(cell.replace('|', '\\|') for cell in row) + ' |' for row in lines
+    )
+
+
+def main() -> None:
+    """Rewrite the manual that the command line names."""
+    path = Path(sys.argv[1])
+    path.write_text(updated(path.read_text(encoding='utf-8')), encoding='utf-8')
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,194 @@
+"""SPARQL SELECT with a time limit that holds: queries run in processes that can be killed.
+
+The engine is Oxigraph (https://pyoxigraph.readthedocs.io), the fastest of those that were tried; a
+query in it cannot be interrupted, hence the processes. A process keeps its graph, so that further
+queries on an unchanged ontology cost no transfer.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import select
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+MEMORY = 2 * 1024**3
+"""Bytes that a query's process may use."""
+GRACE = 1.0
+"""Seconds that a process outlives its time limit when nobody kills it."""
+IDLE = 2
+"""Processes that are kept for the next query."""
+
+Version = tuple[int, int, bool]
+Graph = tuple[Version, bytes]
+
+
+@dataclass(frozen=True)
+class Binding:
+    """A variable's value in one row.
+
+    Attributes:
+        variable: Without the question mark.
+        value: An IRI, a blank node's label, or a literal's lexical form.
+        datatype: A literal's datatype; empty for anything else.
+        language: A literal's language tag, or empty.
+    """
+
+    variable: str
+    value: str
+    datatype: str
+    language: str
+
+
+class SparqlError(Exception):
+    """A query that cannot be answered: one line."""
+
+
+class SparqlTimeoutError(SparqlError):
+    """A query that was stopped at its time limit."""
+
+
+class SparqlEngine:
+    """Runs queries in processes of its own; threads may share it."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._idle: list[_Worker] = []
+
+    def select(
+        self, version: Version, graph: Callable[[], Graph], query: str, seconds: float, rows: int
+    ) -> list[list[Binding]]:
+        """Run a query.
+
+        Args:
+            version: Which graph; equal versions are the same graph.
+            graph: Makes the graph as N-Triples, of this version or a newer one, which it names;
+                called only when no process has this version.
+            query: A SELECT query.
+            seconds: Time limit, the transfer of the graph included.
+            rows: Most rows.
+
+        Raises:
+            SparqlTimeoutError: Stopped at the time limit.
+            SparqlError: Not a valid SELECT query, too many rows, too much memory.
+        """
+        deadline = time.monotonic() + seconds
+        worker = self._take(version)
+        try:
+            answer = worker.ask(version, graph, query, deadline, rows)
+        except BaseException:
+            worker.kill()
+            raise
+        with self._lock:
+            self._idle.append(worker)
+            surplus = self._idle[:-IDLE]
+            self._idle = self._idle[-IDLE:]
+        for other in surplus:
+            other.kill()
+        if 'error' in answer:
+            raise SparqlError(' '.join(str(answer['error']).split()))
+        return [[Binding(*bound) for bound in row] for row in answer['rows']]
+
+    def close(self) -> None:
+        """End the processes."""
+        with self._lock:
+            idle, self._idle = self._idle, []
+        for worker in idle:
+            worker.kill()
+
+    def _take(self, version: Version) -> _Worker:
+        with self._lock:
+            for worker in self._idle:
+                if worker.version == version:
+                    self._idle.remove(worker)
+                    return worker
+            if self._idle:
+                return self._idle.pop(0)
+        return _Worker()
+
+
+class _Worker:
+    def __init__(self) -> None:
+        self.version: Version | None = None
+        self._process = subprocess.Popen(
+            [sys.executable, '-m', 'surveillance_ontology.armor.sparql_worker', str(MEMORY)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            bufsize=0,
+        )
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._in = self._process.stdin.fileno()
+        self._out = self._process.stdout.fileno()
+        os.set_blocking(self._in, False)
+
+    def ask(
+        self,
+        version: Version,
+        graph: Callable[[], Graph],
+        query: str,
+        deadline: float,
+        rows: int,
+    ) -> Any:
+        known = version == self.version
+        version, payload = (version, b'') if known else graph()
+        self.version = None
+        request = {
+            'graph': None if known else len(payload),
+            'query': query,
+            'rows': rows,
+            'seconds': max(deadline - time.monotonic(), 0.0) + GRACE,
+        }
+        self._send(json.dumps(request).encode() + b'\n' + payload, deadline)
+        answer = json.loads(self._receive(deadline))
+        self.version = version
+        return answer
+
+    def kill(self) -> None:
+        """End the process at once."""
+        self._process.kill()
+        self._process.wait()
+        for pipe in (self._process.stdin, self._process.stdout):
+            with contextlib.suppress(OSError):
+                if pipe is not None:
+                    pipe.close()
+
+    def _send(self, data: bytes, deadline: float) -> None:
+        view = memoryview(data)
+        while view:
+            self._await(deadline, writing=True)
+            try:
+                view = view[os.write(self._in, view) :]
+            except BrokenPipeError:
+                raise SparqlError(self._why_ended()) from None
+
+    def _receive(self, deadline: float) -> bytes:
+        parts: list[bytes] = []
+        while not parts or not parts[-1].endswith(b'\n'):
+            self._await(deadline, writing=False)
+            part = os.read(self._out, 1 << 20)
+            if not part:
+                raise SparqlError(self._why_ended())
+            parts.append(part)
+        return b''.join(parts)
+
+    def _why_ended(self) -> str:
+        code = self._process.wait()
+        if code > 0:
+            return 'the query process could not start; pyoxigraph is needed'
+        return 'the query needs too much memory'
+
+    def _await(self, deadline: float, *, writing: bool) -> None:
+        remaining = deadline - time.monotonic()
+        descriptor = self._in if writing else self._out
+        reading, to_write = ([], [descriptor]) if writing else ([descriptor], [])
+        if remaining <= 0 or not any(select.select(reading, to_write, [], remaining)):
+            raise SparqlTimeoutError('the query ran into its time limit')

@@ -1,0 +1,123 @@
+"""The SPARQL directives."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from surveillance_ontology.armor.protocol import DirectiveError, DirectiveResponse
+from surveillance_ontology.armor.reference import Reference
+from surveillance_ontology.armor.rendering import shown
+from surveillance_ontology.armor.sparql import Binding, Graph, SparqlError, SparqlTimeoutError
+from surveillance_ontology.armor.table import query, text
+from surveillance_ontology.axioms import (
+    XSD,
+    Axiom,
+    Declaration,
+    EquivalentClasses,
+    SubClassOf,
+    entities_of,
+)
+from surveillance_ontology.owl_writing import ontology_bytes
+
+if TYPE_CHECKING:
+    from surveillance_ontology.armor.service import ArmorService
+
+_SUMMARY = (
+    'A SELECT query, whole or in three parts that are joined as they are (prefixes, select, '
+    'where), then optionally the longest time in milliseconds. '
+)
+_DIFFERS = (
+    'Derived facts are seen too, unless the parameter sparql_derived is off. A query that cannot '
+    'be run is no success and says why; one that is stopped has timeout set. Without a time the '
+    'parameter sparql_timeout holds, which no query exceeds.'
+)
+
+
+@query(
+    'QUERY SPARQL',
+    text('query'),
+    rest=1,
+    slow=True,
+    summary=_SUMMARY + 'All rows in one text: `{x=iri, v=5^^datatype}, {...}`.',
+    differs=_DIFFERS,
+)
+def _sparql(service: ArmorService, ref: Reference, *parts: str) -> DirectiveResponse:
+    rows = _select(service, ref, parts)
+    texts = [', '.join(f'{b.variable}={_value(b)}' for b in row) for row in rows]
+    return DirectiveResponse(queried_objects=[', '.join(f'{{{text}}}' for text in texts)])
+
+
+@query(
+    'QUERY SPARQL FORMATTED',
+    text('query'),
+    rest=1,
+    slow=True,
+    summary=_SUMMARY + 'The rows one after the other as pairs of variable and value.',
+    differs=_DIFFERS,
+)
+def _sparql_formatted(service: ArmorService, ref: Reference, *parts: str) -> DirectiveResponse:
+    rows = _select(service, ref, parts)
+    pairs = [(bound.variable, _value(bound)) for row in rows for bound in row]
+    return DirectiveResponse(sparql_queried_objects=pairs)
+
+
+def _value(bound: Binding) -> str:
+    if bound.language:
+        return f'{bound.value}@{bound.language}'
+    if bound.datatype in ('', XSD + 'string'):
+        return bound.value
+    return f'{bound.value}^^{bound.datatype}'
+
+
+def _select(service: ArmorService, ref: Reference, parts: tuple[str, ...]) -> list[list[Binding]]:
+    if len(parts) > 4:
+        raise DirectiveError(f'QUERY SPARQL: expected 1 to 4 arguments, got {len(parts)}')
+    *texts, last = parts if len(parts) in (2, 4) else (*parts, '0')
+    limit = service.settings.sparql_timeout
+    asked = _milliseconds(last) / 1000
+    seconds = min(asked, limit) if asked > 0 else limit
+    derived = service.settings.sparql_derived
+    try:
+        return service.sparql.select(
+            (ref.serial, ref.revision, derived),
+            lambda: _graph(ref, derived),
+            ''.join(texts),
+            seconds,
+            service.settings.sparql_rows,
+        )
+    except SparqlTimeoutError:
+        raise DirectiveError(
+            f'QUERY SPARQL: stopped after {seconds * 1000:g} ms', timeout=True
+        ) from None
+    except SparqlError as error:
+        raise DirectiveError(f'QUERY SPARQL: {error}') from None
+
+
+def _graph(ref: Reference, derived: bool) -> Graph:
+    with ref.lock:
+        version = (ref.serial, ref.revision, derived)
+        axioms: list[Axiom] = list(ref.kb.axioms())
+        if derived:
+            axioms += ref.kb.facts()
+            axioms += _hierarchy(axioms, ref)
+    return version, ontology_bytes(axioms, ref.kb.iri, 'ntriples')
+
+
+def _hierarchy(axioms: list[Axiom], ref: Reference) -> list[Axiom]:
+    classes = {
+        iri
+        for axiom in axioms
+        if isinstance(axiom, SubClassOf | EquivalentClasses | Declaration)
+        for kind, iri in entities_of(axiom)
+        if kind == 'class'
+    }
+    return [SubClassOf(sub, cls) for cls in sorted(classes) for sub in ref.kb.subclasses(cls)]
+
+
+def _milliseconds(text: str) -> int:
+    try:
+        return int(text)
+    except ValueError:
+        raise DirectiveError(
+            f'QUERY SPARQL: argument timeout {shown(text)}: expected whole milliseconds'
+        ) from None
