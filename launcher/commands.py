@@ -19,7 +19,7 @@ EXIT_INTERRUPTED = 130
 # Commands that belong to a package: module and function, which takes the arguments and returns
 # the exit code.
 PACKAGE_COMMANDS = {
-    'map': ('surveillance_simulation.map_command', 'check a place and draw it as a picture'),
+    'map': ('surveillance_behaviour.map_command', 'check a place and draw it as a picture'),
     'detect': ('surveillance_perception.detect_command', 'find markers in pictures'),
     'check-behaviour': (
         'surveillance_behaviour.check_command',

@@ -1,0 +1,281 @@
+"""A place as a picture: its rooms, walls, doors, markers and graph, and a run through it.
+
+The picture is drawn from the world alone; what a run added (the driven ways, how long each place
+waited) comes as `Run`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+from PIL import Image
+
+from surveillance_simulation import boxes
+from surveillance_simulation.canvas import Canvas, blend
+from surveillance_simulation.floor_plan import WALL_THICKNESS, Door, Marker
+from surveillance_simulation.world import World
+
+_PAPER, _INK, _SOFT = '#fbfaf7', '#2f3742', '#7d8794'
+_ROOM, _CORRIDOR, _HOME = '#f6ecd9', '#e3ebf3', '#dff0dc'
+_WALL, _LEAF, _CLOSED = '#3a4350', '#b08a57', '#c0392b'
+_GRAPH, _SIGN, _SIGN_HOME = '#7fa3c7', '#2c5d8f', '#2f8a4c'
+_DRIVEN, _CALM, _LATE = '#d4570f', '#f7f1e3', '#e8743b'
+_LONGEST_SIDE = 1180.0
+_PANEL = 250
+
+
+@dataclass(frozen=True)
+class Run:
+    """What a run adds to the picture of its place.
+
+    Attributes:
+        driven: The ways driven, each (n, 2) points in metres.
+        waits: Longest time each place went unvisited, seconds.
+        visits: How often each place was visited.
+        summary: One line about the whole run.
+    """
+
+    driven: Sequence[Sequence[Sequence[float]]] = ()
+    waits: Mapping[str, float] = field(default_factory=dict)
+    visits: Mapping[str, int] = field(default_factory=dict)
+    summary: str = ''
+
+
+def draw_place(world: World, title: str, facts: str, run: Run | None = None) -> Image.Image:
+    """Return the picture of a place.
+
+    Args:
+        world: The place; closed doors and obstacles are drawn as they are now.
+        title: Its name.
+        facts: One line about it.
+        run: A run through it, if there was one.
+    """
+    west, south, east, north = world.plan.bounds
+    scale = min(64.0, _LONGEST_SIDE / max(east - west, north - south))
+    right = _PANEL + 50 if run and run.waits else 40
+    # Wide enough for the words above and the signs below, however small the place is.
+    right += max(0, math.ceil(560 - (east - west) * scale))
+    canvas = Canvas(world.plan.bounds, scale, (40, 96, right, 86), _PAPER)
+    canvas.text((40, 22), title, 26, _INK)
+    canvas.text((40, 58), facts if run is None else run.summary, 15, _SOFT)
+    picture = _Picture(canvas, world)
+    picture.floors(run)
+    if run is None:
+        picture.graph()
+    picture.walls()
+    picture.doors()
+    picture.markers()
+    picture.obstacles()
+    if run is not None:
+        canvas.traces(run.driven, _DRIVEN, max(1.5, scale / 26), 0.34)
+    picture.station()
+    picture.signs()
+    picture.legend(run)
+    if run is not None and run.waits:
+        picture.waits(run)
+    return canvas.finished()
+
+
+class _Picture:
+    def __init__(self, canvas: Canvas, world: World) -> None:
+        self._canvas = canvas
+        self._world = world
+        self._plan = world.plan
+        self._place = world.plan.place
+        self._size = min(15.0, max(9.0, canvas.scale / 3.4))
+
+    def floors(self, run: Run | None) -> None:
+        grid, masks = self._world.regions()
+        longest = max(run.waits.values(), default=0.0) if run else 0.0
+        for name, mask in masks.items():
+            colour = self._floor_colour(name)
+            if run is not None and longest > 0:
+                colour = blend(_CALM, _LATE, run.waits.get(name, 0.0) / longest)
+            outlines = cv2.findContours(
+                mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE
+            )[0]
+            for outline in outlines:
+                cells = outline.reshape(-1, 2)
+                if len(cells) < 3:
+                    continue
+                edge = [grid.centre_of(int(row), int(column)) for column, row in cells]
+                self._canvas.polygon(edge, colour)
+                # The outline runs through the middles of the outermost cells.
+                width = 2 * grid.resolution * self._canvas.scale
+                self._canvas.line([*edge, edge[0]], colour, width)
+
+    def _floor_colour(self, name: str) -> str:
+        if name in self._place.recharge_rooms:
+            return _HOME
+        return _CORRIDOR if len(self._place.rooms[name]) > 1 else _ROOM
+
+    def walls(self) -> None:
+        solid = boxes.boxes_around(self._plan.wall_pieces(), WALL_THICKNESS)
+        solid[:, 5] = max(WALL_THICKNESS / 2, 1.6 / self._canvas.scale)
+        jambs = {end for door in self._plan.doors.values() for end in door.ends}
+        for box, ends in zip(solid, self._plan.wall_pieces(), strict=True):
+            # Corners are filled, doorways keep their width.
+            grown = box.copy()
+            if not any(math.dist(end, jamb) < 1e-3 for end in ends for jamb in jambs):
+                grown[4] += box[5]
+            self._canvas.polygon(boxes.corners(grown[None])[0].tolist(), _WALL)
+        for wall in self._plan.walls.values():
+            for end in (wall.start, wall.end):
+                half = float(solid[0, 5])
+                corner = np.array([[*end, 1.0, 0.0, half, half]])
+                self._canvas.polygon(boxes.corners(corner)[0].tolist(), _WALL)
+
+    def doors(self) -> None:
+        for door in self._plan.doors.values():
+            thin = max(1.0, self._canvas.scale / 40)
+            first, last = door.ends
+            if not self._world.is_open(door.name):
+                self._canvas.line([first, last], _CLOSED, thin * 3)
+            else:
+                start = door.yaw + (0.0 if self._swings_left(door) else -math.pi / 2)
+                open_at = door.yaw + (math.pi / 2 if self._swings_left(door) else -math.pi / 2)
+                tip = (
+                    first[0] + door.width * math.cos(open_at),
+                    first[1] + door.width * math.sin(open_at),
+                )
+                self._canvas.arc(first, door.width, start, start + math.pi / 2, _LEAF, thin * 0.7)
+                self._canvas.line([first, tip], _LEAF, thin * 1.8)
+            if self._canvas.scale > 20:
+                x, y = self._canvas.at((door.x, door.y))
+                side = -1.0 if self._swings_left(door) else 1.0
+                away, along = self._size * 0.85, self._canvas.scale * door.width * 0.31
+                # Beside the middle, where the way leads through.
+                at = (
+                    x - side * away * math.sin(door.yaw) + along * math.cos(door.yaw),
+                    y - side * away * math.cos(door.yaw) - along * math.sin(door.yaw),
+                )
+                self._canvas.text(at, door.name, self._size * 0.78, _SOFT, anchor='mm')
+
+    def _swings_left(self, door: Door) -> bool:
+        """Whether the leaf opens to the left of the door's direction: into the smaller place."""
+        left, right = (
+            self._world.place_at(
+                door.x - side * 0.2 * math.sin(door.yaw), door.y + side * 0.2 * math.cos(door.yaw)
+            )
+            for side in (1.0, -1.0)
+        )
+        doors = self._place.rooms
+        return len(doors.get(left or '', ())) <= len(doors.get(right or '', ()))
+
+    def graph(self) -> None:
+        for name, (first, second) in self._place.doors.items():
+            door = self._plan.doors[name]
+            way = [
+                self._place.positions[first][:2],
+                (door.x, door.y),
+                self._place.positions[second][:2],
+            ]
+            self._canvas.line(way, _GRAPH, max(1.2, self._canvas.scale / 30), dash=(6, 4))
+
+    def markers(self) -> None:
+        for panel in self._world.panels.values():
+            self._marker(panel.marker)
+
+    def _marker(self, marker: Marker) -> None:
+        side = max(4.0, self._canvas.scale * 0.09)
+        x, y = self._canvas.at((marker.x, marker.y))
+        x += side * math.cos(marker.yaw)
+        y -= side * math.sin(marker.yaw)
+        self._canvas.box(x - side, y - side, x + side, y + side, _INK)
+        self._canvas.box(x - side * 0.4, y - side * 0.4, x + side * 0.4, y + side * 0.4, _PAPER)
+        away = side + self._size * 0.9
+        at = (x + away * math.cos(marker.yaw), y - away * math.sin(marker.yaw))
+        self._canvas.text(at, str(marker.id), self._size * 0.8, _INK, anchor='mm')
+
+    def obstacles(self) -> None:
+        for obstacle in self._world.obstacles.values():
+            radius = obstacle.radius * self._canvas.scale
+            self._canvas.disc((obstacle.x, obstacle.y), radius, _CLOSED)
+
+    def station(self) -> None:
+        x, y, _ = self._plan.station
+        radius = max(9.0, self._canvas.scale * 0.24)
+        # Below the sign of the place, which stands at the same point.
+        self._bolt(*self._canvas.at((x, y - (radius + self._size * 1.5) / self._canvas.scale)))
+
+    def _bolt(self, x: float, y: float) -> None:
+        radius = max(8.0, min(14.0, self._canvas.scale * 0.24))
+        west, north = self._canvas.at((0.0, 0.0))
+        point = ((x - west) / self._canvas.scale, (north - y) / self._canvas.scale)
+        self._canvas.disc(point, radius, _SIGN_HOME)
+        shape = [(0.15, 0.7), (-0.42, -0.1), (-0.05, -0.1), (-0.15, -0.7), (0.42, 0.1), (0.05, 0.1)]
+        unit = radius / self._canvas.scale
+        self._canvas.polygon(
+            [(point[0] + a * unit, point[1] + b * unit) for a, b in shape], 'white'
+        )
+
+    def signs(self) -> None:
+        for name, (x, y, _) in self._place.positions.items():
+            colour = _SIGN_HOME if name in self._place.recharge_rooms else _SIGN
+            self._canvas.pill(self._canvas.at((x, y)), name, self._size, colour)
+
+    def legend(self, run: Run | None) -> None:
+        canvas = self._canvas
+        y = canvas.size[1] - 34.0
+        length = 1.0 if canvas.scale > 90 else 2.0 if canvas.scale > 30 else 5.0
+        canvas.box(40, y - 1.5, 40 + length * canvas.scale, y + 1.5, _INK)
+        for x in (40.0, 40 + length * canvas.scale):
+            canvas.box(x - 1, y - 5, x + 1, y + 5, _INK)
+        canvas.text((40, y + 8), f'{length:g} m', 12, _SOFT)
+        x = 40 + max(length * canvas.scale, 40) + 40
+        entries = [(_ROOM, 'room'), (_CORRIDOR, 'corridor'), (_HOME, 'charging station')]
+        if run is not None and run.waits:
+            entries = [(_CALM, 'visited often'), (_LATE, 'waited longest')]
+        for colour, text in entries:
+            canvas.box(x, y - 8, x + 16, y + 8, _SOFT)
+            canvas.box(x + 1, y - 7, x + 15, y + 7, colour)
+            x += self._word(x + 22, y, text) + 40
+        if run is None:
+            self._stroke(x, y, _GRAPH, dashed=True)
+            x += self._word(x + 28, y, 'way between places') + 46
+        elif run.driven:
+            self._stroke(x, y, _DRIVEN, dashed=False)
+            x += self._word(x + 28, y, 'driven') + 46
+        if self._world.panels:
+            canvas.box(x, y - 6, x + 12, y + 6, _INK)
+            canvas.box(x + 3.5, y - 2.5, x + 8.5, y + 2.5, _PAPER)
+            self._word(x + 20, y, 'marker')
+
+    def _word(self, x: float, y: float, text: str) -> float:
+        self._canvas.text((x, y), text, 13, _INK, anchor='lm')
+        return self._canvas.text_width(text, 13)
+
+    def _stroke(self, x: float, y: float, colour: str, *, dashed: bool) -> None:
+        for start in (0, 8, 16) if dashed else (0, 6, 12, 18):
+            self._canvas.box(x + start, y - 1.2, x + start + 6, y + 1.2, colour)
+
+    def waits(self, run: Run) -> None:
+        canvas = self._canvas
+        left = canvas.at((self._plan.bounds[2], 0.0))[0] + 34.0
+        top, bottom = 96.0, canvas.size[1] - 60.0
+        canvas.text((left, top - 6), 'longest wait', 14, _INK)
+        canvas.text((left + _PANEL - 16, top - 6), 'visits', 14, _INK, anchor='ra')
+        ranked = sorted(run.waits, key=lambda name: -run.waits[name])
+        step = min(30.0, (bottom - top - 24) / max(1, len(ranked)))
+        size = min(14.0, max(7.0, step * 0.62))
+        longest = max(run.waits.values())
+        room = _PANEL - 150
+        for number, name in enumerate(ranked):
+            y = top + 24 + (number + 0.5) * step
+            share = run.waits[name] / longest if longest else 0.0
+            canvas.text((left, y), name, size, _INK, anchor='lm')
+            canvas.box(
+                left + 44,
+                y - step * 0.3,
+                left + 44 + max(2.0, room * share),
+                y + step * 0.3,
+                blend(_CALM, _LATE, 0.25 + 0.75 * share),
+            )
+            words = f'{run.waits[name]:.0f} s'
+            canvas.text((left + 50 + room * share, y), words, size, _SOFT, anchor='lm')
+            visits = str(run.visits.get(name, 0))
+            canvas.text((left + _PANEL - 16, y), visits, size, _SOFT, anchor='rm')
