@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
+from surveillance_ontology.axiom_text import axiom_text
 from surveillance_ontology.axioms import (
     THING,
     Assertion,
@@ -33,7 +34,12 @@ from surveillance_ontology.axioms import (
     roles_of,
 )
 from surveillance_ontology.explanation import Explanation
+from surveillance_ontology.reasoner.clauses import Fact as StoredFact
+from surveillance_ontology.reasoner.clauses import Predicate
 from surveillance_ontology.reasoner.engine import Engine
+from surveillance_ontology.reasoner.reasons import Reasons
+from surveillance_ontology.reasoner.schema import Schema
+from surveillance_ontology.reasoner.view import FactView, is_public
 
 Fact: TypeAlias = ClassAssertion | ObjectPropertyAssertion | DataPropertyAssertion | SameIndividual
 
@@ -71,13 +77,18 @@ class KnowledgeBase:
         self.iri = iri
         self._axioms: dict[Axiom, None] = {}
         self._about: dict[str, dict[Axiom, None]] = {}
-        self._added: dict[Assertion, None] = {}
-        self._removed: dict[Assertion, None] = {}
+        self._added: dict[Axiom, None] = {}
+        self._removed: dict[Axiom, None] = {}
         self._engine: Engine | None = None
         self._schema_changed = True
         self._consistent = True
         self._subscribers: list[Callable[[Changes], None]] = []
         self._sequence = 0
+        self._schema: Schema | None = None
+        self._told_consistent = True
+        self._snapshots: dict[str, frozenset[str]] = {}
+        self._watched: set[Predicate] = set()
+        self._literals: dict[tuple[str, str], dict[Literal, None]] = {}
         for axiom in axioms:
             self._assert(axiom)
 
@@ -117,7 +128,9 @@ class KnowledgeBase:
                 self._about[entity] = {axiom: None}
             else:
                 mentions[axiom] = None
-        if isinstance(axiom, Assertion):
+        if type(axiom) is DataPropertyAssertion:
+            self._literals.setdefault((axiom.prop, axiom.subject), {})[axiom.literal] = None
+        if _is_assertion(axiom):
             if axiom in self._removed:
                 del self._removed[axiom]
             else:
@@ -136,7 +149,12 @@ class KnowledgeBase:
                 mentions.pop(axiom, None)
                 if not mentions:
                     del self._about[entity]
-        if isinstance(axiom, Assertion):
+        if type(axiom) is DataPropertyAssertion:
+            written = self._literals[axiom.prop, axiom.subject]
+            del written[axiom.literal]
+            if not written:
+                del self._literals[axiom.prop, axiom.subject]
+        if _is_assertion(axiom):
             if axiom in self._added:
                 del self._added[axiom]
             else:
@@ -199,7 +217,85 @@ class KnowledgeBase:
 
     def reason(self) -> bool:
         """Brings what is derived up to date; whether the ontology is consistent."""
-        raise NotImplementedError
+        engine = self._engine
+        if engine is None or self._schema_changed or not self._fits(engine):
+            before = set(self._visible()) if self._subscribers else set()
+            engine = self._rebuild()
+            if self._subscribers:
+                after = set(self._visible())
+                self._report(after - before, before - after)
+        elif self._added or self._removed:
+            self._update(engine)
+        return self._consistent
+
+    def _fits(self, engine: Engine) -> bool:
+        """Whether the program knows every complex class and negated property that was added."""
+        return all(engine.understands(axiom) for axiom in self._added)
+
+    def _rebuild(self) -> Engine:
+        axioms = tuple(self._axioms)
+        assertions = [axiom for axiom in axioms if _is_assertion(axiom)]
+        self._schema = Schema(axioms, *Engine.needs_of(assertions))
+        engine = self._engine = Engine(self._schema.program, lambda name: self._about.get(name, ()))
+        self._schema_changed = False
+        self._added.clear()
+        self._removed.clear()
+        engine.update(assertions, ())
+        self._consistent = engine.consistent
+        self._snapshots.clear()
+        self._watched.clear()
+        return engine
+
+    def _update(self, engine: Engine) -> None:
+        added, removed = tuple(self._added), tuple(self._removed)
+        self._added.clear()
+        self._removed.clear()
+        if not self._subscribers:
+            engine.update(added, removed)
+            self._consistent = engine.consistent
+            return
+        view = FactView(engine)
+        wholly = not self._consistent or bool(engine.equality.members)
+        before = set(self._visible()) if wholly else set()
+        log: dict[StoredFact, bool] = {}
+        engine.changed, engine.renamed = log, False
+        engine.update(added, removed)
+        engine.changed = None
+        self._consistent = engine.consistent
+        if wholly or engine.renamed or not engine.consistent:
+            if not wholly:
+                before = self._before(engine, view, log)
+            after = set(self._visible())
+            self._report(after - before, before - after)
+            return
+        come: list[Axiom] = []
+        gone: list[Axiom] = []
+        for fact, was_derived in log.items():
+            if is_public(fact[0]):
+                is_derived = fact[0].holds(fact) and fact not in engine.asserted
+                if is_derived and not was_derived:
+                    come += view.public(fact, {})
+                elif was_derived and not is_derived:
+                    gone += view.public(fact, {})
+        self._report(come, gone)
+
+    def _visible(self) -> Iterator[Axiom]:
+        """Derived facts that queries show."""
+        if self._engine is not None and self._consistent:
+            yield from FactView(self._engine).derived()
+
+    def _before(self, engine: Engine, view: FactView, log: dict[StoredFact, bool]) -> set[Axiom]:
+        """The derived facts before an update that began with every individual under its own name."""
+        now = {fact for fact in view.stored() if fact not in engine.asserted and fact not in log}
+        now.update(fact for fact, was_derived in log.items() if was_derived)
+        return {axiom for fact in now if is_public(fact[0]) for axiom in view.public(fact, {})}
+
+    def _report(self, come: Iterable[Axiom], gone: Iterable[Axiom]) -> None:
+        added = tuple((axiom, True) for axiom in come)
+        removed = tuple((axiom, True) for axiom in gone)
+        if added or removed or self._told_consistent != self._consistent:
+            self._told_consistent = self._consistent
+            self._publish(added, removed)
 
     def recompute(self) -> bool:
         """Forgets what is derived and derives it again from nothing; whether the ontology is consistent."""
@@ -218,42 +314,160 @@ class KnowledgeBase:
 
     @property
     def unsupported(self) -> tuple[str, ...]:
-        """One sentence for each asserted axiom (or part) that the reasoner does not use."""
-        raise NotImplementedError
+        """One sentence for each asserted axiom (or part) that the reasoner does not use, as of `reason`."""
+        return () if self._schema is None else tuple(self._schema.program.unsupported)
 
     # --- queries ---
 
-    def instances(self, cls: str) -> set[str]:
+    @property
+    def _usable(self) -> Engine | None:
+        """The engine, where what it derived may be shown."""
+        return self._engine if self._consistent else None
+
+    def instances(self, cls: str) -> frozenset[str]:
         """Individuals of a class, direct and indirect."""
-        raise NotImplementedError
+        pending = self._added or self._removed
+        if not pending and cls in self._snapshots and self._consistent:
+            return self._snapshots[cls]
+        engine = self._usable
+        if engine is None:
+            return frozenset(
+                axiom.individual
+                for axiom in self._about.get(cls, ())
+                if isinstance(axiom, ClassAssertion) and axiom.cls == cls
+            )
+        if cls == THING:
+            return frozenset(name for name in self._about if self.is_known('individual', name))
+        known = engine.program.classes.get(cls)
+        if known is None:
+            found = frozenset[str]()
+        else:
+            found = frozenset(known.members)
+            if engine.equality.members:
+                found = frozenset(name for one in found for name in engine.equality.same(one))
+        if not pending:
+            if known is not None and not engine.equality.members:
+                self._keep_snapshot(known, found)
+            return found
+        gone = {
+            a.individual for a in self._removed if isinstance(a, ClassAssertion) and a.cls == cls
+        }
+        come = {a.individual for a in self._added if isinstance(a, ClassAssertion) and a.cls == cls}
+        return (found - gone) | come
+
+    def _keep_snapshot(self, predicate: Predicate, members: frozenset[str]) -> None:
+        """Remembers the instances until one comes or goes."""
+        cls, snapshots = predicate.name, self._snapshots
+
+        def forget(_: str) -> None:
+            snapshots.pop(cls, None)
+
+        if predicate not in self._watched:
+            self._watched.add(predicate)
+            predicate.on_insert.append(forget)
+            predicate.on_delete.append(forget)
+        snapshots[cls] = members
 
     def types(self, individual: str) -> set[str]:
         """Named classes of an individual, direct and indirect, without owl:Thing."""
-        raise NotImplementedError
+        about = [a for a in self._about.get(individual, ()) if isinstance(a, ClassAssertion)]
+        found = {a.cls for a in about if isinstance(a.cls, str) and a.individual == individual}
+        engine = self._usable
+        if engine is not None:
+            representative = engine.equality.find(individual)
+            gone = {a.cls for a in self._removed if isinstance(a, ClassAssertion)} & {
+                a.cls
+                for a in self._removed
+                if isinstance(a, ClassAssertion) and a.individual == individual
+            }
+            for cls, predicate in engine.program.classes.items():
+                if representative in predicate.members and cls not in gone:
+                    found.add(cls)
+        found.discard(THING)
+        return found
 
     def subclasses(self, cls: str) -> set[str]:
         """Named classes strictly below, direct and indirect, as of the last `reason`."""
-        raise NotImplementedError
+        if self._schema is None:
+            return set()
+        if cls == THING:
+            return self._schema.classes()
+        return self._schema.subclasses(cls)
 
     def superclasses(self, cls: str) -> set[str]:
         """Named classes strictly above, direct and indirect, as of the last `reason`."""
-        raise NotImplementedError
+        return set() if self._schema is None else self._schema.superclasses(cls)
 
     def object_values(self, prop: str, individual: str) -> set[str]:
         """What an individual is related to by an object property."""
-        raise NotImplementedError
+        engine = self._usable
+        known = None if engine is None else engine.program.objects.get(prop)
+        if engine is None or known is None or self._added:
+            found = {
+                axiom.object
+                for axiom in self._about.get(individual, ())
+                if type(axiom) is ObjectPropertyAssertion
+                and axiom.prop == prop
+                and axiom.subject == individual
+            }
+            if engine is None or known is None:
+                return found
+        else:
+            found = set()
+        if engine.equality.members:
+            representative = engine.equality.find(individual)
+            for value in known.succ.get(representative, ()):
+                found.update(engine.equality.same(value))
+        else:
+            found.update(known.succ.get(individual, ()))
+        for axiom in self._removed:
+            if type(axiom) is ObjectPropertyAssertion and axiom.prop == prop:
+                if axiom.subject == individual:
+                    found.discard(axiom.object)
+        return found
 
     def data_values(self, prop: str, individual: str) -> set[Literal]:
         """Values of a data property: asserted ones as written, derived ones in one form for each value."""
-        raise NotImplementedError
+        engine = self._usable
+        if engine is None:
+            return set(self._literals.get((prop, individual), ()))
+        found: set[Literal] = set()
+        for name in engine.equality.same(individual):
+            found.update(self._literals.get((prop, name), ()))
+        known = engine.program.datas.get(prop)
+        if known is None:
+            return found
+        representative = engine.equality.find(individual)
+        stored = known.succ.get(representative)
+        if stored:
+            covered = {engine.value(literal) for literal in found}
+            view = FactView(engine)
+            for value in stored:
+                if value not in covered and (known, representative, value) not in engine.asserted:
+                    found.add(view.literal(value))
+        return found
 
     def object_properties_of(self, individual: str) -> set[str]:
         """Object properties with at least one value for the individual."""
-        raise NotImplementedError
+        names = {
+            axiom.prop
+            for axiom in self._about.get(individual, ())
+            if isinstance(axiom, ObjectPropertyAssertion)
+        }
+        if self._engine is not None:
+            names.update(self._engine.program.objects)
+        return {name for name in names if self.object_values(name, individual)}
 
     def data_properties_of(self, individual: str) -> set[str]:
         """Data properties with at least one value for the individual."""
-        raise NotImplementedError
+        names = {
+            axiom.prop
+            for axiom in self._about.get(individual, ())
+            if isinstance(axiom, DataPropertyAssertion)
+        }
+        if self._engine is not None:
+            names.update(self._engine.program.datas)
+        return {name for name in names if self.data_values(name, individual)}
 
     def equivalents(self, cls: str) -> list[ClassExpression]:
         """The other sides of the asserted equivalences that have the class as one side."""
@@ -267,15 +481,39 @@ class KnowledgeBase:
 
     def facts(self, derived: bool = True) -> Iterator[Fact]:
         """Every fact about individuals; the asserted ones alone when `derived` is False."""
-        raise NotImplementedError
+        stated = (ClassAssertion, ObjectPropertyAssertion, DataPropertyAssertion, SameIndividual)
+        for axiom in tuple(self._axioms):
+            if isinstance(axiom, stated):
+                yield axiom
+        if derived:
+            for axiom in self._visible():
+                if axiom not in self._removed and axiom not in self._axioms:
+                    yield axiom  # type: ignore[misc]
 
     def explain(self, fact: Axiom) -> Explanation | None:
-        """Why a fact holds; None when it is neither asserted nor derived."""
-        raise NotImplementedError
+        """Why a fact holds; None when it is neither asserted nor derived.
+
+        A fact is a class, property, same- or different-individuals assertion, or a subclass axiom between
+        named classes.
+        """
+        if fact in self._axioms:
+            return Explanation(axiom_text(fact), 'asserted')
+        engine = self._usable
+        if engine is None or fact in self._removed:
+            return None
+        if isinstance(fact, SubClassOf):
+            if fact.sup in self.superclasses(str(fact.sub)):
+                return Explanation(axiom_text(fact), 'axiom', 'the class hierarchy')
+            return None
+        if not engine.understands(fact):
+            return None
+        return Reasons(engine).of_fact(fact)
 
     def explain_inconsistency(self) -> Explanation | None:
         """Why the ontology contradicts itself; None when the last `reason` found no contradiction."""
-        raise NotImplementedError
+        if self._engine is None or self._consistent:
+            return None
+        return Reasons(self._engine).of_inconsistency()
 
     # --- changes ---
 
@@ -315,6 +553,13 @@ def _mentioned(axiom: Axiom) -> Iterable[str]:
     if kind is DifferentIndividuals or kind is SameIndividual:
         return axiom.individuals  # type: ignore[attr-defined, no-any-return]
     return {iri for _, iri in entities_of(axiom)}
+
+
+def _is_assertion(axiom: Axiom) -> bool:
+    """Whether an axiom is about individuals; the declaration of one is."""
+    if isinstance(axiom, Declaration):
+        return axiom.kind == 'individual'
+    return isinstance(axiom, Assertion)
 
 
 def _is_schema(axiom: Axiom) -> bool:

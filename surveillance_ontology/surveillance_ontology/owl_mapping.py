@@ -122,7 +122,9 @@ class Mapping:
         items = self._list(head)
         for item in items:
             if not isinstance(item, str):
-                raise self._fail(str(head), f'expected resources in a list, got the literal {item.lexical!r}')
+                raise self._fail(
+                    str(head), f'expected resources in a list, got the literal {item.lexical!r}'
+                )
         return items  # type: ignore[return-value]
 
     def _property(self, node: str) -> ax.PropertyExpression:
@@ -154,7 +156,9 @@ class Mapping:
             number = -1
         if number < 0:
             shown = value.lexical if isinstance(value, Literal) else value
-            raise self._fail(node, f'expected a whole number as {local_name(predicate)}, got {shown!r}')
+            raise self._fail(
+                node, f'expected a whole number as {local_name(predicate)}, got {shown!r}'
+            )
         return number
 
     def data_range(self, node: Node) -> ax.DataRange:
@@ -373,7 +377,9 @@ class Mapping:
         elif 'annotation_property' not in self._kinds.get(subject, ()):
             self._add(ax.SubObjectPropertyOf(self._property(subject), self._property(value)))
         else:
-            self._report(subject, f'annotation property {subject} below {value} has no meaning here')
+            self._report(
+                subject, f'annotation property {subject} below {value} has no meaning here'
+            )
 
     def _chain(self, subject: str, value: Node) -> None:
         chain = tuple(self._property(item) for item in self._resources(value))
@@ -462,8 +468,12 @@ class Mapping:
         self._report(node, 'an annotation on an axiom is not kept')
 
     def _rule(self, node: str, properties: dict[str, list[Node]]) -> None:
-        body = tuple(map(self._atom, self._resources(self._one(node, SWRL + 'body') or RDF + 'nil')))
-        head = tuple(map(self._atom, self._resources(self._one(node, SWRL + 'head') or RDF + 'nil')))
+        body = tuple(
+            map(self._atom, self._resources(self._one(node, SWRL + 'body') or RDF + 'nil'))
+        )
+        head = tuple(
+            map(self._atom, self._resources(self._one(node, SWRL + 'head') or RDF + 'nil'))
+        )
         annotations = tuple(
             (predicate, value)
             for predicate, values in properties.items()

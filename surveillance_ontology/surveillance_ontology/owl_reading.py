@@ -67,7 +67,11 @@ def read_ontology(
         raise OntologyFileError(name, 0, 0, f'larger than the limit of {size_limit} bytes')
     start = data.lstrip(b'\xef\xbb\xbf \t\r\n')
     try:
-        if start.startswith(b'<') and start[1:2] not in b'hu' or start[:2] in (b'\xff\xfe', b'\xfe\xff'):
+        if (
+            start.startswith(b'<')
+            and start[1:2] not in b'hu'
+            or start[:2] in (b'\xff\xfe', b'\xfe\xff')
+        ):
             graph, form = parse_rdf_xml(data, iri), 'rdfxml'
         elif not start:
             raise RdfSyntaxError('the document is empty', 1, 1)

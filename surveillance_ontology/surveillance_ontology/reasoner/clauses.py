@@ -1,0 +1,292 @@
+"""What axioms become: predicates that hold facts, and Horn clauses over them.
+
+A fact is a tuple that begins with its predicate: `(C, x)`, `(R, x, y)`, `(D, x, value)`. Individuals are IRIs
+(`str`), each standing for all individuals known to be the same; values are those of `datatypes`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+from typing import Any, TypeAlias
+
+from surveillance_ontology.axioms import Axiom, ClassExpression, PropertyExpression
+from surveillance_ontology.reasoner.datatypes import Test, Value
+
+Fact: TypeAlias = 'tuple[Any, ...]'
+Premises: TypeAlias = 'tuple[Fact, ...]'
+Support: TypeAlias = Callable[..., Iterable[Premises]]
+
+
+class Predicate:
+    """The extension of one class, property or internal label, and what to do when it changes.
+
+    Attributes:
+        kind: 'class', 'object', 'data' or 'different'.
+        name: IRI, or for an internal label a text that shows the expression.
+        expression: The class expression or property the predicate stands for.
+        members: Individuals (kind 'class').
+        succ, pred: Values by subject and subjects by value (the other kinds).
+        on_insert, on_delete: Called with a fact's arguments after it came, before it goes.
+        supports: Pairs of a generator of premise tuples for given arguments and the origin to name.
+        disjoint: Predicates that share no member with this one (kind 'class').
+        touching: Positions (1, 2) whose individuals may become different from others by a fact of this predicate.
+    """
+
+    __slots__ = (
+        'disjoint',
+        'early',
+        'expression',
+        'kind',
+        'members',
+        'name',
+        'on_delete',
+        'on_insert',
+        'pred',
+        'succ',
+        'supports',
+        'touching',
+    )
+
+    def __init__(self, kind: str, name: str, expression: Any = None) -> None:
+        self.kind = kind
+        self.name = name
+        self.expression = expression
+        self.members: set[str] = set()
+        self.succ: dict[str, set[Any]] = {}
+        self.pred: dict[Any, set[str]] = {}
+        self.on_insert: list[Callable[..., None]] = []
+        self.on_delete: list[Callable[..., None]] = []
+        self.early: list[Callable[..., None]] = []
+        self.supports: list[tuple[Support, object]] = []
+        self.disjoint: set[Predicate] = set()
+        self.touching: tuple[int, ...] = ()
+
+    def __repr__(self) -> str:
+        return f'<{self.kind} {self.name}>'
+
+    def clear(self) -> None:
+        """Empties the extension, in place: compiled joins hold on to the containers."""
+        self.members.clear()
+        self.succ.clear()
+        self.pred.clear()
+
+    def holds(self, fact: Fact) -> bool:
+        """Whether a fact of this predicate is in its extension."""
+        if len(fact) == 2:
+            return fact[1] in self.members
+        values = self.succ.get(fact[1])
+        return values is not None and fact[2] in values
+
+    def insert(self, fact: Fact) -> None:
+        """Adds a fact that is not there."""
+        if len(fact) == 2:
+            self.members.add(fact[1])
+            return
+        _, x, y = fact
+        values = self.succ.get(x)
+        if values is None:
+            self.succ[x] = {y}
+        else:
+            values.add(y)
+        subjects = self.pred.get(y)
+        if subjects is None:
+            self.pred[y] = {x}
+        else:
+            subjects.add(x)
+
+    def discard(self, fact: Fact) -> None:
+        """Takes away a fact that is there."""
+        if len(fact) == 2:
+            self.members.discard(fact[1])
+            return
+        _, x, y = fact
+        values = self.succ[x]
+        values.discard(y)
+        if not values:
+            del self.succ[x]
+        subjects = self.pred[y]
+        subjects.discard(x)
+        if not subjects:
+            del self.pred[y]
+
+    def facts(self) -> Iterator[Fact]:
+        """The whole extension."""
+        if self.kind == 'class':
+            for x in self.members:
+                yield self, x
+        else:
+            for x, values in self.succ.items():
+                for y in values:
+                    yield self, x, y
+
+
+@dataclass(frozen=True, slots=True)
+class Constant:
+    """A fixed individual, or a fixed value, in a clause; a variable is an `int`."""
+
+    value: Value
+    is_value: bool = False
+
+
+Term: TypeAlias = int | Constant
+
+
+@dataclass(frozen=True, slots=True)
+class PredicateAtom:
+    predicate: Predicate
+    terms: tuple[Term, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class DifferentAtom:
+    terms: tuple[Term, Term]
+
+
+@dataclass(frozen=True, slots=True)
+class SameAtom:
+    terms: tuple[Term, Term]
+
+
+@dataclass(frozen=True, slots=True)
+class RangeAtom:
+    test: Test
+    terms: tuple[Term]
+
+
+@dataclass(frozen=True, slots=True)
+class ComputedAtom:
+    """A built-in: `builtin` is its local name, the first term may be unbound where `solve` is given."""
+
+    builtin: str
+    holds: Callable[..., bool]
+    solve: Callable[..., Iterable[Value]] | None
+    terms: tuple[Term, ...]
+
+
+BodyAtom: TypeAlias = PredicateAtom | DifferentAtom | SameAtom | RangeAtom | ComputedAtom
+HeadAtom: TypeAlias = PredicateAtom | SameAtom
+
+
+@dataclass(frozen=True, slots=True)
+class Clause:
+    """If the whole body holds, the head does. `origin` is the axiom to name in an explanation."""
+
+    body: tuple[BodyAtom, ...]
+    head: HeadAtom
+    origin: Axiom | None = field(default=None, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class AtLeast:
+    """`head` holds of what has `n` pairwise different related individuals (values) in the filler.
+
+    `inverse` counts along the property backwards; `filler` None admits every individual.
+    """
+
+    head: Predicate
+    n: int
+    prop: Predicate
+    inverse: bool
+    filler: Predicate | Test | None
+    origin: Axiom | None = field(default=None, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class AtMost:
+    """What `label` holds of (None: everything) has at most `n` related individuals (values) in the filler."""
+
+    label: Predicate | None
+    n: int
+    prop: Predicate
+    inverse: bool
+    filler: Predicate | Test | None
+    origin: Axiom | None = field(default=None, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Key:
+    """Members of `cls` that share a value of every property are the same individual."""
+
+    cls: Predicate | None
+    props: tuple[tuple[Predicate, bool], ...]
+    origin: Axiom | None = field(default=None, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Existential:
+    """What `label` holds of has at least `n` related individuals (or a value) in the filler, known or not."""
+
+    label: Predicate
+    n: int
+    prop: Predicate
+    inverse: bool
+    filler: ClassExpression | object
+
+
+@dataclass
+class Program:
+    """Everything the engine runs.
+
+    Attributes:
+        classes, objects, datas: Predicates by IRI.
+        labels: Predicates of complex class expressions that individuals may be asserted to belong to.
+        thing, nothing, different: The predicates with fixed meaning.
+        uses_thing: Whether the extension of owl:Thing must be kept.
+    """
+
+    classes: dict[str, Predicate] = field(default_factory=dict)
+    objects: dict[str, Predicate] = field(default_factory=dict)
+    datas: dict[str, Predicate] = field(default_factory=dict)
+    labels: dict[ClassExpression, Predicate] = field(default_factory=dict)
+    clauses: list[Clause] = field(default_factory=list)
+    at_least: list[AtLeast] = field(default_factory=list)
+    at_most: list[AtMost] = field(default_factory=list)
+    keys: list[Key] = field(default_factory=list)
+    existentials: list[Existential] = field(default_factory=list)
+    irreflexive: list[Predicate] = field(default_factory=list)
+    asymmetric: list[Predicate] = field(default_factory=list)
+    disjoint_properties: list[tuple[Predicate, bool, Predicate, bool]] = field(default_factory=list)
+    negatives: dict[Predicate, Predicate] = field(default_factory=dict)
+    unsupported: list[str] = field(default_factory=list)
+    uses_thing: bool = False
+    thing: Predicate = field(default_factory=lambda: Predicate('class', 'owl:Thing'))
+    nothing: Predicate = field(default_factory=lambda: Predicate('class', 'owl:Nothing'))
+    different: Predicate = field(default_factory=lambda: Predicate('different', 'different from'))
+
+    def cls(self, iri: str) -> Predicate:
+        """The predicate of a named class."""
+        found = self.classes.get(iri)
+        if found is None:
+            found = self.classes[iri] = Predicate('class', iri, iri)
+        return found
+
+    def object(self, iri: str) -> Predicate:
+        """The predicate of an object property."""
+        found = self.objects.get(iri)
+        if found is None:
+            found = self.objects[iri] = Predicate('object', iri, iri)
+        return found
+
+    def data(self, iri: str) -> Predicate:
+        """The predicate of a data property."""
+        found = self.datas.get(iri)
+        if found is None:
+            found = self.datas[iri] = Predicate('data', iri, iri)
+        return found
+
+    def predicates(self) -> Iterator[Predicate]:
+        """Every predicate with an extension."""
+        yield from (self.thing, self.nothing, self.different)
+        yield from self.classes.values()
+        yield from self.objects.values()
+        yield from self.datas.values()
+        yield from self.labels.values()
+        yield from self.negatives.values()
+
+
+def property_atom(program: Program, prop: PropertyExpression, x: Term, y: Term) -> PredicateAtom:
+    """The atom `prop(x, y)`, an inverse turned round."""
+    if isinstance(prop, str):
+        return PredicateAtom(program.object(prop), (x, y))
+    return PredicateAtom(program.object(prop.prop), (y, x))

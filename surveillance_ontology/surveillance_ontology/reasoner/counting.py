@@ -1,0 +1,290 @@
+"""Cardinalities: counting what is known, with difference decided by `Difference`.
+
+`AtLeastCounter` derives membership in `min n`; `AtMostCounter` finds contradictions with `max n` and
+functional properties, and the individuals that must be the same because only one is allowed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from surveillance_ontology.axioms import Axiom
+from surveillance_ontology.reasoner.clauses import (
+    AtLeast,
+    AtMost,
+    Fact,
+    Key,
+    Predicate,
+    Premises,
+)
+from surveillance_ontology.reasoner.difference import Difference, clique
+
+Emit = Callable[[Fact], None]
+MergeRequest = Callable[[str, str, Axiom | None, Premises], None]
+
+
+class _Counter:
+    """What the two have in common: who is related to whom, and who is in the filler."""
+
+    def __init__(self, condition: AtLeast | AtMost, difference: Difference) -> None:
+        self.prop = condition.prop
+        self.inverse = condition.inverse
+        self.n = condition.n
+        self.origin = condition.origin
+        self.is_data = condition.prop.kind == 'data'
+        self.difference = difference
+        self.succ: dict[Any, set[Any]] = self.prop.pred if self.inverse else self.prop.succ
+        self.pred: dict[Any, set[Any]] = self.prop.succ if self.inverse else self.prop.pred
+        filler = condition.filler
+        self.filler = filler if isinstance(filler, Predicate) else None
+        self.test = None if isinstance(filler, Predicate) else filler
+
+    def related(self, z: str) -> list[Any]:
+        """What counts for `z`."""
+        values = self.succ.get(z, ())
+        if self.filler is not None:
+            members = self.filler.members
+            return [y for y in values if y in members]
+        if self.test is not None:
+            test = self.test
+            return [v for v in values if test(v)]
+        return list(values)
+
+    def facts(self, z: str, values: list[Any]) -> Premises:
+        """The facts by which the values count for `z`."""
+        prop, filler = self.prop, self.filler
+        facts: list[Fact] = [(prop, y, z) if self.inverse else (prop, z, y) for y in values]
+        if filler is not None:
+            facts += [(filler, y) for y in values]
+        return tuple(facts)
+
+    def differences(self, values: list[str]) -> Premises:
+        """The facts by which the values are pairwise different."""
+        predicate = self.difference._predicate
+        return tuple(
+            (predicate, one, other)
+            for place, one in enumerate(values)
+            for other in values[place + 1 :]
+        )
+
+    def on_link(self, act: Callable[[str], None]) -> None:
+        raise NotImplementedError
+
+    def _subjects(self, act: Callable[[str], None]) -> Callable[..., None]:
+        return (lambda y, z: act(z)) if self.inverse else (lambda z, y: act(z))
+
+    def _each_subject(self, act: Callable[[str], None]) -> Callable[[str], None]:
+        pred = self.pred
+
+        def visit(y: str) -> None:
+            for z in tuple(pred.get(y, ())):
+                act(z)
+
+        return visit
+
+
+class AtLeastCounter(_Counter):
+    """Keeps the members of one `min n` expression."""
+
+    def __init__(self, condition: AtLeast, difference: Difference, push: Emit, doom: Emit) -> None:
+        super().__init__(condition, difference)
+        self.head = condition.head
+        self._push, self._doom = push, doom
+        self.prop.on_insert.append(self._subjects(self.gain))
+        self.prop.on_delete.append(self._subjects(self.lose))
+        if self.filler is not None:
+            self.filler.on_insert.append(self._each_subject(self.gain))
+            self.filler.on_delete.append(self._each_subject(self.lose))
+        self.head.supports.append((self.supports, self.origin))
+        self.touch_insert = self._each_subject(self.gain)
+        self.touch_delete = self._each_subject(self.lose)
+
+    def gain(self, z: str) -> None:
+        """Counts again after something came."""
+        if z in self.head.members or len(self.succ.get(z, ())) < self.n:
+            return
+        values = self.related(z)
+        if len(values) >= self.n and (
+            self.is_data or clique(values, self.n, self.difference.different) is not None
+        ):
+            self._push((self.head, z))
+
+    def lose(self, z: str) -> None:
+        """Something that counted is about to go."""
+        if z in self.head.members:
+            self._doom((self.head, z))
+
+    def supports(self, z: str) -> Iterator[Premises]:
+        """Facts by which `z` has enough."""
+        values = self.related(z)
+        if self.is_data:
+            if len(values) >= self.n:
+                yield self.facts(z, sorted(values, key=repr)[: self.n])
+            return
+        chosen = clique(sorted(values), self.n, self.difference.different)
+        if chosen is not None:
+            yield self.facts(z, chosen) + self.differences(chosen)
+
+
+class AtMostCounter(_Counter):
+    """Watches one `max n` expression or functional property."""
+
+    def __init__(
+        self,
+        condition: AtMost,
+        difference: Difference,
+        nothing: Predicate,
+        push: Emit,
+        doom: Emit,
+        merge: MergeRequest,
+    ) -> None:
+        super().__init__(condition, difference)
+        self.label = condition.label
+        self._nothing = nothing
+        self._push, self._doom, self._merge = push, doom, merge
+        self.recheck: set[str] = set()
+        self.prop.on_insert.append(self._subjects(self.gain))
+        self.prop.on_delete.append(self._subjects(self.lose))
+        if self.label is not None:
+            self.label.on_insert.append(self.gain)
+            self.label.on_delete.append(self.lose)
+        if self.filler is not None:
+            self.filler.on_insert.append(self._each_subject(self.gain))
+            self.filler.on_delete.append(self._each_subject(self.lose))
+        nothing.supports.append((self.supports, self.origin))
+        self.touch_insert = self._each_subject(self.gain)
+        self.touch_delete = self._each_subject(self.lose)
+
+    def gain(self, z: str) -> None:
+        """Looks again after something came."""
+        values = self.succ.get(z)
+        if values is None or len(values) <= self.n:
+            return
+        if self.label is not None and z not in self.label.members:
+            return
+        related = self.related(z)
+        if len(related) <= self.n:
+            return
+        different = self.difference.different
+        if self.is_data or clique(related, self.n + 1, different) is not None:
+            if z not in self._nothing.members:
+                self._push((self._nothing, z))
+            return
+        for one, other in self._forced(related):
+            self._merge(one, other, self.origin, self._label_fact(z) + self.facts(z, related))
+
+    def _forced(self, related: list[str]) -> Iterator[tuple[str, str]]:
+        """Pairs that must be the same for the rest to fit."""
+        different = self.difference.different
+        related = sorted(related)
+        if self.n == 1:
+            for other in related[1:]:
+                yield related[0], other
+        elif len(related) == self.n + 1:
+            pairs = [
+                (one, other)
+                for place, one in enumerate(related)
+                for other in related[place + 1 :]
+                if not different(one, other)
+            ]
+            if len(pairs) == 1:
+                yield pairs[0]
+
+    def lose(self, z: str) -> None:
+        """Something that counted is about to go."""
+        if z in self._nothing.members:
+            self._doom((self._nothing, z))
+            self.recheck.add(z)
+
+    def _label_fact(self, z: str) -> Premises:
+        return () if self.label is None else ((self.label, z),)
+
+    def supports(self, z: str) -> Iterator[Premises]:
+        """Facts by which `z` has too many."""
+        values = self.succ.get(z)
+        if values is None or len(values) <= self.n:
+            return
+        if self.label is not None and z not in self.label.members:
+            return
+        related = self.related(z)
+        if len(related) <= self.n:
+            return
+        if self.is_data:
+            chosen = sorted(related, key=repr)[: self.n + 1]
+            yield self._label_fact(z) + self.facts(z, chosen)
+            return
+        found = clique(sorted(related), self.n + 1, self.difference.different)
+        if found is not None:
+            yield self._label_fact(z) + self.facts(z, found) + self.differences(found)
+
+    # --- as evidence that two individuals differ: together they would have too many ---
+
+    def premises(self, x: str, y: str) -> Iterator[Premises]:
+        first, second = self.succ.get(x), self.succ.get(y)
+        if not first or not second:
+            return
+        label = self.label
+        marks: list[Premises] = [()]
+        if label is not None:
+            marks = [((label, z),) for z in (x, y) if z in label.members]
+            if not marks:
+                return
+        ours, theirs = self.related(x), self.related(y)
+        if self.is_data:
+            union = set(ours) | set(theirs)
+            if len(union) <= self.n:
+                return
+            chosen = sorted(union, key=repr)[: self.n + 1]
+            mine = [value for value in chosen if value in first]
+            rest = [value for value in chosen if value not in first]
+            facts = self.facts(x, mine) + self.facts(y, rest)
+            for mark in marks:
+                yield mark + facts
+            return
+        if self.n != 1:
+            return
+        different = self.difference.different
+        for one in ours:
+            for other in theirs:
+                if different(one, other):
+                    facts = self.facts(x, [one]) + self.facts(y, [other])
+                    for mark in marks:
+                        yield mark + facts + ((self.difference._predicate, one, other),)
+
+
+class KeyWatcher:
+    """Finds members of a class that share a value of every key property."""
+
+    def __init__(self, key: Key, merge: MergeRequest) -> None:
+        self._key, self._merge = key, merge
+        if key.cls is not None:
+            key.cls.on_insert.append(self.gain)
+        for prop, inverse in key.props:
+            prop.on_insert.append(
+                (lambda y, x: self.gain(x)) if inverse else (lambda x, y: self.gain(x))
+            )
+
+    def gain(self, x: str) -> None:
+        """Looks for individuals that `x` now shares its key with."""
+        cls = self._key.cls
+        if cls is not None and x not in cls.members:
+            return
+        shared: dict[str, list[Fact]] | None = None
+        for prop, inverse in self._key.props:
+            succ, pred = (prop.pred, prop.succ) if inverse else (prop.succ, prop.pred)
+            found: dict[str, list[Fact]] = {}
+            for value in succ.get(x, ()):
+                for y in pred.get(value, ()):
+                    if y != x and (shared is None or y in shared):
+                        pair = [(prop, value, x), (prop, value, y)]
+                        if not inverse:
+                            pair = [(prop, x, value), (prop, y, value)]
+                        found[y] = pair if shared is None else shared[y] + pair
+            shared = found
+            if not shared:
+                return
+        for y, facts in (shared or {}).items():
+            if cls is None or y in cls.members:
+                marks = [] if cls is None else [(cls, x), (cls, y)]
+                self._merge(x, y, self._key.origin, tuple(marks + facts))

@@ -1,0 +1,376 @@
+"""Literals by value: value spaces, lexical forms, ranges and facets (XML Schema 1.1 part 2, OWL 2 section 4).
+
+A value is a hashable Python object that is equal to another exactly where the value spaces say so: whole
+numbers of the decimal space are `int`, other decimals `Fraction`, plain strings `str`; any other value is a
+tuple that begins with the name of its space. Values of xsd:float and xsd:double are never equal to decimals.
+"""
+
+from __future__ import annotations
+
+import datetime
+import math
+import re
+import struct
+from collections.abc import Callable
+from fractions import Fraction
+from functools import cache
+from typing import Any, TypeAlias
+
+from surveillance_ontology.axioms import (
+    OWL,
+    RDF,
+    RDFS,
+    XSD,
+    DataComplementOf,
+    DataIntersectionOf,
+    DataOneOf,
+    DataRange,
+    DatatypeRestriction,
+    DataUnionOf,
+    Literal,
+)
+
+Value: TypeAlias = 'int | Fraction | str | tuple[Any, ...]'
+
+_INTEGER = re.compile(r'[+-]?[0-9]+')
+_DECIMAL = re.compile(r'[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)')
+_FLOAT = re.compile(r'[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?')
+_MOMENT = re.compile(
+    r'(-?\d{4,}-\d\d-\d\dT\d\d:\d\d:\d\d)(\.\d+)?(Z|[+-]\d\d:\d\d)?',
+    re.ASCII,
+)
+_MAX_DIGITS = 4000
+
+_BOUNDS: dict[str, tuple[int | None, int | None]] = {
+    'integer': (None, None),
+    'nonNegativeInteger': (0, None),
+    'nonPositiveInteger': (None, 0),
+    'positiveInteger': (1, None),
+    'negativeInteger': (None, -1),
+    'long': (-(2**63), 2**63 - 1),
+    'int': (-(2**31), 2**31 - 1),
+    'short': (-(2**15), 2**15 - 1),
+    'byte': (-(2**7), 2**7 - 1),
+    'unsignedLong': (0, 2**64 - 1),
+    'unsignedInt': (0, 2**32 - 1),
+    'unsignedShort': (0, 2**16 - 1),
+    'unsignedByte': (0, 2**8 - 1),
+}
+_STRINGS = ('string', 'normalizedString', 'token', 'language', 'Name', 'NCName', 'NMTOKEN')
+_PATTERNS = {
+    'normalizedString': re.compile(r'[^\t\n\r]*'),
+    'token': re.compile(r'(?:[^\s]+(?: [^\s]+)*)?'),
+    'language': re.compile(r'[a-zA-Z]{1,8}(?:-[a-zA-Z0-9]{1,8})*'),
+    'Name': re.compile(r'[\w:][\w.:\-]*'),
+    'NCName': re.compile(r'[^\W\d][\w.\-]*'),
+    'NMTOKEN': re.compile(r'[\w.:\-]+'),
+}
+
+
+class IllFormedLiteral(ValueError):
+    """A lexical form outside the lexical space of its datatype."""
+
+
+def _number(text: str) -> int | Fraction:
+    if len(text) > _MAX_DIGITS:
+        raise IllFormedLiteral
+    fraction = Fraction(text)
+    return fraction.numerator if fraction.denominator == 1 else fraction
+
+
+def _floating(space: str, text: str) -> Value:
+    special = {'INF': math.inf, '+INF': math.inf, '-INF': -math.inf, 'NaN': math.nan}
+    if text in special:
+        number = special[text]
+    elif _FLOAT.fullmatch(text):
+        number = float(text)
+    else:
+        raise IllFormedLiteral
+    return floating_value(space, number)
+
+
+def floating_value(space: str, number: float) -> Value:
+    """The value of a Python float in the space 'float' or 'double'."""
+    if space == 'float' and math.isfinite(number):
+        try:
+            number = struct.unpack('f', struct.pack('f', number))[0]
+        except OverflowError:
+            number = math.copysign(math.inf, number)
+    if math.isnan(number):
+        return (space, 'NaN')
+    if number == 0.0 and math.copysign(1.0, number) < 0:
+        return (space, 0.0, '-')
+    return (space, number)
+
+
+def _moment(text: str) -> Value:
+    found = _MOMENT.fullmatch(text)
+    if not found:
+        raise IllFormedLiteral
+    try:
+        moment = datetime.datetime.fromisoformat(found[1].removeprefix('-'))
+    except ValueError:
+        raise IllFormedLiteral from None
+    seconds: int | Fraction = (moment - datetime.datetime(1, 1, 1)) // datetime.timedelta(seconds=1)
+    if found[1].startswith('-'):
+        raise IllFormedLiteral
+    if found[2]:
+        seconds += Fraction('0' + found[2])
+    zone = found[3]
+    if zone is None:
+        return ('dateTime', 'local', seconds)
+    offset = 0
+    if zone != 'Z':
+        offset = (int(zone[1:3]) * 60 + int(zone[4:6])) * (60 if zone[0] == '+' else -60)
+    return ('dateTime', 'utc', seconds - offset, offset)
+
+
+def parse_value(literal: Literal) -> Value:
+    """The value a literal denotes.
+
+    Raises:
+        IllFormedLiteral: The lexical form is outside the datatype's lexical space.
+    """
+    datatype, text = literal.datatype, literal.lexical
+    if datatype == RDF + 'langString' or literal.language:
+        return ('langString', text, literal.language)
+    if datatype == RDF + 'PlainLiteral':
+        plain, _, language = text.rpartition('@')
+        return ('langString', plain, language.lower()) if language else plain
+    if datatype.startswith(XSD):
+        name = datatype[len(XSD) :]
+        bounds = _BOUNDS.get(name)
+        if bounds is not None:
+            text = text.strip()
+            if not _INTEGER.fullmatch(text) or len(text) > _MAX_DIGITS:
+                raise IllFormedLiteral
+            number = int(text)
+            low, high = bounds
+            if (low is not None and number < low) or (high is not None and number > high):
+                raise IllFormedLiteral
+            return number
+        if name in _STRINGS:
+            pattern = _PATTERNS.get(name)
+            if pattern is not None and not pattern.fullmatch(text):
+                raise IllFormedLiteral
+            return text
+        if name == 'decimal':
+            if not _DECIMAL.fullmatch(text.strip()):
+                raise IllFormedLiteral
+            return _number(text.strip())
+        if name == 'boolean':
+            if text.strip() not in ('true', 'false', '0', '1'):
+                raise IllFormedLiteral
+            return ('boolean', text.strip() in ('true', '1'))
+        if name in ('float', 'double'):
+            return _floating(name, text.strip())
+        if name in ('dateTime', 'dateTimeStamp'):
+            value = _moment(text.strip())
+            if name == 'dateTimeStamp' and value[1] != 'utc':  # type: ignore[index]
+                raise IllFormedLiteral
+            return value
+        if name == 'anyURI':
+            return ('anyURI', text.strip())
+        if name in ('hexBinary', 'base64Binary'):
+            return (name, text.strip().upper() if name == 'hexBinary' else text.strip())
+    elif datatype == OWL + 'rational':
+        numerator, _, denominator = text.partition('/')
+        if not (_INTEGER.fullmatch(numerator.strip()) and _INTEGER.fullmatch(denominator.strip())):
+            raise IllFormedLiteral
+        if int(denominator) <= 0:
+            raise IllFormedLiteral
+        fraction = Fraction(int(numerator), int(denominator))
+        return fraction.numerator if fraction.denominator == 1 else fraction
+    return ('other', datatype, text)
+
+
+def value_of(literal: Literal) -> Value:
+    """The value a literal denotes; an ill-formed literal denotes a value of its own, in no datatype."""
+    try:
+        return parse_value(literal)
+    except (IllFormedLiteral, ValueError, ZeroDivisionError):
+        return ('ill-formed', literal.datatype, literal.lexical)
+
+
+def literal_of(value: Value) -> Literal:
+    """A literal that denotes the value, in the most general datatype that suits it."""
+    if isinstance(value, int):
+        return Literal(str(value), XSD + 'integer')
+    if isinstance(value, str):
+        return Literal(value)
+    if isinstance(value, Fraction):
+        digits = _terminating(value)
+        if digits is not None:
+            return Literal(digits, XSD + 'decimal')
+        return Literal(f'{value.numerator}/{value.denominator}', OWL + 'rational')
+    space = value[0]
+    if space == 'langString':
+        return Literal(value[1], RDF + 'langString', value[2])
+    if space == 'boolean':
+        return Literal('true' if value[1] else 'false', XSD + 'boolean')
+    if space in ('float', 'double'):
+        number = value[1]
+        text = '-0.0' if len(value) == 3 else str(number)
+        text = {'inf': 'INF', '-inf': '-INF'}.get(text, text)
+        return Literal(text, XSD + space)
+    if space == 'dateTime':
+        seconds = value[2]
+        if value[1] == 'utc':
+            seconds += value[3]
+        whole = math.floor(seconds)
+        moment = datetime.datetime(1, 1, 1) + datetime.timedelta(seconds=whole)
+        text = moment.isoformat()
+        if seconds != whole:
+            text += (_terminating(Fraction(seconds - whole)) or '0.0')[1:]
+        if value[1] == 'utc':
+            minutes = value[3] // 60
+            sign = '+' if minutes >= 0 else '-'
+            zone = f'{sign}{abs(minutes) // 60:02d}:{abs(minutes) % 60:02d}'
+            text += 'Z' if minutes == 0 else zone
+        return Literal(text, XSD + 'dateTime')
+    if space in ('anyURI', 'hexBinary', 'base64Binary'):
+        return Literal(value[1], XSD + space)
+    return Literal(value[2], value[1])
+
+
+def _terminating(number: Fraction) -> str | None:
+    twos = fives = 0
+    rest = number.denominator
+    while rest % 2 == 0:
+        rest, twos = rest // 2, twos + 1
+    while rest % 5 == 0:
+        rest, fives = rest // 5, fives + 1
+    if rest != 1:
+        return None
+    places = max(twos, fives)
+    digits = str(abs(number.numerator) * 10**places // number.denominator).rjust(places + 1, '0')
+    sign = '-' if number < 0 else ''
+    return f'{sign}{digits[:-places]}.{digits[-places:]}' if places else sign + digits
+
+
+# --- data ranges ---
+
+Test: TypeAlias = Callable[[Value], bool]
+
+
+def _numeric(value: Value) -> bool:
+    return isinstance(value, (int, Fraction))
+
+
+def _space(name: str) -> Test:
+    return lambda value: isinstance(value, tuple) and value[0] == name
+
+
+def _datatype_test(datatype: str) -> Test | None:
+    if datatype in (RDFS + 'Literal', OWL + 'topDataProperty'):
+        return lambda value: not (isinstance(value, tuple) and value[0] == 'ill-formed')
+    if datatype in (OWL + 'real', OWL + 'rational', XSD + 'decimal'):
+        if datatype == XSD + 'decimal':
+            return lambda value: (
+                isinstance(value, int)
+                or (isinstance(value, Fraction) and _terminating(value) is not None)
+            )
+        return _numeric
+    if datatype == RDF + 'langString':
+        return _space('langString')
+    if datatype == RDF + 'PlainLiteral':
+        return lambda value: (
+            isinstance(value, str) or (isinstance(value, tuple) and value[0] == 'langString')
+        )
+    if not datatype.startswith(XSD):
+        return None
+    name = datatype[len(XSD) :]
+    if name in _BOUNDS:
+        low, high = _BOUNDS[name]
+        if low is None and high is None:
+            return lambda value: isinstance(value, int)
+        if high is None:
+            return lambda value: isinstance(value, int) and value >= low  # type: ignore[operator]
+        if low is None:
+            return lambda value: isinstance(value, int) and value <= high
+        return lambda value: isinstance(value, int) and low <= value <= high
+    if name in _STRINGS:
+        pattern = _PATTERNS.get(name)
+        if pattern is None:
+            return lambda value: isinstance(value, str)
+        return lambda value: isinstance(value, str) and pattern.fullmatch(value) is not None
+    if name == 'dateTimeStamp':
+        return lambda value: (
+            isinstance(value, tuple) and value[0] == 'dateTime' and value[1] == 'utc'
+        )
+    if name in ('boolean', 'float', 'double', 'dateTime', 'anyURI', 'hexBinary', 'base64Binary'):
+        return _space(name)
+    return None
+
+
+def comparable(value: Value) -> tuple[str, Any]:
+    """A value as (kind, key): keys of one kind compare by order; numbers of all spaces are one kind."""
+    if isinstance(value, (int, Fraction)):
+        return 'number', value
+    if isinstance(value, str):
+        return 'string', value
+    if value[0] in ('float', 'double'):
+        return 'number', math.nan if value[1] == 'NaN' else value[1]
+    if value[0] == 'dateTime':
+        return 'dateTime ' + value[1], value[2]
+    return value[0], value[1:]
+
+
+def _facet_test(facet: str, bound: Literal) -> Test | None:
+    name = facet[len(XSD) :] if facet.startswith(XSD) else facet
+    limit = value_of(bound)
+    if name in ('minInclusive', 'maxInclusive', 'minExclusive', 'maxExclusive'):
+        kind, key = comparable(limit)
+
+        def ordered(value: Value) -> bool:
+            other, mine = comparable(value)
+            if other != kind:
+                return False
+            if name == 'minInclusive':
+                return bool(mine >= key)
+            if name == 'maxInclusive':
+                return bool(mine <= key)
+            return bool(mine > key) if name == 'minExclusive' else bool(mine < key)
+
+        return ordered
+    if name in ('length', 'minLength', 'maxLength') and isinstance(limit, int):
+
+        def sized(value: Value) -> bool:
+            text = value if isinstance(value, str) else literal_of(value).lexical
+            if name == 'length':
+                return len(text) == limit
+            return len(text) >= limit if name == 'minLength' else len(text) <= limit
+
+        return sized
+    if name == 'pattern':
+        try:
+            pattern = re.compile(bound.lexical)
+        except re.error:
+            return None
+        return lambda value: pattern.fullmatch(literal_of(value).lexical) is not None
+    return None
+
+
+@cache
+def range_test(data_range: DataRange) -> Test | None:
+    """A predicate on values for a data range; None when the range is not supported."""
+    if isinstance(data_range, str):
+        return _datatype_test(data_range)
+    if isinstance(data_range, DataOneOf):
+        values = frozenset(value_of(literal) for literal in data_range.literals)
+        return lambda value: value in values
+    if isinstance(data_range, DataComplementOf):
+        inner = range_test(data_range.operand)
+        return None if inner is None else lambda value: not inner(value)
+    if isinstance(data_range, DatatypeRestriction):
+        tests = [range_test(data_range.datatype)]
+        tests += [_facet_test(facet, bound) for facet, bound in data_range.facets]
+    else:
+        tests = [range_test(operand) for operand in data_range.operands]
+    if any(test is None for test in tests):
+        return None
+    known: list[Test] = [test for test in tests if test is not None]
+    if isinstance(data_range, DataUnionOf):
+        return lambda value: any(test(value) for test in known)
+    assert isinstance(data_range, (DataIntersectionOf, DatatypeRestriction))
+    return lambda value: all(test(value) for test in known)

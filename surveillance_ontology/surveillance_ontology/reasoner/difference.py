@@ -1,0 +1,231 @@
+"""Which individuals are known to be different, decided for a pair when it is asked for.
+
+Pairs are never listed: a set of all-different individuals is a number that its members carry, and difference
+that follows from other facts (disjoint classes, functional properties with different values, ...) is looked up
+in the facts of the two individuals. Where such a fact comes or goes, its individual is *touched*, and whatever
+asks for differences of that individual is asked again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from typing import Protocol
+
+from surveillance_ontology.axioms import DifferentIndividuals
+from surveillance_ontology.reasoner.clauses import Predicate, Premises, Program
+
+_MAX_DEPTH = 6
+
+
+class Evidence(Protocol):
+    """One way in which two individuals can be known to be different."""
+
+    def premises(self, x: str, y: str) -> Iterator[Premises]:
+        """Each set of facts by which `x` and `y` differ."""
+
+
+class Difference:
+    """Difference between representatives of individuals."""
+
+    def __init__(self, program: Program) -> None:
+        self._predicate = program.different
+        self._own: dict[str, set[int]] = {}
+        self._merged: dict[str, set[int]] = {}
+        self._numbers: dict[DifferentIndividuals, int] = {}
+        self._axioms: dict[int, DifferentIndividuals] = {}
+        self._next = 0
+        self._depth = 0
+        self._stated = program.different.succ
+        self.evidence: list[Evidence] = []
+
+    def clear(self) -> None:
+        """Forgets every stated difference."""
+        self._own.clear()
+        self._merged.clear()
+        self._numbers.clear()
+        self._axioms.clear()
+
+    # --- stated differences ---
+
+    def state(self, axiom: DifferentIndividuals) -> None:
+        """Adds a set of individuals all different from each other."""
+        number = self._next = self._next + 1
+        self._numbers[axiom] = number
+        self._axioms[number] = axiom
+        own = self._own
+        for individual in axiom.individuals:
+            numbers = own.get(individual)
+            if numbers is None:
+                own[individual] = {number}
+            else:
+                numbers.add(number)
+
+    def withdraw(self, axiom: DifferentIndividuals) -> None:
+        """Takes such a set away."""
+        number = self._numbers.pop(axiom)
+        del self._axioms[number]
+        for individual in axiom.individuals:
+            numbers = self._own[individual]
+            numbers.discard(number)
+            if not numbers:
+                del self._own[individual]
+
+    def merge(self, representative: str, members: Iterable[str]) -> None:
+        """One individual now stands for all members."""
+        numbers: set[int] = set()
+        for member in members:
+            self._merged.pop(member, None)
+            numbers |= self._own.get(member, set())
+        self._merged[representative] = numbers
+
+    def split(self, representative: str) -> None:
+        """Undoes `merge`."""
+        self._merged.pop(representative, None)
+
+    def stated(self, x: str, y: str) -> bool:
+        """Whether the two are in one all-different set."""
+        own = self._own
+        if self._merged:
+            first = self._merged.get(x) or own.get(x)
+            second = self._merged.get(y) or own.get(y)
+        else:
+            first, second = own.get(x), own.get(y)
+        return first is not None and second is not None and not first.isdisjoint(second)
+
+    def stating(self, members: Iterable[str], others: Iterable[str]) -> DifferentIndividuals | None:
+        """An axiom by which some member differs from some other."""
+        others = tuple(others)
+        for x in members:
+            for y in others:
+                for number in self._own.get(x, set()) & self._own.get(y, set()):
+                    return self._axioms[number]
+        return None
+
+    # --- known differences ---
+
+    def different(self, x: str, y: str) -> bool:
+        """Whether two individuals are known to be different."""
+        if x == y:
+            return False
+        own = self._own
+        if not self._merged:
+            first = own.get(x)
+            if first is not None:
+                second = own.get(y)
+                if second is not None and not first.isdisjoint(second):
+                    return True
+        elif self.stated(x, y):
+            return True
+        if self._stated and (y in self._stated.get(x, ()) or x in self._stated.get(y, ())):
+            return True
+        if not self.evidence or self._depth >= _MAX_DEPTH:
+            return False
+        self._depth += 1
+        try:
+            for evidence in self.evidence:
+                for _ in evidence.premises(x, y):
+                    return True
+        finally:
+            self._depth -= 1
+        return False
+
+    def premises(self, x: str, y: str) -> Iterator[Premises]:
+        """Each set of facts by which two individuals differ; an empty set where it is stated."""
+        if x == y:
+            return
+        if self.stated(x, y):
+            yield ()
+        if x in self._stated.get(y, ()):
+            yield ((self._predicate, y, x),)
+        for evidence in self.evidence:
+            yield from evidence.premises(x, y)
+
+
+class DisjointClassEvidence:
+    """Members of disjoint classes differ."""
+
+    def __init__(self, predicates: Iterable[Predicate]) -> None:
+        self._marked = [predicate for predicate in predicates if predicate.disjoint]
+
+    def premises(self, x: str, y: str) -> Iterator[Premises]:
+        for predicate in self._marked:
+            if x in predicate.members:
+                for other in predicate.disjoint:
+                    if y in other.members:
+                        yield ((predicate, x), (other, y))
+
+
+class IrreflexiveEvidence:
+    """What is related by a property that relates nothing to itself differs."""
+
+    def __init__(self, predicate: Predicate) -> None:
+        self._predicate = predicate
+
+    def premises(self, x: str, y: str) -> Iterator[Premises]:
+        for one, other in ((x, y), (y, x)):
+            if other in self._predicate.succ.get(one, ()):
+                yield ((self._predicate, one, other),)
+
+
+class AsymmetricEvidence:
+    """If a is related to x and y to a by an asymmetric property, x and y differ."""
+
+    def __init__(self, predicate: Predicate) -> None:
+        self._predicate = predicate
+
+    def premises(self, x: str, y: str) -> Iterator[Premises]:
+        predicate = self._predicate
+        for one, other in ((x, y), (y, x)):
+            for middle in predicate.pred.get(one, set()) & predicate.succ.get(other, set()):
+                yield ((predicate, middle, one), (predicate, other, middle))
+
+
+class DisjointPropertyEvidence:
+    """Two individuals that stand in disjoint properties to the same third differ.
+
+    `turned` says that the second property is read backwards. A negated assertion is such a property too.
+    """
+
+    def __init__(self, first: Predicate, second: Predicate, turned: bool) -> None:
+        self._first, self._second, self._turned = first, second, turned
+
+    def premises(self, x: str, y: str) -> Iterator[Premises]:
+        first, second = self._first, self._second
+        if self._turned:
+            of_subject, of_value = second.pred, second.succ
+        else:
+            of_subject, of_value = second.succ, second.pred
+        for one, other in ((x, y), (y, x)):
+            for value in first.succ.get(one, set()) & of_subject.get(other, set()):
+                fact = (second, value, other) if self._turned else (second, other, value)
+                yield ((first, one, value), fact)
+            if first.kind == 'object':
+                for subject in first.pred.get(one, set()) & of_value.get(other, set()):
+                    fact = (second, other, subject) if self._turned else (second, subject, other)
+                    yield ((first, subject, one), fact)
+
+
+def clique(
+    items: list[str], size: int, different: Callable[[str, str], bool], budget: int = 20_000
+) -> list[str] | None:
+    """`size` of the items that are pairwise different; None where there are none (or after `budget` tries)."""
+    if size <= 0:
+        return []
+    chosen: list[str] = []
+    left = budget
+
+    def extend(start: int) -> bool:
+        nonlocal left
+        for position in range(start, len(items) - (size - len(chosen)) + 1):
+            left -= 1
+            if left < 0:
+                return False
+            item = items[position]
+            if all(different(item, other) for other in chosen):
+                chosen.append(item)
+                if len(chosen) == size or extend(position + 1):
+                    return True
+                chosen.pop()
+        return False
+
+    return chosen if extend(0) else None

@@ -1,0 +1,125 @@
+"""Which individuals are known to be the same, and since when that is justified by what."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+from surveillance_ontology.axioms import Axiom
+from surveillance_ontology.reasoner.clauses import Fact, Premises
+
+
+@dataclass(frozen=True, slots=True)
+class Merge:
+    """Two individuals found to be the same, by an axiom applied to facts."""
+
+    first: str
+    second: str
+    origin: Axiom | None
+    premises: Premises
+
+
+class Equality:
+    """Classes of individuals known to be the same, each with one representative.
+
+    Attributes:
+        representative: From an individual to its representative, where that is another individual.
+        members: From a representative to its class, for classes of two and more.
+    """
+
+    def __init__(self) -> None:
+        self.representative: dict[str, str] = {}
+        self.members: dict[str, set[str]] = {}
+        self._merges: dict[str, list[Merge]] = {}
+        self._used: dict[Fact, set[str]] = {}
+
+    def clear(self) -> None:
+        """Every individual stands for itself again."""
+        self.representative.clear()
+        self.members.clear()
+        self._merges.clear()
+        self._used.clear()
+
+    def find(self, individual: str) -> str:
+        """The representative."""
+        return self.representative.get(individual, individual)
+
+    def same(self, individual: str) -> Iterable[str]:
+        """Everything that is the same as the individual, itself included."""
+        representative = self.find(individual)
+        return self.members.get(representative, (representative,))
+
+    def join(self, merge: Merge) -> tuple[str, str]:
+        """Joins two classes; (representative that stays, one that goes), the smaller IRI stays."""
+        kept, gone = sorted((self.find(merge.first), self.find(merge.second)))
+        members = self.members.setdefault(kept, {kept})
+        joining = self.members.pop(gone, {gone})
+        members |= joining
+        for individual in joining:
+            self.representative[individual] = kept
+        merges = self._merges.setdefault(kept, [])
+        merges += self._merges.pop(gone, ())
+        merges.append(merge)
+        for fact in merge.premises:
+            self._used.setdefault(fact, set()).add(merge.first)
+        return kept, gone
+
+    def split(self, representative: str) -> set[str]:
+        """Every member of the class stands for itself again; the members."""
+        members = self.members.pop(representative)
+        for individual in members:
+            self.representative.pop(individual, None)
+        for merge in self._merges.pop(representative, ()):
+            for fact in merge.premises:
+                users = self._used.get(fact)
+                if users is not None:
+                    users.discard(merge.first)
+                    if not users:
+                        del self._used[fact]
+        return members
+
+    def dependents(self, fact: Fact) -> set[str]:
+        """Representatives of the classes whose justification uses a fact, or that the fact mentions."""
+        found: set[str] = set()
+        for argument in fact[1:2] if fact[0].kind == 'data' else fact[1:]:
+            if argument in self.members:
+                found.add(argument)
+        if self._used:
+            for written in self._spellings(fact):
+                for individual in self._used.get(written, ()):
+                    found.add(self.find(individual))
+        return {name for name in found if name in self.members}
+
+    def _spellings(self, fact: Fact) -> Iterator[Fact]:
+        """The fact with each merged individual in every of its names."""
+        yield fact
+        for position in range(1, len(fact)):
+            argument = fact[position]
+            if isinstance(argument, str) and argument in self.members:
+                for name in self.members[argument]:
+                    yield (*fact[:position], name, *fact[position + 1 :])
+                    if len(fact) == 3 and position == 1 and fact[2] in self.members:
+                        for other in self.members[fact[2]]:
+                            yield (fact[0], name, other)
+
+    def path(self, first: str, second: str) -> list[Merge]:
+        """The merges that lead from one member of a class to another."""
+        merges = self._merges.get(self.find(first), [])
+        came: dict[str, Merge | None] = {first: None}
+        origin: dict[str, str] = {}
+        pending = [first]
+        while pending and second not in came:
+            here = pending.pop(0)
+            for merge in merges:
+                for one, other in ((merge.first, merge.second), (merge.second, merge.first)):
+                    if one == here and other not in came:
+                        came[other], origin[other] = merge, one
+                        pending.append(other)
+        path: list[Merge] = []
+        here = second
+        while here != first and here in came:
+            merge_here = came[here]
+            assert merge_here is not None
+            path.append(merge_here)
+            here = origin[here]
+        return path[::-1]

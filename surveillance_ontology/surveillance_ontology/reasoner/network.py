@@ -1,0 +1,241 @@
+"""From a program to what runs: compiled joins and counters attached to the predicates that trigger them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+from surveillance_ontology.axioms import Axiom
+from surveillance_ontology.reasoner.clauses import (
+    Clause,
+    Constant,
+    DifferentAtom,
+    Fact,
+    Predicate,
+    PredicateAtom,
+    Premises,
+    Program,
+    SameAtom,
+)
+from surveillance_ontology.reasoner.counting import AtLeastCounter, AtMostCounter, KeyWatcher
+from surveillance_ontology.reasoner.difference import (
+    AsymmetricEvidence,
+    Difference,
+    DisjointClassEvidence,
+    DisjointPropertyEvidence,
+    IrreflexiveEvidence,
+)
+from surveillance_ontology.reasoner.joins import (
+    JoinContext,
+    compile_call,
+    compile_support,
+    compile_trigger,
+)
+from surveillance_ontology.reasoner.thresholds import ThresholdIndex, split_rule
+
+Emit = Callable[[Fact], None]
+MergeRequest = Callable[[str, str, Axiom | None, Premises], None]
+
+
+class Network:
+    """Attaches everything a program needs to its predicates.
+
+    Attributes:
+        initial: Clauses without a condition on facts; run them once at the start.
+        naming: Clauses that name an individual; run them when it comes to stand for another, or ceases to.
+        touch_insert, touch_delete: Called with an individual whose difference from others may have changed.
+        touch_related: Like these, for individuals that differ because their values do.
+        thresholds: The rules run by a sorted index.
+        counters: The watchers of upper bounds.
+    """
+
+    def __init__(
+        self,
+        program: Program,
+        representative: dict[str, str],
+        difference: Difference,
+        push: Emit,
+        doom: Emit,
+        merge: MergeRequest,
+    ) -> None:
+        self._program = program
+        self._difference = difference
+        self._push, self._doom, self._merge = push, doom, merge
+        self._context = JoinContext(representative, difference.different, program.different)
+        self.initial: list[Callable[[], None]] = []
+        self.naming: list[Callable[[], None]] = []
+        self.touch_insert: list[Callable[[str], None]] = []
+        self.touch_delete: list[Callable[[str], None]] = []
+        self.touch_related: list[Callable[[str], list[str]]] = []
+        self.thresholds: list[ThresholdIndex] = []
+        self.counters: list[AtMostCounter] = []
+        program.different.supports.append((difference.premises, None))
+        for at_least in program.at_least:
+            counter = AtLeastCounter(at_least, difference, push, doom)
+            if not counter.is_data:
+                self.touch_insert.append(counter.touch_insert)
+                self.touch_delete.append(counter.touch_delete)
+        for at_most in program.at_most:
+            watcher = AtMostCounter(at_most, difference, program.nothing, push, doom, merge)
+            self.counters.append(watcher)
+            if not watcher.is_data:
+                self.touch_insert.append(watcher.touch_insert)
+                self.touch_delete.append(watcher.touch_delete)
+        for key in program.keys:
+            KeyWatcher(key, merge)
+        for clause in program.clauses:
+            self._attach(clause)
+        self._attach_disjoint()
+        self._attach_evidence()
+
+    # --- clauses ---
+
+    def _attach(self, clause: Clause) -> None:
+        head = clause.head
+        if isinstance(head, SameAtom):
+            self._attach_same(clause, head)
+            return
+        halves = split_rule(clause)
+        if halves is not None:
+            index = ThresholdIndex(clause, halves, self._context, self._push, self._doom)
+            self.thresholds.append(index)
+            return
+        context, body = self._context, clause.body
+        triggered = False
+        for atom in body:
+            if isinstance(atom, PredicateAtom):
+                triggered = True
+                predicate = atom.predicate
+                predicate.on_insert.append(
+                    compile_trigger(context, body, atom, atom.terms, head, self._push, False)
+                )
+                predicate.on_delete.append(
+                    compile_trigger(context, body, atom, atom.terms, head, self._doom, True)
+                )
+            elif isinstance(atom, DifferentAtom):
+                for term in atom.terms:
+                    self.touch_insert.append(
+                        compile_trigger(context, body, None, (term,), head, self._push, False)
+                    )
+                    self.touch_delete.append(
+                        compile_trigger(context, body, None, (term,), head, self._doom, True)
+                    )
+        if not triggered or _names_individual(clause):
+            run = compile_trigger(context, body, None, (), head, self._push, False)
+            self.naming.append(run)
+            if not triggered:
+                self.initial.append(run)
+        support = compile_support(context, body, head.terms)
+        head.predicate.supports.append((support, clause.origin))
+
+    def _attach_same(self, clause: Clause, head: SameAtom) -> None:
+        context, body, merge = self._context, clause.body, self._merge
+        support = compile_support(context, body, head.terms)
+        origin = clause.origin
+
+        def request(x: str, y: str) -> None:
+            if x != y:
+                for premises in support(x, y):
+                    merge(x, y, origin, premises)
+                    return
+
+        triggered = False
+        for atom in body:
+            if isinstance(atom, PredicateAtom):
+                triggered = True
+                atom.predicate.on_insert.append(
+                    compile_call(context, body, atom, atom.terms, head.terms, request)
+                )
+            elif isinstance(atom, DifferentAtom):
+                for term in atom.terms:
+                    self.touch_insert.append(
+                        compile_call(context, body, None, (term,), head.terms, request)
+                    )
+        if not triggered or _names_individual(clause):
+            run = compile_call(context, body, None, (), head.terms, request)
+            self.naming.append(run)
+            if not triggered:
+                self.initial.append(run)
+
+    # --- disjoint classes ---
+
+    def _attach_disjoint(self) -> None:
+        program = self._program
+        marked = [predicate for predicate in program.predicates() if predicate.disjoint]
+        marked = list(dict.fromkeys(marked))
+        if not marked:
+            return
+        nothing, push, doom = program.nothing, self._push, self._doom
+        for predicate in marked:
+            others = sorted(predicate.disjoint, key=lambda other: other.name)
+
+            def gain(x: str, others: list[Predicate] = others) -> None:
+                for other in others:
+                    if x in other.members:
+                        push((nothing, x))
+
+            def lose(x: str) -> None:
+                if x in nothing.members:
+                    doom((nothing, x))
+
+            predicate.on_insert.append(gain)
+            predicate.on_delete.append(lose)
+
+        def supports(x: str) -> Iterator[Premises]:
+            for predicate in marked:
+                if x in predicate.members:
+                    for other in predicate.disjoint:
+                        if x in other.members:
+                            yield ((predicate, x), (other, x))
+
+        nothing.supports.append((supports, 'these classes are disjoint'))
+        self._difference.evidence.append(DisjointClassEvidence(marked))
+        for predicate in marked:
+            predicate.touching = (1,)
+
+    # --- difference ---
+
+    def _attach_evidence(self) -> None:
+        program, evidence = self._program, self._difference.evidence
+        for counter in self.counters:
+            if counter.is_data:
+                evidence.append(counter)
+                counter.prop.touching = (1,)
+                if counter.label is not None:
+                    counter.label.touching = (1,)
+            elif counter.n == 1:
+                evidence.append(counter)
+                _also_touches(counter.prop, 2 if counter.inverse else 1)
+                if counter.label is not None:
+                    counter.label.touching = (1,)
+                if counter.filler is not None:
+                    counter.filler.touching = (1,)
+                pred = counter.pred
+                self.touch_related.append(lambda y, pred=pred: list(pred.get(y, ())))  # type: ignore[misc]
+        for predicate in program.irreflexive:
+            evidence.append(IrreflexiveEvidence(predicate))
+            predicate.touching = (1, 2)
+        for predicate in program.asymmetric:
+            evidence.append(AsymmetricEvidence(predicate))
+            predicate.touching = (1, 2)
+        for first, turned_first, second, turned_second in program.disjoint_properties:
+            evidence.append(DisjointPropertyEvidence(first, second, turned_first != turned_second))
+            _touch_individuals(first)
+            _touch_individuals(second)
+        for prop, negative in program.negatives.items():
+            evidence.append(DisjointPropertyEvidence(prop, negative, False))
+            _touch_individuals(prop)
+            _touch_individuals(negative)
+        program.different.touching = (1, 2)
+
+
+def _also_touches(predicate: Predicate, position: int) -> None:
+    predicate.touching = tuple(sorted({*predicate.touching, position}))
+
+
+def _touch_individuals(predicate: Predicate) -> None:
+    predicate.touching = (1, 2) if predicate.kind == 'object' else (1,)
+
+
+def _names_individual(clause: Clause) -> bool:
+    terms = [term for atom in (*clause.body, clause.head) for term in atom.terms]
+    return any(isinstance(term, Constant) and not term.is_value for term in terms)

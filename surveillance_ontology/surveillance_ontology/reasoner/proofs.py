@@ -1,0 +1,104 @@
+"""Backward search: from a fact to the assertions it follows from.
+
+A proof is a finite tree whose leaves are asserted, so a fact with a proof holds whatever else is being taken
+away. The search deepens step by step, so the first proof found is a shallowest one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Container
+from dataclasses import dataclass
+
+from surveillance_ontology.reasoner.clauses import Fact
+
+
+@dataclass(frozen=True)
+class Proof:
+    """A fact and the proofs of its premises; `origin` is the axiom or rule applied, None for an assertion."""
+
+    fact: Fact
+    origin: object = None
+    premises: tuple[Proof, ...] = ()
+    asserted: bool = False
+
+
+class ProofSearch:
+    """Searches proofs while the assertions stay as they are; `reset` when they change.
+
+    Args:
+        asserted: The asserted facts.
+    """
+
+    def __init__(self, asserted: Container[Fact]) -> None:
+        self._asserted = asserted
+        self._proved: set[Fact] = set()
+        self._failed: dict[Fact, int] = {}
+        self._budget = 0
+
+    def reset(self) -> None:
+        """Forgets what was found: the assertions (or who is the same as whom) changed."""
+        self._proved.clear()
+        self._failed.clear()
+
+    def proves(self, fact: Fact, depth: int = 4, budget: int = 48) -> bool:
+        """Whether a proof of at most this depth was found within `budget` rule applications."""
+        self._budget = budget
+        return self._prove(fact, depth)
+
+    def _prove(self, fact: Fact, depth: int) -> bool:
+        if fact in self._asserted or fact in self._proved:
+            return True
+        if depth <= 0 or self._failed.get(fact, -1) >= depth:
+            return False
+        arguments = fact[1:]
+        for support, _ in fact[0].supports:
+            for premises in support(*arguments):
+                self._budget -= 1
+                for premise in premises:
+                    if not self._prove(premise, depth - 1):
+                        break
+                else:
+                    self._proved.add(fact)
+                    return True
+                if self._budget <= 0:
+                    return False
+        self._failed[fact] = depth
+        return False
+
+    def find(self, fact: Fact, deepest: int = 64, budget: int = 500_000) -> Proof | None:
+        """A shallowest proof; None where there is none within the bounds."""
+        self._budget = budget
+        for depth in range(deepest + 1):
+            failed: dict[Fact, int] = {}
+            proof = self._find(fact, depth, failed, {})
+            if proof is not None or self._budget <= 0:
+                return proof
+        return None
+
+    def _find(
+        self, fact: Fact, depth: int, failed: dict[Fact, int], found: dict[Fact, Proof]
+    ) -> Proof | None:
+        if fact in self._asserted:
+            return Proof(fact, asserted=True)
+        known = found.get(fact)
+        if known is not None:
+            return known
+        if depth <= 0 or failed.get(fact, -1) >= depth:
+            return None
+        for support, origin in fact[0].supports:
+            for premises in support(*fact[1:]):
+                self._budget -= 1
+                if self._budget <= 0:
+                    return None
+                proofs: list[Proof] = []
+                for premise in premises:
+                    proof = self._find(premise, depth - 1, failed, found)
+                    if proof is None:
+                        break
+                    proofs.append(proof)
+                else:
+                    made = Proof(fact, origin, tuple(proofs))
+                    found[fact] = made
+                    return made
+        failed[fact] = depth
+        return None

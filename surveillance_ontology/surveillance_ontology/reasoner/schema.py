@@ -1,0 +1,248 @@
+"""The part of an ontology that is not about individuals: its program, completed, and its class hierarchy.
+
+What follows from a class alone is found by trying: a prototype individual is asserted to be a member, what it
+must be related to is made up as further individuals down to a bounded depth, and the engine shows what else
+the prototype is. Rules take no part, since they speak of named individuals only. What a class implies only
+through such made-up individuals is added to the program as clauses, so that the engine over real individuals
+needs none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from itertools import count
+
+from surveillance_ontology import axioms as ax
+from surveillance_ontology.axioms import Axiom, ClassExpression
+from surveillance_ontology.reasoner.clauses import (
+    Clause,
+    Existential,
+    Fact,
+    Predicate,
+    PredicateAtom,
+    Program,
+)
+from surveillance_ontology.reasoner.engine import Engine
+from surveillance_ontology.reasoner.normalisation import Normaliser
+from surveillance_ontology.reasoner.simplification import simplify
+
+_ROOT = '_:prototype'
+_MAX_DEPTH = 3
+_MAX_MADE_UP = 200
+_MAX_PAIRS = 400
+_MAX_COUNT = 12
+
+
+class Schema:
+    """Builds the program and the hierarchy of named classes.
+
+    Args:
+        axioms: The ontology's axioms; of its assertions only the complex classes matter.
+        asserted: Complex class expressions that individuals are asserted to belong to.
+        negated: Properties with negative assertions, as pairs (kind, IRI).
+
+    Attributes:
+        program: To be run by one `Engine`.
+    """
+
+    def __init__(
+        self,
+        axioms: Iterable[Axiom],
+        asserted: Iterable[ClassExpression] = (),
+        negated: Iterable[tuple[str, str]] = (),
+    ) -> None:
+        tbox = [axiom for axiom in axioms if not isinstance(axiom, ax.Assertion)]
+        asserted, negated = tuple(asserted), tuple(negated)
+        self.program = Normaliser(tbox, asserted, negated).program
+        self._above: dict[str, frozenset[str]] = {}
+        self._impossible: set[str] = set()
+        self._classes = [
+            axiom.iri
+            for axiom in tbox
+            if isinstance(axiom, ax.Declaration) and axiom.kind == 'class'
+        ]
+        self._hierarchy(tbox, asserted)
+        labels = [self.program.labels[expression] for expression in asserted]
+        simplify(self.program, labels)
+
+    # --- class hierarchy ---
+
+    def superclasses(self, cls: str) -> set[str]:
+        """Named classes strictly above; of a class that can have no members, every other class."""
+        if cls in self._impossible:
+            return {name for name in self._above if name != cls}
+        return set(self._above.get(cls, ())) - {cls}
+
+    def subclasses(self, cls: str) -> set[str]:
+        """Named classes strictly below, those that can have no members included."""
+        found = {name for name, above in self._above.items() if cls in above}
+        return (found | self._impossible) - {cls}
+
+    def classes(self) -> set[str]:
+        """Every named class."""
+        return set(self._above)
+
+    def unsatisfiable(self) -> set[str]:
+        """Named classes that can have no members."""
+        return set(self._impossible)
+
+    def _hierarchy(self, tbox: list[Axiom], asserted: tuple[ClassExpression, ...]) -> None:
+        without_rules = [axiom for axiom in tbox if not isinstance(axiom, ax.Rule)]
+        normaliser = Normaliser(without_rules, asserted, abstract=True)
+        prototypes = _Prototypes(normaliser)
+        names = dict.fromkeys([*self._classes, *self.program.classes])
+        for name in names:
+            self._above[name] = frozenset()
+        extra: dict[Clause, None] = {}
+        for name in names:
+            own = prototypes.program.cls(name)
+            found = prototypes.consequences((own,))
+            if found is None:
+                self._impossible.add(name)
+                extra[self._clause((own,), None)] = None
+                continue
+            self._above[name] = frozenset(
+                predicate.expression for predicate in found if isinstance(predicate.expression, str)
+            )
+            plain = prototypes.consequences((own,), make_up=False) or set()
+            for predicate in found - plain:
+                extra[self._clause((own,), predicate)] = None
+        existentials = list(
+            dict.fromkeys(existential.label for existential in prototypes.program.existentials)
+        )
+        alone: dict[Predicate, set[Predicate]] = {}
+        for label in existentials:
+            found = prototypes.consequences((label,))
+            plain = prototypes.consequences((label,), make_up=False) or set()
+            alone[label] = found or set()
+            if found is None:
+                extra[self._clause((label,), None)] = None
+            else:
+                for predicate in found - plain:
+                    extra[self._clause((label,), predicate)] = None
+        pairs = 0
+        for label in existentials:
+            for other in prototypes.interacting(label):
+                pairs += 1
+                if pairs > _MAX_PAIRS:
+                    self.program.unsupported.append(
+                        'the class hierarchy: too many pairs of restrictions to combine'
+                    )
+                    break
+                both = prototypes.consequences((label, other))
+                known = prototypes.consequences((label, other), make_up=False) or set()
+                if both is None:
+                    extra[self._clause((label, other), None)] = None
+                    continue
+                for predicate in both - known - alone[label] - alone.get(other, set()):
+                    extra[self._clause((label, other), predicate)] = None
+        self.program.clauses += [clause for clause in extra if clause.head not in clause.body]
+
+    def _own(self, predicate: Predicate) -> Predicate:
+        """The predicate of this program that stands for the same expression."""
+        if isinstance(predicate.expression, str):
+            return self.program.cls(predicate.expression)
+        found = self.program.labels.get(predicate.expression)
+        if found is None:
+            found = Predicate('class', predicate.name, predicate.expression)
+            self.program.labels[predicate.expression] = found
+        return found
+
+    def _clause(self, body: tuple[Predicate, ...], head: Predicate | None) -> Clause:
+        conclusion = self.program.nothing if head is None else self._own(head)
+        atoms = tuple(PredicateAtom(self._own(predicate), (0,)) for predicate in body)
+        return Clause(atoms, PredicateAtom(conclusion, (0,)))
+
+
+class _Prototypes:
+    """Tries out what members of classes must be."""
+
+    def __init__(self, normaliser: Normaliser) -> None:
+        self.program: Program = normaliser.program
+        self._filler: dict[int, Predicate | None] = {}
+        fillers = [
+            existential.filler
+            for existential in self.program.existentials
+            if existential.prop.kind == 'object'
+        ]
+        labels: dict[object, Predicate] = {}
+        for filler in fillers:
+            if not isinstance(filler, str) and filler not in labels:
+                labels[filler] = normaliser.label_asserted(filler)  # type: ignore[arg-type]
+        self._labels = labels
+        self._engine = Engine(self.program, lambda _: ())
+
+    def _filled(self, existential: Existential) -> Predicate | None:
+        filler = existential.filler
+        if isinstance(filler, str):
+            return None if filler == ax.THING else self.program.cls(filler)
+        return self._labels[filler]
+
+    def interacting(self, label: Predicate) -> list[Predicate]:
+        """Labels that say something more about what an existential's individuals are related to."""
+        kinds = (
+            ax.ObjectAllValuesFrom,
+            ax.ObjectMaxCardinality,
+            ax.ObjectSomeValuesFrom,
+            ax.ObjectMinCardinality,
+            ax.DataMaxCardinality,
+            ax.DataAllValuesFrom,
+            ax.ObjectComplementOf,
+        )
+        return [
+            other
+            for other in self.program.labels.values()
+            if other is not label and isinstance(other.expression, kinds)
+        ]
+
+    def consequences(
+        self, labels: tuple[Predicate, ...], make_up: bool = True
+    ) -> set[Predicate] | None:
+        """What a member of all labels is, the labels included; None where there can be none."""
+        engine = self._engine
+        engine.restart([(label, _ROOT) for label in labels])
+        if make_up and self.program.existentials:
+            self._make_up()
+        if not engine.consistent:
+            return None
+        root = engine.equality.find(_ROOT)
+        found = [*self.program.classes.values(), *self.program.labels.values()]
+        return {predicate for predicate in found if root in predicate.members}
+
+    def _make_up(self) -> None:
+        engine, numbers = self._engine, count()
+        depth = {_ROOT: 0}
+        done: set[tuple[int, str]] = set()
+        progress = True
+        while progress and engine.consistent and len(depth) < _MAX_MADE_UP:
+            progress = False
+            for place, existential in enumerate(self.program.existentials):
+                for owner in tuple(existential.label.members):
+                    level = depth.get(owner)
+                    if level is None or level >= _MAX_DEPTH or (place, owner) in done:
+                        continue
+                    done.add((place, owner))
+                    facts = self._witnesses(existential, owner, numbers, depth)
+                    if facts:
+                        progress = True
+                        engine.supply(facts)
+
+    def _witnesses(
+        self, existential: Existential, owner: str, numbers: count[int], depth: dict[str, int]
+    ) -> list[Fact]:
+        prop = existential.prop
+        n = min(existential.n, _MAX_COUNT)
+        facts: list[Fact] = []
+        if prop.kind == 'data':
+            return [(prop, owner, ('some', existential.filler, next(numbers))) for _ in range(n)]
+        filler = self._filled(existential)
+        names = [f'_:made{next(numbers)}' for _ in range(n)]
+        for name in names:
+            depth[name] = depth[owner] + 1
+            facts.append((prop, name, owner) if existential.inverse else (prop, owner, name))
+            if filler is not None:
+                facts.append((filler, name))
+            facts += [(self.program.different, other, name) for other in names[: names.index(name)]]
+            if self.program.uses_thing:
+                facts.append((self.program.thing, name))
+        return facts

@@ -1,0 +1,203 @@
+"""Makes a program smaller without changing what it derives.
+
+Three steps: a label that exactly one class stands for is replaced by the class; clauses whose labels nothing
+can reach, or whose results nothing can see, go; and an atom of a body that the other atoms imply goes, so that
+`LOCATION(?l), visitedAt(?l, ?v)` becomes `visitedAt(?l, ?v)` where LOCATION is the domain of visitedAt.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+from surveillance_ontology.reasoner.clauses import (
+    AtLeast,
+    AtMost,
+    BodyAtom,
+    Clause,
+    Predicate,
+    PredicateAtom,
+    Program,
+    Term,
+)
+
+
+def simplify(program: Program, asserted: Iterable[Predicate]) -> None:
+    """Simplifies in place; `asserted` are labels that individuals are asserted to belong to."""
+    kept = set(asserted)
+    program.clauses = list(dict.fromkeys(program.clauses))
+    _replace_aliases(program, kept)
+    _prune(program, kept)
+    _drop_implied_atoms(program)
+    program.clauses = list(dict.fromkeys(program.clauses))
+
+
+def _is_label(predicate: Predicate) -> bool:
+    return predicate.kind == 'class' and not isinstance(predicate.expression, str | None)
+
+
+def _replace_aliases(program: Program, kept: set[Predicate]) -> None:
+    while True:
+        producers: dict[Predicate, list[Clause]] = {}
+        for clause in program.clauses:
+            if isinstance(clause.head, PredicateAtom) and _is_label(clause.head.predicate):
+                producers.setdefault(clause.head.predicate, []).append(clause)
+        counted = {condition.head for condition in program.at_least}
+        alias: dict[Predicate, Predicate] = {}
+        for label, clauses in producers.items():
+            if len(clauses) != 1 or label in kept or label in counted or label.disjoint:
+                continue
+            (clause,) = clauses
+            if len(clause.body) == 1 and isinstance(clause.body[0], PredicateAtom):
+                (atom,) = clause.body
+                source = atom.predicate
+                if (
+                    source.kind == 'class'
+                    and atom.terms == clause.head.terms
+                    and source is not label
+                ):
+                    if source not in alias and label not in alias.values():
+                        alias[label] = source
+        if not alias:
+            return
+        _substitute(program, alias)
+
+
+def _substitute(program: Program, alias: dict[Predicate, Predicate]) -> None:
+    def atom_of(atom: BodyAtom) -> BodyAtom:
+        if isinstance(atom, PredicateAtom) and atom.predicate in alias:
+            return PredicateAtom(alias[atom.predicate], atom.terms)
+        return atom
+
+    clauses: dict[Clause, None] = {}
+    for clause in program.clauses:
+        body = tuple(dict.fromkeys(map(atom_of, clause.body)))
+        head = atom_of(clause.head)
+        if head not in body:
+            clauses[Clause(body, head, clause.origin)] = None  # type: ignore[arg-type]
+    program.clauses = list(clauses)
+    program.at_least = [
+        replace(condition, filler=alias.get(condition.filler, condition.filler))  # type: ignore[arg-type, call-overload]
+        for condition in program.at_least
+    ]
+    program.at_most = [
+        replace(
+            condition,
+            label=alias.get(condition.label, condition.label),  # type: ignore[arg-type]
+            filler=alias.get(condition.filler, condition.filler),  # type: ignore[arg-type, call-overload]
+        )
+        for condition in program.at_most
+    ]
+    program.keys = [replace(key, cls=alias.get(key.cls, key.cls)) for key in program.keys]  # type: ignore[arg-type]
+    program.existentials = [
+        replace(existential, label=alias.get(existential.label, existential.label))
+        for existential in program.existentials
+    ]
+    program.labels = {
+        expression: alias.get(label, label) for expression, label in program.labels.items()
+    }
+
+
+def _prune(program: Program, kept: set[Predicate]) -> None:
+    while True:
+        reached = set(kept) | {condition.head for condition in program.at_least}
+        consumed: set[Predicate] = set()
+        for clause in program.clauses:
+            if isinstance(clause.head, PredicateAtom):
+                reached.add(clause.head.predicate)
+            consumed.update(a.predicate for a in clause.body if isinstance(a, PredicateAtom))
+        conditions: list[AtLeast | AtMost] = [*program.at_least, *program.at_most]
+        for condition in conditions:
+            if isinstance(condition.filler, Predicate):
+                consumed.add(condition.filler)
+            if isinstance(condition, AtMost) and condition.label is not None:
+                consumed.add(condition.label)
+        consumed.update(key.cls for key in program.keys if key.cls is not None)
+        consumed.update(existential.label for existential in program.existentials)
+
+        def lives(predicate: Predicate, seen: set[Predicate]) -> bool:
+            return predicate in seen or bool(predicate.disjoint) or not _is_label(predicate)
+
+        before = len(program.clauses) + len(program.at_least)
+        program.clauses = [
+            clause
+            for clause in program.clauses
+            if all(
+                lives(atom.predicate, reached)
+                for atom in clause.body
+                if isinstance(atom, PredicateAtom)
+            )
+            and (
+                not isinstance(clause.head, PredicateAtom) or lives(clause.head.predicate, consumed)
+            )
+        ]
+        program.at_least = [
+            condition for condition in program.at_least if lives(condition.head, consumed)
+        ]
+        program.at_most = [
+            condition
+            for condition in program.at_most
+            if condition.label is None or lives(condition.label, reached)
+        ]
+        if len(program.clauses) + len(program.at_least) == before:
+            return
+
+
+def _drop_implied_atoms(program: Program) -> None:
+    simple: dict[Predicate, list[Clause]] = {}
+    for clause in program.clauses:
+        if len(clause.body) == 1 and isinstance(clause.body[0], PredicateAtom):
+            if isinstance(clause.head, PredicateAtom):
+                simple.setdefault(clause.body[0].predicate, []).append(clause)
+
+    def implied(atoms: list[PredicateAtom]) -> set[PredicateAtom]:
+        found = set(atoms)
+        pending = list(atoms)
+        while pending:
+            atom = pending.pop()
+            for clause in simple.get(atom.predicate, ()):
+                pattern = clause.body[0].terms
+                if not all(isinstance(term, int) for term in pattern):
+                    continue
+                if len(set(pattern)) != len(pattern):
+                    continue
+                binding: dict[Term, Term] = dict(zip(pattern, atom.terms, strict=True))
+                head = clause.head
+                assert isinstance(head, PredicateAtom)
+                result = PredicateAtom(
+                    head.predicate, tuple(binding.get(term, term) for term in head.terms)
+                )
+                if result not in found:
+                    found.add(result)
+                    pending.append(result)
+        return found
+
+    clauses = []
+    for clause in program.clauses:
+        body = list(clause.body)
+        for atom in clause.body:
+            if isinstance(atom, PredicateAtom) and atom.predicate.kind == 'class' and len(body) > 1:
+                rest = [other for other in body if other is not atom]
+                if atom in implied([a for a in rest if isinstance(a, PredicateAtom)]):
+                    body = rest
+        if len(body) == 1 and clause.head == body[0]:
+            continue
+        clauses.append(replace(clause, body=tuple(body)))
+    program.clauses = clauses
+
+    def needless(condition: AtLeast | AtMost) -> bool:
+        if not isinstance(condition.filler, Predicate) or condition.prop.kind != 'object':
+            return False
+        terms = (1, 0) if condition.inverse else (0, 1)
+        return PredicateAtom(condition.filler, (1,)) in implied(
+            [PredicateAtom(condition.prop, terms)]
+        )
+
+    program.at_least = [
+        replace(condition, filler=None) if needless(condition) else condition
+        for condition in program.at_least
+    ]
+    program.at_most = [
+        replace(condition, filler=None) if needless(condition) else condition
+        for condition in program.at_most
+    ]

@@ -1,0 +1,175 @@
+"""SWRL rules as clauses. Variables stand for named individuals and known values only (DL-safe)."""
+
+from __future__ import annotations
+
+from itertools import product
+from typing import TYPE_CHECKING
+
+from surveillance_ontology import axioms as ax
+from surveillance_ontology.axioms import SWRLB, Literal, local_name
+from surveillance_ontology.reasoner.clauses import (
+    BodyAtom,
+    ComputedAtom,
+    Constant,
+    DifferentAtom,
+    PredicateAtom,
+    RangeAtom,
+    SameAtom,
+    Term,
+)
+from surveillance_ontology.reasoner.datatypes import value_of
+from surveillance_ontology.reasoner.swrl_builtins import builtin
+
+if TYPE_CHECKING:
+    from surveillance_ontology.reasoner.normalisation import Normaliser
+
+
+class _Terms:
+    """Numbers a rule's variables; tells individuals from values."""
+
+    def __init__(self, normaliser: Normaliser) -> None:
+        self._normaliser = normaliser
+        self._numbers: dict[ax.Variable, int] = {}
+        self.individuals: set[int] = set()
+        self.values: set[int] = set()
+
+    def individual(self, argument: ax.IndividualArgument) -> Term:
+        if isinstance(argument, ax.Variable):
+            number = self._number(argument)
+            self.individuals.add(number)
+            return number
+        return Constant(argument)
+
+    def value(self, argument: ax.DataArgument) -> Term:
+        if isinstance(argument, ax.Variable):
+            number = self._number(argument)
+            self.values.add(number)
+            return number
+        if not isinstance(argument, Literal):
+            _unsupported(f'{argument} stands where a literal or a variable is expected')
+        return Constant(value_of(argument), True)
+
+    def _number(self, variable: ax.Variable) -> int:
+        number = self._numbers.get(variable)
+        if number is None:
+            number = self._numbers[variable] = self._normaliser.fresh()
+        return number
+
+
+def _unsupported(text: str) -> None:
+    from surveillance_ontology.reasoner.normalisation import Unsupported
+
+    raise Unsupported(text)
+
+
+def _computed(atom: ax.BuiltinAtom, terms: _Terms) -> ComputedAtom:
+    name = atom.builtin.removeprefix(SWRLB)
+    known = builtin(name, len(atom.arguments)) if atom.builtin.startswith(SWRLB) else None
+    if known is None:
+        _unsupported(
+            f'the built-in {local_name(atom.builtin)} with {len(atom.arguments)} arguments is not supported'
+        )
+        raise AssertionError
+    holds, solve = known
+    return ComputedAtom(name, holds, solve, tuple(map(terms.value, atom.arguments)))
+
+
+def normalise_rule(normaliser: Normaliser, rule: ax.Rule) -> None:
+    """Adds the clauses of one rule to the normaliser's program."""
+    program, terms = normaliser.program, _Terms(normaliser)
+    alternatives: list[list[tuple[BodyAtom, ...]]] = []
+    for atom in rule.body:
+        if isinstance(atom, ax.ClassAtom):
+            alternatives.append(normaliser.bodies(atom.cls, terms.individual(atom.argument)))
+        elif isinstance(atom, ax.DataRangeAtom):
+            term, test = terms.value(atom.argument), normaliser.test(atom.range)
+            if test is not None:
+                alternatives.append([(RangeAtom(test, (term,)),)])
+        elif isinstance(atom, ax.ObjectPropertyAtom):
+            pair = terms.individual(atom.first), terms.individual(atom.second)
+            alternatives.append([(normaliser.property(atom.prop, *pair),)])
+        elif isinstance(atom, ax.DataPropertyAtom):
+            data = program.data(atom.prop)
+            both = (terms.individual(atom.first), terms.value(atom.second))
+            alternatives.append([(PredicateAtom(data, both),)])
+        elif isinstance(atom, ax.SameIndividualAtom):
+            pair = terms.individual(atom.first), terms.individual(atom.second)
+            alternatives.append([(SameAtom(pair),)])
+        elif isinstance(atom, ax.DifferentIndividualsAtom):
+            pair = terms.individual(atom.first), terms.individual(atom.second)
+            alternatives.append([(DifferentAtom(pair),)])
+        else:
+            alternatives.append([(_computed(atom, terms),)])
+    for parts in product(*alternatives):
+        body = tuple(atom for part in parts for atom in part)
+        _heads(normaliser, rule, _bound(normaliser, body, terms), terms)
+
+
+def _bound(
+    normaliser: Normaliser, body: tuple[BodyAtom, ...], terms: _Terms
+) -> tuple[BodyAtom, ...]:
+    """The body, with owl:Thing for individuals that nothing else binds; refuses unbound values."""
+    program = normaliser.program
+    bound: set[Term] = set()
+    for atom in body:
+        if isinstance(atom, PredicateAtom):
+            bound.update(atom.terms)
+    free = [
+        term
+        for atom in body
+        for term in atom.terms
+        if isinstance(term, int) and term in terms.individuals and term not in bound
+    ]
+    for term in dict.fromkeys(free):
+        program.uses_thing = True
+        body = (*body, PredicateAtom(program.thing, (term,)))
+        bound.add(term)
+    waiting = [atom for atom in body if isinstance(atom, (ComputedAtom, RangeAtom))]
+    progress = True
+    while waiting and progress:
+        progress = False
+        for atom in tuple(waiting):
+            unbound = [term for term in atom.terms if isinstance(term, int) and term not in bound]
+            first_only = unbound == [atom.terms[0]] and isinstance(atom, ComputedAtom)
+            if not unbound or (first_only and atom.solve is not None):  # type: ignore[union-attr]
+                bound.update(atom.terms)
+                waiting.remove(atom)
+                progress = True
+    if waiting:
+        name = waiting[0].builtin if isinstance(waiting[0], ComputedAtom) else 'a data range'
+        _unsupported(f'an argument of {name} is bound by no other atom')
+    return body
+
+
+def _heads(
+    normaliser: Normaliser, rule: ax.Rule, body: tuple[BodyAtom, ...], terms: _Terms
+) -> None:
+    program = normaliser.program
+    bound = {term for atom in body for term in atom.terms if isinstance(term, int)}
+
+    def known(term: Term) -> Term:
+        if isinstance(term, int) and term not in bound:
+            _unsupported('a variable of the head does not stand in the body')
+        return term
+
+    if not rule.head:
+        subject = next((term for term in sorted(bound) if term in terms.individuals), None)
+        term: Term = Constant(ax.NOTHING) if subject is None else subject
+        normaliser.contradict(body, term)
+    for atom in rule.head:
+        if isinstance(atom, ax.ClassAtom):
+            normaliser.imply(body, atom.cls, known(terms.individual(atom.argument)))
+        elif isinstance(atom, ax.ObjectPropertyAtom):
+            pair = known(terms.individual(atom.first)), known(terms.individual(atom.second))
+            normaliser.clause(body, normaliser.property(atom.prop, *pair))
+        elif isinstance(atom, ax.DataPropertyAtom):
+            both = (known(terms.individual(atom.first)), known(terms.value(atom.second)))
+            normaliser.clause(body, PredicateAtom(program.data(atom.prop), both))
+        elif isinstance(atom, (ax.SameIndividualAtom, ax.DifferentIndividualsAtom)):
+            pair = known(terms.individual(atom.first)), known(terms.individual(atom.second))
+            if isinstance(atom, ax.SameIndividualAtom):
+                normaliser.clause(body, SameAtom(pair))
+            else:
+                normaliser.clause(body, PredicateAtom(program.different, pair))
+        else:
+            _unsupported('a built-in or data range in the head has no meaning here')
