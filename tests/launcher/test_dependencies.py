@@ -1,0 +1,84 @@
+"""What the packages import is what `pyproject.toml` installs."""
+
+from __future__ import annotations
+
+import ast
+import re
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from launcher.environment import PACKAGES
+from tests.launcher.conftest import ROOT
+
+# Names under which distributions are imported, where they differ.
+DISTRIBUTIONS = {
+    'cv2': 'opencv-python-headless',
+    'skimage': 'scikit-image',
+    'yaml': 'pyyaml',
+    'PIL': 'pillow',
+}
+# Looked for at run time and done without when absent: an installed ROS has them.
+OPTIONAL = {'tf2_msgs', 'nav2_msgs', 'opennav_docking_msgs', 'mujoco', 'launch', 'launch_ros'}
+# With rclpy[fastrtps] and common_interfaces.
+ROS = re.compile(
+    r'(rclpy|ament_index_python|action_msgs|builtin_interfaces|lifecycle_msgs|'
+    r'rcl_interfaces|rosgraph_msgs|unique_identifier_msgs|rosidl_\w+|rpyutils|'
+    r'(diagnostic|geometry|nav|sensor|shape|std|stereo|trajectory|visualization)_msgs|'
+    r'std_srvs)$'
+)
+
+
+def imports(folder: Path) -> dict[str, Path]:
+    found: dict[str, Path] = {}
+    for path in folder.rglob('*.py'):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.Import):
+                names = [alias.name for alias in node.names]
+            elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
+                names = [node.module]
+            else:
+                continue
+            found.update({name.partition('.')[0]: path for name in names})
+    return found
+
+
+def installed() -> set[str]:
+    project = tomllib.loads((ROOT / 'pyproject.toml').read_text())['project']
+    lists = [project['dependencies'], project['optional-dependencies']['test']]
+    return {
+        re.split(r'[\[<>=!~ ]', line)[0].lower().replace('_', '-')
+        for part in lists
+        for line in part
+    }
+
+
+@pytest.mark.parametrize('folder', [*(f'{p}/{p}' for p in PACKAGES), 'launcher', 'tests'])
+def test_every_import_is_installed_by_the_set_up(folder):
+    known = installed()
+    for name, path in imports(ROOT / folder).items():
+        own = name in (*PACKAGES, 'surveillance_interfaces', 'launcher', 'tests')
+        if own or name in sys.stdlib_module_names or name in OPTIONAL or ROS.match(name):
+            continue
+        distribution = DISTRIBUTIONS.get(name, name).lower().replace('_', '-')
+        assert distribution in known, f'{path} imports {name}'
+
+
+def test_the_set_up_itself_needs_the_standard_library_alone():
+    first = ['commands', 'environment', 'fingerprint', 'progress', 'system', 'graph', '__init__']
+    for module in first:
+        tree = ast.parse((ROOT / 'launcher' / f'{module}.py').read_text())
+        for node in tree.body:  # what a function imports, it imports in the environment
+            names = []
+            if isinstance(node, ast.Import):
+                names = [alias.name for alias in node.names]
+            elif isinstance(node, ast.ImportFrom):
+                names = [node.module or '']
+            for name in names:
+                top = name.partition('.')[0]
+                assert top in sys.stdlib_module_names or name in (
+                    'launcher',
+                    *(f'launcher.{other}' for other in first),
+                ), f'{module} imports {name}'
