@@ -11,11 +11,11 @@ from builtin_interfaces.msg import Time
 from sensor_msgs.msg import CameraInfo, Image
 
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.qos import SENSOR_QOS
 from surveillance_simulation import conversions, simulator_parameters
 from surveillance_simulation.camera import Conditions
 from surveillance_simulation.rendering import Renderer
 from surveillance_simulation.robot import Robot
+from surveillance_simulation.sensor_feed import SENSOR_DEPTH
 
 _FRAME = 'camera_optical_frame'
 
@@ -57,8 +57,8 @@ class CameraFeed:
         self._changing = changing
         self._stamp = stamp
         self._wanted = threading.Semaphore(0)
-        self._images = node.create_publisher(Image, 'camera/rgb/image_raw', SENSOR_QOS)
-        self._infos = node.create_publisher(CameraInfo, 'camera/rgb/camera_info', SENSOR_QOS)
+        self._images = node.create_publisher(Image, 'camera/rgb/image_raw', SENSOR_DEPTH)
+        self._infos = node.create_publisher(CameraInfo, 'camera/rgb/camera_info', SENSOR_DEPTH)
         self._stopping = node.stopping
         node.stopping.subscribe(self._wanted.release)
         node.spawn(self._work, 'camera')

@@ -12,10 +12,13 @@ from std_msgs.msg import UInt32
 
 from surveillance_interfaces.msg import DoorStates
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
+from surveillance_runtime.qos import STATE_QOS
 from surveillance_simulation import conversions, occupancy_grid, simulator_parameters
 from surveillance_simulation.robot import Robot
 from surveillance_simulation.tf_feed import TfFeed
+
+SENSOR_DEPTH = 5
+"""Sensors offer reliable delivery, so that subscribers of either kind are served (REP-2003)."""
 
 
 class SensorFeed:
@@ -26,10 +29,10 @@ class SensorFeed:
         self._robot = robot
         self._drives_clock = drives_clock
         self._clock = node.create_publisher(Clock, '/clock', 1) if drives_clock else None
-        self._odometry = node.create_publisher(Odometry, 'odom', SENSOR_QOS)
-        self._scan = node.create_publisher(LaserScan, 'scan', SENSOR_QOS)
-        self._joints = node.create_publisher(JointState, 'joint_states', SENSOR_QOS)
-        self._truth = node.create_publisher(PoseStamped, 'ground_truth', SENSOR_QOS)
+        self._odometry = node.create_publisher(Odometry, 'odom', SENSOR_DEPTH)
+        self._scan = node.create_publisher(LaserScan, 'scan', SENSOR_DEPTH)
+        self._joints = node.create_publisher(JointState, 'joint_states', SENSOR_DEPTH)
+        self._truth = node.create_publisher(PoseStamped, 'ground_truth', SENSOR_DEPTH)
         self._collisions = node.create_publisher(UInt32, 'collisions', STATE_QOS)
         self._doors = node.create_publisher(DoorStates, 'door_states', STATE_QOS)
         self._map = node.create_publisher(OccupancyGrid, 'map', STATE_QOS)
