@@ -33,9 +33,9 @@ _CODES = {
     ExitCode.NO_COMMAND: 'no command',
     ExitCode.MOUNT_REFUSED: 'MOUNT while another client is mounted, or on an unknown reference',
     ExitCode.NOT_IMPLEMENTED: 'defined by ARMOR, never sent',
-    ExitCode.INVALID_COMMAND: 'unknown command or reference; too few or wrong arguments; a file that '
-    'cannot be loaded or saved; the description says which',
-    ExitCode.SEVERAL_VALUES: 'raised by the client: one value was to be replaced and there are several',
+    ExitCode.INVALID_COMMAND: 'unknown command or reference; too few or wrong arguments; a file '
+    'that cannot be loaded or saved; the description says which',
+    ExitCode.SEVERAL_VALUES: 'raised by the client: one value was to be replaced, there are several',
 }
 
 
@@ -76,9 +76,8 @@ def updated(manual: str) -> str:
 
 def _table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
     lines = [head, tuple('---' for _ in head), *rows]
-    return '\n'.join(
-        '| ' + ' | '.join(cell.replace('|', '\\|') for cell in row) + ' |' for row in lines
-    )
+    escaped = [[cell.replace('|', '\\|') for cell in row] for row in lines]
+    return '\n'.join(f'| {" | ".join(row)} |' for row in escaped)
 
 
 def main() -> None:

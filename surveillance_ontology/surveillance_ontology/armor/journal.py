@@ -1,10 +1,10 @@
 """An append-only log of JSON records that survives being killed at any moment.
 
 A journal is a directory with numbered segments, ``journal-<n>.log``, and at most one snapshot in
-use, ``snapshot-<n>.log``, which stands for everything before segment n. Each line is ``<crc32 of the
-text> <text>`` with a list of records, and is on the disk when `Journal.append` returns. A line that
-was cut off by a crash is the last of the last segment; it was never answered for, and is removed
-when the journal is opened.
+use, ``snapshot-<n>.log``, which stands for everything before segment n. Each line is ``<crc32>
+<text>`` with a list of records, and is on the disk when `Journal.append` returns. A line that was
+cut off by a crash is the last of the last segment; it was never answered for, and is removed when
+the journal is opened.
 """
 
 from __future__ import annotations

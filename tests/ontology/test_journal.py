@@ -1,0 +1,114 @@
+"""The journal: what was appended is there again, whatever happened to the process."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from surveillance_ontology.armor.journal import Journal, JournalError
+
+
+def reopened(directory: Path) -> list[object]:
+    journal = Journal(directory)
+    try:
+        return list(journal.records())
+    finally:
+        journal.close()
+
+
+def test_records_come_back_in_order(tmp_path: Path) -> None:
+    journal = Journal(tmp_path / 'store')
+    journal.append([['a', 1], ['b', 'ü\n']])
+    journal.append([['c', None]])
+    journal.close()
+    assert reopened(tmp_path / 'store') == [['a', 1], ['b', 'ü\n'], ['c', None]]
+
+
+def test_a_record_cut_off_at_any_byte_is_dropped_and_the_journal_goes_on(tmp_path: Path) -> None:
+    journal = Journal(tmp_path)
+    journal.append([1])
+    journal.append([2, 3])
+    journal.close()
+    path = tmp_path / 'journal-0.log'
+    whole = path.read_bytes()
+    first = whole.index(b'\n') + 1
+    for length in range(first, len(whole)):
+        path.write_bytes(whole[:length])
+        journal = Journal(tmp_path)
+        assert list(journal.records()) == [1], length
+        journal.append([4])
+        journal.close()
+        assert reopened(tmp_path) == [1, 4]
+
+
+def test_damage_in_the_middle_is_reported_with_its_place(tmp_path: Path) -> None:
+    journal = Journal(tmp_path)
+    journal.append([1])
+    journal.append([2])
+    journal.close()
+    path = tmp_path / 'journal-0.log'
+    data = bytearray(path.read_bytes())
+    data[10] ^= 1
+    path.write_bytes(data)
+    with pytest.raises(JournalError, match=r'journal-0\.log: damaged at byte 0'):
+        Journal(tmp_path)
+
+
+def test_a_snapshot_stands_for_what_was_before_it(tmp_path: Path) -> None:
+    journal = Journal(tmp_path)
+    journal.append([1])
+    journal.append([2])
+    number = journal.begin_snapshot()
+    journal.append([3])
+    assert list(journal.records()) == [1, 2, 3]
+    journal.finish_snapshot(number, ['state'])
+    journal.append([4])
+    assert list(journal.records()) == ['state', 3, 4]
+    journal.close()
+    assert reopened(tmp_path) == ['state', 3, 4]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ['journal-1.log', 'lock', 'snapshot-1.log']
+
+
+def test_a_snapshot_that_was_not_finished_changes_nothing(tmp_path: Path) -> None:
+    journal = Journal(tmp_path)
+    journal.append([1])
+    journal.begin_snapshot()
+    journal.append([2])
+    (tmp_path / 'snapshot-1.tmp').write_bytes(b'half')
+    journal.close()
+    assert reopened(tmp_path) == [1, 2]
+    assert not (tmp_path / 'snapshot-1.tmp').exists()
+
+
+def test_only_one_process_at_a_time(tmp_path: Path) -> None:
+    journal = Journal(tmp_path)
+    with pytest.raises(JournalError, match='in use by another process'):
+        Journal(tmp_path)
+    journal.close()
+    Journal(tmp_path).close()
+
+
+def test_a_write_that_fails_leaves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    journal = Journal(tmp_path)
+    journal.append([1])
+
+    def full(_: int) -> None:
+        raise OSError(28, 'No space left on device')
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, 'fdatasync', full)
+        with pytest.raises(JournalError, match='No space left'):
+            journal.append([2])
+    journal.append([3])
+    assert list(journal.records()) == [1, 3]
+    journal.close()
+
+
+def test_a_directory_that_cannot_be_used(tmp_path: Path) -> None:
+    (tmp_path / 'file').write_text('')
+    with pytest.raises(JournalError, match='file'):
+        Journal(tmp_path / 'file' / 'store')

@@ -1,0 +1,122 @@
+"""Entities, literals and facts in text form."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from surveillance_ontology.armor.facts import ShortFact, parse_fact
+from surveillance_ontology.armor.rendering import (
+    parse_entity,
+    parse_literal,
+    parse_rendered,
+    render_entity,
+    render_literal,
+)
+from surveillance_ontology.axioms import XSD, Literal
+
+BASE = 'http://example.org/place'
+
+
+@pytest.mark.parametrize(
+    ('text', 'iri'),
+    [
+        ('R1', BASE + '#R1'),
+        ('<http://other.org/x#R1>', 'http://other.org/x#R1'),
+        ('http://other.org/x#R1', 'http://other.org/x#R1'),
+        ('urn:x:y', 'urn:x:y'),
+        ('owl:Thing', 'http://www.w3.org/2002/07/owl#Thing'),
+        ('a:b', BASE + '#a:b'),
+        ('Küche', BASE + '#Küche'),
+    ],
+)
+def test_entities_are_read(text: str, iri: str) -> None:
+    assert parse_entity(text, BASE) == iri
+
+
+@pytest.mark.parametrize('text', ['', 'a b', 'a\x00', 'a\n', '<>', 'a"b', '#x', 'a' * 3000, '<a b>'])
+def test_names_that_no_iri_can_hold_are_refused(text: str) -> None:
+    with pytest.raises(ValueError, match=r'\S'):
+        parse_entity(text, BASE)
+
+
+@pytest.mark.parametrize(
+    ('type_word', 'text', 'rendered'),
+    [
+        ('LONG', '1665579740', '"1665579740"^^xsd:long'),
+        ('LONG', '"10"^^xsd:long', '"10"^^xsd:long'),
+        ('LONG', f'"10"^^<{XSD}long>', '"10"^^xsd:long'),
+        ('LONG', '+007', '"7"^^xsd:long'),
+        ('INT', '3', '"3"^^xsd:integer'),
+        ('INTEGER', '"3"^^xsd:long', '"3"^^xsd:long'),
+        ('STRING', 'ab "q"', '"ab \\"q\\""^^xsd:string'),
+        ('STRING', '"ab \\"q\\""^^xsd:string', '"ab \\"q\\""^^xsd:string'),
+        ('STRING', '"x"@en', '"x"@en'),
+        ('STRING', '"10"^^xsd:long', '"\\"10\\"^^xsd:long"^^xsd:string'),
+        ('STRING', 'a\\b', '"a\\\\b"^^xsd:string'),
+        ('BOOLEAN', 'True', '"true"^^xsd:boolean'),
+        ('BOOL', 'no', '"false"^^xsd:boolean'),
+        ('FLOAT', '5.5', '"5.5"^^xsd:float'),
+        ('FLOAT', '0.1', '"0.1"^^xsd:float'),
+        ('FLOAT', '1e10', '"1.0E10"^^xsd:float'),
+        ('DOUBLE', '1e-5', '"1.0E-5"^^xsd:double'),
+        ('DOUBLE', 'NaN', '"NaN"^^xsd:double'),
+    ],
+)
+def test_values_are_read_bare_or_as_answers_have_them(
+    type_word: str, text: str, rendered: str
+) -> None:
+    assert render_literal(parse_literal(type_word, text)) == rendered
+
+
+def test_doubles_are_narrowed_when_asked_for() -> None:
+    wide = parse_literal('DOUBLE', '0.123456789012')
+    narrow = parse_literal('DOUBLE', '0.123456789012', narrow_doubles=True)
+    assert render_literal(wide) == '"0.123456789012"^^xsd:double'
+    assert render_literal(narrow) == '"0.12345679"^^xsd:float'
+
+
+@pytest.mark.parametrize(
+    ('type_word', 'text', 'words'),
+    [
+        ('INT', 'x', "'x' is not a whole number, expected INT"),
+        ('INT', '2147483648', 'out of range'),
+        ('LONG', '9223372036854775808', 'out of range'),
+        ('LONG', '1.5', 'not a whole number'),
+        ('LONG', '', 'not a whole number'),
+        ('FLOAT', '1,5', 'not a number'),
+        ('DOUBLE', '0x10', 'not a number'),
+    ],
+)
+def test_wrong_values_are_named(type_word: str, text: str, words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        parse_literal(type_word, text)
+
+
+@settings(max_examples=100, deadline=None, derandomize=True)
+@given(st.text(), st.sampled_from([XSD + 'string', XSD + 'long', 'http://example.org/t']))
+def test_rendered_literals_read_back(text: str, datatype: str) -> None:
+    literal = Literal(text, datatype)
+    assert parse_rendered(render_literal(literal)) == literal
+
+
+def test_entities_read_back() -> None:
+    for iri in (BASE + '#R1', 'http://www.w3.org/2002/07/owl#Nothing'):
+        assert parse_entity(render_entity(iri), BASE) == iri
+
+
+def test_facts_and_patterns() -> None:
+    fact = parse_fact('visitedAt( R3 , "5, (six) \\"x\\""^^xsd:string )')
+    assert fact == ShortFact('visitedAt', ('R3', '"5, (six) \\"x\\""^^xsd:string'))
+    assert parse_fact(str(fact)) == fact
+    assert parse_fact('visitedAt(?, ?)').matches(fact)
+    assert parse_fact('visitedAt(R3, ?)').matches(fact)
+    assert not parse_fact('visitedAt(R4, ?)').matches(fact)
+    assert not parse_fact('visitedAt(?)').matches(fact)
+
+
+@pytest.mark.parametrize('text', ['', 'URGENT', 'URGENT()', 'a(b', 'a(b,)', 'a(b,c,d)', 'a(b c)'])
+def test_what_is_no_fact_is_refused(text: str) -> None:
+    with pytest.raises(ValueError, match='expected CLASS'):
+        parse_fact(text)
