@@ -1,0 +1,263 @@
+"""Writing an ontology to a file: whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import re
+import tempfile
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from xml.sax.saxutils import escape, quoteattr
+
+from surveillance_ontology.axioms import OWL, RDF, RDFS, SWRL, XSD, Axiom, Literal
+from surveillance_ontology.owl_triples import triples_of
+from surveillance_ontology.rdf_xml import Node, Triple
+
+FORMATS = ('rdfxml', 'ntriples')
+_PREFIXES = {'rdf': RDF, 'rdfs': RDFS, 'owl': OWL, 'xsd': XSD, 'swrl': SWRL}
+_LOCAL = re.compile(r'[^\W\d][\w.\-]*$')
+_NOT_XML = re.compile('[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]')
+
+
+class OntologyWriteError(ValueError):
+    """An ontology that the format cannot hold, or a file that cannot be written; one line."""
+
+
+def write_ontology(
+    axioms: Iterable[Axiom],
+    iri: str,
+    path: str | Path,
+    format: str = 'rdfxml',
+    prefixes: Mapping[str, str] | None = None,
+) -> None:
+    """Writes a document through a temporary file beside it, so that the old one stays until the new is whole.
+
+    Args:
+        axioms: What the document states, in this order.
+        iri: The ontology's IRI.
+        path: The file; its directory must exist.
+        format: One of `FORMATS`.
+        prefixes: Further namespace prefixes for RDF/XML.
+
+    Raises:
+        OntologyWriteError: The directory is not writable, the format is unknown, or RDF/XML cannot hold a
+            property IRI or a character.
+    """
+    data = ontology_bytes(axioms, iri, format, prefixes)
+    target = Path(path)
+    temporary = ''
+    try:
+        handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f'.{target.name}.')
+        with open(handle, 'wb') as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        umask = os.umask(0)
+        os.umask(umask)
+        os.chmod(temporary, 0o666 & ~umask)
+        os.replace(temporary, target)
+    except OSError as error:
+        if temporary:
+            Path(temporary).unlink(missing_ok=True)
+        raise OntologyWriteError(f'{target}: {error.strerror or error}') from None
+    directory = os.open(target.parent, os.O_RDONLY)
+    try:
+        os.fsync(directory)
+    finally:
+        os.close(directory)
+
+
+def ontology_bytes(
+    axioms: Iterable[Axiom],
+    iri: str,
+    format: str = 'rdfxml',
+    prefixes: Mapping[str, str] | None = None,
+) -> bytes:
+    """The document as bytes; arguments and errors as in `write_ontology`."""
+    triples = triples_of(axioms, iri)
+    if format == 'ntriples':
+        return ''.join(map(_ntriple, triples)).encode()
+    if format == 'rdfxml':
+        return _RdfXml(list(triples), iri, prefixes or {}).document().encode()
+    raise OntologyWriteError(f'format {format!r}: expected one of {", ".join(FORMATS)}')
+
+
+# --- N-Triples ---
+
+
+def _escaped(text: str) -> str:
+    for plain, escaped in (('\\', '\\\\'), ('"', '\\"'), ('\n', '\\n'), ('\r', '\\r')):
+        text = text.replace(plain, escaped)
+    return text
+
+
+def _term(node: Node) -> str:
+    if isinstance(node, str):
+        return node if node.startswith('_:') else f'<{node}>'
+    if node.language:
+        return f'"{_escaped(node.lexical)}"@{node.language}'
+    return f'"{_escaped(node.lexical)}"^^<{node.datatype}>'
+
+
+def _ntriple(triple: Triple) -> str:
+    return f'{_term(triple[0])} <{triple[1]}> {_term(triple[2])} .\n'
+
+
+# --- RDF/XML ---
+
+
+class _RdfXml:
+    """One element for each subject; anonymous nodes used once stand inside what uses them."""
+
+    def __init__(self, triples: list[Triple], iri: str, prefixes: Mapping[str, str]) -> None:
+        self._iri = iri
+        self._nodes: dict[str, list[tuple[str, Node]]] = {}
+        uses: dict[str, int] = {}
+        for subject, predicate, value in triples:
+            self._nodes.setdefault(subject, []).append((predicate, value))
+            if isinstance(value, str) and value.startswith('_:'):
+                uses[value] = uses.get(value, 0) + 1
+        self._inner = {
+            node for node, number in uses.items() if number == 1 and node in self._nodes
+        } - self._on_cycles()
+        self._names: dict[str, str] = {}
+        self._namespaces: dict[str, str] = {}
+        for prefix, namespace in {**_PREFIXES, **prefixes, '': iri.rstrip('#/') + '#'}.items():
+            if prefix != 'xml' and namespace:
+                self._namespaces.setdefault(namespace, prefix)
+        self._lines: list[str] = []
+
+    def _on_cycles(self) -> set[str]:
+        """Anonymous nodes that no named node or unused anonymous node leads to."""
+        targets = {
+            value
+            for values in self._nodes.values()
+            for _, value in values
+            if isinstance(value, str) and value.startswith('_:')
+        }
+        pending = [node for node in self._nodes if node not in targets]
+        reached = set(pending)
+        while pending:
+            for _, value in self._nodes.get(pending.pop(), ()):
+                if isinstance(value, str) and value.startswith('_:') and value not in reached:
+                    reached.add(value)
+                    pending.append(value)
+        return set(self._nodes) - reached
+
+    def document(self) -> str:
+        for subject in self._nodes:
+            if subject not in self._inner:
+                self._node(subject, 1)
+                self._lines.append('')
+        header = ['<?xml version="1.0" encoding="utf-8"?>', '<rdf:RDF']
+        for namespace, prefix in sorted(self._namespaces.items(), key=lambda item: item[1]):
+            name = f'xmlns:{prefix}' if prefix else 'xmlns'
+            header.append(f'     {name}={quoteattr(namespace)}')
+        header.append(f'     xml:base={quoteattr(self._iri)}>')
+        return '\n'.join([*header, '', *self._lines, '</rdf:RDF>', ''])
+
+    def _name(self, iri: str) -> str:
+        known = self._names.get(iri)
+        if known is not None:
+            return known
+        found = _LOCAL.search(iri)
+        cut = max(iri.rfind('#'), iri.rfind('/'), iri.rfind(':')) + 1
+        local = iri[cut:]
+        if not _LOCAL.match(local):
+            local = found.group() if found else ''
+        namespace = iri[: len(iri) - len(local)]
+        if not local or not namespace:
+            raise OntologyWriteError(f'RDF/XML cannot name <{iri}>; save as ntriples instead')
+        prefix = self._namespaces.get(namespace)
+        if prefix is None:
+            prefix = self._namespaces[namespace] = f'ns{len(self._namespaces)}'
+        name = self._names[iri] = f'{prefix}:{local}' if prefix else local
+        return name
+
+    def _identity(self, node: str) -> str:
+        if node in self._inner:
+            return ''
+        if node.startswith('_:'):
+            return f' rdf:nodeID={quoteattr(node[2:])}'
+        return f' rdf:about={quoteattr(_checked(node))}'
+
+    def _node(self, node: str, depth: int) -> None:
+        statements = self._nodes.get(node, [])
+        kind = next(
+            (
+                value
+                for predicate, value in statements
+                if predicate == RDF + 'type' and isinstance(value, str) and _nameable(value)
+            ),
+            None,
+        )
+        name = 'rdf:Description' if kind is None else self._name(kind)
+        rest = list(statements)
+        if kind is not None:
+            rest.remove((RDF + 'type', kind))
+        margin = '    ' * depth
+        if not rest:
+            self._lines.append(f'{margin}<{name}{self._identity(node)}/>')
+            return
+        self._lines.append(f'{margin}<{name}{self._identity(node)}>')
+        for predicate, value in rest:
+            self._statement(predicate, value, depth + 1)
+        self._lines.append(f'{margin}</{name}>')
+
+    def _statement(self, predicate: str, value: Node, depth: int) -> None:
+        margin, name = '    ' * depth, self._name(predicate)
+        if isinstance(value, Literal):
+            note = ''
+            if value.language:
+                note = f' xml:lang={quoteattr(value.language)}'
+            elif value.datatype != XSD + 'string':
+                note = f' rdf:datatype={quoteattr(value.datatype)}'
+            text = escape(_checked(value.lexical), {'\r': '&#13;'})
+            self._lines.append(f'{margin}<{name}{note}>{text}</{name}>')
+            return
+        items = self._items(value)
+        if items:
+            self._lines.append(f'{margin}<{name} rdf:parseType="Collection">')
+            for item in items:
+                if item in self._inner:
+                    self._node(item, depth + 1)
+                else:
+                    self._lines.append(f'{margin}    <rdf:Description{self._identity(item)}/>')
+            self._lines.append(f'{margin}</{name}>')
+        elif value in self._inner:
+            self._lines.append(f'{margin}<{name}>')
+            self._node(value, depth + 1)
+            self._lines.append(f'{margin}</{name}>')
+        elif value.startswith('_:'):
+            self._lines.append(f'{margin}<{name} rdf:nodeID={quoteattr(value[2:])}/>')
+        else:
+            self._lines.append(f'{margin}<{name} rdf:resource={quoteattr(_checked(value))}/>')
+
+    def _items(self, head: str) -> list[str]:
+        """The items of a plain list of resources; empty for anything else."""
+        items: list[str] = []
+        while head != RDF + 'nil':
+            cell = dict(self._nodes.get(head, ()))
+            first = cell.get(RDF + 'first')
+            rest = cell.get(RDF + 'rest')
+            if head not in self._inner or not isinstance(first, str) or not isinstance(rest, str):
+                return []
+            if set(cell) != {RDF + 'first', RDF + 'rest'}:
+                return []
+            items.append(first)
+            head = rest
+        return items
+
+
+def _nameable(iri: str) -> bool:
+    return not iri.startswith('_:') and bool(_LOCAL.match(re.split('[#/:]', iri)[-1]))
+
+
+def _checked(text: str) -> str:
+    found = _NOT_XML.search(text)
+    if found:
+        raise OntologyWriteError(
+            f'RDF/XML cannot hold the character {found.group()!r} in {text[:40]!r};'
+            ' save as ntriples instead'
+        )
+    return text
