@@ -1,31 +1,18 @@
-"""A directive service on the patrol's own ontology, and the seven-room map in it."""
+"""A directive service on the patrol's own ontology, and a client of it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from surveillance_ontology.armor.client import ArmorClient
 from surveillance_ontology.armor.in_process import InProcessTransport
-from surveillance_ontology.armor.protocol import DirectiveRequest, DirectiveResponse
 from surveillance_ontology.armor.service import ArmorService
 from surveillance_ontology.armor.settings import DATA, Settings
 
-IRI = 'http://bnc/exp-rob-lab/2022-23'
-FIXTURES = Path(__file__).parent / 'fixtures'
-ONTOLOGY = str(DATA / 'surveillance.owl')
-SEVEN_ROOMS = {
-    'R1': ['D1'],
-    'R2': ['D2'],
-    'R3': ['D3'],
-    'R4': ['D4'],
-    'E': ['D6', 'D7'],
-    'C1': ['D1', 'D2', 'D5', 'D6'],
-    'C2': ['D3', 'D4', 'D5', 'D7'],
-}
-Ask = Callable[..., DirectiveResponse]
+from .seven_rooms import FIXTURES, IRI, ONTOLOGY, Ask, asker
 
 
 @pytest.fixture
@@ -38,18 +25,6 @@ def service(tmp_path: Path) -> Iterator[ArmorService]:
     )
     yield made
     made.close()
-
-
-def asker(service: ArmorService, reference: str = 'map', client: str = 'tester') -> Ask:
-    """A short way to send directives: ``ask('ADD IND CLASS', 'R1', 'ROOM')``."""
-
-    def ask(words: str, *args: str, client: str = client, reference: str = reference) -> DirectiveResponse:
-        command, primary, secondary, *_ = (*words.split(), '', '', '')
-        return service.execute(
-            DirectiveRequest(client, reference, command, primary, secondary, args)
-        )
-
-    return ask
 
 
 @pytest.fixture
@@ -65,23 +40,3 @@ def ask(service: ArmorService) -> Ask:
 def client(service: ArmorService) -> ArmorClient:
     """A client of the reference `map`, which is not loaded yet."""
     return ArmorClient('tester', 'map', InProcessTransport(service))
-
-
-def names(response: DirectiveResponse) -> list[str]:
-    """The local names in an answer."""
-    assert response.success, response
-    return sorted(item.removeprefix(f'<{IRI}#').removesuffix('>') for item in response.queried_objects)
-
-
-def build_seven_rooms(client: ArmorClient, buffered: bool, lazy: bool) -> None:
-    """The well-known order of building the map: add, reason, tell apart, place the robot, reason."""
-    client.utils.load_ref_from_file(ONTOLOGY, IRI, buffered, 'PELLET', lazy)
-    for room, doors in SEVEN_ROOMS.items():
-        for door in doors:
-            client.manipulation.add_objectprop_to_ind('hasDoor', room, door)
-        client.manipulation.add_dataprop_to_ind('visitedAt', room, 'LONG', '1665579740')
-    client.utils.sync_buffered_reasoner()
-    client.manipulation.disj_inds_of_class('ROOM')
-    client.manipulation.disj_inds_of_class('DOOR')
-    client.manipulation.add_objectprop_to_ind('isIn', 'Robot1', 'E')
-    client.utils.sync_buffered_reasoner()

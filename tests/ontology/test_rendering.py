@@ -35,7 +35,9 @@ def test_entities_are_read(text: str, iri: str) -> None:
     assert parse_entity(text, BASE) == iri
 
 
-@pytest.mark.parametrize('text', ['', 'a b', 'a\x00', 'a\n', '<>', 'a"b', '#x', 'a' * 3000, '<a b>'])
+@pytest.mark.parametrize(
+    'text', ['', 'a b', 'a\x00', 'a\n', '<>', 'a"b', '#x', 'a' * 3000, '<a b>']
+)
 def test_names_that_no_iri_can_hold_are_refused(text: str) -> None:
     with pytest.raises(ValueError, match=r'\S'):
         parse_entity(text, BASE)
