@@ -198,7 +198,7 @@ class Mission:
         self.place = place
         self.astray = False
         self.chooser.saw(place, self.now())
-        self.recovery.worked(place)
+        self.recovery.arrived(place)
         self.failure = None
         self._write('visit', place=place, distance=distance)
         self.say(f'arrived in {place}')
@@ -212,7 +212,7 @@ class Mission:
 
     def charged(self, place: str, seconds: float) -> None:
         """The battery was charged in ``place``."""
-        self.recovery.worked(charging(place))
+        self.recovery.charged(place)
         self.failure = None
         self._write('recharge', place=place, seconds=seconds)
         self.say(f'charged in {place} to {self.level_text()}')
@@ -237,8 +237,13 @@ class Mission:
         return f'the battery is at {level:g} %, below {required:.1f} %: {words}'
 
     def at_station(self) -> bool:
-        """Whether the robot is where it can charge, and did not leave half-way since."""
-        return self.place in self.settings.choice.recharge_rooms and not self.astray
+        """Whether the robot is where it can charge, and has not left half-way since.
+
+        A station that did not charge lately is none as long as there is another.
+        """
+        stations = self.settings.choice.recharge_rooms
+        good = [place for place in stations if place not in self.recovery.avoided(self.now())]
+        return self.place in (good or stations) and not self.astray
 
     def charged_enough(self) -> bool:
         """Whether the robot may leave the station."""
@@ -256,9 +261,11 @@ class Mission:
 
     # Failures.
 
-    def failed(self, what: str, reason: str, goal: str | None = None) -> None:
-        """Remembers, records and says what did not work."""
-        self.failure = Failure(what, reason, goal)
+    def failed(
+        self, what: str, reason: str, goal: str | None = None, *, charging: bool = False
+    ) -> None:
+        """Remembers, records and says what did not work; see :class:`Failure`."""
+        self.failure = Failure(what, reason, goal, charging)
         self._write('failure', what=what, reason=reason)
         self.say(f'{what} failed: {reason}', warning=True)
 
@@ -280,11 +287,6 @@ class Mission:
     def _write(self, name: str, **fields: object) -> None:
         if self._record is not None:
             self._record.write(name, self.now(), **fields)
-
-
-def charging(place: str) -> str:
-    """The name under which the recovery counts failures to charge in ``place``."""
-    return f'charging in {place}'
 
 
 def path_length(path: list[Point]) -> float:

@@ -27,6 +27,8 @@ class MissionState(fsm.State):
 
     task = ''
     """What the state does, for the message when that fails."""
+    charging = False
+    """Whether a failure means that the battery is not charged."""
 
     def __init__(
         self,
@@ -49,7 +51,7 @@ class MissionState(fsm.State):
                 return self._preempted()
             return self.interrupted(ud)
         except (PeerError, NowhereToGoError) as error:
-            self.mission.failed(self.task, str(error), self.goal(ud))
+            self.mission.failed(self.task, str(error), self.goal(ud), charging=self.charging)
             return FAILED
 
     def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:

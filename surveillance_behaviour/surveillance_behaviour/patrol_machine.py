@@ -12,7 +12,6 @@ from typing import Any
 from surveillance_behaviour import fsm
 from surveillance_behaviour.mission import (
     Mission,
-    charging,
     check_arrival,
     check_path,
     path_length,
@@ -187,17 +186,16 @@ class Recharge(RoutineState):
 
     def __init__(self, mission: Mission) -> None:
         super().__init__(mission, ['battery_full', 'not_at_dock'], output_keys=['target'])
-        self._docked = False
 
     def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
         mission = self.mission
-        self._docked = False
+        self.charging = False
         mission.look(interrupt)
         if not mission.at_station():
             why = mission.why_charge() or 'charging was begun'
             ud.target = mission.choose_station(interrupt, why).place
             return 'not_at_dock'
-        self._docked = True
+        self.charging = True
         ud.target = mission.place
         began = mission.now()
         mission.say(f'charging in {mission.place} ({mission.level_text()})')
@@ -210,7 +208,7 @@ class Recharge(RoutineState):
         return 'battery_full'
 
     def goal(self, ud: Any) -> str | None:
-        return charging(self.mission.place) if self._docked else None
+        return self.mission.place if self.charging else None
 
 
 def moving(mission: Mission, *, heeds_battery: bool) -> fsm.StateMachine:

@@ -13,6 +13,9 @@ from collections import Counter
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+DOUBLINGS = 30
+"""More doublings of a time than this are not worth counting."""
+
 
 class Step(StrEnum):
     """What to do next; the values are the outcomes of the machines' recovery state."""
@@ -53,11 +56,13 @@ class Failure:
         what: The state in which it happened.
         reason: One line.
         goal: The place that was not reached; None: the failure has nothing to do with a place.
+        charging: The place was reached, but the battery is not charged there.
     """
 
     what: str
     reason: str
     goal: str | None = None
+    charging: bool = False
 
 
 @dataclass
@@ -66,6 +71,7 @@ class Recovery:
 
     limits: RecoveryLimits = field(default_factory=RecoveryLimits)
     _tries: Counter[str] = field(default_factory=Counter)
+    _charge_tries: Counter[str] = field(default_factory=Counter)
     _given_up: Counter[str] = field(default_factory=Counter)
     _avoided_until: dict[str, float] = field(default_factory=dict)
     _in_a_row: int = 0
@@ -87,10 +93,14 @@ class Recovery:
         goal = failure.goal
         if goal is None:
             return Step.WAIT_FOR_HELP
-        self._tries[goal] += 1
-        if self._tries[goal] < self.limits.path_tries:
+        tries = self._charge_tries if failure.charging else self._tries
+        tries[goal] += 1
+        if tries[goal] % self.limits.path_tries:
             return Step.ANOTHER_PATH
-        self._give_up(goal, now)
+        self._avoid(goal, now)
+        if failure.charging:
+            return Step.WAIT_FOR_HELP
+        del tries[goal]
         self._in_a_row += 1
         if self._in_a_row < self.limits.place_tries:
             return Step.ANOTHER_PLACE
@@ -99,9 +109,8 @@ class Recovery:
             return Step.GO_BACK
         return Step.WAIT_FOR_HELP
 
-    def _give_up(self, goal: str, now: float) -> None:
-        del self._tries[goal]
-        seconds = self.limits.avoid_seconds * 2.0 ** self._given_up[goal]
+    def _avoid(self, goal: str, now: float) -> None:
+        seconds = self.limits.avoid_seconds * 2.0 ** min(self._given_up[goal], DOUBLINGS)
         self._avoided_until[goal] = now + min(seconds, self.limits.longest_avoid)
         self._given_up[goal] += 1
 
@@ -109,18 +118,31 @@ class Recovery:
         """Places that are left alone at present."""
         return frozenset(place for place, until in self._avoided_until.items() if until > now)
 
-    def worked(self, goal: str | None = None) -> None:
-        """``goal`` was reached, or what has no place worked again."""
-        self._in_a_row = self._pauses = 0
+    def arrived(self, place: str) -> None:
+        """A place was reached."""
+        self._in_a_row = 0
         self._went_back = False
-        if goal is not None:
-            for memory in (self._tries, self._given_up, self._avoided_until):
-                memory.pop(goal, None)
+        if not self._charge_tries:
+            self._pauses = 0
+        if place not in self._charge_tries:
+            self._forget(place)
+
+    def charged(self, place: str) -> None:
+        """The battery was charged in ``place``."""
+        self._charge_tries.clear()
+        self._pauses = 0
+        self._forget(place)
+
+    def _forget(self, place: str) -> None:
+        for memory in (self._tries, self._given_up, self._avoided_until):
+            memory.pop(place, None)
 
     def pause(self) -> float:
         """Seconds to wait for help now; after them all steps are open again."""
-        seconds = min(self.limits.help_seconds * 2.0**self._pauses, self.limits.longest_help)
-        self._pauses = min(self._pauses + 1, 30)
+        seconds = min(
+            self.limits.help_seconds * 2.0 ** min(self._pauses, DOUBLINGS), self.limits.longest_help
+        )
+        self._pauses += 1
         self._in_a_row = 0
         self._went_back = False
         self._tries.clear()

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, cast
+from typing import Any
 
 from surveillance_behaviour.fsm import Interrupt
 from surveillance_behaviour.ports import InterruptedWaitError, PeerError
-from surveillance_runtime import waiting
 from surveillance_runtime.calls import CallFailed, GoalCaller, Interrupted, ServiceCaller
 
 
@@ -25,7 +24,7 @@ def call(caller: ServiceCaller, request: Any, deadline: float, interrupt: Interr
         InterruptedWaitError: The interrupt was raised.
     """
     try:
-        return caller.call(request, deadline, _as_runtime(interrupt))
+        return caller.call(request, deadline, interrupt)
     except Interrupted:
         raise InterruptedWaitError from None
     except CallFailed as error:
@@ -59,7 +58,7 @@ def run(
             goal,
             accept_timeout=accept_deadline,
             result_timeout=result_deadline or None,
-            interrupt=_as_runtime(interrupt),
+            interrupt=interrupt,
             on_feedback=on_feedback,
         )
     except Interrupted:
@@ -69,11 +68,6 @@ def run(
     if end.status != 'succeeded':
         raise PeerError(caller.name, f'the goal was {end.status}')
     return end.result
-
-
-def _as_runtime(interrupt: Interrupt) -> waiting.Interrupt:
-    """The engine's interrupt has the methods that the calls use, but is a class of its own."""
-    return cast(waiting.Interrupt, interrupt)
 
 
 def _peer_error(name: str, error: CallFailed) -> PeerError:

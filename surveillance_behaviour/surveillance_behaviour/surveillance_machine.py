@@ -12,7 +12,6 @@ from typing import Any
 from surveillance_behaviour import fsm
 from surveillance_behaviour.mission import (
     Mission,
-    charging,
     check_arrival,
     check_path,
     path_length,
@@ -85,6 +84,7 @@ class RechargeTask(MissionState):
     """Waits at the station until the battery is charged enough."""
 
     task = 'recharging'
+    charging = True
 
     def __init__(self, mission: Mission) -> None:
         super().__init__(mission, ['recharged'])
@@ -115,7 +115,7 @@ class RechargeTask(MissionState):
         return rose
 
     def goal(self, ud: Any) -> str | None:
-        return charging(self.mission.place)
+        return self.mission.place
 
 
 class ChooseNextRoom(MissionState):

@@ -257,6 +257,8 @@ class World:
     def recharge(self, interrupt: Interrupt) -> None:
         self._call('recharge', interrupt)
         while self.level < 100.0 and self.docked():
+            if not self.charge:
+                raise PeerError('recharge', 'nothing came from it for 60 s')
             if not self.clock.sleep(1.0, interrupt):
                 raise InterruptedWaitError
 

@@ -1,0 +1,371 @@
+"""Both machines as plain Python: the seeds' ways through them, and every fault at every state."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from surveillance_behaviour import fsm
+from surveillance_behaviour.chooser import ChoiceSettings
+from surveillance_behaviour.machines import MACHINES
+from surveillance_behaviour.mission import Mission, MissionSettings
+from surveillance_behaviour.mission_record import MissionRecord, read, summarize
+from surveillance_behaviour.ports import LostRobotError, PeerError, Point
+
+from .scripted_world import POSITIONS, SEVEN_ROOMS, World, fails
+
+CALLS = {
+    'surveillance': [
+        'wait_until_built',
+        'set_urgency_threshold',
+        'beliefs',
+        'note_visit',
+        'note_arrival',
+        'position',
+        'plan',
+        'follow',
+    ],
+    'patrol': [
+        'start',
+        'wait_until_built',
+        'set_urgency_threshold',
+        'beliefs',
+        'robot_place',
+        'position',
+        'reason',
+        'plan',
+        'control',
+        'recharge',
+    ],
+}
+Transition = tuple[str, str, str]
+
+
+def settings(**choice: object) -> MissionSettings:
+    values = {'urgency_threshold': 30.0, **choice}
+    return MissionSettings(
+        choice=ChoiceSettings(**values),  # type: ignore[arg-type]
+        settle_seconds=0.0,
+        charge_stall_seconds=40.0,
+    )
+
+
+class Run:
+    """One machine in one world, run for a while; the transitions it took are kept."""
+
+    def __init__(
+        self,
+        machine: str,
+        world: World,
+        mission_settings: MissionSettings | None = None,
+        record: MissionRecord | None = None,
+    ) -> None:
+        self.world = world
+        self.mission: Mission = world.mission(mission_settings or settings(), record)
+        self.machine = MACHINES[machine](self.mission)
+        self.states: list[str] = []
+        for container in containers(self.machine):
+            container.register_start_cb(self._entered)
+            container.register_transition_cb(self._entered)
+
+    def _entered(self, _data: object, active: list[str]) -> None:
+        self.states.extend(active)
+
+    def until(self, time: float) -> Run:
+        self.world.clock.limit = time
+        self.world.clock.on_limit = self.machine.request_preempt
+        assert self.machine.execute() == 'preempted'
+        return self
+
+
+def containers(state: fsm.State) -> Iterator[fsm.Container]:
+    if isinstance(state, fsm.Container):
+        yield state
+        for child in state.get_children().values():
+            yield from containers(child)
+
+
+@pytest.fixture(params=list(MACHINES))
+def machine(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
+def visited(world: World, since: float = 0.0) -> set[str]:
+    return {place for time, place in world.arrivals if time >= since}
+
+
+def test_an_hour_of_patrol_reaches_all_places_and_charges_in_time(machine: str) -> None:
+    world = World(draw=0.4)
+    run = Run(machine, world).until(3600.0)
+    assert visited(world) == set(SEVEN_ROOMS)
+    assert world.stranded == 0
+    assert sum(decision.rule == 'recharge' for decision in world.decisions) >= 5
+    assert not world.cries
+    assert run.mission.failure is None
+
+
+def test_surveillance_takes_the_seeds_way(machine: str) -> None:
+    if machine == 'patrol':
+        pytest.skip('the other seed')
+    run = Run(machine, World()).until(20.0)
+    assert run.states[:8] == [
+        'INITIALIZATION',
+        'CHOOSE_ROOM_TASK',
+        'EXPLORE_TASK',
+        'PERFORM_ROOM_TASKS',
+        'CHOOSE_NEXT_ROOM',
+        'MOVE_TO_NEXT_ROOM',
+        'CHOOSE_ROOM_TASK',
+        'EXPLORE_TASK',
+    ] or run.states[:4] == [
+        'INITIALIZATION',
+        'PERFORM_ROOM_TASKS',
+        'CHOOSE_ROOM_TASK',
+        'EXPLORE_TASK',
+    ]
+
+
+@pytest.mark.parametrize('times', [1, 4, 30])
+@pytest.mark.parametrize(('name', 'call'), [(m, c) for m, calls in CALLS.items() for c in calls])
+def test_a_peer_that_fails_is_got_over(name: str, call: str, times: int) -> None:
+    world = World(draw=0.4)
+    world.faults = fails(call, times)
+    run = Run(name, world).until(5400.0)
+    assert any('scripted fault' in text for text in world.said)
+    assert visited(world, since=4000.0) == set(SEVEN_ROOMS)
+    assert world.stranded == 0
+    assert run.mission.failure is None
+
+
+@pytest.mark.parametrize(('name', 'call'), [(m, c) for m, calls in CALLS.items() for c in calls])
+def test_a_peer_that_stays_away_is_cried_about_and_waited_for(name: str, call: str) -> None:
+    world = World()
+
+    def begin() -> None:
+        world.faults = fails(call)
+        world.set_level(10.0)
+
+    world.clock.after(100.0, begin)
+    Run(name, world).until(2000.0)
+    if call in ('start', 'wait_until_built', 'set_urgency_threshold'):
+        assert not world.cries, 'asked at the start only'
+        return
+    assert any('scripted fault' in cry for cry in world.cries)
+    assert world.cries.count('') >= 3, 'it goes on trying'
+
+
+@pytest.mark.parametrize(('name', 'call'), [(m, c) for m, calls in CALLS.items() for c in calls])
+def test_a_battery_that_falls_during_any_call_is_charged_next(name: str, call: str) -> None:
+    world = World()
+    seen: list[float] = []
+
+    def fall(called: str) -> None:
+        if called == call and world.clock.time > 60.0 and not seen:
+            seen.append(world.clock.time)
+            world.set_level(12.0)
+            world.gauge.set_low(True)
+            world.clock.after(150.0, lambda: world.gauge.set_low(False))
+
+    world.faults = fall
+    run = Run(name, world).until(900.0)
+    if not seen:
+        return  # A call of the start only.
+    after = [decision for decision in world.decisions if decision.time >= seen[0]]
+    assert any(decision.rule == 'recharge' for decision in after[:2])
+    assert world.level > 12.0
+    assert run.mission.failure is None
+
+
+@pytest.mark.parametrize(('name', 'call'), [(m, c) for m, calls in CALLS.items() for c in calls])
+def test_a_preempt_during_any_call_ends_the_machine(name: str, call: str) -> None:
+    world = World()
+    run = Run(name, world)
+    world.faults = lambda called: run.machine.request_preempt() if called == call else None
+    run.world.set_level(10.0)
+    assert run.machine.execute() == 'preempted'
+    assert world.clock.time < 200.0
+
+
+WRONG_PATHS: list[tuple[list[Point], str]] = [
+    ([], 'the path has no points'),
+    ([(math.nan, 0.0, 0.0)], 'a point that is not finite'),
+    ([(90.0, 90.0, 0.0)], 'from the goal, expected at most 1 m'),
+]
+
+
+@pytest.mark.parametrize(('path', 'words'), WRONG_PATHS)
+def test_a_wrong_path_is_asked_for_again(machine: str, path: list[Point], words: str) -> None:
+    world = World()
+    right = world.plan_path
+    wrong = iter([path] * 2)
+    world.plan_path = lambda start, goal, interrupt: (
+        next(  # type: ignore[method-assign]
+            wrong, None
+        )
+        or ([] if path == [] and next(wrong, None) == [] else right(start, goal, interrupt))
+    )
+    Run(machine, world).until(600.0)
+    assert any(words in text for text in world.said)
+    assert visited(world) == set(SEVEN_ROOMS)
+    assert all(math.isfinite(value) for value in world.at)
+
+
+def test_a_robot_that_stops_short_tries_again(machine: str) -> None:
+    world = World()
+    right = world._drive
+    times = [0]
+
+    def stops_short(path: list[Point], interrupt: fsm.Interrupt) -> Point:
+        times[0] += 1
+        return right(path[:-1] if times[0] % 5 == 0 and len(path) > 2 else path, interrupt)
+
+    world._drive = stops_short  # type: ignore[method-assign, assignment]
+    run = Run(machine, world).until(1800.0)
+    assert any('stopped' in text and 'short' in text for text in world.said)
+    assert visited(world, since=1000.0) == set(SEVEN_ROOMS)
+    assert run.mission.place == world.is_in
+
+
+def test_a_blocked_door_is_gone_around(machine: str) -> None:
+    if machine == 'patrol':
+        pytest.skip('the planner goes round there')
+    world = World()
+    right = world.plan_path
+    blocked = {POSITIONS['E'], POSITIONS['C1']}
+
+    def plan(start: Point, goal: Point, interrupt: fsm.Interrupt) -> list[Point]:
+        if {start, goal} == blocked:
+            raise PeerError('compute_path', 'a closed door is in the way')
+        return right(start, goal, interrupt)
+
+    world.plan_path = plan  # type: ignore[method-assign]
+    Run(machine, world).until(900.0)
+    assert any('trying the way round: E - C2 - C1' in text for text in world.said)
+    assert visited(world) == set(SEVEN_ROOMS)
+    assert not world.cries
+
+
+def test_a_place_that_disappears_is_left_out(machine: str) -> None:
+    world = World()
+
+    def vanish() -> None:
+        del world.rooms['R3']
+        del world.positions['R3']
+
+    world.clock.after(100.0, vanish)
+    Run(machine, world).until(900.0)
+    assert visited(world, since=500.0) == set(SEVEN_ROOMS) - {'R3'}
+
+
+def test_a_closed_door_leaves_the_rest_and_an_opened_one_brings_it_back(machine: str) -> None:
+    world = World()
+    world.clock.after(100.0, lambda: world.closed.add('D4'))
+    world.clock.after(700.0, world.closed.clear)
+    Run(machine, world).until(1500.0)
+    between = {place for time, place in world.arrivals if 150.0 < time < 690.0}
+    assert between == set(SEVEN_ROOMS) - {'R4'}
+    assert 'R4' in visited(world, since=700.0)
+
+
+def test_a_robot_that_is_shut_in_cries_for_help_and_goes_on_when_freed(machine: str) -> None:
+    world = World()
+    world.clock.after(100.0, lambda: world.closed.update(f'D{n}' for n in range(1, 8)))
+    world.clock.after(400.0, world.closed.clear)
+    Run(machine, world).until(1500.0)
+    assert any('nothing can be reached' in cry for cry in world.cries)
+    assert visited(world, since=500.0) == set(SEVEN_ROOMS)
+
+
+def test_an_ontology_that_lost_the_robot_is_told_where_it_is(machine: str) -> None:
+    world = World()
+    right = world.beliefs
+    lost, times = [False], []  # type: ignore[var-annotated]
+
+    def beliefs(*args: object) -> object:
+        if world.clock.time > 100.0 and not times:
+            times.append(world.clock.time)
+            lost[0] = True
+        if lost[0]:
+            raise LostRobotError('armor', 'Robot1 isIn no place')
+        return right(*args)  # type: ignore[arg-type]
+
+    told = world.note_arrival
+
+    def note_arrival(*args: object) -> None:
+        lost[0] = False
+        told(*args)  # type: ignore[arg-type]
+
+    world.beliefs = beliefs  # type: ignore[method-assign, assignment]
+    world.note_arrival = note_arrival  # type: ignore[method-assign, assignment]
+    Run(machine, world).until(600.0)
+    assert any('isIn no place' in text and 'it was last in' in text for text in world.said)
+    assert visited(world, since=200.0) == set(SEVEN_ROOMS)
+
+
+def test_an_ontology_built_anew_is_told_of_the_visits(machine: str) -> None:
+    world = World()
+
+    def rebuild() -> None:
+        before.update(world.visited_at)
+        world.visited_at = dict.fromkeys(world.rooms, world.clock.time)
+
+    before: dict[str, float] = {}
+    world.clock.after(200.0, rebuild)
+    run = Run(machine, world)
+    run.until(212.0)
+    kept = [place for place in before if abs(world.visited_at[place] - before[place]) <= 1.0]
+    assert len(kept) >= 4
+
+
+def test_a_station_that_does_not_charge_is_driven_to_again_and_cried_about(machine: str) -> None:
+    world = World(charge=0.0)
+    world.clock.after(50.0, lambda: world.set_level(10.0))
+    world.clock.after(900.0, lambda: setattr(world, 'charge', 2.0))
+    run = Run(machine, world).until(2000.0)
+    assert any('10 %' in cry for cry in world.cries)
+    assert run.mission.gauge.level is not None and run.mission.gauge.level >= 10.0
+    assert visited(world, since=1200.0) == set(SEVEN_ROOMS)
+
+
+def test_the_record_holds_what_happened(machine: str, tmp_path: Path) -> None:
+    world = World(draw=0.4)
+    path = tmp_path / 'mission.jsonl'
+    with MissionRecord(path) as record:
+        Run(machine, world, record=record).until(1800.0)
+    events = read(path)
+    summary = summarize(events)
+    assert sum(summary.visits.values()) == len(world.arrivals)
+    assert set(summary.visits) == set(SEVEN_ROOMS)
+    assert summary.recharges >= 2
+    assert summary.distance > 900.0
+    assert [event.text('place') for event in events if event.name == 'visit'] == [
+        place for _, place in world.arrivals
+    ]
+
+
+def test_settings_changed_on_the_way_count_from_the_next_choice(machine: str) -> None:
+    world = World()
+    mission_settings = settings()
+    run = Run(machine, world, mission_settings)
+
+    def change() -> None:
+        mission_settings.choice.urgency_threshold = 500.0
+        mission_settings.choice.policy = 'oldest'
+
+    world.clock.after(200.0, change)
+    run.until(500.0)
+    assert world.threshold == 500.0
+    assert world.decisions[-1].policy == 'oldest'
+    assert {place for time, place in world.arrivals if time > 220.0} == {'C1', 'C2', 'E'}
+
+
+EXPLAIN: Callable[[list[str]], str] = ' '.join
+
+
+@pytest.mark.parametrize('name', list(MACHINES))
+def test_the_same_world_gives_the_same_mission(name: str) -> None:
+    runs = [Run(name, World(draw=0.4)).until(900.0) for _ in range(2)]
+    assert runs[0].states == runs[1].states
+    assert runs[0].world.arrivals == runs[1].world.arrivals
