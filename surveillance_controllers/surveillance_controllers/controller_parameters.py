@@ -269,6 +269,7 @@ def planner_settings(node: PatrolNode) -> PlannerSettings:
 class MotionSettings:
     """What `motion_controller` is told by its parameters; units as declared."""
 
+    navigator: str
     feedback_period: float
     place_reach: float
     random_seed: int
@@ -283,6 +284,13 @@ def motion_settings(node: PatrolNode) -> MotionSettings:
         ParameterError: A value is of the wrong type or out of range.
     """
     return MotionSettings(
+        navigator=node.parameter(
+            'navigator',
+            'own',
+            'SIMULATED: who drives the base: this node, or Nav2 by its action navigate_to_pose.',
+            choices=('own', 'nav2'),
+            read_only=True,
+        ),
         feedback_period=node.parameter(
             'feedback_period',
             0.2,

@@ -6,12 +6,16 @@ import math
 from collections.abc import Iterable, Sequence
 
 import numpy as np
-from geometry_msgs.msg import Point, Quaternion
+from geometry_msgs.msg import Point, PoseWithCovarianceStamped, Quaternion, Twist
 from geometry_msgs.msg import Pose as PoseMessage
-from sensor_msgs.msg import BatteryState
+from nav_msgs.msg import OccupancyGrid
+from sensor_msgs.msg import BatteryState, LaserScan, PointCloud2, PointField
 
 from surveillance_controllers.battery_model import Battery
 from surveillance_controllers.battery_use import Pose
+from surveillance_controllers.grid_map import GridMap
+from surveillance_controllers.localisation import Scan
+from surveillance_controllers.path_following import Velocity
 from surveillance_controllers.polyline import Points
 
 
@@ -69,3 +73,92 @@ def pose_message(pose: Pose) -> PoseMessage:
     message.position = point_from(pose[:2])
     message.orientation = Quaternion(z=math.sin(pose[2] / 2), w=math.cos(pose[2] / 2))
     return message
+
+
+def pose_estimate(pose: Pose, deviation: float, turn_deviation: float) -> PoseWithCovarianceStamped:
+    """An estimated pose with its standard deviations in metres and rad; the caller stamps it."""
+    message = PoseWithCovarianceStamped()
+    message.header.frame_id = 'map'
+    message.pose.pose = pose_message(pose)
+    covariance = [0.0] * 36
+    covariance[0] = covariance[7] = deviation**2
+    covariance[35] = turn_deviation**2
+    message.pose.covariance = covariance
+    return message
+
+
+def twist_from(velocity: Velocity) -> Twist:
+    """A velocity of a differential drive as a message."""
+    message = Twist()
+    message.linear.x = float(velocity.speed)
+    message.angular.z = float(velocity.turn)
+    return message
+
+
+def grid_from(message: OccupancyGrid) -> GridMap:
+    """A map.
+
+    Raises:
+        ValueError: The message is not sound, or its origin is turned.
+    """
+    info = message.info
+    cells = np.array(message.data, dtype=np.int8)
+    if cells.size != info.width * info.height:
+        raise ValueError(
+            f'a map of {cells.size} cells: expected {info.width} x {info.height} of them'
+        )
+    x, y, yaw = pose_from(info.origin)
+    if abs(yaw) > 1e-6:
+        raise ValueError(f'a map turned by {yaw:.3f} rad: expected one that is not turned')
+    return GridMap(cells.reshape(info.height, info.width), float(info.resolution), (x, y))
+
+
+def scan_from(message: LaserScan) -> Scan:
+    """A turn of a lidar; rays that are out of its range or not a number met nothing."""
+    ranges = np.frombuffer(message.ranges, dtype=np.float32).astype(float)
+    angles = message.angle_min + message.angle_increment * np.arange(len(ranges))
+    # The lidar gives what is nearer than it can measure as its least range, or below it.
+    good = (ranges > 0) & (ranges < message.range_max)
+    return Scan(angles, np.where(good, ranges, np.inf), float(message.range_max))
+
+
+def cloud_from_points(points: Points) -> PointCloud2:
+    """Points of shape (n, 2), metres, as a cloud in the map's frame; the caller stamps it."""
+    message = PointCloud2()
+    message.header.frame_id = 'map'
+    message.height, message.width = 1, len(points)
+    message.fields = [
+        PointField(name=name, offset=4 * index, datatype=PointField.FLOAT32, count=1)
+        for index, name in enumerate('xyz')
+    ]
+    message.point_step, message.row_step = 12, 12 * len(points)
+    message.is_dense = True
+    xyz = np.zeros((len(points), 3), dtype='<f4')
+    xyz[:, :2] = points
+    message.data.frombytes(xyz.tobytes())
+    return message
+
+
+def points_from_cloud(message: PointCloud2) -> Points:
+    """The x and y of a cloud's points, shape (n, 2), metres.
+
+    Raises:
+        ValueError: The cloud has no x and y of 32 bits.
+    """
+    offsets = {
+        field.name: field.offset for field in message.fields if field.datatype == PointField.FLOAT32
+    }
+    if not {'x', 'y'} <= offsets.keys():
+        raise ValueError('a cloud without x and y: expected fields of type FLOAT32')
+    count = message.width * message.height
+    order = '>f4' if message.is_bigendian else '<f4'
+    kind = np.dtype(
+        {
+            'names': ['x', 'y'],
+            'formats': [order, order],
+            'offsets': [offsets['x'], offsets['y']],
+            'itemsize': message.point_step,
+        }
+    )
+    points = np.frombuffer(bytes(message.data), dtype=kind, count=count)
+    return np.stack([points['x'], points['y']], axis=1).astype(float)

@@ -59,6 +59,8 @@ class RecoveryParameters:
         off_path: Further from the path than this, another one is asked for, metres.
         fresh_start: After this much progress the list of recoveries starts anew, metres.
         most_paths: So many other paths are asked for at most without a fresh start.
+        stand_lost: A robot that does not know where it is stands this long, seconds,
+        look_lost: then looks around for this long before the drive fails, seconds.
     """
 
     patience: float = 0.5
@@ -70,6 +72,8 @@ class RecoveryParameters:
     off_path: float = 0.5
     fresh_start: float = 1.0
     most_paths: int = 6
+    stand_lost: float = 1.0
+    look_lost: float = 30.0
 
 
 _RECOVERIES = (
@@ -116,6 +120,7 @@ class Drive:
         self._turned = 0.0
         self._backed = 0.0
         self._last: Pose | None = None
+        self._lost_since: float | None = None
 
     @property
     def path(self) -> Points:
@@ -139,9 +144,10 @@ class Drive:
         dt = 0.0 if self._now is None else max(0.0, now - self._now)
         self._now = now
         turned, moved = self._motion(pose)
-        if lost and not self.state.ended:
-            self._mark = None
-            return self._follower.halt(dt)
+        if not lost:
+            self._lost_since = None
+        elif not self.state.ended:
+            return self._while_lost(now, dt)
         if self.state is State.DRIVING:
             return self._drive(now, pose, seen, dt)
         if self.state is State.WAITING and now - self._since >= self._recovery.wait:
@@ -169,6 +175,20 @@ class Drive:
         self.reason = reason
         if self.state is State.ASKING and self._now is not None:
             self._recover(self._now, reason)
+
+    def _while_lost(self, now: float, dt: float) -> Velocity:
+        r = self._recovery
+        self._mark = self._blocked_since = None
+        if self._lost_since is None:
+            self._lost_since = now
+        lost_for = now - self._lost_since
+        if lost_for < r.stand_lost:
+            return self._follower.halt(dt)
+        if lost_for < r.stand_lost + r.look_lost:
+            return Velocity(0.0, 0.5)
+        self.reason = 'the robot does not know where it is: what it sees is nowhere on the map'
+        self.state = State.FAILED
+        return Velocity()
 
     def _motion(self, pose: Pose) -> tuple[float, float]:
         last, self._last = self._last, pose

@@ -97,6 +97,11 @@ class GridPlanner:
             self._obstacles = array
             self._update()
 
+    @property
+    def cost(self) -> NDArray[np.float32]:
+        """What the search works on: each cell's cost, -1 where the robot cannot be."""
+        return self._costs.cost
+
     def clearance(self, points: ArrayLike) -> Points:
         """How far points are from everything that is not free, shape (n,), metres.
 

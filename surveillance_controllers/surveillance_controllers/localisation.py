@@ -58,14 +58,19 @@ class LocalisationParameters:
     """How the localiser works.
 
     Attributes:
-        rays: Rays of a scan that are used.
+        rays: Rays of a scan that are matched.
+        cast_rays: Rays that are cast into the map to measure how well a pose explains a scan.
+        update_distance: A scan is used after this way, metres,
+        update_turn: or this turn, rad,
+        update_period: or this time, seconds; and always while the robot doubts.
         hit: A ray agrees with the map when it is off by at most this, metres.
         spread: Points further than about this from any edge lose their weight, metres.
         doubt_below: The robot looks for a better pose when a smaller part of the rays agrees.
         lost_below: It counts as lost when none is found and a smaller part than this agrees.
         sure_from: A pose near the last one that explains this part ends the search.
         better: A pose must explain this much more to be taken instead of the present one.
-        doubts: Doubtful scans in a row before it looks, and between two looks while lost.
+        doubts: Doubtful scans in a row before it looks.
+        lost_pause: Scans between two looks while it is lost.
         top_step: Odometry that jumps further than this between two readings is not believed, m.
         top_turn: Likewise, rad.
         near: Radius of the first search around the last pose, metres.
@@ -75,6 +80,10 @@ class LocalisationParameters:
     """
 
     rays: int = 90
+    cast_rays: int = 45
+    update_distance: float = 0.15
+    update_turn: float = 0.15
+    update_period: float = 0.5
     hit: float = 0.15
     spread: float = 0.2
     doubt_below: float = 0.85
@@ -82,6 +91,7 @@ class LocalisationParameters:
     sure_from: float = 0.93
     better: float = 0.1
     doubts: int = 3
+    lost_pause: int = 10
     top_step: float = 0.3
     top_turn: float = 0.6
     near: float = 2.5
@@ -117,6 +127,7 @@ class Localiser:
         self._doubts = 0
         self._tolerated = 1.0
         self._moved = (0.0, 0.0)
+        self._used_at: float | None = None
         self.set_map(grid)
 
     def set_map(self, grid: GridMap) -> None:
@@ -132,12 +143,18 @@ class Localiser:
         self._occupied = occupied
         self._standable = grid.free & (outside - half >= self.parameters.body)
 
+    @property
+    def certain(self) -> bool:
+        """Whether the last scan fitted, so that the estimate is to be trusted."""
+        return not self.lost and self._doubts == 0
+
     def believe(self, pose: Pose) -> None:
         """Takes a pose that somebody gave as the estimate."""
         self.pose = pose
         self.lost = False
         self._doubts = 0
         self._tolerated = 1.0
+        self._used_at = None
 
     def move(self, odometry: Pose) -> None:
         """Takes a new reading of the odometry, in the odometry's own frame."""
@@ -150,12 +167,38 @@ class Localiser:
                 self._moved = (self._moved[0] + step, self._moved[1] + abs(turn))
         self._odometry = odometry
 
-    def see(self, scan: Scan) -> None:
-        """Takes a scan made where the robot is now: corrects the estimate, or looks for it."""
-        thin = scan.thinned(self.parameters.rays)
+    def see(self, scan: Scan, now: float) -> bool:
+        """Takes a scan made where the robot is now: corrects the estimate, or looks for it.
+
+        Args:
+            scan: The scan.
+            now: Its time, seconds.
+
+        Returns:
+            Whether the scan was used; one that would tell little new is not.
+        """
+        p = self.parameters
+        if not self._is_due(now):
+            return False
+        self._used_at = now
+        thin = scan.thinned(p.rays)
         moved, self._moved = self._moved, (0.0, 0.0)
         corrected = self._matched(self.pose, thin.points, moved)
-        agreement = self.explained(corrected, thin)
+        self._judge(corrected, self.explained(corrected, thin.thinned(p.cast_rays)), thin)
+        return True
+
+    def _is_due(self, now: float) -> bool:
+        p = self.parameters
+        return (
+            self._used_at is None
+            or self.lost
+            or self._doubts > 0
+            or self._moved[0] >= p.update_distance
+            or self._moved[1] >= p.update_turn
+            or not 0 <= now - self._used_at < p.update_period
+        )
+
+    def _judge(self, corrected: Pose, agreement: float, thin: Scan) -> None:
         p = self.parameters
         if agreement >= p.doubt_below:
             self._tolerated = 1.0
@@ -164,7 +207,7 @@ class Localiser:
             return
         self.agreement = agreement
         self._doubts += 1
-        if self._doubts < p.doubts:
+        if self._doubts < (p.lost_pause if self.lost else p.doubts):
             return
         self._doubts = 0
         found = self.search(thin)

@@ -5,7 +5,7 @@ Every method blocks for at most the peers' deadline, so it belongs on a worker t
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from surveillance_controllers import conversions
@@ -16,6 +16,7 @@ from surveillance_ontology.armor_client import (
     ArmorClient,
     ArmorServiceCallError,
     ArmorServiceInternalError,
+    FactSubscription,
     value_in,
 )
 from surveillance_runtime.calls import CallFailed, ServiceCaller
@@ -68,19 +69,22 @@ class MapKnowledge:
             names = self._client(interrupt).query.ind_b2_class('LOCATION')
         return {name: self.position(name, interrupt) for name in sorted(names)}
 
-    def doors(self, interrupt: Interrupt) -> dict[str, set[str]]:
-        """The places that each door leads into, as the ontology has them now.
+    def watch(
+        self, pattern: str, interrupt: Interrupt, on_change: Callable[[], None] = lambda: None
+    ) -> FactSubscription:
+        """Keeps the facts that match a pattern, such as `hasDoor(?, ?)`, as long as the node lives.
+
+        Args:
+            pattern: Which facts.
+            interrupt: Ends the wait for the map.
+            on_change: Called in the executor's thread with each fact that comes or goes.
 
         Raises:
-            KnowledgeError: The ontology does not answer.
+            KnowledgeError: The map is not built yet.
         """
         with _answered():
             armor = self._client(interrupt)
-            rooms_of: dict[str, set[str]] = {}
-            for place in armor.query.ind_b2_class('LOCATION'):
-                for door in armor.query.objectprop_b2_ind('hasDoor', place):
-                    rooms_of.setdefault(door, set()).add(place)
-        return rooms_of
+        return FactSubscription(self._node, armor, pattern, lambda _fact, _came: on_change())
 
     def robot_place(self, interrupt: Interrupt) -> str:
         """The place in which the ontology has the robot.

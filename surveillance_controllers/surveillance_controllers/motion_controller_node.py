@@ -16,9 +16,13 @@ from surveillance_controllers import conversions, polyline, request_texts, stimu
 from surveillance_controllers.console_commands import MOTION, ParsedCommand
 from surveillance_controllers.controller_parameters import execution_mode, motion_settings
 from surveillance_controllers.map_knowledge import KnowledgeError, MapKnowledge
+from surveillance_controllers.motion import MotionFailed
+from surveillance_controllers.nav2_motion import Nav2Motion
 from surveillance_controllers.operator_console import OperatorConsole
 from surveillance_controllers.operator_desk import OperatorDesk
 from surveillance_controllers.polyline import Points
+from surveillance_controllers.robot_parameters import robot_settings
+from surveillance_controllers.simulated_motion import SimulatedMotion
 from surveillance_controllers.stimulus_motion import glide, points_passed
 from surveillance_interfaces.action import Control, FollowPath
 from surveillance_runtime.goals import GoalAborted, GoalRun, GoalServer
@@ -40,6 +44,12 @@ class MotionController(PatrolNode):
         self._knowledge = MapKnowledge(self, self._settings.peer_timeout)
         self._desk: OperatorDesk[tuple[float, float]] = OperatorDesk(self._announce)
         self._console = OperatorConsole(self, MOTION, self._carry_out, lambda: self._desk.status)
+        self._robot: SimulatedMotion | Nav2Motion | None = None
+        if self._mode == 'SIMULATED' and self._settings.navigator == 'nav2':
+            self._robot = Nav2Motion(self, self._settings.peer_timeout)
+        elif self._mode == 'SIMULATED':
+            settings = robot_settings(self, self._settings)
+            self._robot = SimulatedMotion(self, settings, self._knowledge)
         GoalServer(self, FollowPath, 'follow_path', self._follow_path)
         GoalServer(self, Control, 'motion/controller', self._control)
         self.get_logger().info(f'{self._mode} mode')
@@ -61,13 +71,17 @@ class MotionController(PatrolNode):
             run.feedback(FollowPath.Feedback(position=conversions.point_from(position)))
 
         path = _checked(goal.path)
-        end = self._move(path, run, report, 'follow a path')
+        try:
+            end = self._move(path, run, report, 'follow a path')
+        except MotionFailed as failure:
+            position = conversions.point_from(path[0] if failure.end is None else failure.end)
+            raise GoalAborted(str(failure), FollowPath.Result(position=position)) from failure
         return FollowPath.Result(position=conversions.point_from(end))
 
     def _control(self, goal: Any, run: GoalRun) -> Control.Result:
         path = _checked(goal.point_set)
-        passed = 0
         total = polyline.length(path)
+        passed = 0
 
         def report(position: Points) -> None:
             nonlocal passed
@@ -78,34 +92,49 @@ class MotionController(PatrolNode):
                 point = conversions.point_from(path[passed - 1])
                 run.feedback(Control.Feedback(reached_point=point))
 
-        end = self._move(path, run, report, 'move through via points')
-        result = Control.Result(reached_point=conversions.point_from(end))
-        if not run.interrupt.is_set():
-            try:
-                self._note_visit(end, run)
-            except KnowledgeError as error:
-                raise GoalAborted(f'the visit could not be noted: {error}', result) from error
-        return result
+        end: Points | None = None
+        try:
+            end = self._move(path, run, report, 'move through via points')
+            if not run.interrupt.is_set():
+                self._note_visit(path[-1], end, run)
+        except (MotionFailed, KnowledgeError) as failure:
+            if isinstance(failure, MotionFailed):
+                end = failure.end
+            point = conversions.point_from(path[0] if end is None else end)
+            raise GoalAborted(str(failure), Control.Result(reached_point=point)) from failure
+        return Control.Result(reached_point=conversions.point_from(end))
 
-    def _note_visit(self, end: Points, run: GoalRun) -> None:
+    def _note_visit(self, goal: Points, end: Points, run: GoalRun) -> None:
+        if isinstance(self._robot, SimulatedMotion):
+            place = self._robot.place_reached(goal, end)
+        else:
+            place = self._nearest_place(end, run)
+        self._knowledge.record_visit(place, run.now(), run.interrupt)
+        if isinstance(self._robot, SimulatedMotion):
+            self._robot.look_around(run)
+
+    def _nearest_place(self, end: Points, run: GoalRun) -> str:
         places = self._knowledge.places(run.interrupt)
         gaps = {name: float(np.linalg.norm(end - at)) for name, at in places.items()}
         nearest = min(gaps, key=lambda name: gaps[name], default=None)
         if nearest is None or gaps[nearest] > self._settings.place_reach:
-            raise KnowledgeError(
+            raise MotionFailed(
                 f'the robot stopped at {request_texts.point(end)}: expected a place within '
                 f'{self._settings.place_reach:g} m'
-                + (f', {nearest} is {gaps[nearest]:.2f} m away' if nearest else '')
+                + (f', {nearest} is {gaps[nearest]:.2f} m away' if nearest else ''),
+                end,
             )
-        self._knowledge.record_visit(nearest, run.now(), run.interrupt)
+        return nearest
 
     def _move(
         self, path: Points, run: GoalRun, report: Callable[[Points], None], what: str
     ) -> Points:
+        if self._robot is not None:
+            return self._robot.follow(path, run, report)
         if self._mode == 'MANUAL':
             answer = self._desk.ask(request_texts.move_request(what, path), run.interrupt)
             if answer is None:
-                raise GoalAborted(f'{what}: withdrawn before the operator answered')
+                raise MotionFailed(f'{what}: withdrawn before the operator answered', None)
             seconds, delta = answer
         else:
             seconds, delta = stimuli.move(self._draw)

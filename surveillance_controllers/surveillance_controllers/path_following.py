@@ -142,9 +142,10 @@ class PathFollower:
         if beside < p.caution:
             wanted *= max(beside, 0.0) / p.caution
         wanted = max(wanted, min(p.creep, remaining / max(dt, 1e-6)))
-        room = room_ahead(seen, curvature, p.radius + p.margin, 2.0)
         # The speed from which braking, after the latency, ends within the room.
         a, t = p.acceleration, p.latency
+        stop = p.speed * t + p.speed**2 / (2 * a)
+        room = room_ahead(seen, curvature, p.radius + p.margin, stop + 0.1)
         safe = max(0.0, math.sqrt((a * t) ** 2 + 2 * a * room) - a * t)
         blocked = safe < 0.02
         speed = self._ramped(self._velocity.speed, min(wanted, safe), p.acceleration * dt)
@@ -240,7 +241,7 @@ def room_ahead(seen: Points, curvature: float, reach: float, horizon: float) -> 
     near = seen[(np.abs(seen) <= horizon + reach).all(axis=1)]
     if not len(near):
         return horizon
-    way = np.linspace(0.0, horizon, 41)
+    way = np.linspace(0.0, horizon, max(2, math.ceil(horizon / 0.04)) + 1)
     if abs(curvature) < 1e-6:
         arc = np.stack([way, np.zeros_like(way)], axis=1)
     else:

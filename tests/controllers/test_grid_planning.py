@@ -121,7 +121,7 @@ def test_in_any_clutter_a_path_is_free_and_not_longer_than_the_grid_s(seed: int)
     assert path[0] == pytest.approx(start)
     assert path[-1] == pytest.approx(goal)
     assert true_clearance(grid, path) >= robot.radius
-    search = MCP_Geometric(planner._costs.cost)
+    search = MCP_Geometric(planner.cost)
     cells_of = [tuple(c) for c in grid.cells_of([start, goal])]
     search.find_costs(cells_of[:1], cells_of[1:])
     on_grid = grid.centres_of(search.traceback(cells_of[1]))
