@@ -209,9 +209,12 @@ class FactSubscription:
                 if not self._ask_again:
                     break
             self._tell(self._set.replace(facts))
-        except (ArmorServiceCallError, ArmorServiceInternalError) as error:
+        except ArmorServiceCallError as error:
             # The server's next message or its return brings the next attempt.
-            self._node.get_logger().warn(f'facts {self._set.pattern}: {error}')
+            self._node.get_logger().debug(f'facts {self._set.pattern}: {error}')
+        except ArmorServiceInternalError:
+            # There is no such reference: no facts either. Its loading is announced.
+            self._tell(self._set.replace([]))
         finally:
             self._asking = False
 

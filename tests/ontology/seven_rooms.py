@@ -48,7 +48,7 @@ def names(response: DirectiveResponse) -> list[str]:
 
 
 def build_seven_rooms(client: ArmorClient, buffered: bool, lazy: bool) -> None:
-    """The well-known order of building the map: add, reason, tell apart, place the robot, reason."""
+    """The usual order of building a map: add, reason, tell apart, place the robot, reason."""
     client.utils.load_ref_from_file(ONTOLOGY, IRI, buffered, 'PELLET', lazy)
     for room, doors in SEVEN_ROOMS.items():
         for door in doors:

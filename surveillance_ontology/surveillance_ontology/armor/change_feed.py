@@ -27,7 +27,7 @@ class NumberedChange(NamedTuple):
 
     Attributes:
         reference_name: Where.
-        sequence: Counts from 1 for each reference; 0 says that the reference was dropped.
+        sequence: Counts from 1 for each reference; 0 says that it was loaded or dropped.
         added: Axioms that came, each with whether it is derived.
         removed: Axioms that went, likewise.
         is_consistent: As of the last reasoning.

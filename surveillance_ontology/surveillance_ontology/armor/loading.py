@@ -77,7 +77,7 @@ def load_document(
         more = f' and {len(unsupported) - MAX_NAMED} more' if len(unsupported) > MAX_NAMED else ''
         named = '; '.join(unsupported[:MAX_NAMED])
         notes.append(f'{len(unsupported)} statements not supported by the reasoner: {named}{more}')
-    return Reference(name, kb, Origin(path, document.format)), notes
+    return Reference(name, kb, Origin(path, document.format, document.prefixes)), notes
 
 
 def _fetch(url: str, settings: Settings) -> bytes:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import threading
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -21,10 +22,12 @@ class Origin:
     Attributes:
         path: File or URL that was loaded; the target of SAVE without a path. Empty: none.
         format: Format of that file, in which SAVE writes.
+        prefixes: Namespace prefixes of that file, which SAVE uses.
     """
 
     path: str
     format: str
+    prefixes: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def file(self) -> Path | None:

@@ -40,13 +40,13 @@ from surveillance_ontology.armor.sparql import SparqlEngine
 from surveillance_ontology.armor.store import Store
 from surveillance_ontology.armor.table import Directive, Kind, look_up
 from surveillance_ontology.knowledge_base import Changes
-from surveillance_ontology.owl_writing import write_ontology
+from surveillance_ontology.owl_writing import OntologyWriteError, write_ontology
 
 LONG_BACKLOG = 500
 """Changes since the last reasoning from which on REASON counts as slow."""
 LONG_ARGUMENTS = 1000
 Watcher = Callable[[str, Changes | None], None]
-"""Told of a reference's name and what changed in it; None: the reference was dropped."""
+"""Told of a reference's name and what changed in it; None: it was loaded or dropped."""
 
 
 class ArmorService:
@@ -241,6 +241,7 @@ class ArmorService:
         self._follow(ref)
         with self._registry:
             self._references[ref.name] = ref
+        self._tell(ref.name, None)
 
     def _follow(self, ref: Reference) -> None:
         ref.kb.subscribe(lambda changes: self._tell(ref.name, changes))
@@ -313,11 +314,13 @@ class ArmorService:
             axioms = list(ref.kb.axioms())
             if inferences:
                 axioms = list(dict.fromkeys([*axioms, *ref.kb.facts()]))
-            form = ref.origin.format
+            origin = ref.origin
         try:
-            write_ontology(axioms, ref.kb.iri, self.paths.to_write(target), form)
-        except OSError as error:
-            raise DirectiveError(f'SAVE: {target}: {error.strerror}') from None
+            write_ontology(
+                axioms, ref.kb.iri, self.paths.to_write(target), origin.format, origin.prefixes
+            )
+        except OntologyWriteError as error:
+            raise DirectiveError(f'SAVE: {error}') from None
 
     def _guarded(
         self, request: DirectiveRequest, run: Callable[[DirectiveRequest], DirectiveResponse]

@@ -152,6 +152,7 @@ def _state(ref: Reference) -> _State:
         'iri': ref.kb.iri,
         'path': ref.origin.path,
         'format': ref.origin.format,
+        'prefixes': dict(ref.origin.prefixes),
         'buffered_manipulation': ref.buffered_manipulation,
         'buffered_reasoner': ref.buffered_reasoner,
         'mounted': ref.mounted,
@@ -180,7 +181,7 @@ class _Recovery:
             self.references[name] = Reference(
                 name,
                 KnowledgeBase(settings['iri'], [decode(axiom) for axiom in axioms]),
-                Origin(settings['path'], settings['format']),
+                Origin(settings['path'], settings['format'], settings['prefixes']),
                 settings['buffered_manipulation'],
                 settings['buffered_reasoner'],
                 settings['mounted'],

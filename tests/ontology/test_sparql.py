@@ -1,0 +1,122 @@
+"""SPARQL: what it sees, how it answers, and that nothing makes it run on."""
+
+from __future__ import annotations
+
+import socket
+from pathlib import Path
+
+import pytest
+
+from surveillance_ontology.armor.client import ArmorClient, ArmorServiceInternalError
+from surveillance_ontology.armor.in_process import InProcessTransport
+from surveillance_ontology.armor.service import ArmorService
+from surveillance_ontology.armor.settings import Settings
+
+from .seven_rooms import IRI, asker, build_seven_rooms
+
+PREFIX = f'PREFIX : <{IRI}#> '
+ENDLESS = PREFIX + 'SELECT (COUNT(*) AS ?n) { ?a ?b ?c . ?d ?e ?f . ?g ?h ?i . ?j ?k ?l }'
+
+
+@pytest.fixture
+def built(client: ArmorClient) -> ArmorClient:
+    """A client of a built map."""
+    build_seven_rooms(client, False, True)
+    return client
+
+
+def test_rows_as_one_text_and_as_pairs(service: ArmorService, built: ArmorClient) -> None:
+    ask = asker(service)
+    query = PREFIX + 'SELECT ?x ?v { :Robot1 :canReach ?x . ?x :visitedAt ?v } ORDER BY ?x'
+    long = '1665579740^^http://www.w3.org/2001/XMLSchema#long'
+    assert ask('QUERY SPARQL', query).queried_objects == [
+        f'{{x={IRI}#C1, v={long}}}, {{x={IRI}#C2, v={long}}}'
+    ]
+    formatted = ask('QUERY SPARQL FORMATTED', query)
+    assert formatted.queried_objects == []
+    assert formatted.sparql_queried_objects == [
+        ('x', f'{IRI}#C1'),
+        ('v', long),
+        ('x', f'{IRI}#C2'),
+        ('v', long),
+    ]
+    parts = (PREFIX, 'SELECT ?x ', '{ :Robot1 :isIn ?x }')
+    for args in (parts, (*parts, '5000'), (''.join(parts), '5000')):
+        assert ask('QUERY SPARQL', *args).queried_objects == [f'{{x={IRI}#E}}']
+    assert ask('QUERY SPARQL', PREFIX + 'SELECT ?x { :R9 :isIn ?x }').queried_objects == ['']
+
+
+def test_it_follows_the_ontology(built: ArmorClient) -> None:
+    query = PREFIX + 'SELECT ?x { ?x a :URGENT } ORDER BY ?x'
+    assert built.query.sparql(query) == []
+    built.manipulation.replace_one_dataprop_b2_ind('visitedAt', 'R2', 'LONG', '1665579700')
+    built.utils.sync_buffered_reasoner()
+    assert built.query.sparql(query) == [{'x': f'{IRI}#R2'}]
+    subclasses = PREFIX + (
+        'PREFIX rdfs: <http://www.w3.org/2000/01/rdf-schema#> '
+        'SELECT ?x { ?x rdfs:subClassOf :LOCATION } ORDER BY ?x'
+    )
+    found = [row['x'].rpartition('#')[2] for row in built.query.sparql(subclasses)]
+    assert found == ['CORRIDOR', 'ROOM', 'URGENT']
+
+
+def test_derived_facts_can_be_left_out() -> None:
+    service = ArmorService(Settings(sparql_derived=False))
+    client = ArmorClient('c', 'map', InProcessTransport(service))
+    build_seven_rooms(client, False, True)
+    assert client.query.sparql(PREFIX + 'SELECT ?x { :Robot1 :canReach ?x }') == []
+    assert client.query.sparql(PREFIX + 'SELECT ?x { :Robot1 :isIn ?x }') == [{'x': f'{IRI}#E'}]
+    service.close()
+
+
+def test_a_query_is_stopped_at_its_time(service: ArmorService, built: ArmorClient) -> None:
+    answer = asker(service)('QUERY SPARQL', ENDLESS, '300')
+    assert (answer.success, answer.timeout) == (False, True)
+    assert answer.error_description == 'QUERY SPARQL: stopped after 300 ms'
+    assert built.query.sparql(PREFIX + 'SELECT ?x { :Robot1 :isIn ?x }'), 'the next one runs'
+
+
+def test_the_server_sets_the_longest_time(tmp_path: Path) -> None:
+    service = ArmorService(Settings(sparql_timeout=0.3))
+    client = ArmorClient('c', 'map', InProcessTransport(service))
+    build_seven_rooms(client, False, True)
+    for args in ((ENDLESS,), (ENDLESS, '0'), (ENDLESS, '-1'), (ENDLESS, '600000')):
+        answer = asker(service)('QUERY SPARQL', *args)
+        assert (answer.success, answer.timeout) == (False, True)
+    service.close()
+
+
+def test_queries_that_cannot_be_answered_say_why(service: ArmorService, built: ArmorClient) -> None:
+    ask = asker(service)
+    for query, words in (
+        ('SELECT', 'not valid SPARQL'),
+        ('ASK { ?a ?b ?c }', 'expected a SELECT query'),
+        ('INSERT DATA { <urn:a> <urn:b> <urn:c> }', 'not valid SPARQL'),
+    ):
+        answer = ask('QUERY SPARQL', query)
+        assert (answer.success, answer.exit_code, answer.timeout) == (False, 205, False)
+        assert words in answer.error_description
+    assert 'got 5' in ask('QUERY SPARQL', *'abcde').error_description
+    with pytest.raises(ArmorServiceInternalError, match='not valid SPARQL'):
+        built.query.sparql('SELECT')
+
+
+def test_rows_are_bounded() -> None:
+    service = ArmorService(Settings(sparql_rows=5))
+    client = ArmorClient('c', 'map', InProcessTransport(service))
+    build_seven_rooms(client, False, True)
+    answer = asker(service)('QUERY SPARQL', 'SELECT * { ?a ?b ?c }')
+    assert 'more than 5 rows' in answer.error_description
+    service.close()
+
+
+def test_a_query_reaches_no_other_machine(service: ArmorService, built: ArmorClient) -> None:
+    with socket.create_server(('127.0.0.1', 0)) as listener:
+        address = f'http://127.0.0.1:{listener.getsockname()[1]}/'
+        answer = asker(service)(
+            'QUERY SPARQL', f'SELECT * {{ SERVICE <{address}> {{ ?a ?b ?c }} }}'
+        )
+        assert not answer.success
+        listener.setblocking(False)
+        with pytest.raises(BlockingIOError):
+            listener.accept()
