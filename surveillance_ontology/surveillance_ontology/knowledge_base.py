@@ -86,6 +86,7 @@ class KnowledgeBase:
         self._sequence = 0
         self._schema: Schema | None = None
         self._told_consistent = True
+        self._shown: set[Axiom] | None = None
         self._snapshots: dict[str, frozenset[str]] = {}
         self._watched: set[Predicate] = set()
         self._literals: dict[tuple[str, str], dict[Literal, None]] = {}
@@ -219,10 +220,12 @@ class KnowledgeBase:
         """Brings what is derived up to date; whether the ontology is consistent."""
         engine = self._engine
         if engine is None or self._schema_changed or not self._fits(engine):
-            before = set(self._visible()) if self._subscribers else set()
-            engine = self._rebuild()
+            before = self._shown if self._shown is not None else set[Axiom]()
+            if self._subscribers and self._shown is None:
+                before = set(self._visible())
+            self._rebuild()
             if self._subscribers:
-                after = set(self._visible())
+                after = self._show()
                 self._report(after - before, before - after)
         elif self._added or self._removed:
             self._update(engine)
@@ -255,17 +258,16 @@ class KnowledgeBase:
             self._consistent = engine.consistent
             return
         view = FactView(engine)
-        wholly = not self._consistent or bool(engine.equality.members)
-        before = set(self._visible()) if wholly else set()
+        before = self._shown
         log: dict[StoredFact, bool] = {}
         engine.changed, engine.renamed = log, False
         engine.update(added, removed)
         engine.changed = None
         self._consistent = engine.consistent
-        if wholly or engine.renamed or not engine.consistent:
-            if not wholly:
+        if before is not None or engine.renamed or not engine.consistent:
+            if before is None:
                 before = self._before(engine, view, log)
-            after = set(self._visible())
+            after = self._show()
             self._report(after - before, before - after)
             return
         come: list[Axiom] = []
@@ -283,6 +285,14 @@ class KnowledgeBase:
         """Derived facts that queries show."""
         if self._engine is not None and self._consistent:
             yield from FactView(self._engine).derived()
+
+    def _show(self) -> set[Axiom]:
+        """The derived facts now; kept where the next change cannot be told from the engine's log alone."""
+        visible = set(self._visible())
+        engine = self._engine
+        special = engine is not None and (not self._consistent or bool(engine.equality.members))
+        self._shown = visible if special else None
+        return visible
 
     def _before(self, engine: Engine, view: FactView, log: dict[StoredFact, bool]) -> set[Axiom]:
         """The derived facts before an update that began with every individual under its own name."""
@@ -523,6 +533,8 @@ class KnowledgeBase:
         Returns:
             A function that ends the subscription.
         """
+        if not self._subscribers:
+            self._show()
         self._subscribers.append(callback)
 
         def unsubscribe() -> None:

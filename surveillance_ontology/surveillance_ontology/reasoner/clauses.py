@@ -231,7 +231,7 @@ class Program:
     Attributes:
         classes, objects, datas: Predicates by IRI.
         labels: Predicates of complex class expressions that individuals may be asserted to belong to.
-        thing, nothing, different: The predicates with fixed meaning.
+        thing, nothing, different, same: The predicates with fixed meaning; `same` only ever names a premise.
         uses_thing: Whether the extension of owl:Thing must be kept.
     """
 
@@ -253,6 +253,7 @@ class Program:
     thing: Predicate = field(default_factory=lambda: Predicate('class', 'owl:Thing'))
     nothing: Predicate = field(default_factory=lambda: Predicate('class', 'owl:Nothing'))
     different: Predicate = field(default_factory=lambda: Predicate('different', 'different from'))
+    same: Predicate = field(default_factory=lambda: Predicate('different', 'same as'))
 
     def cls(self, iri: str) -> Predicate:
         """The predicate of a named class."""

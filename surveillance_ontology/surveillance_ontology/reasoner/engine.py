@@ -72,7 +72,8 @@ class Engine:
             self._request,
         )
         self._nothing = program.nothing
-        self._nothing.supports.append((self._conflict_supports, 'they are the same individual'))
+        self._nothing.supports.append((self._conflict_supports, 'one individual, yet different'))
+        program.same.supports.append((self._same_supports, None))
         for index in self._network.thresholds:
             index.proves = self.proofs.proves
         self._flushes = [index.flush for index in self._network.thresholds]
@@ -274,6 +275,9 @@ class Engine:
         for axiom in removed:
             if equality.members:
                 splitting.update(self._classes_of(axiom))
+            if self.conflicts and isinstance(axiom, SameIndividual):
+                for pair in [p for p, merge in self.conflicts.items() if merge.origin == axiom]:
+                    self._withdraw_conflict(pair, again=False)
             fact = self.fact_of(axiom)
             if fact is not None:
                 self._unassert(fact)
@@ -400,6 +404,8 @@ class Engine:
     def _holds(self, fact: Fact) -> bool:
         if fact[0] is self.program.different:
             return self.difference.different(fact[1], fact[2])
+        if fact[0] is self.program.same:
+            return (fact[1], fact[2]) in self.conflicts
         holds: bool = fact[0].holds(fact)
         return holds
 
@@ -418,6 +424,9 @@ class Engine:
         self._requests.clear()
         equality = self.equality
         for merge in pending:
+            origin = merge.origin
+            if isinstance(origin, SameIndividual) and origin not in self.about(merge.first):
+                continue
             x, y = equality.find(merge.first), equality.find(merge.second)
             if x == y or not all(self._holds(self._current(fact)) for fact in merge.premises):
                 continue
@@ -447,14 +456,16 @@ class Engine:
             fact[0].discard(fact)
             if self.changed is not None:
                 self.changed.setdefault(fact, fact not in self.asserted)
-            count = self.asserted.pop(fact, 0)
-            current = self._current(fact)
-            if count:
-                self.asserted[current] = self.asserted.get(current, 0) + count
-            self._queue.append(current)
+            self._queue.append(fact)
         # Nothing ceased to hold: what the removal hooks named holds of the representative.
         self._doomed.clear()
-        self._queue[:] = map(self._current, self._queue)
+        for place, fact in enumerate(self._queue):
+            current = self._current(fact)
+            if current != fact:
+                self._queue[place] = current
+                count = self.asserted.pop(fact, 0)
+                if count:
+                    self.asserted[current] = self.asserted.get(current, 0) + count
         for index in self._network.thresholds:
             index.settle()
         for run in self._network.naming:
@@ -506,17 +517,23 @@ class Engine:
 
     # --- conflicts: individuals that must be the same and are different ---
 
-    def _withdraw_conflict(self, pair: Conflict) -> None:
+    def _withdraw_conflict(self, pair: Conflict, again: bool = True) -> None:
         merge = self.conflicts.pop(pair)
         self._doomed.append((self._nothing, self.equality.find(pair[0])))
-        self._requests[merge] = None
+        if again:
+            self._requests[merge] = None
 
     def _conflict_supports(self, x: str) -> Iterator[Premises]:
         find = self.equality.find
         for (first, second), merge in self.conflicts.items():
             if find(first) == x:
                 different = (self.program.different, x, find(second))
-                yield (*map(self._current, merge.premises), different)
+                yield ((self.program.same, first, second), different)
+
+    def _same_supports(self, first: str, second: str) -> Iterator[Premises]:
+        merge = self.conflicts.get((first, second))
+        if merge is not None:
+            yield tuple(map(self._current, merge.premises))
 
     # --- addition ---
 

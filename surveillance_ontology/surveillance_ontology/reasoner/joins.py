@@ -197,7 +197,8 @@ class _Writer:
                 else 2 + isinstance(atom, DifferentAtom)
             )
         if isinstance(atom, ComputedAtom):
-            return 4 if bound == len(atom.terms) - 1 and not self.is_bound(atom.terms[0]) else 1000
+            solvable = atom.solve is not None and not self.is_bound(atom.terms[0])
+            return 4 if solvable and free == 1 else 1000
         if isinstance(atom, SameAtom):
             return 4 if bound else 1000
         return 1000

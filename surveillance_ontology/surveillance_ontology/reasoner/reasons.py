@@ -93,6 +93,8 @@ class Reasons:
         predicate = proof.fact[0]
         if predicate is self._engine.program.different and not proof.premises:
             return self._stated_difference(proof.fact, text)
+        if predicate is self._engine.program.same:
+            return self._merge(self._engine.conflicts[proof.fact[1], proof.fact[2]])
         premises: list[Explanation] = []
         for premise in proof.premises:
             premises += self._premise(premise)
