@@ -79,6 +79,10 @@ class ActiveContainer(Container):
         """Name a root: paths begin with it."""
         self._fsm_path = name
 
+    def get_name(self) -> str:
+        """The path of the container: a root's name, or where a run found it."""
+        return self._fsm_path
+
     # Running.
 
     def execute(self, parent_ud: Any = None) -> Any:
