@@ -174,6 +174,15 @@ def test_the_places_that_come_along_are_places(name: str) -> None:
     assert place.reachable(place.start) == set(place.rooms)
 
 
+def problem_of(path: Path) -> str:
+    """What is wrong with a place's file; empty when nothing is."""
+    try:
+        read_place(path)
+    except ParameterFileError as error:
+        return str(error)
+    return ''
+
+
 @settings(max_examples=60, deadline=None, derandomize=True)
 @given(st.text(max_size=200))
 def test_any_text_is_read_or_refused_in_one_line(
@@ -181,7 +190,4 @@ def test_any_text_is_read_or_refused_in_one_line(
 ) -> None:
     path = tmp_path_factory.mktemp('fuzz') / 'place.yaml'
     path.write_text(GOOD.replace('[D1]', text, 1), encoding='utf-8', errors='surrogatepass')
-    with pytest.raises(ParameterFileError) as refusal:
-        read_place(path)
-        raise ParameterFileError('a place after all')
-    assert '\n' not in str(refusal.value)
+    assert '\n' not in problem_of(path)

@@ -35,7 +35,7 @@ _CODES = {
     ExitCode.NOT_IMPLEMENTED: 'defined by ARMOR, never sent',
     ExitCode.INVALID_COMMAND: 'unknown command or reference; too few or wrong arguments; a file '
     'that cannot be loaded or saved; the description says which',
-    ExitCode.SEVERAL_VALUES: 'raised by the client: one value was to be replaced, there are several',
+    ExitCode.SEVERAL_VALUES: 'raised by the client: one value was to be replaced, there are more',
 }
 
 

@@ -1,0 +1,203 @@
+"""The durable service: after any death it is as it was answered for."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from surveillance_ontology.armor.journal import Journal, JournalError
+from surveillance_ontology.armor.protocol import DirectiveRequest
+from surveillance_ontology.armor.service import ArmorService
+from surveillance_ontology.armor.settings import Settings
+from surveillance_ontology.armor.store import Store
+
+from .seven_rooms import IRI, ONTOLOGY, Ask, asker, names
+
+LOAD = ('LOAD FILE', ONTOLOGY, IRI)
+
+
+class Server:
+    """A service with a store, which can be restarted without a goodbye."""
+
+    def __init__(self, directory: Path, compact_from: int = 1 << 20) -> None:
+        self._directory = directory
+        self._compact_from = compact_from
+        self._files = directory.parent / 'files'
+        self._files.mkdir(exist_ok=True)
+        self.notes: list[str] = []
+        self.start()
+
+    def start(self) -> None:
+        store = Store(self._directory, self._compact_from)
+        settings = Settings(directories=(self._files,))
+        self.service = ArmorService(settings, print, self.notes.append, store)
+        self.ask: Ask = asker(self.service)
+
+    def restart(self) -> None:
+        self.service.close()
+        self.start()
+
+
+@pytest.fixture
+def server(tmp_path: Path) -> Server:
+    """A fresh durable service with the patrol's ontology, nothing buffered."""
+    made = Server(tmp_path / 'store')
+    made.ask(*LOAD, 'false', 'PELLET', 'false')
+    return made
+
+
+def test_facts_mounts_and_references_come_back(server: Server) -> None:
+    ask = server.ask
+    ask('ADD DATAPROP IND', 'visitedAt', 'R1', 'LONG', '1')
+    ask('ADD OBJECTPROP IND', 'hasDoor', 'R1', 'D1')
+    ask('ADD IND CLASS', 'X', 'DOOR')
+    ask('REMOVE IND CLASS', 'X', 'DOOR')
+    ask('RENAME IND', 'R1', 'R2')
+    ask('DISJOINT IND', 'A', 'B')
+    ask('MOUNT', client='a')
+    ask(*LOAD, 'false', '', 'false', reference='other')
+    ask(*LOAD, 'false', '', 'false', reference='gone')
+    ask('DROP', reference='gone')
+    server.restart()
+    ask = server.ask
+    assert ask('GET ALL REFS').queried_objects == ['map', 'other']
+    assert ask('GET REF CLIENT', 'map').queried_objects == ['a']
+    assert ask('ADD IND', 'Y', client='b').exit_code == 102
+    assert names(ask('QUERY IND', 'R2')) == ['LOCATION', 'ROOM', 'URGENT']
+    assert names(ask('QUERY IND CLASS', 'DOOR')) == ['D1']
+    assert ask('QUERY CLASS RESTRICTIONS', 'ROOM').queried_objects
+    assert ask(*LOAD, 'false', '', 'false').error_description == 'map is loaded already'
+
+
+def test_what_waits_in_the_buffer_waits_again(tmp_path: Path) -> None:
+    server = Server(tmp_path / 'store')
+    server.ask(*LOAD, 'true', '', 'true')
+    server.ask('ADD IND CLASS', 'X', 'DOOR')
+    server.ask('APPLY')
+    server.ask('ADD IND CLASS', 'Y', 'DOOR')
+    server.restart()
+    assert names(server.ask('QUERY IND CLASS', 'DOOR')) == ['X']
+    server.ask('APPLY')
+    assert names(server.ask('QUERY IND CLASS', 'DOOR')) == ['X', 'Y']
+    server.ask(*LOAD, 'false', '', 'true')
+    server.ask('ADD IND CLASS', 'Z', 'DOOR')
+    server.restart()
+    assert names(server.ask('QUERY IND CLASS', 'DOOR')) == ['X', 'Y', 'Z']
+
+
+def test_an_inconsistent_ontology_comes_back_as_such(server: Server) -> None:
+    for value in '12':
+        server.ask('ADD DATAPROP IND', 'visitedAt', 'R1', 'LONG', value)
+    server.restart()
+    assert not server.ask('QUERY IND', 'R1').is_consistent
+    assert server.ask('REMOVE DATAPROP IND', 'visitedAt', 'R1', 'LONG', '1').is_consistent
+
+
+def test_a_batch_is_there_as_a_whole_or_not_at_all(
+    server: Server, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    batch = [DirectiveRequest('c', 'map', 'ADD', 'IND', 'CLASS', (name, 'DOOR')) for name in 'ABC']
+
+    def full(_: int) -> None:
+        raise OSError(28, 'No space left on device')
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, 'fdatasync', full)
+        failed = server.service.execute_list(batch)
+        single = server.ask('ADD IND CLASS', 'D', 'DOOR')
+    assert not failed.success
+    assert 'No space left' in failed.responses[0].error_description
+    assert (single.success, single.exit_code) == (False, 205)
+    assert 'nothing was done' in single.error_description
+    assert names(server.ask('QUERY IND CLASS', 'DOOR')) == []
+    assert server.service.execute_list(batch).success
+    assert names(server.ask('QUERY IND CLASS', 'DOOR')) == ['A', 'B', 'C']
+    server.restart()
+    assert names(server.ask('QUERY IND CLASS', 'DOOR')) == ['A', 'B', 'C']
+
+
+def test_snapshots_keep_the_journal_short(tmp_path: Path) -> None:
+    server = Server(tmp_path / 'store', compact_from=2000)
+    server.ask(*LOAD, 'false', '', 'true')
+    for number in range(200):
+        server.ask('REPLACE DATAPROP IND', 'now', 'Robot1', 'LONG', str(number + 1), str(number))
+    server.ask('ADD IND CLASS', 'X', 'DOOR')
+    server.restart()
+    size = sum(path.stat().st_size for path in (tmp_path / 'store').iterdir())
+    assert size < 30_000, 'without snapshots it would be twice as much'
+    assert names(server.ask('QUERY IND CLASS', 'DOOR')) == ['X']
+    assert '"200"^^xsd:long' in server.ask('QUERY DATAPROP IND', 'now', 'Robot1').queried_objects
+    assert server.notes == []
+
+
+def test_a_store_that_cannot_be_read_is_reported(tmp_path: Path) -> None:
+    journal = Journal(tmp_path / 'store')
+    journal.append([['change', 'nowhere', []]])
+    journal.close()
+    with pytest.raises(JournalError, match='cannot be read'):
+        Server(tmp_path / 'store')
+
+
+WRITER = """
+import sys
+from pathlib import Path
+from surveillance_ontology.armor.protocol import DirectiveRequest
+from surveillance_ontology.armor.service import ArmorService
+from surveillance_ontology.armor.store import Store
+
+service = ArmorService(store=Store(Path(sys.argv[1]), compact_from=3000))
+number = int(sys.argv[2])
+while True:
+    number += 1
+    what = 'ADD' if number % 3 else 'REMOVE'
+    args = (f'X{number if number % 3 else number - 1}', 'DOOR')
+    request = DirectiveRequest('c', 'map', what, 'IND', 'CLASS', args)
+    assert service.execute(request).success
+    sys.stdout.write(f'{number}\\n')
+    sys.stdout.flush()
+"""
+
+
+def doors_after(number: int) -> set[str]:
+    doors: set[str] = set()
+    for step in range(1, number + 1):
+        if step % 3:
+            doors.add(f'X{step}')
+        else:
+            doors.discard(f'X{step - 1}')
+    return doors
+
+
+def test_killed_at_any_moment_it_has_exactly_what_it_answered(server: Server) -> None:
+    server.service.close()
+    directory = str(server._directory)
+    seed = random.Random(7)
+    answered = 0
+    for _ in range(4):
+        writer = subprocess.Popen(
+            [sys.executable, '-c', WRITER, directory, str(answered)],
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        assert writer.stdout is not None
+        for _ in range(seed.randrange(20, 120)):
+            answered = int(writer.stdout.readline())
+        writer.send_signal(signal.SIGKILL)
+        for line in writer.stdout:
+            if line.endswith('\n'):
+                answered = int(line)
+        writer.wait()
+        writer.stdout.close()
+        server.start()
+        present = set(names(server.ask('QUERY IND CLASS', 'DOOR')))
+        server.service.close()
+        # The directive under way when it died may have been done, but not answered.
+        assert present in (doors_after(answered), doors_after(answered + 1))
+        if present != doors_after(answered):
+            answered += 1
