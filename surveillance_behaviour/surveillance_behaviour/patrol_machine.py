@@ -253,6 +253,7 @@ def recharge_routine(mission: Mission) -> fsm.StateMachine:
 def patrol_machine(mission: Mission) -> fsm.StateMachine:
     """The second seed's machine with its recovery; it ends only when it is preempted."""
     machine = fsm.StateMachine([PREEMPTED])
+    machine.set_name('patrol')
     machine.set_clock(mission.clock)
     with machine:
         add('Initial', Initial(mission), {'start': 'Reasoning', FAILED: 'WaitForStart'})

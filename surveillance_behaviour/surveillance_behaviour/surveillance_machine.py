@@ -224,6 +224,7 @@ def surveillance_machine(mission: Mission) -> fsm.StateMachine:
         add('RECHARGE_TASK', RechargeTask(mission), {'recharged': 'recharged', FAILED: FAILED})
 
     machine = fsm.StateMachine([PREEMPTED])
+    machine.set_name('surveillance')
     machine.set_clock(mission.clock)
     with machine:
         add(

@@ -1,0 +1,125 @@
+"""Time that stands still while anybody works, and jumps when all there is to do is wait.
+
+A mission under ``use_sim_time`` usually runs against a clock that ticks on its own: what happens
+first then depends on how busy the machine is. Here the clock moves only while one of the threads
+that carry the mission on (the state machine, a goal, a charge) sleeps on it, and then to the
+moment at which the next of all sleepers is due. Hours take seconds, and a run with the same seeds
+takes the same course.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+from rosgraph_msgs.msg import Clock
+from surveillance_runtime.waiting import ClockWait
+
+CARRIES_ON = ('surveillance', 'patrol', ' goal', '_recharge')
+"""Ends of the names of threads whose sleep means that nothing else is under way."""
+
+
+class SimulatedTime:
+    """Drives ``/clock`` for the nodes of a graph."""
+
+    def __init__(self, graph: Any) -> None:
+        self._graph = graph
+        self._topic = graph.node.create_publisher(Clock, '/clock', 10)
+        self._condition = threading.Condition()
+        self._sleepers: dict[int, tuple[float, str]] = {}
+        self._ended = False
+        self._held = False
+        self.now = 1000.0
+        self.alarms: list[tuple[float, Any]] = []
+        self._thread = threading.Thread(target=self._run, name='simulated time')
+
+    def start(self) -> None:
+        """Lets time run; all nodes are there."""
+        self._publish()
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Ends time; sleepers stay asleep."""
+        with self._condition:
+            self._ended = True
+            self._condition.notify_all()
+        self._thread.join(5.0)
+
+    def at(self, seconds: float, action: Any) -> None:
+        """Does something ``seconds`` after the start, while everybody sleeps."""
+        with self._condition:
+            self.alarms.append((1000.0 + seconds, action))
+            self.alarms.sort(key=lambda alarm: alarm[0])
+
+    def fell_asleep(self, deadline: float) -> None:
+        """The calling thread sleeps until ``deadline``."""
+        with self._condition:
+            self._sleepers[threading.get_ident()] = (deadline, threading.current_thread().name)
+            self._condition.notify_all()
+
+    def woke_up(self) -> None:
+        """The calling thread goes on."""
+        with self._condition:
+            self._sleepers.pop(threading.get_ident(), None)
+            self._condition.notify_all()
+
+    def _run(self) -> None:
+        while True:
+            with self._condition:
+                self._condition.wait_for(lambda: self._ended or self._all_wait())
+                if self._ended:
+                    return
+                due = min(deadline for deadline, _ in self._sleepers.values())
+                action = None
+                if self.alarms and self.alarms[0][0] <= due:
+                    due, action = self.alarms.pop(0)
+            self.now = max(self.now, due)
+            self._publish()
+            if action is not None:
+                action()
+            with self._condition:
+                self._condition.wait_for(lambda: self._ended or not self._overdue(), timeout=5.0)
+
+    def _all_wait(self) -> bool:
+        return any(name.endswith(CARRIES_ON) for _, name in self._sleepers.values())
+
+    def _overdue(self) -> bool:
+        return any(deadline <= self.now + 1e-9 for deadline, _ in self._sleepers.values())
+
+    def _publish(self) -> None:
+        message = Clock()
+        message.clock.sec = int(self.now)
+        message.clock.nanosec = round((self.now - int(self.now)) * 1e9) % 10**9
+        self._topic.publish(message)
+        nanoseconds = message.clock.sec * 10**9 + message.clock.nanosec
+        late = time.monotonic() + 5.0
+        while any(
+            node.get_clock().now().nanoseconds < nanoseconds
+            for node in self._graph.nodes_on_simulated_time()
+        ):
+            assert time.monotonic() < late, 'a node does not follow the clock'
+            threading.Event().wait(0.0002)
+
+
+@contextmanager
+def simulated_time(graph: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[SimulatedTime]:
+    """Puts the graph's nodes on simulated time; call ``start`` once they are there."""
+    driver = SimulatedTime(graph)
+    sleep = ClockWait.sleep
+
+    def watched(self: ClockWait, seconds: float, interrupt: Any = None) -> bool:
+        driver.fell_asleep(self.now() + seconds)
+        try:
+            return sleep(self, seconds, interrupt)
+        finally:
+            driver.woke_up()
+
+    monkeypatch.setattr(ClockWait, 'sleep', watched)
+    try:
+        yield driver
+    finally:
+        driver.stop()
