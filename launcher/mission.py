@@ -28,6 +28,7 @@ CHILD = Path(__file__).with_name('child.py')
 PLACES = {'surveillance': 'seven_rooms.yaml', 'patrol': 'patrol_world.yaml'}
 RECORD = 'mission.jsonl'
 COMPOSED = 'composed'
+BEHAVIOUR_NODE = 'robot_behavior'
 LOG_LEVELS = ('debug', 'info', 'warn', 'error', 'fatal')
 _NAMESPACE = re.compile(r'/?[A-Za-z]\w*(/[A-Za-z]\w*)*\Z', re.ASCII)
 MAX_DOMAIN = 101
@@ -195,7 +196,7 @@ def make_folder(checkout: Path) -> Path:
 def write_own_parameters(folder: Path, run: Run) -> Path:
     """Writes what the command line says as parameters, for the nodes that it concerns."""
     own: dict[str, dict[str, Any]] = {
-        'robot_behavior': {'behaviour': run.behaviour, 'record': str(folder / RECORD)}
+        BEHAVIOUR_NODE: {'behaviour': run.behaviour, 'record': str(folder / RECORD)}
     }
     # A mode that was asked for counts more than one in the user's file, the default one less.
     if run.mode or 'execution_mode' not in (run.parameters or Path(os.devnull)).read_text():
@@ -238,6 +239,7 @@ def run_mission(checkout: Path, run: Run) -> int:
                 command([node], arguments, os.getpid()),
                 environ,
                 takes_input=manual and bool(node.console),
+                leads=node.name == BEHAVIOUR_NODE,
             )
             for node in nodes
         ]
@@ -259,7 +261,7 @@ def run_mission(checkout: Path, run: Run) -> int:
     code = supervisor.run(run.seconds)
     if console is not None:
         console.stop()
-    if any(node.name == 'robot_behavior' for node in nodes):
+    if any(node.name == BEHAVIOUR_NODE for node in nodes):
         log.plain(summary(folder / RECORD))
     log.close()
     return code

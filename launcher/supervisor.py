@@ -22,8 +22,10 @@ PAUSES = (0.5, 1.0, 2.0, 4.0, 8.0, 15.0, 30.0)
 """Seconds before the first, second, ... restart in a row; the last one is kept."""
 STEADY_AFTER = 20.0
 """A process that ran this long, in seconds, starts again from the first pause."""
+STOP_LEADERS_WITHIN = 1.2
+"""Seconds that the processes which use the others have before those are told to stop as well."""
 STOP_WITHIN = 2.5
-"""Seconds that a process has for its clean-up before it is killed."""
+"""Seconds until whatever is left is killed."""
 EXIT_UNUSABLE = 2
 """The exit code with which a node says that its configuration does not let it start."""
 _LONGEST_LINE = 64 * 1024
@@ -32,12 +34,20 @@ _STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 @dataclass(frozen=True)
 class Program:
-    """A process to run: its name in the log, its command, and whether it reads commands."""
+    """A process to run.
+
+    Attributes:
+        name: in the log.
+        command, environ: as for `subprocess`.
+        takes_input: whether it reads lines, see `Supervisor.send`.
+        leads: whether it uses the others, and so is stopped before them.
+    """
 
     name: str
     command: Sequence[str]
     environ: Mapping[str, str]
     takes_input: bool = False
+    leads: bool = False
 
 
 @dataclass
@@ -49,6 +59,7 @@ class Child:
     started: float = 0.0
     restart_at: float | None = None
     deaths: int = 0
+    told_to_stop: bool = False
     killed: bool = False
     rest: bytes = field(default=b'', repr=False)
 
@@ -112,10 +123,10 @@ class Supervisor:
         if self._stopping_since is None:
             self._stopping_since = time.monotonic()
             self._code = code
-            for child in reversed(self.children.values()):
+            for child in self.children.values():
                 child.restart_at = None
-                if child.process is not None:
-                    child.process.terminate()
+            self._tell_to_stop(leaders_only=True)
+            self._keep_stopping(self._stopping_since)
 
     def run(self, seconds: float | None = None) -> int:
         """Starts everything and returns the exit code when everything has ended.
@@ -222,11 +233,37 @@ class Supervisor:
     def _timeout(self, end: float | None) -> float | None:
         times = [child.restart_at for child in self.children.values() if child.restart_at]
         if self._stopping_since is not None:
-            if not all(child.killed for child in self.children.values() if child.running):
+            running = [child for child in self.children.values() if child.running]
+            if not all(child.told_to_stop for child in running):
+                times.append(self._stopping_since + STOP_LEADERS_WITHIN)
+            if not all(child.killed for child in running):
                 times.append(self._stopping_since + STOP_WITHIN)
         elif end is not None:
             times.append(end)
         return max(0.0, min(times) - time.monotonic()) if times else None
+
+    def _tell_to_stop(self, *, leaders_only: bool) -> None:
+        for child in reversed(self.children.values()):
+            wanted = child.program.leads or not leaders_only
+            if child.process is not None and wanted and not child.told_to_stop:
+                child.told_to_stop = True
+                child.process.terminate()
+
+    def _keep_stopping(self, now: float) -> None:
+        """Goes on with a stop: leaders first, then the rest, at last by force."""
+        since = self._stopping_since
+        if since is None:
+            return
+        running = [child for child in self.children.values() if child.process is not None]
+        if now >= since + STOP_LEADERS_WITHIN or not any(c.program.leads for c in running):
+            self._tell_to_stop(leaders_only=False)
+        if now < since + STOP_WITHIN:
+            return
+        for child in running:
+            if child.process is not None and not child.killed:
+                self._log.warn(f'{child.program.name} did not end in time: killed')
+                child.killed = True
+                _kill_group(child.process.pid)
 
     def _keep_time(self, end: float | None) -> None:
         now = time.monotonic()
@@ -238,15 +275,7 @@ class Supervisor:
         for child in self.children.values():
             if child.restart_at is not None and now >= child.restart_at:
                 self._start(child)
-            if (
-                child.process is not None
-                and not child.killed
-                and self._stopping_since is not None
-                and now >= self._stopping_since + STOP_WITHIN
-            ):
-                self._log.warn(f'{child.program.name} did not end in time: killed')
-                child.killed = True
-                _kill_group(child.process.pid)
+        self._keep_stopping(now)
 
     @contextlib.contextmanager
     def _signals(self) -> Iterator[None]:
