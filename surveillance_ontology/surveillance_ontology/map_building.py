@@ -147,8 +147,11 @@ class MapBuilding:
         known = self._known(place)
         if known:
             place = replace(place, closed=closed_doors(place, known))
-            shown = shown_doors(place)
-            todo = self._differences({room: shown[room] for room in known}, shown, now)
+            mine = {
+                room: [door for door in doors if door in place.rooms[room]]
+                for room, doors in known.items()
+            }
+            todo = self._differences(mine, shown_doors(place), now)
         else:
             todo = self._differences({}, shown_doors(place), now)
             clock = self._client.query.dataprop_b2_ind('now', ROBOT)

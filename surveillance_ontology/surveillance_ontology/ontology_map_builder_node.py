@@ -57,7 +57,7 @@ class OntologyMapBuilder(PatrolNode):
             'armor_timeout', 5.0, 'Longest wait for an answer of the server, seconds.', minimum=0.1
         )
         self._place = self._described_place()
-        self._robot_room = self._place.start if self._place else ''
+        self.robot_room = self._place.start if self._place else ''
         self._built = False
         self._waiting: list[Future] = []
         self._work: queue.SimpleQueue[Callable[[], None] | None] = queue.SimpleQueue()
@@ -161,7 +161,7 @@ class OntologyMapBuilder(PatrolNode):
 
     def _on_moved(self, fact: Any, came: bool) -> None:
         if came:
-            self._robot_room = fact.arguments[1]
+            self.robot_room = fact.arguments[1]
 
     # --- work, on the worker's thread ---
 
@@ -179,7 +179,7 @@ class OntologyMapBuilder(PatrolNode):
                 if self._built and self._building.is_loaded():
                     return
                 self._built = False
-                self._place = self._building.build(self._place, self._now(), self._robot_room)
+                self._place = self._building.build(self._place, self._now(), self.robot_room)
             except ArmorServiceCallError as error:
                 if not told and not self.stopping.is_set():
                     self.get_logger().warn(f'waiting for the armor server: {error}')
@@ -211,9 +211,16 @@ class OntologyMapBuilder(PatrolNode):
         except PlaceError as error:
             self.get_logger().error(f'ontology_map/build_map refused: {error}')
             return
-        if robot_room or not self._robot_room:
-            self._robot_room = place.start
-        self._place = place
+        if robot_room or not self.robot_room:
+            self.robot_room = place.start
+        before, self._place = self._place, place
+        if before is not None and self._built:
+            try:
+                self._building.change(before, place, self._now())
+            except (ArmorServiceCallError, ArmorServiceInternalError) as error:
+                self.get_logger().warn(f'ontology_map/build_map: {error}; building anew')
+            else:
+                return
         self._built = False
         self._ensure_built()
 

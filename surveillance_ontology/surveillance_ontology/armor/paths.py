@@ -39,7 +39,7 @@ class SafePaths:
         path = self._resolved(text, (*self._writable, *self._read_only), 'read')
         if not path.is_file():
             what = 'is not a file' if path.exists() else 'does not exist'
-            raise DirectiveError(f'{shown(text)} {what}')
+            raise DirectiveError(f'path {shown(text)} {what}')
         return path
 
     def to_write(self, text: str) -> Path:
@@ -50,22 +50,22 @@ class SafePaths:
         """
         path = self._resolved(text, self._writable, 'written')
         if path.is_dir():
-            raise DirectiveError(f'{shown(text)} is a directory, expected a file')
+            raise DirectiveError(f'path {shown(text)} is a directory, expected a file')
         if not path.parent.is_dir():
-            raise DirectiveError(f'{shown(text)}: directory {path.parent} does not exist')
+            raise DirectiveError(f'path {shown(text)}: directory {path.parent} does not exist')
         return path
 
     def _resolved(self, text: str, allowed: tuple[Path, ...], verb: str) -> Path:
         if not text:
             raise DirectiveError('path is empty, expected a file')
         if len(text) > MAX_PATH or _CONTROL.search(text):
-            raise DirectiveError(f'{shown(text)} is not a path')
+            raise DirectiveError(f'path {shown(text)} is not a path')
         base = self._writable[0] if self._writable else Path.cwd()
         try:
             path = (base / Path(text).expanduser()).resolve()
         except (OSError, RuntimeError, ValueError) as error:
-            raise DirectiveError(f'{shown(text)}: {error}') from None
+            raise DirectiveError(f'path {shown(text)}: {error}') from None
         if not any(path.is_relative_to(directory) for directory in allowed):
             where = ', '.join(map(str, allowed)) or 'no directory'
-            raise DirectiveError(f'{shown(text)} may not be {verb}; allowed is {where}')
+            raise DirectiveError(f'path {shown(text)} may not be {verb}; allowed is {where}')
         return path
