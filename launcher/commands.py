@@ -8,11 +8,15 @@ import signal
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 from launcher import graph, system
 from launcher.environment import CHECKOUT, Environment, SetupError, clean_environ
 
+if TYPE_CHECKING:
+    from launcher.mission import Run
+
+CONFIG = CHECKOUT / 'config'
 EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
 
@@ -143,26 +147,23 @@ def _run(argv: list[str]) -> int:
     options = make_parser().parse_args(argv)
     graph.select('RANDOM', only=options.only, without=options.without)
     _enter(['run', *argv])
-    from launcher.mission import Run, run_mission
+    from launcher.mission import run_mission
 
     # From here on the supervisor takes signals; one that comes after its end changes nothing.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    return run_mission(
-        CHECKOUT,
-        Run(
-            mode=options.mode,
-            behaviour=options.behaviour,
-            place=options.map,
-            parameters=options.params,
-            composed=options.composed,
-            only=options.only,
-            without=options.without,
-            log_level=options.log_level,
-            namespace=options.namespace,
-            domain=options.domain,
-            seconds=options.seconds,
-        ),
-    )
+    return run_mission(wanted_run(options), CONFIG, CHECKOUT / 'runs')
+
+
+def wanted_run(options: argparse.Namespace) -> Run:
+    """What the options of `run`, or those that `node` has of them, ask for."""
+    from launcher.mission import Run
+
+    given = vars(options)
+    renamed = {'map': 'place', 'params': 'parameters'}
+    values = {
+        renamed.get(name, name): given[name] for name in given if name not in ('name', 'rest')
+    }
+    return Run(**values)
 
 
 def _node(argv: list[str]) -> int:
@@ -176,18 +177,11 @@ def _node(argv: list[str]) -> int:
     options = parser.parse_args(argv)
     node = graph.find(options.name)
     _enter(['node', *argv])
-    from launcher.mission import Run, command, node_environ, parameter_files, ros_arguments
+    from launcher.mission import command, node_environ, parameter_files, ros_arguments
 
-    run = Run(
-        behaviour=options.behaviour,
-        place=options.map,
-        parameters=options.params,
-        log_level=options.log_level,
-        namespace=options.namespace,
-        domain=options.domain,
-    )
+    run = wanted_run(options)
     run.check()
-    arguments = [*ros_arguments(parameter_files(CHECKOUT, run), run), '--', *options.rest]
+    arguments = [*ros_arguments(parameter_files(CONFIG, run), run), '--', *options.rest]
     words = command([node], arguments, 0)
     os.execve(words[0], words, node_environ(run))
 

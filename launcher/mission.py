@@ -135,9 +135,8 @@ def check_parameter_file(path: Path) -> None:
             )
 
 
-def parameter_files(checkout: Path, run: Run) -> list[Path]:
+def parameter_files(config: Path, run: Run) -> list[Path]:
     """The files that every node gets, in ROS's order: a later one wins."""
-    config = checkout / 'config'
     place = run.place or config / PLACES[run.behaviour]
     files = [config / 'parameters.yaml', place]
     if run.parameters is not None:
@@ -174,15 +173,18 @@ def node_environ(run: Run, logs: Path | None = None) -> dict[str, str]:
 
 def command(nodes: Sequence[graph.Node], arguments: Sequence[str], parent: int) -> list[str]:
     """The command of one process that holds `nodes`; it ends with `parent`, unless that is 0."""
-    targets = ','.join(f'{n.name}={n.module}:{n.class_name}' for n in nodes)
+    # Nodes of one process are stopped from the last to the first: the one that uses the others
+    # comes last.
+    ordered = sorted(nodes, key=lambda node: node.name == BEHAVIOUR_NODE)
+    targets = ','.join(f'{n.name}={n.module}:{n.class_name}' for n in ordered)
     return [sys.executable, '-P', str(CHILD), str(parent), targets, *arguments]
 
 
-def make_folder(checkout: Path) -> Path:
+def make_folder(runs: Path) -> Path:
     """A new folder for what the run leaves behind: its log, its parameters, its record."""
     stamp = time.strftime('%Y%m%d-%H%M%S')
     for suffix in ('', *(f'-{number}' for number in range(2, 100))):
-        folder = checkout / 'runs' / (stamp + suffix)
+        folder = runs / (stamp + suffix)
         try:
             folder.mkdir(parents=True)
         except FileExistsError:
@@ -216,16 +218,21 @@ def _write_parameters(path: Path, of_nodes: Mapping[str, Mapping[str, Any]]) -> 
     return path
 
 
-def run_mission(checkout: Path, run: Run) -> int:
+def run_mission(run: Run, config: Path, runs: Path) -> int:
     """Starts the nodes, supervises them until the end, prints the summary; returns the exit code.
+
+    Args:
+        run: what to run.
+        config: the folder with the parameter files.
+        runs: where the run gets a folder of its own for its log, parameters and record.
 
     Raises:
         RunError, graph.SelectionError: what was asked for cannot be run.
     """
     run.check()
     nodes = run.nodes()
-    folder = make_folder(checkout)
-    files = [*parameter_files(checkout, run), write_own_parameters(folder, run)]
+    folder = make_folder(runs)
+    files = [*parameter_files(config, run), write_own_parameters(folder, run)]
     arguments = ros_arguments(files, run)
     environ = node_environ(run, folder / 'ros')
     manual = run.mode == 'MANUAL'
