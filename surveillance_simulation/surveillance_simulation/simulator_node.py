@@ -28,7 +28,11 @@ from surveillance_simulation.world import World
 
 
 class Simulator(PatrolNode):
-    """Moves the robot on in time, obeys its commands and publishes what its sensors measure."""
+    """Moves the robot on in time, obeys its commands and publishes what its sensors measure.
+
+    Attributes:
+        robot: The robot in its world, for whoever runs the node in their own process.
+    """
 
     def __init__(self, **node_options: Any) -> None:
         super().__init__('simulator', **node_options)
@@ -38,7 +42,7 @@ class Simulator(PatrolNode):
             world = World.from_parameters(simulator_parameters.place(self))
         except WorldError as error:
             raise StartError(f'simulator: {error}') from None
-        self._robot = Robot(
+        self.robot = Robot(
             world,
             simulator_parameters.base(self),
             simulator_parameters.lidar(self),
@@ -47,12 +51,12 @@ class Simulator(PatrolNode):
         self._changing = threading.RLock()
         self._drives_clock = pace.speed != 1.0 or bool(self.get_parameter('use_sim_time').value)
         self._pace = Pace(pace, time.monotonic())
-        self._sensors = SensorFeed(self, self._robot, drives_clock=self._drives_clock)
+        self._sensors = SensorFeed(self, self.robot, drives_clock=self._drives_clock)
         try:
-            self._camera = CameraFeed(self, self._robot, seed, self._changing, self._stamp)
+            self._camera = CameraFeed(self, self.robot, seed, self._changing, self._stamp)
         except TextureError as error:
             raise StartError(f'simulator: {error}') from None
-        FaultServices(self, self._robot, self._changing, self._sensors.tell_doors)
+        FaultServices(self, self.robot, self._changing, self._sensors.tell_doors)
         self.create_subscription(Twist, 'cmd_vel', self._on_command, 1)
         self.create_subscription(JointTrajectory, 'arm/joint_trajectory', self._on_trajectory, 1)
         steady = RclpyClock(clock_type=ClockType.STEADY_TIME)
@@ -61,31 +65,31 @@ class Simulator(PatrolNode):
 
     def _stamp(self) -> Time:
         if self._drives_clock:
-            return conversions.time_to_ros(self._robot.time)
+            return conversions.time_to_ros(self.robot.time)
         return self.get_clock().now().to_msg()
 
     def _tick(self) -> None:
         with self._changing:
             passed = self._pace.due(
-                self._robot.time, time.monotonic(), moving=self._robot.is_moving
+                self.robot.time, time.monotonic(), moving=self.robot.is_moving
             )
             if not passed:
                 return
-            self._robot.advance(passed)
+            self.robot.advance(passed)
         self._sensors.publish(self._stamp())
         self._camera.tick()
 
     def _on_command(self, message: Twist) -> None:
         speed, turn_speed = message.linear.x, message.angular.z
         with self._changing:
-            self._robot.base.command(speed, turn_speed)
-            self._pace.command(self._robot.base.is_moving, self._robot.time, time.monotonic())
+            self.robot.base.command(speed, turn_speed)
+            self._pace.command(self.robot.base.is_moving, self.robot.time, time.monotonic())
 
     def _on_trajectory(self, message: JointTrajectory) -> None:
         names, points = conversions.trajectory_from_ros(message)
         try:
             with self._changing:
-                self._robot.arm.follow(names, points, self._robot.time)
+                self.robot.arm.follow(names, points, self.robot.time)
         except TrajectoryError as error:
             self.get_logger().error(f'arm/joint_trajectory: {error}')
 

@@ -1,0 +1,109 @@
+"""The whole patrol in this process on simulated time: every node, one executor, nothing scripted.
+
+Used by the navigation benchmark and the endurance run. Nodes and parameters are those that
+`python3 launch.py --mode SIMULATED --composed` starts.
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import sys
+import tempfile
+import threading
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[1]
+if str(ROOT) not in sys.path:
+    sys.path.insert(0, str(ROOT))
+
+import rclpy  # noqa: E402
+from surveillance_interfaces.msg import FactChanges  # noqa: E402
+from surveillance_runtime.node import ExecutorThread, PatrolNode  # noqa: E402
+from surveillance_simulation.robot import Robot  # noqa: E402
+from surveillance_simulation.simulator_node import Simulator  # noqa: E402
+
+from launcher import graph  # noqa: E402
+
+
+class Stack:
+    """Every node of a simulated patrol, spun in this process.
+
+    Attributes:
+        observer: A further node in the same graph, for whoever watches.
+        robot: The simulated robot in its world.
+    """
+
+    def __init__(
+        self,
+        place: Path,
+        parameters: Mapping[str, Mapping[str, Any]] | None = None,
+        domain: int | None = None,
+    ) -> None:
+        """Create all nodes; `start` lets them run.
+
+        Args:
+            place: The place's file.
+            parameters: Further parameters by node; those of '*' are for every node.
+            domain: ROS domain; None takes that of the environment.
+        """
+        self._folder = tempfile.TemporaryDirectory(prefix='patrol-')
+        own = Path(self._folder.name) / 'own.yaml'
+        own.write_text(json.dumps(_own_parameters(parameters or {})))
+        files = [ROOT / 'config' / 'parameters.yaml', place, own]
+        arguments = ['--ros-args']
+        for file in files:
+            arguments += ['--params-file', str(file)]
+        self.context = rclpy.Context()
+        rclpy.init(context=self.context, domain_id=domain)
+        self._spinner = ExecutorThread(self.context)
+        options = {'context': self.context, 'cli_args': arguments, 'use_global_arguments': False}
+        self.nodes: dict[str, PatrolNode] = {}
+        for node in graph.select('SIMULATED'):
+            kind = getattr(importlib.import_module(node.module), node.class_name)
+            self._add(node.name, kind(**options))
+        self.observer = self._add('observer', PatrolNode('observer', **options))
+        simulator = self.nodes['simulator']
+        assert isinstance(simulator, Simulator)
+        self.robot: Robot = simulator.robot
+        self._place_told = ''
+        self._place_at = 0.0
+        self.observer.create_subscription(FactChanges, 'armor/changes', self._on_changes, 100)
+        self._changed = threading.Condition()
+
+    def _add(self, name: str, node: PatrolNode) -> PatrolNode:
+        self.nodes[name] = node
+        self._spinner.executor.add_node(node)
+        return node
+
+    def start(self) -> None:
+        """Let the nodes run."""
+        self._spinner.start()
+
+    def close(self) -> None:
+        """Stop all nodes while messages flow, then the executor, then ROS."""
+        for node in reversed(self.nodes.values()):
+            node.stop()
+        self._spinner.stop()
+        for node in reversed(self.nodes.values()):
+            node.destroy_node()
+        rclpy.try_shutdown(context=self.context)
+        self._folder.cleanup()
+
+    def _on_changes(self, message: FactChanges) -> None:
+        pass
+
+
+def _own_parameters(parameters: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    sections: dict[str, dict[str, Any]] = {'/**': {'use_sim_time': True}}
+    for node in graph.NODES:
+        sections[f'/**/{node.name}'] = {}
+        if node.console:
+            sections[f'/**/{node.name}'] = {'execution_mode': 'SIMULATED', 'console': False}
+    sections['/**/simulator'] = {'speed': 0.0}
+    for name, values in parameters.items():
+        key = '/**' if name == '*' else f'/**/{name}'
+        sections.setdefault(key, {}).update(values)
+    return {key: {'ros__parameters': values} for key, values in sections.items() if values}
