@@ -17,6 +17,11 @@ setup(
     description='ArUco detection, marker server and camera arm of the surveillance robot.',
     license='Apache-2.0',
     entry_points={
-        'console_scripts': [],
+        'console_scripts': [
+            'aruco_detector = surveillance_perception.aruco_detector_node:main',
+            'arm_controller = surveillance_perception.arm_controller_node:main',
+            'marker_server = surveillance_perception.marker_server_node:main',
+            'video_source = surveillance_perception.video_source_node:main',
+        ],
     },
 )

@@ -20,6 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from surveillance_perception.dictionaries import MarkerCodes, dictionary_named
+from surveillance_perception.marker_reading import MarkerReader, Readings
 from surveillance_perception.picture_preparation import PreparedPicture, prepare
 from surveillance_perception.picture_sampling import (
     Array,
@@ -27,7 +28,6 @@ from surveillance_perception.picture_sampling import (
     corners_of,
     homographies_of,
 )
-from surveillance_perception.marker_reading import MarkerReader, Readings
 from surveillance_perception.quads import Quads, dark_masks, distinct, quads_around
 from surveillance_perception.ring_test import RingTest
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from surveillance_perception.dictionaries import MarkerCodes
 from surveillance_perception.picture_sampling import Array, Patches, PicturePyramid

@@ -196,9 +196,7 @@ def _paste(
     part[:] = part * (1.0 - share) + grey
 
 
-def _sheet(
-    panel: Panel, dictionary: cv2.aruco.Dictionary, cell: int
-) -> npt.NDArray[np.float32]:
+def _sheet(panel: Panel, dictionary: cv2.aruco.Dictionary, cell: int) -> npt.NDArray[np.float32]:
     cells = dictionary.markerSize + 2
     margin = round(panel.margin * cell)
     sheet = np.full((cells * cell + 2 * margin,) * 2, _WHITE, np.float32)

@@ -48,7 +48,11 @@ class RingTest:
         levels = levels_for(homographies, self._side, _CELL_PIXELS)
         values = pyramid.sample(homographies, self._grid, levels).astype(float)
         count = 4 * _PER_SIDE
-        margin, border, inner = values[:, :count], values[:, count : 2 * count], values[:, 2 * count :]
+        margin, border, inner = (
+            values[:, :count],
+            values[:, count : 2 * count],
+            values[:, 2 * count :],
+        )
         contrast = margin.mean(axis=1) - border.mean(axis=1)
         variance = (margin.var(axis=1) + border.var(axis=1)) / 2.0
         correlation = contrast / np.sqrt(contrast**2 + 4.0 * variance + 1e-6)

@@ -177,9 +177,7 @@ class TemplateFit:
 
     def _energy(self, cells: Patches, footprint: Footprint) -> Patches:
         """Sum of squares (m, j) of the centred templates of codes (m, j, cells)."""
-        gram = np.einsum(
-            'mij,mkl->mikjl', self._gram[footprint.down], self._gram[footprint.across]
-        )
+        gram = np.einsum('mij,mkl->mikjl', self._gram[footprint.down], self._gram[footprint.across])
         mean = np.einsum('mi,mj->mij', self._sum[footprint.down], self._sum[footprint.across])
         size = cells.shape[2]
         weighed = cells @ gram.reshape(-1, size, size)

@@ -1,0 +1,204 @@
+"""The `arm_controller` node: named poses, looking at a point, looking all around."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from nav_msgs.msg import Odometry
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.task import Future
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Bool
+from trajectory_msgs.msg import JointTrajectory
+
+from surveillance_interfaces.action import ScanSurroundings
+from surveillance_interfaces.srv import MarkerRoutine, PointCamera
+from surveillance_perception.arm_driver import ArmDriver, ArmError
+from surveillance_perception.arm_kinematics import UnreachableError, look_at
+from surveillance_perception.arm_trajectory import TrajectoryError
+from surveillance_perception.conversions import base_pose_from_ros, trajectory_to_ros
+from surveillance_perception.surroundings_scan import ScanOutcome, ScanPlan, scan
+from surveillance_perception.view_coverage import View
+from surveillance_runtime.goals import GoalAborted, GoalRun, GoalServer
+from surveillance_runtime.node import PatrolNode, run_node
+from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
+from surveillance_runtime.robot_arm import ARM
+
+_POSES = {
+    MarkerRoutine.Request.LEFT: ('left', math.pi / 2),
+    MarkerRoutine.Request.HOME: ('home', 0.0),
+    MarkerRoutine.Request.RIGHT: ('right', -math.pi / 2),
+    MarkerRoutine.Request.BACK: ('back', math.pi),
+}
+_FAILURES = (ArmError, TrajectoryError, UnreachableError, ValueError)
+
+
+class ArmController(PatrolNode):
+    """Moves the arm that carries the camera."""
+
+    def __init__(self, **node_options: Any) -> None:
+        super().__init__('arm_controller', **node_options)
+        self._poses = {number: self._pose(*entry) for number, entry in _POSES.items()}
+        self._dwell = self.parameter(
+            'dwell',
+            0.5,
+            'Rest at each view of a scan, seconds.',
+            minimum=0.0,
+            on_change=lambda value: setattr(self, '_dwell', value),
+        )
+        fields = (('horizontal', 60.0), ('vertical', 46.8))
+        self._field_of_view = tuple(
+            math.radians(
+                self.parameter(
+                    f'{name}_field_of_view',
+                    degrees,
+                    f"The camera's {name} field of view, degrees.",
+                    minimum=5.0,
+                    maximum=150.0,
+                    read_only=True,
+                )
+            )
+            for name, degrees in fields
+        )
+        group = ReentrantCallbackGroup()
+        self._base: tuple[str, np.ndarray] | None = None
+        self._trajectories = self.create_publisher(JointTrajectory, 'arm/joint_trajectory', 10)
+        self._at_rest = self.create_publisher(Bool, 'arm/at_rest', STATE_QOS)
+        self._driver = ArmDriver(
+            ARM,
+            lambda motion: self._trajectories.publish(trajectory_to_ros(motion, ARM.names)),
+            lambda: self.get_clock().now().nanoseconds / 1e9,
+            lambda resting: self._at_rest.publish(Bool(data=resting)),
+        )
+        self.stopping.subscribe(self._driver.wake)
+        self.create_subscription(
+            JointState,
+            'joint_states',
+            lambda msg: self._driver.report(msg.name, msg.position, msg.velocity),
+            SENSOR_QOS,
+        )
+        self.create_subscription(Odometry, 'odom', self._on_odometry, SENSOR_QOS)
+        self.create_service(MarkerRoutine, 'move_arm', self._on_move, callback_group=group)
+        self.create_service(PointCamera, 'point_camera', self._on_point, callback_group=group)
+        GoalServer(self, ScanSurroundings, 'scan_surroundings', self._scan)
+
+    def _pose(self, name: str, pan: float) -> list[float]:
+        def check(value: Sequence[float]) -> str | None:
+            pose = np.array(value)
+            if (
+                len(pose) == len(ARM.names)
+                and (ARM.lower <= pose).all()
+                and (pose <= ARM.upper).all()
+            ):
+                return None
+            return f'{len(ARM.names)} joint positions within the limits of the arm'
+
+        value: list[float] = self.parameter(
+            f'pose_{name}',
+            [pan, *ARM.home[1:]],
+            f'Joint positions of the pose {name}, rad, in the order {", ".join(ARM.names)}.',
+            check=check,
+            read_only=True,
+        )
+        return value
+
+    def _on_odometry(self, message: Odometry) -> None:
+        self._base = (message.header.frame_id, base_pose_from_ros(message))
+
+    async def _on_move(self, request: Any, response: Any) -> Any:
+        def work() -> str:
+            if request.pos == MarkerRoutine.Request.STOP:
+                self._driver.halt(self.stopping.is_set)
+                return 'stopped'
+            if request.pos not in self._poses:
+                raise ValueError(f'no pose {request.pos}, expected 1 to 5')
+            self._driver.move(np.array(self._poses[request.pos]), self.stopping.is_set)
+            return f'at pose {_POSES[request.pos][0]}'
+
+        response.success, response.message = await self._off_executor(work)
+        return response
+
+    async def _on_point(self, request: Any, response: Any) -> Any:
+        def work() -> str:
+            target = self._in_base(request)
+            aim = look_at(ARM, target, self._start())
+            response.error = aim.error
+            self._driver.move(aim.positions, self.stopping.is_set)
+            return 'looking at the point'
+
+        response.success, response.message = await self._off_executor(work)
+        return response
+
+    def _in_base(self, request: Any) -> np.ndarray:
+        point = np.array([request.point.x, request.point.y, request.point.z])
+        if request.frame_id in ('', 'base_link'):
+            return point
+        base = self._base
+        if base is None or request.frame_id not in (base[0], 'map'):
+            known = "'base_link'" if base is None else f"'base_link', 'map' or '{base[0]}'"
+            raise ValueError(f"frame '{request.frame_id}' is not known, expected {known}")
+        return np.asarray((np.linalg.inv(base[1]) @ np.array([*point, 1.0]))[:3])
+
+    def _start(self) -> np.ndarray:
+        positions = self._driver.positions
+        return np.array(ARM.home) if positions is None else positions
+
+    async def _off_executor(self, work: Callable[[], str]) -> tuple[bool, str]:
+        """Do blocking work on a thread of its own; whether it went well, and what there is to say."""
+        done = Future(executor=self.executor)
+
+        def body() -> None:
+            try:
+                done.set_result((True, work()))
+            except _FAILURES as error:
+                done.set_result((False, str(error)))
+            self.executor.wake()
+
+        self.spawn(body, 'arm motion')
+        result: tuple[bool, str] = await done
+        return result
+
+    def _scan(self, goal: Any, run: GoalRun) -> Any:
+        lowest, highest = goal.lowest, goal.highest
+        if lowest == highest == 0.0:
+            lowest, highest = -math.pi / 2, math.pi / 2
+        plan = ScanPlan(*self._field_of_view, goal.overlap, lowest, highest)
+        try:
+            views = plan.views()
+        except ValueError as error:
+            raise GoalAborted(str(error)) from None
+        dwell = goal.dwell if goal.dwell > 0 else self._dwell
+
+        def tell(index: int, view: View, resting: bool) -> None:
+            feedback = ScanSurroundings.Feedback(view=index + 1, views=len(views), resting=resting)
+            feedback.azimuth, feedback.elevation = view.azimuth, view.elevation
+            run.feedback(feedback)
+
+        outcome = ScanOutcome([], [])
+        failure = ''
+        wake = run.interrupt.subscribe(self._driver.wake)
+        try:
+            scan(self._driver, views, lambda: run.sleep(dwell), tell, run.interrupt.is_set, outcome)
+        except (ArmError, TrajectoryError) as error:
+            failure = str(error)
+        finally:
+            wake()
+        result = ScanSurroundings.Result(
+            views=len(outcome.rested), unreachable=len(outcome.unreachable), message=failure
+        )
+        result.coverage = plan.covered(outcome.rested)
+        if failure and not run.interrupt.is_set():
+            raise GoalAborted(f'scan ended at view {result.views + 1}: {failure}', result)
+        return result
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the node."""
+    return run_node(ArmController, args)
+
+
+if __name__ == '__main__':
+    raise SystemExit(main())

@@ -1,0 +1,195 @@
+"""The `aruco_detector` node: camera pictures in, markers out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from geometry_msgs.msg import PoseArray
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.time import Time
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image
+from std_msgs.msg import Bool, Int32
+
+from surveillance_interfaces.msg import MarkerDetectionArray
+from surveillance_perception.annotation import annotated
+from surveillance_perception.camera_model import CameraModel
+from surveillance_perception.conversions import (
+    camera_from_ros,
+    detection_to_ros,
+    picture_from_compressed,
+    picture_from_ros,
+    picture_to_ros,
+    pose_to_ros,
+)
+from surveillance_perception.detection_watch import DetectionWatch, Sighting
+from surveillance_perception.detector_parameters import DetectorParameters
+from surveillance_perception.latest import Latest
+from surveillance_perception.picture_files import Picture
+from surveillance_runtime.node import PatrolNode, run_node
+from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
+
+IDS_QOS = QoSProfile(depth=200, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+"""Each id is sent once, so whoever comes late gets those that were sent before."""
+
+_DIAGNOSTICS_PERIOD = 1.0
+
+
+class ArucoDetector(PatrolNode):
+    """Finds ArUco markers in the camera's pictures."""
+
+    def __init__(self, **node_options: Any) -> None:
+        super().__init__('aruco_detector', **node_options)
+        self._parameters = DetectorParameters(self, self._on_change)
+        self._field_of_view = self._changeable(
+            'field_of_view',
+            60.0,
+            'Horizontal, degrees, while there is no camera_info.',
+            minimum=5.0,
+            maximum=170.0,
+        )
+        self._max_pixels = self._changeable(
+            'max_pixels',
+            20_000_000,
+            'The largest picture that is looked at.',
+            minimum=1,
+        )
+        self._only_at_rest = self._changeable(
+            'only_at_rest', False, 'Look only at pictures taken while arm/at_rest is true.'
+        )
+        self._camera: CameraModel | None = None
+        self._rest_since: Time | None = None
+        self._stale = False
+        self._watch = DetectionWatch(self._parameters.settings())
+        self._pictures: Latest[Image | CompressedImage] = Latest()
+        self._ids = self.create_publisher(Int32, 'aruco_detector/id', IDS_QOS)
+        self._detections = self.create_publisher(
+            MarkerDetectionArray, 'aruco_detector/detections', 10
+        )
+        self._poses = self.create_publisher(PoseArray, 'aruco_detector/poses', 10)
+        self._annotated = self.create_publisher(Image, 'aruco_detector/annotated', SENSOR_QOS)
+        self._diagnostics = self.create_publisher(DiagnosticArray, 'diagnostics', 10)
+        topic = 'camera/rgb/image_raw'
+        self.create_subscription(Image, topic, self._pictures.put, SENSOR_QOS)
+        self.create_subscription(
+            CompressedImage, topic + '/compressed', self._pictures.put, SENSOR_QOS
+        )
+        self.create_subscription(
+            CameraInfo, 'camera/rgb/camera_info', self._on_camera_info, SENSOR_QOS
+        )
+        self.create_subscription(Bool, 'arm/at_rest', self._on_rest, STATE_QOS)
+        self.create_timer(_DIAGNOSTICS_PERIOD, self._diagnose)
+        self.spawn(self._work, 'marker detection')
+
+    def on_stop(self) -> None:
+        """End the worker."""
+        self._pictures.close()
+
+    def _changeable(self, name: str, default: Any, description: str, **limits: Any) -> Any:
+        return self.parameter(
+            name,
+            default,
+            description,
+            on_change=lambda value: setattr(self, '_' + name, value),
+            **limits,
+        )
+
+    def _on_change(self) -> None:
+        self._stale = True
+
+    def _on_camera_info(self, message: CameraInfo) -> None:
+        try:
+            self._camera = camera_from_ros(message)
+        except ValueError as error:
+            self.get_logger().warn(f'camera_info: {error}', throttle_duration_sec=10.0)
+
+    def _on_rest(self, message: Bool) -> None:
+        self._rest_since = self.get_clock().now() if message.data else None
+
+    def _work(self) -> None:
+        while (message := self._pictures.take()) is not None:
+            if self._stale:
+                self._stale = False
+                self._adopt()
+            if self._only_at_rest and not self._taken_at_rest(message):
+                continue
+            try:
+                self._look(message)
+            except ValueError as error:
+                self._watch.refuse(str(error))
+                self.get_logger().error(str(error), throttle_duration_sec=5.0)
+
+    def _adopt(self) -> None:
+        try:
+            self._watch.adopt(self._parameters.settings())
+        except ValueError as error:
+            self.get_logger().error(f'settings refused: {error}')
+
+    def _taken_at_rest(self, message: Any) -> bool:
+        since = self._rest_since
+        return since is not None and Time.from_msg(message.header.stamp) >= since
+
+    def _look(self, message: Any) -> None:
+        if isinstance(message, Image):
+            picture = picture_from_ros(message, self._max_pixels)
+        else:
+            picture = picture_from_compressed(message, self._max_pixels)
+        sightings, new = self._watch.look(picture, self._camera_of(picture))
+        for marker_id in new:
+            self._ids.publish(Int32(data=marker_id))
+        self._publish(message.header, sightings)
+        if self._annotated.get_subscription_count():
+            drawn = annotated(picture, (s.detection for s in sightings), self._watch.confirmed)
+            self._annotated.publish(picture_to_ros(drawn, message.header))
+
+    def _camera_of(self, picture: Picture) -> CameraModel:
+        height, width = picture.shape[:2]
+        camera = self._camera
+        if camera is not None and (camera.width, camera.height) == (width, height):
+            return camera
+        return CameraModel.from_field_of_view(width, height, math.radians(self._field_of_view))
+
+    def _publish(self, header: Any, sightings: list[Sighting]) -> None:
+        self._detections.publish(
+            MarkerDetectionArray(
+                header=header,
+                detections=[
+                    detection_to_ros(each.detection, each.pose, each.size, each.confirmed)
+                    for each in sightings
+                ],
+            )
+        )
+        poses = [pose_to_ros(each.pose) for each in sightings if each.pose and each.confirmed]
+        self._poses.publish(PoseArray(header=header, poses=poses))
+
+    def _diagnose(self) -> None:
+        counts = self._watch.take_statistics()
+        status = DiagnosticStatus(name=f'{self.get_name()}: pictures', hardware_id='camera')
+        status.level, status.message = DiagnosticStatus.OK, 'looking'
+        if counts.refused:
+            status.level, status.message = DiagnosticStatus.ERROR, counts.last_error
+        elif not counts.pictures:
+            status.level, status.message = DiagnosticStatus.WARN, 'no pictures'
+        mean = 1e3 * counts.seconds / counts.pictures if counts.pictures else 0.0
+        figures = {
+            'pictures': counts.pictures,
+            'refused': counts.refused,
+            'dropped in all': self._pictures.dropped,
+            'ms per picture': f'{mean:.1f}',
+            'confirmed ids': ' '.join(str(each) for each in sorted(self._watch.confirmed)),
+        }
+        status.values = [KeyValue(key=key, value=str(value)) for key, value in figures.items()]
+        message = DiagnosticArray(status=[status])
+        message.header.stamp = self.get_clock().now().to_msg()
+        self._diagnostics.publish(message)
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the node."""
+    return run_node(ArucoDetector, args)
+
+
+if __name__ == '__main__':
+    raise SystemExit(main())

@@ -1,0 +1,190 @@
+"""Between ROS messages and the core's types."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+from geometry_msgs.msg import Point, Pose, Quaternion
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image
+from std_msgs.msg import Header
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+from surveillance_interfaces.msg import MarkerDetection, RoomConnection
+from surveillance_interfaces.srv import RoomInformation
+from surveillance_perception.arm_trajectory import ArmTrajectory
+from surveillance_perception.camera_model import CameraModel
+from surveillance_perception.detection import Detection
+from surveillance_perception.marker_registry import MarkedPlace
+from surveillance_perception.picture_files import Picture, PictureError, decode_picture
+from surveillance_perception.pose import MarkerPose
+
+_CHANNELS = {'mono8': 1, 'rgb8': 3, 'bgr8': 3, 'rgba8': 4, 'bgra8': 4}
+_TO_BGR = {
+    'rgb8': cv2.COLOR_RGB2BGR,
+    'rgba8': cv2.COLOR_RGBA2BGR,
+    'bgra8': cv2.COLOR_BGRA2BGR,
+}
+
+
+def picture_from_ros(message: Any, max_pixels: int) -> Picture:
+    """A grey (height, width) or BGR (height, width, 3) picture from an Image.
+
+    Args:
+        message: sensor_msgs/Image.
+        max_pixels: The largest picture that is taken.
+
+    Raises:
+        PictureError: The picture is empty, too large, shorter than its size says, or in an encoding
+            other than mono8, rgb8, bgr8, rgba8 and bgra8.
+    """
+    size = f'{message.width}x{message.height}'
+    channels = _CHANNELS.get(message.encoding)
+    if channels is None:
+        raise PictureError(
+            f"picture encoded as '{message.encoding}', expected one of {', '.join(_CHANNELS)}"
+        )
+    if message.width == 0 or message.height == 0:
+        raise PictureError(f'picture of {size} pixels is empty')
+    if message.width * message.height > max_pixels:
+        raise PictureError(f'picture of {size} pixels is larger than {max_pixels} pixels')
+    if message.step < message.width * channels:
+        raise PictureError(
+            f'picture has rows of {message.step} bytes, expected at least '
+            f'{message.width * channels} for {message.width} pixels of {message.encoding}'
+        )
+    expected = message.step * message.height
+    if len(message.data) < expected:
+        raise PictureError(
+            f'picture of {size} pixels has {len(message.data)} bytes, expected {expected}'
+        )
+    rows = np.frombuffer(message.data, np.uint8, expected).reshape(message.height, message.step)
+    pixels = rows[:, : message.width * channels].reshape(message.height, message.width, channels)
+    if channels == 1:
+        return np.ascontiguousarray(pixels[:, :, 0])
+    if message.encoding in _TO_BGR:
+        return np.asarray(cv2.cvtColor(pixels, _TO_BGR[message.encoding]), dtype=np.uint8)
+    return np.ascontiguousarray(pixels)
+
+
+def picture_from_compressed(message: CompressedImage, max_pixels: int) -> Picture:
+    """A BGR picture (height, width, 3) from a CompressedImage.
+
+    Raises:
+        PictureError: The data is no picture, or the picture is larger than `max_pixels`.
+    """
+    picture = decode_picture(bytes(message.data), 'compressed picture')
+    if picture.shape[0] * picture.shape[1] > max_pixels:
+        size = f'{picture.shape[1]}x{picture.shape[0]}'
+        raise PictureError(f'picture of {size} pixels is larger than {max_pixels} pixels')
+    return picture
+
+
+def picture_to_ros(picture: npt.NDArray[np.uint8], header: Header) -> Image:
+    """An Image (mono8 or bgr8) of a grey or BGR picture."""
+    height, width = picture.shape[:2]
+    message = Image(header=header, height=height, width=width)
+    message.encoding = 'mono8' if picture.ndim == 2 else 'bgr8'
+    message.step = width * (1 if picture.ndim == 2 else 3)
+    # rclpy takes an array.array without looking at each byte
+    message.data.frombytes(np.ascontiguousarray(picture).tobytes())
+    return message
+
+
+def camera_from_ros(message: CameraInfo) -> CameraModel:
+    """The camera that a CameraInfo describes.
+
+    Raises:
+        ValueError: It describes no calibrated camera.
+    """
+    matrix = np.array(message.k, dtype=float).reshape(3, 3)
+    distortion = np.array(message.d if len(message.d) else np.zeros(5), dtype=float)
+    return CameraModel(message.width, message.height, matrix, distortion)
+
+
+def camera_to_ros(camera: CameraModel, header: Header) -> CameraInfo:
+    """A CameraInfo of a camera whose picture is not rectified further."""
+    message = CameraInfo(header=header, width=camera.width, height=camera.height)
+    message.distortion_model = 'plumb_bob'
+    message.d = camera.distortion.tolist()
+    message.k = camera.matrix.ravel().tolist()
+    message.r = np.eye(3).ravel().tolist()
+    message.p = np.hstack([camera.matrix, np.zeros((3, 1))]).ravel().tolist()
+    return message
+
+
+def detection_to_ros(
+    detection: Detection, pose: MarkerPose | None, size: float, confirmed: bool
+) -> MarkerDetection:
+    """A MarkerDetection; without a pose its position is not a number."""
+    message = MarkerDetection(
+        id=detection.marker_id, known=detection.known, confirmed=confirmed, size=size
+    )
+    message.confidence = detection.confidence
+    message.corners = detection.corners.ravel().astype(float)
+    if pose is None:
+        nothing = float('nan')
+        message.pose.position = Point(x=nothing, y=nothing, z=nothing)
+        message.reprojection_error = nothing
+    else:
+        message.pose = pose_to_ros(pose)
+        message.reprojection_error = pose.reprojection_error
+    return message
+
+
+def pose_to_ros(pose: MarkerPose) -> Pose:
+    """A Pose message."""
+    x, y, z = pose.position.tolist()
+    qx, qy, qz, qw = pose.quaternion
+    return Pose(position=Point(x=x, y=y, z=z), orientation=Quaternion(x=qx, y=qy, z=qz, w=qw))
+
+
+def base_pose_from_ros(message: Odometry) -> npt.NDArray[np.float64]:
+    """Transform (4, 4) from base_link to the frame of the odometry."""
+    position, orientation = message.pose.pose.position, message.pose.pose.orientation
+    x, y, z, w = orientation.x, orientation.y, orientation.z, orientation.w
+    # rotation matrix of a unit quaternion
+    pose = np.eye(4)
+    pose[:3, :3] = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    pose[:3, 3] = (position.x, position.y, position.z)
+    return pose
+
+
+def marked_place_to_ros(place: MarkedPlace, response: RoomInformation.Response) -> None:
+    """Fill in the answer of `room_info`."""
+    response.room = place.room
+    response.x = place.x
+    response.y = place.y
+    response.connections = [
+        RoomConnection(connected_to=behind, through_door=door)
+        for door, behind in place.connections.items()
+    ]
+
+
+def trajectory_to_ros(trajectory: ArmTrajectory, names: tuple[str, ...]) -> JointTrajectory:
+    """A JointTrajectory whose points run from now."""
+    message = JointTrajectory(joint_names=list(names))
+    for time, position, speed, acceleration in zip(
+        trajectory.times,
+        trajectory.positions,
+        trajectory.speeds,
+        trajectory.accelerations,
+        strict=True,
+    ):
+        point = JointTrajectoryPoint(
+            positions=position.tolist(),
+            velocities=speed.tolist(),
+            accelerations=acceleration.tolist(),
+        )
+        whole = int(time)
+        point.time_from_start.sec = whole
+        point.time_from_start.nanosec = int((time - whole) * 1e9)
+        message.points.append(point)
+    return message

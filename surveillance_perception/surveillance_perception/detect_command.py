@@ -1,0 +1,69 @@
+"""The `detect` command: prints the markers in picture files and writes annotated copies."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import cv2
+
+from surveillance_perception.annotation import annotated
+from surveillance_perception.detection import DetectorSettings, MarkerDetector
+from surveillance_perception.picture_files import PictureError, read_picture
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command.
+
+    Returns:
+        0 when every picture could be read, 1 when one could not, 2 for a wrong command line.
+    """
+    parser = argparse.ArgumentParser(
+        prog='detect', description='Find ArUco markers in pictures and write annotated copies.'
+    )
+    parser.add_argument('images', nargs='+', type=Path, metavar='IMAGE')
+    parser.add_argument('--dictionary', default='DICT_5X5_100', help='default: %(default)s')
+    parser.add_argument('--known', type=int, nargs='+', metavar='ID', help='ids that are expected')
+    parser.add_argument(
+        '--out', type=Path, metavar='FOLDER', help='for the annotated copies; default: beside each'
+    )
+    options = parser.parse_args(argv)
+    known = None if options.known is None else frozenset(options.known)
+    try:
+        detector = MarkerDetector(DetectorSettings(options.dictionary, known))
+    except ValueError as error:
+        print(f'detect: {error}', file=sys.stderr)
+        return 2
+    failed = 0
+    for path in options.images:
+        try:
+            _detect(detector, path, options.out)
+        except (PictureError, OSError) as error:
+            print(f'detect: {error}', file=sys.stderr)
+            failed += 1
+    return 1 if failed else 0
+
+
+def _detect(detector: MarkerDetector, path: Path, folder: Path | None) -> None:
+    picture = read_picture(path)
+    detections = detector.detect(picture)
+    if folder is not None:
+        folder.mkdir(parents=True, exist_ok=True)
+    target = (folder or path.parent) / f'{path.stem}_markers.png'
+    encoded = cv2.imencode('.png', annotated(picture, detections))[1]
+    target.write_bytes(encoded.tobytes())
+    count = f'{len(detections)} marker{"" if len(detections) == 1 else "s"}'
+    print(f'{path}: {count}, drawn in {target}')
+    for detection in sorted(detections, key=lambda each: each.marker_id):
+        x, y = detection.corners.mean(axis=0)
+        note = '' if detection.known else '  not on the known list'
+        print(
+            f'  id {detection.marker_id:4d}  at ({x:.1f}, {y:.1f})'
+            f'  confidence {detection.confidence:.2f}{note}'
+        )
+
+
+if __name__ == '__main__':
+    sys.exit(main())

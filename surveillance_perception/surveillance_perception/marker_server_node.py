@@ -1,0 +1,69 @@
+"""The `marker_server` node: tells what a marker stands for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from surveillance_interfaces.srv import RoomInformation
+from surveillance_perception.conversions import marked_place_to_ros
+from surveillance_perception.marker_registry import MarkedPlace, RegistryError, read_registry
+from surveillance_runtime.node import PatrolNode, StartError, run_node
+
+UNKNOWN = 'no room associated with this marker id'
+
+_OF_THE_PROJECT = Path(__file__).resolve().parents[2] / 'config' / 'markers.yaml'
+
+
+class MarkerServer(PatrolNode):
+    """Answers `room_info` from a file."""
+
+    def __init__(self, **node_options: Any) -> None:
+        super().__init__('marker_server', **node_options)
+        path = self.parameter(
+            'markers_file',
+            '',
+            "What markers stand for; empty: the project's config/markers.yaml.",
+            check=_problem_in,
+            on_change=self._read,
+        )
+        self._markers: dict[int, MarkedPlace] = {}
+        try:
+            self._read(path)
+        except RegistryError as error:
+            raise StartError(f'{self.get_name()}: {error}') from None
+        self.create_service(RoomInformation, 'room_info', self._on_room_info)
+
+    def _read(self, path: str) -> None:
+        self._markers = read_registry(_file(path))
+        self.get_logger().info(f'{len(self._markers)} markers from {_file(path).name}')
+
+    def _on_room_info(self, request: Any, response: Any) -> Any:
+        place = self._markers.get(request.id)
+        if place is None:
+            response.room = UNKNOWN
+        else:
+            marked_place_to_ros(place, response)
+        return response
+
+
+def _file(path: str) -> Path:
+    return Path(path) if path else _OF_THE_PROJECT
+
+
+def _problem_in(path: str) -> str | None:
+    try:
+        read_registry(_file(path))
+    except RegistryError as error:
+        return f'a file of markers ({error})'
+    return None
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the node."""
+    return run_node(MarkerServer, args)
+
+
+if __name__ == '__main__':
+    raise SystemExit(main())

@@ -1,0 +1,111 @@
+"""The `video_source` node: a webcam, a video or pictures as the camera topic."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from sensor_msgs.msg import CameraInfo, Image
+from std_msgs.msg import Header
+
+from surveillance_perception.camera_model import CameraModel
+from surveillance_perception.conversions import camera_to_ros, picture_to_ros
+from surveillance_perception.picture_files import Picture, PictureError
+from surveillance_perception.video_frames import FrameSource, open_source
+from surveillance_runtime.node import PatrolNode, StartError, run_node
+from surveillance_runtime.qos import SENSOR_QOS
+from surveillance_runtime.waiting import ClockWait
+
+
+class VideoSource(PatrolNode):
+    """Publishes pictures from outside ROS on `camera/rgb/image_raw`."""
+
+    def __init__(self, **node_options: Any) -> None:
+        super().__init__('video_source', **node_options)
+        source = self.parameter(
+            'source',
+            '0',
+            'Number of a webcam, a video file, or a folder of pictures.',
+            read_only=True,
+        )
+        self._rate = self.parameter(
+            'rate',
+            0.0,
+            "Pictures a second; 0: the video's own, 5 for pictures.",
+            minimum=0.0,
+            maximum=1000.0,
+            on_change=lambda value: setattr(self, '_rate', value),
+        )
+        self._loop = self.parameter(
+            'loop',
+            False,
+            'Begin again after the last picture.',
+            on_change=lambda value: setattr(self, '_loop', value),
+        )
+        self._frame = self.parameter(
+            'frame_id', 'camera_rgb_optical_frame', "The camera's optical frame.", read_only=True
+        )
+        self._field_of_view = self.parameter(
+            'field_of_view',
+            60.0,
+            'Horizontal field of view, degrees.',
+            minimum=5.0,
+            maximum=170.0,
+            on_change=lambda value: setattr(self, '_field_of_view', value),
+        )
+        self._is_camera = str(source).isdigit()
+        self._images = self.create_publisher(Image, 'camera/rgb/image_raw', SENSOR_QOS)
+        self._infos = self.create_publisher(CameraInfo, 'camera/rgb/camera_info', SENSOR_QOS)
+        self._wait = ClockWait(self)
+        self._source = str(source)
+        try:
+            opened = open_source(self._source)
+        except PictureError as error:
+            raise StartError(f'{self.get_name()}: {error}') from None
+        self.spawn(lambda: self._work(opened), 'video')
+
+    def _work(self, source: FrameSource) -> None:
+        while True:
+            good = self._play(source)
+            source.close()
+            if self.stopping.is_set():
+                return
+            if self._is_camera:
+                self.fail(f'camera {self._source} gives no more pictures')
+                return
+            if not self._loop or not good:
+                self.get_logger().info('the last picture was sent')
+                return
+            source = open_source(self._source)
+
+    def _play(self, source: FrameSource) -> bool:
+        """Send every picture once; whether there was one."""
+        good = False
+        for frame in source.frames():
+            if isinstance(frame, PictureError):
+                self.get_logger().error(str(frame))
+                continue
+            self._send(frame)
+            good = True
+            rate = self._rate or source.rate or (0.0 if self._is_camera else 5.0)
+            if not self._wait.sleep(1.0 / rate if rate else 0.0, self.stopping):
+                break
+        return good
+
+    def _send(self, frame: Picture) -> None:
+        header = Header(stamp=self.get_clock().now().to_msg(), frame_id=self._frame)
+        height, width = frame.shape[:2]
+        field_of_view = math.radians(self._field_of_view)
+        camera = CameraModel.from_field_of_view(width, height, field_of_view)
+        self._infos.publish(camera_to_ros(camera, header))
+        self._images.publish(picture_to_ros(frame, header))
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the node."""
+    return run_node(VideoSource, args)
+
+
+if __name__ == '__main__':
+    raise SystemExit(main())
