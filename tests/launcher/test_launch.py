@@ -1,0 +1,106 @@
+"""Whole launches with real processes, on a clock that the test drives."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import signal
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from rclpy.clock import Clock, ClockType
+from rclpy.time import Time
+from rosgraph_msgs.msg import Clock as ClockMessage
+
+from launcher.graph import select
+from tests.launcher.conftest import ROOT, Started, gone
+
+PROCESS = str(Path(__file__).with_name('mission_process.py'))
+ENVIRON = {**os.environ, 'PYTHONPATH': str(ROOT), 'FASTDDS_BUILTIN_TRANSPORTS': 'UDPv4'}
+NODES = [node.name for node in select('RANDOM')]
+PARAMETERS = """
+/**:
+  ros__parameters:
+    use_sim_time: true
+"""
+SPEED = 20.0
+TICK = 0.02
+
+
+@pytest.fixture
+def clock(graph) -> Iterator[None]:
+    """Simulated time that passes `SPEED` times as fast as real time."""
+    publisher = graph.node.create_publisher(ClockMessage, 'clock', 10)
+    ticks = itertools.count(1)
+
+    def tick() -> None:
+        now = Time(nanoseconds=round(next(ticks) * TICK * SPEED * 1e9))
+        publisher.publish(ClockMessage(clock=now.to_msg()))
+
+    steady = Clock(clock_type=ClockType.STEADY_TIME)
+    graph.node.create_timer(TICK, tick, clock=steady)
+    yield
+
+
+@pytest.fixture
+def launch(start, tmp_path, ros_domain) -> Callable[..., Started]:
+    parameters = tmp_path / 'parameters.yaml'
+    parameters.write_text(PARAMETERS)
+
+    def begin(*options: str) -> Started:
+        shared = ('--params', str(parameters), '--domain', str(ros_domain))
+        return start(PROCESS, str(tmp_path / 'runs'), *shared, *options, environ=ENVIRON)
+
+    return begin
+
+
+def process_of(launched: Started, node: str, after: int = 0) -> int:
+    return int(launched.until(rf'started {node} \(process (\d+)\)', after=after)[1])
+
+
+def test_ctrl_c_ends_a_mission_with_its_summary_and_leaves_nothing_behind(launch, clock, tmp_path):
+    mission = launch()
+    processes = [process_of(mission, node) for node in NODES]
+    mission.until(r'robot_behavior +\| decision 1:', timeout=60)
+    mission.until(r'robot_behavior +\| arrived in', timeout=30)
+    code, seconds = mission.end(signal.SIGINT)
+    assert code == 0
+    assert seconds < 3.5  # three seconds for the processes, the rest for the summary
+    assert gone(processes, 0)
+    output = '\n'.join(mission.lines)
+    assert 'SIGINT: stopping' in output
+    assert 'every process has ended' in output
+    assert 'visits' in output
+    assert 'decisions by rule' in output
+    assert 'Traceback' not in output
+    assert 'killed' not in output
+    (folder,) = (tmp_path / 'runs').iterdir()
+    assert {'mission.jsonl', 'launch.log', 'launch.yaml'} <= {p.name for p in folder.iterdir()}
+
+
+def test_the_mission_goes_on_when_each_node_is_killed_once(launch, clock):
+    mission = launch()
+    mission.until(r'robot_behavior +\| arrived in', timeout=60)
+    for node in NODES:
+        seen = len(mission.lines)
+        earlier = [line for line in mission.lines if f'started {node} ' in line][-1]
+        os.kill(int(earlier.split('process ')[1].rstrip(')')), signal.SIGKILL)
+        mission.until(rf'{node} died \(killed by SIGKILL\)', after=seen)
+        process_of(mission, node, after=seen)
+        back = len(mission.lines)
+        for _ in range(2):  # the first may still be an answer from before
+            mission.until(r'robot_behavior +\| arrived in', timeout=60, after=back)
+            back = len(mission.lines)
+    assert mission.end(signal.SIGINT)[0] == 0
+
+
+def test_all_nodes_in_one_process(launch, clock):
+    mission = launch('--composed')
+    process = process_of(mission, 'composed')
+    mission.until(r'robot_behavior +\| arrived in', timeout=60)
+    assert sum('started' in line for line in mission.lines) == 1
+    code, seconds = mission.end(signal.SIGTERM)
+    assert code == 0
+    assert seconds < 3.5
+    assert gone([process], 0)
