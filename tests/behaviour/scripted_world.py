@@ -101,6 +101,7 @@ class World:
     speed: float = 1.0
     draw: float = 0.0
     charge: float = 2.0
+    low_below: float = 20.0
     faults: Callable[[str], None] = lambda call: None
 
     def __post_init__(self) -> None:
@@ -136,6 +137,8 @@ class World:
             self.stranded += 1
         self.level = min(100.0, max(-1e-9, level))
         self.gauge.set_level(float(max(0, round(self.level))))
+        if (self.level < self.low_below) != self.gauge.low:
+            self.gauge.set_low(self.level < self.low_below)
 
     # The ports.
 
