@@ -151,6 +151,7 @@ class FactSubscription:
         armor: A client of the reference.
         pattern: ``URGENT(?)``, ``canReach(Robot1, ?)``, ``visitedAt(?, ?)``.
         callback: Called in the executor with a fact and whether it came (True) or went (False).
+        on_reload: Called when the reference was loaded or dropped, or another server appeared.
 
     Raises:
         ValueError: The pattern cannot be read.
@@ -162,7 +163,9 @@ class FactSubscription:
         armor: client.ArmorClient,
         pattern: str,
         callback: Callable[[ShortFact, bool], None],
+        on_reload: Callable[[], None] | None = None,
     ) -> None:
+        self._on_reload = on_reload
         self._set = FactSet(pattern)
         self._node = node
         self._armor = armor
@@ -183,11 +186,15 @@ class FactSubscription:
         return self._set.facts
 
     def _on_matched(self, _status: Any) -> None:
+        if self._on_reload is not None:
+            self._on_reload()
         self._resynchronise()
 
     def _on_changes(self, msg: FactChanges) -> None:
         if msg.reference_name != self._armor.reference_name:
             return
+        if msg.sequence == 0 and self._on_reload is not None:
+            self._on_reload()
         told = self._set.follow(msg.sequence, changes_from_ros(msg))
         if told is None or (told and self._asking):
             self._resynchronise()

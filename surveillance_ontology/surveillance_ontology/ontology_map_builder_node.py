@@ -12,10 +12,9 @@ from collections.abc import Callable
 from typing import Any
 
 from rclpy.callback_groups import ReentrantCallbackGroup
-from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.task import Future
 
-from surveillance_interfaces.msg import FactChanges, OntologyMap
+from surveillance_interfaces.msg import OntologyMap
 from surveillance_interfaces.srv import (
     AddRoom,
     ReferenceName,
@@ -25,8 +24,6 @@ from surveillance_interfaces.srv import (
 )
 from surveillance_ontology.armor.settings import DATA
 from surveillance_ontology.armor_client import (
-    CHANGES_QOS,
-    CHANGES_TOPIC,
     ArmorClient,
     ArmorServiceCallError,
     ArmorServiceInternalError,
@@ -65,7 +62,8 @@ class OntologyMapBuilder(PatrolNode):
             self, self.get_name(), self._reference, timeout=timeout, interrupt=self.stopping
         )
         self._building = MapBuilding(armor, path, uri)
-        self._is_in = FactSubscription(self, armor, f'isIn({ROBOT}, ?)', self._on_moved)
+        pattern = f'isIn({ROBOT}, ?)'
+        self._is_in = FactSubscription(self, armor, pattern, self._on_moved, self._look)
         group = ReentrantCallbackGroup()
         prefix = 'ontology_map/'
         for kind, name, callback in (
@@ -78,13 +76,6 @@ class OntologyMapBuilder(PatrolNode):
             self.create_service(kind, prefix + name, callback, callback_group=group)
         self.create_subscription(
             OntologyMap, prefix + 'build_map', self._on_build_map, STATE_QOS, callback_group=group
-        )
-        self.create_subscription(
-            FactChanges,
-            CHANGES_TOPIC,
-            self._on_changes,
-            CHANGES_QOS,
-            event_callbacks=SubscriptionEventCallbacks(matched=lambda _status: self._look()),
         )
         self._look()
         self.spawn(self._run_work, 'map building')
@@ -154,10 +145,6 @@ class OntologyMapBuilder(PatrolNode):
     def _on_build_map(self, msg: OntologyMap) -> None:
         notes = [room_note_from_ros(place) for place in msg.places]
         self._work.put(lambda: self._extend(notes, msg.robot_room))
-
-    def _on_changes(self, msg: FactChanges) -> None:
-        if msg.reference_name == self._reference and msg.sequence == 0:
-            self._look()
 
     def _on_moved(self, fact: Any, came: bool) -> None:
         if came:

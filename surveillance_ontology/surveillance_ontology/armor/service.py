@@ -84,7 +84,28 @@ class ArmorService:
 
     def execute(self, request: DirectiveRequest) -> DirectiveResponse:
         """Carry out one directive; never raises for what a client sent."""
-        return self._guarded(request, self._execute)
+        try:
+            response = self._execute(request)
+        except DirectiveError as error:
+            response = DirectiveResponse(
+                success=error.success,
+                timeout=error.timeout,
+                exit_code=int(error.exit_code),
+                error_description=error.description,
+            )
+        except JournalError as error:
+            response = _refusal(f'{request.words}: nothing was done: {error}')
+        except Exception as error:
+            problem = f'{request.words}: internal error, {type(error).__name__}: {error}'
+            problem = ' '.join(problem.split())
+            self._warn(problem)
+            response = _refusal(problem)
+        ref = self._references.get(request.reference_name)
+        if ref is not None:
+            response.is_consistent = ref.kb.consistent
+        if self.log.enabled:
+            self.log.write(request, response)
+        return response
 
     def execute_at_once(self, request: DirectiveRequest) -> DirectiveResponse | None:
         """Carry out a directive that will be quick.
@@ -93,8 +114,11 @@ class ArmorService:
             The response; None when it may take long or would have to wait for another thread. Then
             nothing was done, and the caller takes it to `execute` on a thread that may block.
         """
-        directive = _peek(request)
-        if directive is not None and (directive.slow or len(request.args) > LONG_ARGUMENTS):
+        try:
+            directive = look_up(request)
+        except DirectiveError:
+            return self.execute(request)
+        if directive.slow or len(request.args) > LONG_ARGUMENTS:
             return None
         ref = self._references.get(request.reference_name)
         if ref is None:
@@ -102,7 +126,7 @@ class ArmorService:
         if not ref.lock.acquire(blocking=False):
             return None
         try:
-            if ref.backlog > LONG_BACKLOG and directive is not None and directive.kind.may_reason:
+            if ref.backlog > LONG_BACKLOG and directive.kind.may_reason:
                 return None
             return self.execute(request)
         finally:
@@ -322,32 +346,6 @@ class ArmorService:
         except OntologyWriteError as error:
             raise DirectiveError(f'SAVE: {error}') from None
 
-    def _guarded(
-        self, request: DirectiveRequest, run: Callable[[DirectiveRequest], DirectiveResponse]
-    ) -> DirectiveResponse:
-        try:
-            response = run(request)
-        except DirectiveError as error:
-            response = DirectiveResponse(
-                success=error.success,
-                timeout=error.timeout,
-                exit_code=int(error.exit_code),
-                error_description=error.description,
-            )
-        except JournalError as error:
-            response = _refusal(f'{request.words}: nothing was done: {error}')
-        except Exception as error:
-            problem = f'{request.words}: internal error, {type(error).__name__}: {error}'
-            problem = ' '.join(problem.split())
-            self._warn(problem)
-            response = _refusal(problem)
-        ref = self._references.get(request.reference_name)
-        if ref is not None:
-            response.is_consistent = ref.kb.consistent
-        if self.log.enabled:
-            self.log.write(request, response)
-        return response
-
     def _execute(self, request: DirectiveRequest) -> DirectiveResponse:
         if not request.reference_name:
             raise DirectiveError(
@@ -362,27 +360,33 @@ class ArmorService:
         if directive.slow:
             ref = self.reference(request.reference_name)
             return _response(directive.run(self, ref, *self._values(directive, request, ref)))
-        with self.locked(request.reference_name) as ref:
+        ref = self.reference(request.reference_name)
+        with ref.lock:
+            if ref.dropped:
+                return self._execute(request)
             if directive.kind is Kind.QUERY:
                 return _response(directive.run(ref, *self._values(directive, request, ref)))
-            if self.settings.enforce_mount and not ref.is_free_for(request.client_name):
-                raise DirectiveError(
-                    f'{request.client_name} cannot connect to {ref.name}. '
-                    'Another client is already mounted on it.',
-                    ExitCode.REFERENCE_BUSY,
-                )
-            if directive.kind is Kind.CONTROL:
-                if self._store and ref.queue:
-                    self._store.flushed(ref.name)
-                directive.run(ref)
-            else:
-                changes: list[Change] = directive.run(ref, *self._values(directive, request, ref))
-                if self._store and changes:
-                    self._store.changed(ref.name, changes)
-                ref.submit(changes)
+            self._change(directive, request, ref)
         if self._store:
             self._store.compact_if_large(lambda: self._held(self.names()), self._warn)
         return DirectiveResponse()
+
+    def _change(self, directive: Directive, request: DirectiveRequest, ref: Reference) -> None:
+        if self.settings.enforce_mount and not ref.is_free_for(request.client_name):
+            raise DirectiveError(
+                f'{request.client_name} cannot connect to {ref.name}. '
+                'Another client is already mounted on it.',
+                ExitCode.REFERENCE_BUSY,
+            )
+        if directive.kind is Kind.CONTROL:
+            if self._store and ref.queue:
+                self._store.flushed(ref.name)
+            directive.run(ref)
+            return
+        changes: list[Change] = directive.run(ref, *self._values(directive, request, ref))
+        if self._store and changes:
+            self._store.changed(ref.name, changes)
+        ref.submit(changes)
 
     def _values(self, directive: Directive, request: DirectiveRequest, ref: Reference) -> list[Any]:
         return directive.read(request.args, ref.kb.iri, narrow_doubles=self.settings.narrow_doubles)
@@ -406,13 +410,6 @@ def _refusal(problem: str) -> DirectiveResponse:
 def _response(result: Any) -> DirectiveResponse:
     assert isinstance(result, DirectiveResponse)
     return result
-
-
-def _peek(request: DirectiveRequest) -> Directive | None:
-    try:
-        return look_up(request)
-    except DirectiveError:
-        return None
 
 
 def _check_name(name: str) -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from functools import cached_property
 from typing import Any, Protocol, TypeVar
 
 from surveillance_ontology.armor.protocol import DirectiveError, DirectiveRequest, ExitCode
@@ -125,7 +126,7 @@ class Directive:
         """Command and specifications, one blank between."""
         return ' '.join(word for word in (self.command, self.primary, self.secondary) if word)
 
-    @property
+    @cached_property
     def required(self) -> int:
         """How many arguments must be given."""
         given = [argument for argument in self.arguments if argument.default is None]
@@ -151,40 +152,45 @@ class Directive:
         Raises:
             DirectiveError: Too few, or one that cannot be read; names the argument.
         """
-        if len(args) < self.required:
+        count = len(args)
+        if count < self.required:
             wanted = f'{"at least " if self.rest else ""}{self.required}'
             raise DirectiveError(
                 f'{self.words}: expected {wanted} argument{"s" if self.required != 1 else ""} '
-                f'({self.signature}), got {len(args)}'
+                f'({self.signature}), got {count}'
             )
         values: list[Any] = []
         type_word = ''
-        for index, argument in enumerate(self.arguments):
-            text = args[index] if index < len(args) else argument.default
-            assert text is not None
-            if argument.read is Read.TYPE:
-                type_word = self._type(text, args)
-                continue
-            values.append(self._one(argument, text, base, type_word, narrow_doubles))
-        if self.rest:
-            last = self.arguments[-1]
-            for text in args[len(self.arguments) :]:
-                values.append(self._one(last, text, base, type_word, narrow_doubles))
+        index = 0
+        try:
+            for index, (read, default) in enumerate(self._plan):
+                text = args[index] if index < count else default
+                if read == _ENTITY:
+                    values.append(parse_entity(text, base))
+                elif read == Read.TYPE.value:
+                    type_word = self._type(text, args)
+                elif read == Read.VALUE.value:
+                    values.append(parse_literal(type_word, text, narrow_doubles=narrow_doubles))
+                else:
+                    values.append(_OTHERS[read](text))
+            if self.rest:
+                for text in args[len(self._plan) :]:
+                    values.append(parse_entity(text, base) if read == _ENTITY else text)
+        except ValueError as error:
+            name = self.arguments[index].name
+            raise DirectiveError(f'{self.words}: argument {name} {error}') from None
         return values
 
-    def _one(self, argument: Argument, text: str, base: str, type_word: str, narrow: bool) -> Any:
-        try:
-            if argument.read in ENTITY_KINDS:
-                return parse_entity(text, base)
-            if argument.read is Read.VALUE:
-                return parse_literal(type_word, text, narrow_doubles=narrow)
-            if argument.read is Read.NUMBER:
-                return _number(text)
-            if argument.read is Read.FLAG:
-                return text.lower() == 'true'
-        except ValueError as error:
-            raise DirectiveError(f'{self.words}: argument {argument.name} {error}') from None
-        return text
+    @cached_property
+    def _plan(self) -> tuple[tuple[str, str], ...]:
+        """Way of reading and default of each argument; strings, since reading is hot."""
+        return tuple(
+            (
+                _ENTITY if argument.read in ENTITY_KINDS else argument.read.value,
+                argument.default or '',
+            )
+            for argument in self.arguments
+        )
 
     def _type(self, text: str, args: Sequence[str]) -> str:
         word = text.upper()
@@ -201,6 +207,16 @@ def _number(text: str) -> int:
     return int(text)
 
 
+def _flag(text: str) -> bool:
+    return text.lower() == 'true'
+
+
+_ENTITY = 'entity'
+_OTHERS: dict[str, Callable[[str], Any]] = {
+    Read.NUMBER.value: _number,
+    Read.FLAG.value: _flag,
+    Read.TEXT.value: str,
+}
 TABLE: dict[tuple[str, str, str], Directive] = {}
 """Every directive under its capital words; filled by the modules `manipulations`, `queries`, ..."""
 
@@ -211,8 +227,10 @@ def look_up(request: DirectiveRequest) -> Directive:
     Raises:
         DirectiveError: 202 without a command, 205 when there is no such directive.
     """
-    key = (request.command.upper(), request.primary.upper(), request.secondary.upper())
-    directive = TABLE.get(key)
+    directive = TABLE.get((request.command, request.primary, request.secondary))
+    if directive is None:
+        key = (request.command.upper(), request.primary.upper(), request.secondary.upper())
+        directive = TABLE.get(key)
     if directive is None:
         if not request.command:
             raise DirectiveError('Invalid request. No command specified.', ExitCode.NO_COMMAND)
