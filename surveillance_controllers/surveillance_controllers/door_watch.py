@@ -13,7 +13,6 @@ from surveillance_controllers.map_knowledge import KnowledgeError, MapKnowledge
 from surveillance_controllers.place_regions import Segment
 from surveillance_interfaces.msg import DoorStates
 from surveillance_interfaces.srv import SetDoor
-from surveillance_ontology.armor_client import FactSubscription
 from surveillance_runtime.calls import CallFailed, ServiceCaller
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import STATE_QOS
@@ -46,35 +45,34 @@ class DoorWatch:
         self._timeout = timeout
         self._contacts: frozenset[str] = frozenset()
         self._told: frozenset[str] = frozenset()
-        self._facts: FactSubscription | None = None
         self._news = Interrupt()
         self._set_door = ServiceCaller(node, SetDoor, 'ontology_map/set_door')
         node.create_subscription(DoorStates, 'door_states', self._on_states, STATE_QOS)
         node.stopping.subscribe(self._news.set)
         node.spawn(self._work, name='door watch')
 
-    @property
-    def rooms_of(self) -> dict[str, set[str]]:
-        """The places that each door leads into, as the ontology has them; empty until it is
-        known."""
-        rooms: dict[str, set[str]] = {}
-        for fact in self._facts.facts if self._facts is not None else ():
-            place, door = fact.arguments
-            rooms.setdefault(door, set()).add(place)
-        return rooms
+    def rooms_of(self, interrupt: Interrupt) -> dict[str, set[str]]:
+        """The places that each door leads into; empty while the ontology does not say.
 
-    @property
-    def closed(self) -> frozenset[str]:
-        """The doors that are closed."""
-        rooms = self.rooms_of
-        if not rooms:
-            return self._contacts
-        half = {door for door in self._segments if len(rooms.get(door, ())) < 2}
-        return self._contacts | half
+        Blocks for the ontology's answer, so it belongs on a worker thread.
+        """
+        if not self._knowledge.connected:
+            return {}
+        try:
+            return self._knowledge.doors(interrupt)
+        except KnowledgeError as error:
+            self._node.get_logger().warn(f'doors as their contacts report them: {error}')
+            return {}
 
-    def closed_segments(self) -> dict[str, Segment]:
-        """Where the closed doors are."""
-        return {door: self._segments[door] for door in self.closed if door in self._segments}
+    def closed(self, rooms_of: Mapping[str, set[str]]) -> frozenset[str]:
+        """The doors that are closed, by their contacts or because they join no two places."""
+        half = {door for door in self._segments if len(rooms_of.get(door, ())) < 2}
+        return self._contacts | half if rooms_of else self._contacts
+
+    def closed_segments(self, interrupt: Interrupt) -> dict[str, Segment]:
+        """Where the closed doors are; blocks as `rooms_of` does."""
+        closed = self.closed(self.rooms_of(interrupt))
+        return {door: self._segments[door] for door in closed if door in self._segments}
 
     def _on_states(self, message: DoorStates) -> None:
         self._contacts = frozenset(message.closed)
@@ -95,8 +93,7 @@ class DoorWatch:
         """Subscribes to the ontology's doors and tells it of the contacts; whether all went
         well."""
         try:
-            if self._facts is None:
-                self._facts = self._knowledge.watch('hasDoor(?, ?)', self._node.stopping)
+            self._knowledge.connect(self._node.stopping)
             for door in sorted(self._contacts ^ self._told):
                 self._tell(door, is_open=door not in self._contacts)
         except (KnowledgeError, CallFailed):

@@ -36,6 +36,7 @@ class State(Enum):
     BACKING = 'backing up'
     LOOKING = 'looking around'
     ASKING = 'asking for another path'
+    STOPPING = 'stopping'
     ARRIVED = 'arrived'
     FAILED = 'failed'
 
@@ -56,6 +57,7 @@ class RecoveryParameters:
         wait: How long to wait for what stands in the way, seconds.
         back_up: How far to back up, metres.
         back_speed: How fast, m/s.
+        look_ahead: An obstacle on this much of the path ahead makes it ask for another, metres.
         off_path: Further from the path than this, another one is asked for, metres.
         fresh_start: After this much progress the list of recoveries starts anew, metres.
         most_paths: So many other paths are asked for at most without a fresh start.
@@ -69,12 +71,16 @@ class RecoveryParameters:
     wait: float = 3.0
     back_up: float = 0.4
     back_speed: float = 0.15
+    look_ahead: float = 3.0
     off_path: float = 0.5
     fresh_start: float = 1.0
     most_paths: int = 6
     stand_lost: float = 1.0
     look_lost: float = 30.0
 
+
+_STANDS = 0.004
+"""A robot that moves less than this between two steps, metres or rad, stands."""
 
 _RECOVERIES = (
     (State.WAITING, State.ASKING),
@@ -150,6 +156,10 @@ class Drive:
             return self._while_lost(now, dt)
         if self.state is State.DRIVING:
             return self._drive(now, pose, seen, dt)
+        if self.state is State.STOPPING:
+            if (moved <= _STANDS and abs(turned) <= _STANDS) or now - self._since > 3.0:
+                self.state = State.ARRIVED
+            return Velocity()
         if self.state is State.WAITING and now - self._since >= self._recovery.wait:
             self._next(now)
         elif self.state is State.BACKING:
@@ -162,6 +172,15 @@ class Drive:
             else:
                 return Velocity(0.0, min(self._robot.turn, 1.0))
         return self._follower.halt(dt)
+
+    def heed(self, obstacles: Points) -> None:
+        """Takes the obstacles known now (map frame); asks for another path if one is on the
+        path."""
+        r = self._recovery
+        if self.state is State.DRIVING and self._now is not None:
+            reach = self._robot.radius + self._robot.margin / 2
+            if not self._follower.is_clear(obstacles, reach, r.look_ahead):
+                self._ask(self._now, 'something is on the path ahead')
 
     def new_path(self, path: ArrayLike) -> None:
         """Goes on along another path."""
@@ -200,7 +219,8 @@ class Drive:
         r = self._recovery
         guidance = self._follower.step(pose, seen, dt)
         if guidance.done:
-            self.state = State.ARRIVED
+            self._since = now
+            self.state = State.STOPPING
             return guidance.velocity
         if guidance.off_path > r.off_path:
             self._ask(now, f'the robot is {guidance.off_path:.2f} m off its path')

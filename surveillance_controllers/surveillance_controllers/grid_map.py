@@ -55,7 +55,7 @@ class GridMap:
     def cells_of(self, points: ArrayLike) -> NDArray[np.intp]:
         """Row and column of each point, shape (n, 2); they may lie outside of the map."""
         xy = np.asarray(points, dtype=float).reshape(-1, 2)
-        columns_rows = np.floor((xy - self.origin) / self.resolution)
+        columns_rows = np.nan_to_num(np.floor((xy - self.origin) / self.resolution), nan=-1.0)
         # Far outside is outside: no larger number survives the conversion.
         return np.clip(columns_rows, -1, 2**40).astype(np.intp)[:, ::-1]
 

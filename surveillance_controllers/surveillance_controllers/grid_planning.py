@@ -42,10 +42,12 @@ class PlanningParameters:
 
     Attributes:
         radius: Radius of the robot, metres.
-        margin: What a path keeps beyond the radius, metres.
+        margin: What a path keeps beyond the radius, metres; at least 0.71 cells, so that a
+            diagonal step between two free cells grazes nothing.
         comfort: Beyond radius and margin, room up to this distance makes a cell cheaper, metres.
         aversion: How many times dearer than an open cell one at the margin is, minus one.
         escape: A start that is not free may be left over at most this distance, metres.
+        goal_shift: A goal on which an obstacle stands is moved by at most this distance, metres.
         corner: Longest part of a straight line that rounding a corner may take, metres.
     """
 
@@ -54,6 +56,7 @@ class PlanningParameters:
     comfort: float = 0.5
     aversion: float = 3.0
     escape: float = 0.6
+    goal_shift: float = 1.0
     corner: float = 0.5
 
 
@@ -120,7 +123,8 @@ class GridPlanner:
 
         Args:
             start: x, y in metres; when it is not free, the path leaves it by the shortest way.
-            goal: x, y in metres.
+            goal: x, y in metres; when an obstacle that the map does not have stands there, the
+                path ends as near to it as it can.
 
         Returns:
             The path, shape (n, 2), n of at least 2, both points included.
@@ -130,9 +134,10 @@ class GridPlanner:
         """
         start, goal = np.asarray(start, float)[:2], np.asarray(goal, float)[:2]
         goal_cell = self._cell('the goal', goal)
-        if self._costs.regions[goal_cell] == 0:
-            raise NoPath(f'the goal {_shown(goal)} {self._why_not_free(goal)}')
         start_cell = self._free_cell_near(start)
+        if self._costs.regions[goal_cell] == 0:
+            goal_cell = self._cell_beside(goal, goal_cell, start_cell)
+            goal = self.grid.centres_of(goal_cell)[0]
         if self._costs.regions[start_cell] != self._costs.regions[goal_cell]:
             raise NoPath(
                 f'no path from {_shown(start)} to {_shown(goal)}: '
@@ -162,8 +167,7 @@ class GridPlanner:
         crowded = np.clip(1 - spare / np.float32(max(p.comfort, 1e-6)), 0, 1)
         price = 1 + np.float32(p.aversion) * crowded * crowded
         cost = np.where(free, price, np.float32(-1))
-        # Four neighbours: a diagonal step between two free cells may graze what is not free.
-        _, regions = cv2.connectedComponents(free.astype(np.uint8), connectivity=4)
+        _, regions = cv2.connectedComponents(free.astype(np.uint8), connectivity=8)
         self._costs = _Costs(clearance, cost, price, regions)
 
     def _cell(self, what: str, point: Points) -> tuple[int, int]:
@@ -199,6 +203,25 @@ class GridPlanner:
             if self._can_escape(start, self.grid.centres_of(found[index])[0]):
                 return int(found[index, 0]), int(found[index, 1])
         raise NoPath(f'the start {_shown(start)} {self._why_not_free(start)}')
+
+    def _cell_beside(
+        self, goal: Points, cell: tuple[int, int], start: tuple[int, int]
+    ) -> tuple[int, int]:
+        """The cell nearest to a goal that an obstacle covers, among those that can be reached."""
+        needed = self.parameters.radius + self.parameters.margin
+        if self._static[cell] >= needed:
+            reach = int(self.parameters.goal_shift / self.grid.resolution)
+            first_row, first_column = max(0, cell[0] - reach), max(0, cell[1] - reach)
+            window = self._costs.regions[
+                first_row : cell[0] + reach + 1, first_column : cell[1] + reach + 1
+            ]
+            found = np.argwhere(window == self._costs.regions[start])
+            found += np.array([first_row, first_column])
+            gaps = np.hypot(*(found - np.array(cell)).T)
+            if len(gaps) and gaps.min() <= reach:
+                nearest = found[int(np.argmin(gaps))]
+                return int(nearest[0]), int(nearest[1])
+        raise NoPath(f'the goal {_shown(goal)} {self._why_not_free(goal)}')
 
     def _can_escape(self, start: Points, end: Points) -> bool:
         """Whether the way out only leads away from what is near: it must never come closer."""

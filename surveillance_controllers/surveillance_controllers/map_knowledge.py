@@ -17,6 +17,7 @@ from surveillance_ontology.armor_client import (
     ArmorServiceCallError,
     ArmorServiceInternalError,
     FactSubscription,
+    name_in,
     value_in,
 )
 from surveillance_runtime.calls import CallFailed, ServiceCaller
@@ -45,18 +46,32 @@ class MapKnowledge:
         self._names = ServiceCaller(node, ReferenceName, 'ontology_map/reference_name')
         self._armor: ArmorClient | None = None
 
+    def find_position(self, place: str, interrupt: Interrupt) -> Points | None:
+        """The point of a place that the robot can reach; None when the map has no such place.
+
+        Returns:
+            Shape (3,), metres, world frame.
+
+        Raises:
+            KnowledgeError: The map does not answer.
+        """
+        request = RoomPosition.Request(room_name=place)
+        with _answered():
+            answer = self._positions.call(request, self._timeout, interrupt)
+        if not answer.valid:
+            return None
+        point: Points = conversions.array_from_points([answer.position])[0]
+        return point
+
     def position(self, place: str, interrupt: Interrupt) -> Points:
         """The point of a place that the robot can reach, shape (3,), metres, world frame.
 
         Raises:
             KnowledgeError: The map has no such place, or does not answer.
         """
-        request = RoomPosition.Request(room_name=place)
-        with _answered():
-            answer = self._positions.call(request, self._timeout, interrupt)
-        if not answer.valid:
+        point = self.find_position(place, interrupt)
+        if point is None:
             raise KnowledgeError(f'the map has no place {place!r}')
-        point: Points = conversions.array_from_points([answer.position])[0]
         return point
 
     def places(self, interrupt: Interrupt) -> dict[str, Points]:
@@ -68,6 +83,37 @@ class MapKnowledge:
         with _answered():
             names = self._client(interrupt).query.ind_b2_class('LOCATION')
         return {name: self.position(name, interrupt) for name in sorted(names)}
+
+    def connect(self, interrupt: Interrupt) -> None:
+        """Waits until the map is built, so that the ontology can be asked.
+
+        Raises:
+            KnowledgeError: It is not built within the deadline.
+        """
+        with _answered():
+            self._client(interrupt)
+
+    @property
+    def connected(self) -> bool:
+        """Whether the map has been built, so that the ontology can be asked without a long wait."""
+        return self._armor is not None
+
+    def doors(self, interrupt: Interrupt) -> dict[str, set[str]]:
+        """The places that each door leads into, as the ontology has them now.
+
+        Raises:
+            KnowledgeError: The ontology does not answer.
+        """
+        with _answered():
+            armor = self._client(interrupt)
+            places = armor.query.ind_b2_class('LOCATION')
+            questions = [armor.request('QUERY OBJECTPROP IND', 'hasDoor', p) for p in places]
+            answers = armor.batch(questions).responses
+        rooms_of: dict[str, set[str]] = {}
+        for place, answer in zip(places, answers, strict=True):
+            for door in answer.queried_objects:
+                rooms_of.setdefault(name_in(door), set()).add(place)
+        return rooms_of
 
     def watch(
         self, pattern: str, interrupt: Interrupt, on_change: Callable[[], None] = lambda: None

@@ -70,8 +70,9 @@ class MapPlanner:
         if self._planner is None:
             self._has_map.clear()
             raise NoPath(f'no map came on the topic map within {timeout:g} s')
+        closed = self._doors.closed_segments(interrupt)
         with self._lock:
-            self._planner.set_closed(self._doors.closed_segments())
+            self._planner.set_closed(closed)
             self._planner.set_obstacles(self._obstacles)
             path = self._planner.plan(start, goal)
         heights = np.linspace(start[2], goal[2], len(path))

@@ -30,7 +30,7 @@ class ObstacleMemory:
     def __init__(
         self,
         grid: GridMap,
-        cell: float = 0.1,
+        cell: float = 0.05,
         apart: float = 0.25,
         reach: float = 4.0,
         keep: float = 120.0,

@@ -42,7 +42,8 @@ class DriveParameters:
         creep: What regulation does not reduce the speed below, m/s.
         turn_first: Where the point lies further to the side than this, turn on the spot, rad.
         tolerance: The end is reached within this distance, metres.
-        latency: Time between seeing and braking, seconds.
+        settle: Towards the end the robot goes the remaining way in this time constant, seconds.
+        latency: Time between seeing and braking, seconds; two periods of the lidar and a half.
     """
 
     radius: float = 0.22
@@ -60,7 +61,8 @@ class DriveParameters:
     creep: float = 0.1
     turn_first: float = 0.9
     tolerance: float = 0.08
-    latency: float = 0.1
+    settle: float = 1.0
+    latency: float = 0.3
 
 
 @dataclass(frozen=True)
@@ -135,15 +137,20 @@ class PathFollower:
             return self._guide(*self._turn(side, dt), False, off_path)
         distance = max(float(np.hypot(*(target - position))), 1e-6)
         curvature = 2 * math.sin(side) / distance
-        wanted = min(p.speed, math.sqrt(2 * p.acceleration * max(remaining, 0.0)))
+        wanted = min(
+            p.speed,
+            math.sqrt(2 * p.acceleration * max(remaining, 0.0)),
+            max(remaining / p.settle, p.creep),
+        )
         if abs(curvature) * p.tight_arc > 1:
             wanted /= abs(curvature) * p.tight_arc
         beside = _nearest(seen) - p.radius
         if beside < p.caution:
             wanted *= max(beside, 0.0) / p.caution
         wanted = max(wanted, min(p.creep, remaining / max(dt, 1e-6)))
-        # The speed from which braking, after the latency, ends within the room.
-        a, t = p.acceleration, p.latency
+        # The speed from which braking, after the latency, ends within the room. The last braking
+        # counts on less than the full deceleration.
+        a, t = 0.8 * p.acceleration, p.latency
         stop = p.speed * t + p.speed**2 / (2 * a)
         room = room_ahead(seen, curvature, p.radius + p.margin, stop + 0.1)
         safe = max(0.0, math.sqrt((a * t) ** 2 + 2 * a * room) - a * t)
@@ -156,6 +163,22 @@ class PathFollower:
             speed = turn / curvature
         limited = self._ramped(self._velocity.turn, turn, p.turn_acceleration * dt)
         return self._guide(speed, limited, blocked, off_path)
+
+    def is_clear(self, obstacles: Points, reach: float, ahead: float) -> bool:
+        """Whether the next part of the path keeps away from obstacles.
+
+        Args:
+            obstacles: Points of shape (n, 2), metres, in the path's frame.
+            reach: What it must keep from each, metres.
+            ahead: How much of the path is looked at, metres.
+        """
+        if not len(obstacles):
+            return True
+        end = min(self.progress + ahead, self.length)
+        count = max(2, math.ceil((end - self.progress) / 0.05) + 1)
+        way = polyline.point_at(self.path, np.linspace(self.progress, end, count))
+        gaps = np.hypot(way[:, :1] - obstacles[:, 0], way[:, 1:] - obstacles[:, 1])
+        return bool((gaps >= reach).all())
 
     def halt(self, dt: float) -> Velocity:
         """Brakes to a stand."""

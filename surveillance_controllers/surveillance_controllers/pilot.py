@@ -145,6 +145,8 @@ class Pilot:
             return
         if self._memory is not None and self._memory.update(self._localiser.pose, scan, now):
             self.obstacles_changed = True
+            if isinstance(self.task, Drive):
+                self.task.heed(self._memory.points)
         if self._regions is None:
             return
         place = self._regions.place_at(self._localiser.pose[:2])

@@ -71,12 +71,13 @@ class PlaceTracking:
         names = {fact.arguments[0] for fact in self._doors.facts}
         if not names or names == set(self._positions):
             return
-        self._positions = {
-            name: self._positions[name]
-            if name in self._positions
-            else self._knowledge.position(name, stopping)
-            for name in names
-        }
+        for name in names ^ set(self._positions):
+            # The facts may come one by one, so what is missing among them is asked for.
+            position = self._knowledge.find_position(name, stopping)
+            if position is None:
+                self._positions.pop(name, None)
+            else:
+                self._positions[name] = position
         self._base.set_positions(self._positions)
 
     def _correct(self) -> None:

@@ -99,7 +99,8 @@ class PlannerController(PatrolNode):
         if self._map is None:
             return self._knowledge.position(place, run.interrupt)
         positions = self._knowledge.places(run.interrupt)
-        doors = route(self._doors.rooms_of, self._doors.closed, place, target, positions)
+        rooms_of = self._doors.rooms_of(run.interrupt)
+        doors = route(rooms_of, self._doors.closed(rooms_of), place, target, positions)
         self.get_logger().info(f'{place} to {target}: through {", ".join(doors) or "no door"}')
         pose = self._map.pose
         return positions[place] if pose is None else np.array([pose[0], pose[1], 0.0])

@@ -317,13 +317,15 @@ class ExecutorThread:
         self.executor = SingleThreadedExecutor(context=context)
         self.error: BaseException | None = None
         self._thread: threading.Thread | None = None
+        self._stopping = False
 
     def start(self, on_end: Callable[[], None] | None = None) -> None:
         """Begin to spin; `on_end` is called when spinning ends for whatever reason."""
 
         def spin() -> None:
             try:
-                self.executor.spin()
+                while not self._stopping:
+                    self.executor.spin_once()
             except (ExternalShutdownException, ShutdownException):
                 pass
             except BaseException as error:
@@ -337,9 +339,12 @@ class ExecutorThread:
 
     def stop(self) -> None:
         """End the spinning and join the thread, so that the nodes may be destroyed."""
-        self.executor.shutdown(timeout_sec=JOIN_SECONDS)
+        self._stopping = True
+        # The executor's own shutdown would take its guard conditions away under a running callback.
+        self.executor.create_task(lambda: None)
         if self._thread is not None:
             self._thread.join(JOIN_SECONDS)
+        self.executor.shutdown(timeout_sec=JOIN_SECONDS)
 
 
 def _check_parameter_files(argv: Sequence[str]) -> None:

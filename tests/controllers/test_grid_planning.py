@@ -91,6 +91,16 @@ def test_an_obstacle_on_the_way_is_driven_around() -> None:
     assert np.hypot(*(polyline.equally_spaced(around, 0.02) - (1.75, 2)).T).min() >= ROBOT.radius
 
 
+def test_a_goal_that_an_obstacle_covers_is_approached() -> None:
+    planner = GridPlanner(two_rooms(), ROBOT)
+    planner.set_obstacles([(3.0, 2.0)])
+    path = planner.plan((0.5, 2), (3, 2))
+    assert 0.25 <= np.hypot(*(path[-1] - (3, 2))) <= 0.35
+    planner.set_closed({'D1': (3.0, 0.0, 3.0, 4.0)})
+    with pytest.raises(NoPath, match='the closed door D1 is in the way'):
+        planner.plan((0.5, 2), (7, 2))
+
+
 def test_a_robot_pushed_against_a_wall_finds_its_way_out() -> None:
     planner = GridPlanner(two_rooms(), ROBOT)
     path = planner.plan((0.2, 1), (3, 1))
@@ -109,7 +119,7 @@ def test_in_any_clutter_a_path_is_free_and_not_longer_than_the_grid_s(seed: int)
         height, width = draw.integers(1, 12, 2)
         cells[row : row + height, column : column + width] = 100
     grid = GridMap(cells, RESOLUTION, (-1.0, 2.0))
-    robot = PlanningParameters(radius=0.1, margin=0.03, comfort=0.2)
+    robot = PlanningParameters(radius=0.1, margin=0.04, comfort=0.2)
     planner = GridPlanner(grid, robot)
     start, goal = (grid.centres_of(c)[0] for c in draw.integers(3, 57, (2, 2)))
     assume((planner.clearance([start, goal]) > robot.radius + robot.margin).all())

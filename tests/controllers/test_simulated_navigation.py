@@ -1,0 +1,180 @@
+"""Planner and motion controller in SIMULATED mode, with the simulator, ARMOR and the map
+builder."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from geometry_msgs.msg import Point, PoseStamped
+from std_msgs.msg import UInt32
+
+from surveillance_controllers.motion_controller_node import MotionController
+from surveillance_controllers.planner_controller_node import PlannerController
+from surveillance_interfaces.action import ComputePath, Control, FollowPath, Plan
+from surveillance_interfaces.srv import PlaceObstacle, PushRobot, SetDoor
+from surveillance_ontology.armor_client import ArmorClient
+from surveillance_ontology.armor_server_node import ArmorServer
+from surveillance_ontology.ontology_map_builder_node import OntologyMapBuilder
+from surveillance_runtime.calls import GoalCaller, ServiceCaller
+from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
+from surveillance_simulation.simulator_node import Simulator
+
+PLACE_FILE = Path(__file__).parents[2] / 'config' / 'seven_rooms.yaml'
+
+
+def place_parameters() -> dict[str, Any]:
+    """The place's file as flat parameter overrides."""
+    nested = yaml.safe_load(PLACE_FILE.read_text())['/**']['ros__parameters']
+    flat: dict[str, Any] = {}
+    for name, value in nested.items():
+        if isinstance(value, dict):
+            flat.update({f'{name}.{key}': entry for key, entry in value.items()})
+        else:
+            flat[name] = value
+    return flat
+
+
+class World:
+    """The nodes of one robot in the seven rooms, and a client of their actions."""
+
+    def __init__(self, graph: Any) -> None:
+        self.graph = graph
+        place = place_parameters()
+        timed = {**place, 'use_sim_time': True, 'execution_mode': 'SIMULATED'}
+        graph.add(ArmorServer)
+        graph.add(OntologyMapBuilder, place)
+        graph.add(Simulator, {**place, 'use_sim_time': True, 'speed': 0.0})
+        self.planner = graph.add(PlannerController, {**timed, 'via_point_delay': 0.1})
+        self.motion = graph.add(MotionController, timed)
+        self.truth = graph.listen(PoseStamped, 'ground_truth', SENSOR_QOS)
+        self.collisions = graph.listen(UInt32, 'collisions', STATE_QOS)
+        self.armor = ArmorClient(graph.node, 'test', 'surveillance')
+        node = graph.node
+        self._compute = GoalCaller(node, ComputePath, 'compute_path')
+        self._follow = GoalCaller(node, FollowPath, 'follow_path')
+        self._plan = GoalCaller(node, Plan, 'motion/planner')
+        self._control = GoalCaller(node, Control, 'motion/controller')
+
+    def call(self, kind: Any, service: str, **fields: Any) -> Any:
+        answer = ServiceCaller(self.graph.node, kind, service).call(kind.Request(**fields), 5.0)
+        assert answer.success, answer.message
+        return answer
+
+    @property
+    def position(self) -> tuple[float, float]:
+        self.graph.until(lambda: self.truth)
+        point = self.truth[-1].pose.position
+        return point.x, point.y
+
+    def compute(self, goal: tuple[float, float]) -> Any:
+        x, y = self.position
+        request = ComputePath.Goal(start=Point(x=x, y=y), goal=Point(x=goal[0], y=goal[1]))
+        return self._compute.run(request, accept_timeout=10.0, result_timeout=20.0)
+
+    def follow(self, path: list[Point], **options: Any) -> Any:
+        return self._follow.run(FollowPath.Goal(path=path), accept_timeout=10.0, **options)
+
+    def plan(self, target: str) -> Any:
+        seen: list[int] = []
+        end = self._plan.run(
+            Plan.Goal(target=target),
+            accept_timeout=10.0,
+            result_timeout=20.0,
+            on_feedback=lambda feedback: seen.append(len(feedback.via_points)),
+        )
+        return end, seen
+
+    def control(self, points: list[Point]) -> Any:
+        return self._control.run(Control.Goal(point_set=points), accept_timeout=10.0)
+
+    def ask_until(self, holds: Callable[[], bool]) -> None:
+        """Asks again and again, which `graph.until` cannot: it must not wait for answers."""
+        deadline = time.monotonic() + 10.0
+        while not holds():
+            assert time.monotonic() < deadline, 'not within 10 s'
+
+    def can_reach(self, place: str) -> bool:
+        return place in self.armor.query.objectprop_b2_ind('canReach', 'Robot1')
+
+    def robot_place(self) -> list[str]:
+        return self.armor.query.objectprop_b2_ind('isIn', 'Robot1')
+
+
+@pytest.fixture
+def world(graph: Any) -> World:
+    return World(graph)
+
+
+def test_a_visit_is_planned_driven_and_noted(world: World) -> None:
+    end, seen = world.plan('C1')
+    assert end.status == 'succeeded'
+    points = end.result.via_points
+    assert len(points) == 10
+    assert len(seen) >= 2
+    assert seen == sorted(seen)
+    steps = [math.dist((a.x, a.y), (b.x, b.y)) for a, b in itertools.pairwise(points)]
+    assert max(steps) < 1.5 * min(steps)
+    end = world.control(points)
+    assert end.status == 'succeeded'
+    reached = end.result.reached_point
+    assert (reached.x, reached.y) == pytest.approx(world.position, abs=0.05)
+    assert world.position == pytest.approx((10, 8), abs=0.15)
+    assert world.robot_place() == ['C1']
+    (visited,) = world.armor.query.dataprop_b2_ind('visitedAt', 'C1')
+    (now,) = world.armor.query.dataprop_b2_ind('now', 'Robot1')
+    assert visited == now
+    assert world.collisions[-1].data == 0
+
+
+def test_a_closed_door_leaves_route_path_and_ontology_and_comes_back(world: World) -> None:
+    world.ask_until(lambda: world.can_reach('C1'))
+    world.call(SetDoor, 'simulation/set_door', door='D6', open=False)
+    world.ask_until(lambda: not world.can_reach('C1'))
+    assert world.compute((10.0, 8.0)).status == 'succeeded'
+    world.call(SetDoor, 'simulation/set_door', door='D7', open=False)
+    world.ask_until(lambda: world.compute((10.0, 8.0)).status == 'aborted')
+    end, _ = world.plan('C1')
+    assert end.status == 'aborted'
+    world.call(SetDoor, 'simulation/set_door', door='D6', open=True)
+    world.ask_until(lambda: world.compute((10.0, 8.0)).status == 'succeeded')
+    world.ask_until(lambda: world.can_reach('C1'))
+
+
+def test_an_obstacle_in_the_way_is_driven_around(world: World) -> None:
+    path = world.compute((10.0, 8.0)).result.path
+    middle = path[len(path) // 2]
+    world.call(
+        PlaceObstacle, 'simulation/place_obstacle', name='box', x=middle.x, y=middle.y, radius=0.2
+    )
+    end = world.follow(path)
+    assert end.status == 'succeeded'
+    assert world.position == pytest.approx((10, 8), abs=0.15)
+    assert world.collisions[-1].data == 0
+
+
+def test_a_robot_pushed_off_its_way_finds_itself_and_arrives(world: World) -> None:
+    path = world.compute((10.0, 8.0)).result.path
+    pushed: list[Any] = []
+
+    def push(_feedback: Any) -> None:
+        if not pushed:
+            request = PushRobot.Request(dx=-0.5, dy=0.6, dyaw=1.5)
+            pushed.append(client.call_async(request))
+
+    client = world.graph.node.create_client(PushRobot, 'simulation/push_robot')
+    world.graph.until(client.service_is_ready)
+    end = world.follow(path, on_feedback=push)
+    assert pushed
+    assert pushed[0].result().success
+    assert end.status == 'succeeded'
+    reached = end.result.position
+    assert (reached.x, reached.y) == pytest.approx(world.position, abs=0.08)
+    assert world.position == pytest.approx((10, 8), abs=0.15)
+    world.ask_until(lambda: world.robot_place() == ['C1'])
