@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import os
 import signal
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -29,7 +29,7 @@ TICK = 0.02
 
 
 @pytest.fixture
-def clock(graph) -> Iterator[None]:
+def clock(graph) -> None:
     """Simulated time that passes `SPEED` times as fast as real time."""
     publisher = graph.node.create_publisher(ClockMessage, 'clock', 10)
     ticks = itertools.count(1)
@@ -40,7 +40,6 @@ def clock(graph) -> Iterator[None]:
 
     steady = Clock(clock_type=ClockType.STEADY_TIME)
     graph.node.create_timer(TICK, tick, clock=steady)
-    yield
 
 
 @pytest.fixture
@@ -104,3 +103,24 @@ def test_all_nodes_in_one_process(launch, clock):
     assert code == 0
     assert seconds < 3.5
     assert gone([process], 0)
+
+
+def test_one_console_serves_the_three_controllers(launch, clock):
+    mission = launch('--mode', 'MANUAL')
+    mission.write('fly')
+    mission.until(r"launch +\| 'fly' is no command: expected one of battery, plan, move")
+    mission.until(r'planner_controller +\| New request', timeout=60)
+    mission.write('plan set [[6, 9, 0], oops]')
+    mission.until(r"planner_controller +\| plan set: .*'oops'")
+    mission.write('plan set [[6, 9, 0]]')
+    mission.until(r'motion_controller +\| New request')
+    mission.write('move 2 0.1')
+    mission.until(r'robot_behavior +\| arrived in')
+    mission.write('battery set 15')
+    mission.until(r'robot_behavior +\| decision 2: .*battery is low \(15 %\)')
+    mission.write('exit battery_controller')
+    mission.until('battery_controller has ended by itself')
+    mission.write('exit')
+    code, _ = mission.end()
+    assert code == 0
+    assert 'exit: stopping' in '\n'.join(mission.lines)
