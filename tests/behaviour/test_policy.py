@@ -204,6 +204,19 @@ def test_the_tour_of_a_small_map_is_the_shortest(graph: PatrolGraph) -> None:
     assert set(graph.walk) == set(graph.places)
 
 
+@settings(max_examples=30, deadline=None)
+@given(graphs())
+def test_the_shortest_ways_are_the_same_with_and_without_scipy(graph: PatrolGraph) -> None:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr('surveillance_behaviour.policy.graph.DENSE_UP_TO', 0)
+        other = PatrolGraph(graph.legs, graph.dwell)
+        assert np.allclose(graph.distances, other.distances)
+    for start, goal in itertools.product(graph.places, repeat=2):
+        way = (start, *graph.route(start, goal))
+        seconds = sum(graph.legs[a][b] + graph.dwell for a, b in itertools.pairwise(way))
+        assert seconds == pytest.approx(graph.seconds(start, goal))
+
+
 @settings(max_examples=10, deadline=None)
 @given(st.integers(13, 40), st.integers(0, 10**6))
 def test_a_good_tour_lies_between_the_bound_and_a_random_one(count: int, seed: int) -> None:

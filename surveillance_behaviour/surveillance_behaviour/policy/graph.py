@@ -10,14 +10,23 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
-import networkx
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import dijkstra
 
-from surveillance_behaviour.policy.tour import Tour, tour_over_blocks
+from surveillance_behaviour.policy.tour import (
+    EXACT_UP_TO,
+    Tour,
+    shortest_tour,
+    tour_over_blocks,
+)
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
+DENSE_UP_TO = 128
+"""Up to so many places the shortest ways are computed without scipy, whose import takes longer."""
 
 
 class GraphError(ValueError):
@@ -62,26 +71,36 @@ class PatrolGraph:
         return {place: position for position, place in enumerate(self.places)}
 
     @cached_property
-    def adjacency(self) -> csr_array:
-        """Seconds of each leg, dwell included, sparse, shape (n, n)."""
-        rows, columns, costs = [], [], []
+    def direct(self) -> NDArray[np.float64]:
+        """Seconds of each leg, dwell included, shape (n, n); inf: not neighbours."""
+        costs = np.full((len(self.places), len(self.places)), np.inf)
         for place, ways in self.legs.items():
             for other, seconds in ways.items():
-                rows.append(self.index[place])
-                columns.append(self.index[other])
-                costs.append(seconds + self.dwell)
-        shape = (len(self.places), len(self.places))
-        return csr_array((costs, (rows, columns)), shape=shape)
+                costs[self.index[place], self.index[other]] = seconds + self.dwell
+        return costs
 
     @cached_property
-    def _shortest(self) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
-        distances, before = dijkstra(self.adjacency, return_predecessors=True)
-        return distances, before
+    def adjacency(self) -> csr_array:
+        """:attr:`direct` as a sparse matrix without the infinite entries."""
+        from scipy.sparse import csr_array
 
-    @property
+        rows, columns = np.nonzero(np.isfinite(self.direct))
+        values = self.direct[rows, columns]
+        return csr_array((values, (rows, columns)), shape=self.direct.shape)
+
+    @cached_property
     def distances(self) -> NDArray[np.float64]:
         """Seconds from each place to each other by the shortest way, shape (n, n); inf: no way."""
-        return self._shortest[0]
+        if len(self.places) > DENSE_UP_TO:
+            from scipy.sparse.csgraph import dijkstra
+
+            found: NDArray[np.float64] = dijkstra(self.adjacency)
+            return found
+        seconds = self.direct.copy()
+        np.fill_diagonal(seconds, 0.0)
+        for middle in range(len(seconds)):
+            np.minimum(seconds, seconds[:, middle, None] + seconds[middle], out=seconds)
+        return seconds
 
     def seconds(self, start: str, goal: str) -> float:
         """Seconds from ``start`` to ``goal`` by the shortest way; inf when there is none."""
@@ -93,14 +112,14 @@ class PatrolGraph:
         Raises:
             GraphError: There is no way.
         """
-        begin, place = self.index[start], self.index[goal]
-        backwards = []
-        while place != begin:
-            backwards.append(self.places[place])
-            place = int(self._shortest[1][begin, place])
-            if place < 0:
-                raise GraphError(f'there is no way from {start} to {goal}')
-        return tuple(reversed(backwards))
+        if not math.isfinite(self.seconds(start, goal)):
+            raise GraphError(f'there is no way from {start} to {goal}')
+        way, place = [], start
+        while place != goal:
+            ways = self.legs[place]
+            place = min(sorted(ways), key=lambda other: ways[other] + self.seconds(other, goal))
+            way.append(place)
+        return tuple(way)
 
     def connected(self, place: str) -> PatrolGraph:
         """The part of the map that can be reached from ``place``; itself when that is all."""
@@ -139,6 +158,11 @@ class PatrolGraph:
         """
         if not np.isfinite(self.distances).all():
             raise GraphError('no tour leads through all places: the map is not connected')
+        seconds = (self.distances + self.distances.T) / 2.0
+        if len(self.places) <= EXACT_UP_TO:
+            return shortest_tour(seconds)
+        import networkx
+
         network = networkx.Graph()
         network.add_nodes_from(self.places)
         network.add_edges_from((place, other) for place in self.legs for other in self.legs[place])
@@ -146,7 +170,7 @@ class PatrolGraph:
             sorted(self.index[place] for place in block)
             for block in networkx.biconnected_components(network)
         ]
-        return tour_over_blocks((self.distances + self.distances.T) / 2.0, sorted(blocks))
+        return tour_over_blocks(seconds, sorted(blocks))
 
     @cached_property
     def walk(self) -> tuple[str, ...]:

@@ -29,8 +29,6 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import dijkstra
 
 from surveillance_behaviour.policy.graph import PatrolGraph
 from surveillance_behaviour.policy.situation import Score, Situation
@@ -190,6 +188,9 @@ def _idle_ways(graph: PatrolGraph, idle: NDArray[np.float64], goal: int) -> NDAr
 
     Only the row of each place to its neighbours and the column of ``goal`` are filled in.
     """
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import dijkstra
+
     direct = graph.adjacency
     coo = direct.tocoo()
     longest, idlest = max(float(coo.data.max()), 1e-9), max(float(idle.max()), 1e-9)
