@@ -149,6 +149,9 @@ def ros_arguments(files: Sequence[Path], run: Run) -> list[str]:
     arguments = ['--ros-args']
     for path in files:
         arguments += ['--params-file', str(path)]
+    if run.behaviour == 'patrol':
+        # the place's file is for the simulator: the robot learns its map from the markers
+        arguments += ['-p', 'map_source:=markers']
     if run.namespace is not None:
         arguments += ['-r', f'__ns:=/{run.namespace.strip("/")}']
     if run.log_level is not None:

@@ -9,7 +9,9 @@ from geometry_msgs.msg import Point as PointMessage
 
 from surveillance_behaviour.policy.situation import Decision
 from surveillance_behaviour.ports import Point
+from surveillance_behaviour.survey import PlaceNote
 from surveillance_interfaces.msg import Decision as DecisionMessage
+from surveillance_interfaces.msg import OntologyMap, OntologyPlace, RoomConnection
 
 
 def point_from(message: PointMessage) -> Point:
@@ -60,4 +62,30 @@ def decision_from(message: DecisionMessage) -> Decision:
         policy=message.policy,
         reason=message.reason,
         scores=dict(zip(message.candidates, message.scores, strict=True)),
+    )
+
+
+def place_note_from(response: Any) -> PlaceNote | None:
+    """What a marker stands for, from the answer of `room_info`; None when it is not known."""
+    if not response.connections:
+        return None
+    doors = {each.through_door: each.connected_to for each in response.connections}
+    return PlaceNote(response.room, (response.x, response.y), doors)
+
+
+def map_message(places: Iterable[PlaceNote], robot_room: str) -> OntologyMap:
+    """The message that enters places into the ontology."""
+    return OntologyMap(
+        places=[
+            OntologyPlace(
+                name=place.room,
+                position=point_message(place.position),
+                connections=[
+                    RoomConnection(connected_to=behind, through_door=door)
+                    for door, behind in place.connections.items()
+                ],
+            )
+            for place in places
+        ],
+        robot_room=robot_room,
     )

@@ -1,0 +1,228 @@
+"""The `initial_state` node: looks around for markers and has the map built from them."""
+
+from __future__ import annotations
+
+import queue
+from collections.abc import Sequence
+from typing import Any
+
+from nav_msgs.msg import Odometry
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.task import Future
+from std_msgs.msg import Int32
+from std_srvs.srv import Empty
+
+from surveillance_behaviour.conversions import map_message, place_note_from
+from surveillance_behaviour.ros_eyes import RosEyes
+from surveillance_behaviour.surroundings import LookingAround
+from surveillance_behaviour.survey import PlaceNote, Survey, SurveyReport
+from surveillance_interfaces.msg import MarkerDetectionArray, OntologyMap
+from surveillance_interfaces.srv import ReferenceName, RoomInformation
+from surveillance_ontology.place import Place, PlaceError, make_place
+from surveillance_runtime.calls import CallFailed, ServiceCaller
+from surveillance_runtime.node import PatrolNode, StartError, run_node
+from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
+
+_ANSWER_SECONDS = 5.0
+_BUILD_SECONDS = 20.0
+_START = -1
+
+
+class InitialState(PatrolNode):
+    """Serves `start`; afterwards goes on listening for new markers."""
+
+    def __init__(self, **node_options: Any) -> None:
+        super().__init__('initial_state', **node_options)
+        source = self.parameter(
+            'map_source',
+            'markers',
+            'Where the map comes from.',
+            choices=('markers', 'configuration'),
+            read_only=True,
+        )
+        robot_room = self.parameter(
+            'robot_room', '', 'Where the robot starts; empty: the place nearest to it.'
+        )
+        poses = self.parameter(
+            'poses', [1, 2, 3, 4], "The arm's poses for looking around.", minimum=1, maximum=4
+        )
+        deadline = self.parameter(
+            'deadline', 45.0, 'Seconds after which what was found has to do.', minimum=0.0
+        )
+        dwell = self.parameter('dwell', 0.5, 'Rest at each view of a scan, seconds.', minimum=0.0)
+        pictures = self.parameter('pictures', 6, 'Pictures to take at each pose.', minimum=1)
+        patience = self.parameter(
+            'patience', 2.0, 'Seconds after which a pose is left without them.', minimum=0.0
+        )
+        self._looking = LookingAround(tuple(poses), deadline, dwell)
+        self._survey = Survey(robot_room, (0.0, 0.0))
+        self._configured = self._place(robot_room) if source == 'configuration' else None
+        self._sent: tuple[PlaceNote, ...] = ()
+        self._finished = False
+        self._waiting: list[Future] = []
+        self._events: queue.SimpleQueue[int | None] = queue.SimpleQueue()
+        self._queued: set[int] = set()
+        self._eyes = RosEyes(self, pictures, patience)
+        self._room_info = ServiceCaller(self, RoomInformation, 'room_info')
+        self._reference = ServiceCaller(self, ReferenceName, 'ontology_map/reference_name')
+        self._map = self.create_publisher(OntologyMap, 'ontology_map/build_map', STATE_QOS)
+        self.create_subscription(
+            Int32, 'aruco_detector/id', lambda message: self._on_id(message.data), 100
+        )
+        self.create_subscription(
+            MarkerDetectionArray, 'aruco_detector/detections', self._on_detections, 10
+        )
+        self.create_subscription(Odometry, 'odom', self._on_odometry, SENSOR_QOS)
+        self.create_service(Empty, 'start', self._on_start, callback_group=ReentrantCallbackGroup())
+        self.spawn(self._work, 'initial state')
+
+    def on_stop(self) -> None:
+        """End the worker."""
+        self._events.put(None)
+
+    def _place(self, robot_room: str) -> Place:
+        rooms, positions = self.parameters_under('map'), self.parameters_under('room_positions')
+        try:
+            return make_place(rooms, positions, robot_room)
+        except PlaceError as error:
+            raise StartError(f'{self.get_name()}: parameter {error}') from None
+
+    # --- callbacks ---
+
+    async def _on_start(self, _request: Any, response: Any) -> Any:
+        if not self._finished:
+            future = Future(executor=self.executor)
+            self._waiting.append(future)
+            self._events.put(_START)
+            await future
+        return response
+
+    def _on_id(self, marker_id: int) -> None:
+        if marker_id >= 0 and marker_id not in self._queued:
+            self._queued.add(marker_id)
+            self._events.put(marker_id)
+
+    def _on_detections(self, message: MarkerDetectionArray) -> None:
+        for detection in message.detections:
+            if detection.confirmed:
+                self._on_id(detection.id)
+
+    def _on_odometry(self, message: Odometry) -> None:
+        if not self._finished:
+            position = message.pose.pose.position
+            self._survey.robot_position = (position.x, position.y)
+
+    # --- work, on the worker's thread ---
+
+    def _work(self) -> None:
+        while (event := self._events.get()) is not None:
+            if event == _START and not self._finished:
+                self._start()
+            elif event >= 0:
+                self._ask(event)
+                if self._finished and self._configured is None:
+                    self._extend()
+
+    def _start(self) -> None:
+        if self._configured is not None:
+            notes = _notes_of(self._configured)
+            self._publish(notes, self._configured.start)
+        else:
+            logger = self.get_logger()
+            report = self._looking.run(
+                self._eyes,
+                self._judge,
+                lambda: self.get_clock().now().nanoseconds / 1e9,
+                lambda sentence: logger.info(sentence),
+                self.stopping.is_set,
+            )
+            if self.stopping.is_set():
+                return
+            self._tell(report)
+            self._publish(report.places, report.robot_room)
+        self._await_map()
+        self.executor.create_task(self._answer)
+
+    def _judge(self) -> SurveyReport:
+        while not self._events.empty() and not self.stopping.is_set():
+            event = self._events.get()
+            if event is None:
+                self._events.put(None)
+                break
+            if event >= 0:
+                self._ask(event)
+        return self._survey.report()
+
+    def _ask(self, marker_id: int) -> None:
+        request = RoomInformation.Request(id=marker_id)
+        try:
+            answer = self._room_info.call(request, _ANSWER_SECONDS, self.stopping)
+        except CallFailed as error:
+            self._queued.discard(marker_id)
+            if not self.stopping.is_set():
+                self.get_logger().warn(f'marker {marker_id}: {error}')
+            return
+        note = place_note_from(answer)
+        if note is None:
+            self._survey.discard(marker_id)
+            self.get_logger().info(f'marker {marker_id} is discarded: {answer.room}')
+        else:
+            self._survey.note(marker_id, note)
+            self.get_logger().info(f'marker {marker_id} stands for {note.room}')
+
+    def _extend(self) -> None:
+        report = self._survey.report()
+        if report.places != self._sent:
+            known = {place.room for place in self._sent}
+            new = [place.room for place in report.places if place.room not in known]
+            self.get_logger().info(f'the map is extended: {", ".join(new) or "new doors"}')
+            self._publish(report.places, '')
+
+    def _tell(self, report: SurveyReport) -> None:
+        found = ', '.join(sorted(place.room for place in report.places))
+        if report.complete:
+            self.get_logger().info(f'all places are found: {found}')
+            return
+        for sentence in report.sentences():
+            self.get_logger().warn(sentence)
+        self.get_logger().warn(f'patrolling without what is missing: {found}')
+
+    def _publish(self, places: Sequence[PlaceNote], robot_room: str) -> None:
+        self._sent = tuple(places)
+        self._map.publish(map_message(places, robot_room))
+
+    def _await_map(self) -> None:
+        try:
+            self._reference.call(ReferenceName.Request(), _BUILD_SECONDS, self.stopping)
+        except CallFailed as error:
+            if not self.stopping.is_set():
+                self.get_logger().warn(f'the map is sent, but not known to be built: {error}')
+
+    def _answer(self) -> None:
+        self._finished = True
+        waiting, self._waiting = self._waiting, []
+        for future in waiting:
+            future.set_result(None)
+
+
+def _notes_of(place: Place) -> tuple[PlaceNote, ...]:
+    notes = []
+    for room in place.rooms:
+        connections = {
+            door: other
+            for door in place.rooms[room]
+            for other in place.doors[door]
+            if other != room
+        }
+        x, y, _ = place.positions[room]
+        notes.append(PlaceNote(room, (x, y), connections))
+    return tuple(notes)
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the node."""
+    return run_node(InitialState, args)
+
+
+if __name__ == '__main__':
+    raise SystemExit(main())

@@ -1,0 +1,114 @@
+"""The camera on its arm, as `surroundings` turns it, over ROS."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from rclpy.time import Time
+
+from surveillance_interfaces.action import ScanSurroundings
+from surveillance_interfaces.msg import MarkerDetectionArray
+from surveillance_interfaces.srv import MarkerRoutine
+from surveillance_runtime.calls import CallFailed, GoalCaller, ServiceCaller
+from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.waiting import ClockWait, Interrupt
+
+_ARM_SECONDS = 30.0
+_HORIZON = 0.5
+
+
+class RosEyes:
+    """Moves the arm over `move_arm` and `scan_surroundings`, and waits for pictures at rest.
+
+    Args:
+        node: The node that looks around; its threads call the methods.
+        pictures: How many pictures to wait for at each pose.
+        patience: Seconds after which a pose is left without them.
+    """
+
+    def __init__(self, node: PatrolNode, pictures: int, patience: float) -> None:
+        self._node = node
+        self._pictures = pictures
+        self._patience = patience
+        self._wait = ClockWait(node)
+        self._move = ServiceCaller(node, MarkerRoutine, 'move_arm')
+        self._scan = GoalCaller(node, ScanSurroundings, 'scan_surroundings')
+        self._resting_since: Time | None = None
+        self._seen = 0
+        self._enough = Interrupt()
+        node.stopping.subscribe(self._enough.set)
+        node.create_subscription(
+            MarkerDetectionArray, 'aruco_detector/detections', self._on_picture, 10
+        )
+
+    def pose(self, number: int) -> None:
+        """Take one of the arm's poses and look."""
+        if self._moved(number):
+            self._look()
+
+    def home(self) -> None:
+        """Fold the arm for driving."""
+        self._moved(MarkerRoutine.Request.HOME)
+
+    def scan(self, overlap: float, dwell: float, done: Callable[[], bool]) -> None:
+        """Look all around the horizon; `done` is asked after each view and ends the scan."""
+        goal = ScanSurroundings.Goal(overlap=overlap, lowest=-_HORIZON, highest=_HORIZON)
+        goal.dwell = dwell
+        view_changed, ended = Interrupt(), Interrupt()
+        self._node.stopping.subscribe(ended.set)
+
+        def told(feedback: Any) -> None:
+            if not feedback.resting and feedback.view > 1:
+                view_changed.set()
+
+        # `done` may ask other nodes, which a feedback callback must not wait for
+        watcher = self._node.spawn(lambda: _watch(view_changed, ended, done), 'scan watch')
+        try:
+            self._scan.run(goal, accept_timeout=_ARM_SECONDS, interrupt=ended, on_feedback=told)
+        except CallFailed as error:
+            if not ended.is_set():
+                self._complain(str(error))
+        finally:
+            ended.set()
+            view_changed.set()
+            watcher.join()
+
+    def _moved(self, number: int) -> bool:
+        request = MarkerRoutine.Request(pos=number)
+        try:
+            answer = self._move.call(request, _ARM_SECONDS, self._node.stopping)
+        except CallFailed as error:
+            self._complain(str(error))
+            return False
+        if not answer.success:
+            self._complain(f'move_arm to pose {number}: {answer.message}')
+        return bool(answer.success)
+
+    def _look(self) -> None:
+        self._seen = 0
+        if not self._node.stopping.is_set():
+            self._enough.clear()
+        self._resting_since = self._node.get_clock().now()
+        self._wait.sleep(self._patience, self._enough)
+        self._resting_since = None
+
+    def _on_picture(self, message: MarkerDetectionArray) -> None:
+        since = self._resting_since
+        if since is not None and Time.from_msg(message.header.stamp) >= since:
+            self._seen += 1
+            if self._seen >= self._pictures:
+                self._enough.set()
+
+    def _complain(self, reason: str) -> None:
+        if not self._node.stopping.is_set():
+            self._node.get_logger().warn(reason)
+            # without an arm there is nothing to wait for but the pictures that come anyway
+            self._wait.sleep(1.0, self._node.stopping)
+
+
+def _watch(view_changed: Interrupt, ended: Interrupt, done: Callable[[], bool]) -> None:
+    while view_changed.wait() and not ended.is_set():
+        view_changed.clear()
+        if done():
+            ended.set()

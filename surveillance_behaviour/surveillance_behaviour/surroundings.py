@@ -1,0 +1,81 @@
+"""Looking around until the map is whole, or until a deadline.
+
+First the arm's poses, as long as they bring something new; then whole scans around the horizon,
+each with more overlap and a longer rest than the one before, so that a marker missed at the edge of
+a picture, at a flat angle or in poor light has another chance from a slightly different view.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from surveillance_behaviour.survey import SurveyReport
+
+
+class Eyes(Protocol):
+    """What turns the camera. Each blocks until the camera has rested and its pictures were seen."""
+
+    def pose(self, number: int) -> None:
+        """Take one of the arm's poses and look."""
+
+    def scan(self, overlap: float, dwell: float, done: Callable[[], bool]) -> None:
+        """Look all around; `done` is asked after each view and ends the scan."""
+
+    def home(self) -> None:
+        """Fold the arm for driving."""
+
+
+@dataclass(frozen=True)
+class LookingAround:
+    """How to look around.
+
+    Attributes:
+        poses: Numbers of the poses, in order.
+        deadline: Seconds after which what was found has to do.
+        dwell: Rest at each view of the first scan, seconds.
+    """
+
+    poses: Sequence[int] = (1, 2, 3, 4)
+    deadline: float = 50.0
+    dwell: float = 0.4
+
+    def run(
+        self,
+        eyes: Eyes,
+        judge: Callable[[], SurveyReport],
+        now: Callable[[], float],
+        say: Callable[[str], None],
+        stopping: Callable[[], bool],
+    ) -> SurveyReport:
+        """Look until everything fits, the deadline has passed and there is something to patrol.
+
+        Args:
+            eyes: What turns the camera.
+            judge: What has been found so far.
+            now: Seconds.
+            say: Told what goes on.
+            stopping: Tells whether to give up.
+        """
+        end = now() + self.deadline
+
+        def enough() -> bool:
+            return stopping() or judge().complete or (now() >= end and bool(judge().places))
+
+        for number in self.poses:
+            eyes.pose(number)
+            if enough():
+                break
+        overlap, dwell, late = 0.2, self.dwell, False
+        while not enough():
+            for sentence in judge().sentences():
+                say(f'looking on: {sentence}')
+            eyes.scan(overlap, dwell, enough)
+            overlap, dwell = min(overlap + 0.15, 0.5), min(dwell * 2.0, 4.0 * self.dwell)
+            if now() >= end and not judge().places and not late:
+                late = True
+                say('nothing to patrol was found yet; looking on')
+        if not stopping():
+            eyes.home()
+        return judge()
