@@ -239,7 +239,10 @@ class KnowledgeBase:
         axioms = tuple(self._axioms)
         assertions = [axiom for axiom in axioms if _is_assertion(axiom)]
         self._schema = Schema(axioms, *Engine.needs_of(assertions))
-        engine = self._engine = Engine(self._schema.program, lambda name: self._about.get(name, ()))
+        engine = Engine(self._schema.program, lambda name: self._about.get(name, ()))
+        if self._engine is not None:
+            engine.take_spelling(self._engine)
+        self._engine = engine
         self._schema_changed = False
         self._added.clear()
         self._removed.clear()

@@ -262,6 +262,11 @@ class Engine:
             return self.program.data(axiom.prop) in self.program.negatives
         return True
 
+    def take_spelling(self, other: Engine) -> None:
+        """Writes derived values as another engine did."""
+        self._values.update(other._values)
+        self.spelling.update(other.spelling)
+
     # --- updates ---
 
     def update(self, added: Iterable[Axiom], removed: Iterable[Axiom]) -> None:
@@ -465,7 +470,10 @@ class Engine:
                 self._queue[place] = current
                 count = self.asserted.pop(fact, 0)
                 if count:
-                    self.asserted[current] = self.asserted.get(current, 0) + count
+                    known = self.asserted.get(current, 0)
+                    if self.changed is not None and not known:
+                        self.changed.setdefault(current, current[0].holds(current))
+                    self.asserted[current] = known + count
         for index in self._network.thresholds:
             index.settle()
         for run in self._network.naming:
@@ -494,10 +502,15 @@ class Engine:
         for fact in facts:
             if self.asserted.pop(fact, None) and self.changed is not None:
                 self.changed.setdefault(fact, False)
+        others: dict[str, None] = {}
         for fact in facts:
+            others.update(dict.fromkeys(self.equality.dependents(fact)))
             self._take(fact)
         members = self.equality.split(representative)
         self.difference.split(representative)
+        for pair in [pair for pair in self.conflicts if not members.isdisjoint(pair)]:
+            self._doomed.append((self._nothing, representative))
+            self._withdraw_conflict(pair)
         self.proofs.reset()
         axioms: dict[Axiom, None] = {}
         for member in sorted(members):
@@ -509,11 +522,13 @@ class Engine:
             if isinstance(axiom, SameIndividual):
                 self._state_same(axiom)
             fact = self.fact_of(axiom)
-            if fact is not None:
+            if fact is not None and not members.isdisjoint(_individuals_of(fact)):
                 self._assert(fact, fresh)
             if self.program.uses_thing:
                 for individual in self._individuals(axiom) & members:
                     self._assert((self.program.thing, individual), fresh)
+        for other in others:
+            self._split(other, fresh)
 
     # --- conflicts: individuals that must be the same and are different ---
 
@@ -582,6 +597,10 @@ class Engine:
                     flush()
                 if not queue:
                     return
+
+
+def _individuals_of(fact: Fact) -> tuple[str, ...]:
+    return fact[1:2] if fact[0].kind == 'data' else fact[1:]
 
 
 def _is_assertion(axiom: Axiom) -> bool:
