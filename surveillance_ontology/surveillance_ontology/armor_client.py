@@ -50,7 +50,7 @@ __all__ = [
 
 CHANGES_TOPIC = 'fact_changes'
 CHANGES_QOS = QoSProfile(
-    depth=100,
+    depth=100,  # The publisher keeps one; a subscriber that is busy may catch up with a burst.
     reliability=ReliabilityPolicy.RELIABLE,
     durability=DurabilityPolicy.TRANSIENT_LOCAL,
 )

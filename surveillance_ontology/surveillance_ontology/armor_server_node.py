@@ -23,9 +23,10 @@ from surveillance_ontology.armor.journal import JournalError
 from surveillance_ontology.armor.service import ArmorService
 from surveillance_ontology.armor.settings import Settings
 from surveillance_ontology.armor.store import Store
-from surveillance_ontology.armor_client import CHANGES_QOS, CHANGES_TOPIC
+from surveillance_ontology.armor_client import CHANGES_TOPIC
 from surveillance_ontology.conversions import changes_to_ros, fill_response, request_from_ros
 from surveillance_runtime.node import PatrolNode, StartError, run_node
+from surveillance_runtime.qos import STATE_QOS
 
 WORKERS = 4
 """Threads for directives that may take long."""
@@ -48,7 +49,7 @@ class ArmorServer(PatrolNode):
         self._publisher = self.create_publisher(
             FactChanges,
             CHANGES_TOPIC,
-            CHANGES_QOS,
+            STATE_QOS,
             event_callbacks=PublisherEventCallbacks(matched=lambda _status: self._publish()),
         )
         group = ReentrantCallbackGroup()

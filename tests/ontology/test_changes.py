@@ -1,0 +1,127 @@
+"""Changes on their way to subscribers, and several clients at once."""
+
+from __future__ import annotations
+
+import threading
+
+from surveillance_interfaces.msg import ArmorDirectiveRes
+from surveillance_ontology.armor.change_feed import LARGE, ChangeFeed
+from surveillance_ontology.armor.changes import decode, encode
+from surveillance_ontology.armor.client import ArmorClient
+from surveillance_ontology.armor.fact_set import FactSet
+from surveillance_ontology.armor.facts import ShortFact, parse_fact
+from surveillance_ontology.armor.in_process import InProcessTransport
+from surveillance_ontology.armor.service import ArmorService
+from surveillance_ontology.conversions import (
+    changes_from_ros,
+    changes_to_ros,
+    fill_response,
+    request_from_ros,
+    request_to_ros,
+    response_from_ros,
+)
+
+from .seven_rooms import IRI, ONTOLOGY, asker, build_seven_rooms
+
+
+def test_changes_are_numbered_and_say_what_is_derived(
+    service: ArmorService, client: ArmorClient
+) -> None:
+    announced: list[int] = []
+    feed = ChangeFeed(service, lambda: announced.append(1))
+    build_seven_rooms(client, False, True)
+    loaded, *changes = feed.take()
+    assert (loaded.reference_name, loaded.sequence) == ('map', 0)
+    assert [change.sequence for change in changes] == list(range(1, len(changes) + 1))
+    assert announced == [1], 'once, until it is taken'
+    client.manipulation.replace_one_dataprop_b2_ind('visitedAt', 'R2', 'LONG', '1')
+    client.utils.sync_buffered_reasoner()
+    asserted, derived = (changes_to_ros(*change) for change in feed.take())
+    assert [(str(f), came, d) for f, came, d in changes_from_ros(asserted)] == [
+        ('visitedAt(R2, "1665579740"^^xsd:long)', False, False),
+        ('visitedAt(R2, "1"^^xsd:long)', True, False),
+    ]
+    assert ('URGENT(R2)', True, True) in [
+        (str(fact), came, d) for fact, came, d in changes_from_ros(derived)
+    ]
+    assert derived.is_consistent
+    client.utils.drop_ref()
+    assert [change.sequence for change in feed.take()] == [0]
+
+
+def test_a_change_too_large_for_a_message_leaves_a_gap(
+    service: ArmorService, client: ArmorClient
+) -> None:
+    client.utils.load_ref_from_file(ONTOLOGY, IRI, True)
+    feed = ChangeFeed(service, lambda: None)
+    for number in range(LARGE + 1):
+        client.manipulation.add_ind_to_class(f'X{number}', 'THING')
+    client.utils.apply_buffered_changes()
+    first = feed.take()[0]
+    assert (first.sequence, first.added) == (2, ())
+
+
+def test_a_fact_set_follows_messages_and_asks_when_it_cannot() -> None:
+    facts = FactSet('URGENT(?)')
+    one, two = parse_fact('URGENT(R1)'), parse_fact('URGENT(R2)')
+    other = parse_fact('ROOM(R1)')
+    assert facts.follow(5, [(one, True, True)]) is None, 'it does not know what was before'
+    assert facts.replace([one]) == [(one, True)]
+    assert facts.follow(6, [(two, True, True), (other, True, True)]) == [(two, True)]
+    assert facts.follow(7, [(two, True, False)]) == [], 'asserted as well now'
+    assert facts.follow(8, [(two, False, True)]) is None, 'it may still be asserted'
+    assert facts.replace([one, two]) == []
+    assert facts.follow(10, []) is None, 'one was missed'
+    assert facts.replace([two]) == [(one, False)]
+    assert facts.facts == {two}
+
+
+def test_messages_round_trip(service: ArmorService, client: ArmorClient) -> None:
+    build_seven_rooms(client, False, True)
+    request = client.request('QUERY SPARQL FORMATTED', 'SELECT * { ?a ?b ?c } LIMIT 2')
+    back = request_from_ros(request_to_ros(request))
+    assert (back.words, list(back.args)) == (request.words, list(request.args))
+    for response in (service.execute(request), asker(service)('NO SUCH'), asker(service)('REASON')):
+        assert response_from_ros(fill_response(ArmorDirectiveRes(), response)) == response
+
+
+def test_every_axiom_can_be_journalled(service: ArmorService, client: ArmorClient) -> None:
+    build_seven_rooms(client, False, True)
+    for axiom in service.reference('map').kb.axioms():
+        assert decode(encode(axiom)) == axiom
+
+
+def test_clients_at_once_do_not_disturb_each_other(service: ArmorService) -> None:
+    clients = [ArmorClient(f'c{n}', 'map', InProcessTransport(service)) for n in range(4)]
+    errors: list[BaseException] = []
+    start = threading.Barrier(len(clients))
+
+    def work(number: int, client: ArmorClient) -> None:
+        try:
+            start.wait()
+            client.utils.load_ref_from_file(ONTOLOGY, IRI)
+            for value in range(60):
+                client.manipulation.replace_one_dataprop_b2_ind(
+                    'visitedAt', f'R{number}', 'LONG', str(value)
+                )
+                client.manipulation.add_objectprop_to_ind('hasDoor', f'R{number}', f'D{value}')
+                assert f'R{number}' in client.query.ind_b2_class('ROOM')
+                client.manipulation.remove_objectprop_from_ind('hasDoor', f'R{number}', f'D{value}')
+        except BaseException as error:
+            errors.append(error)
+
+    threads = [
+        threading.Thread(target=work, args=(number, client))
+        for number, client in enumerate(clients)
+    ]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert errors == []
+    ask = clients[0].query
+    assert ask.facts('visitedAt(?, ?)') == [
+        ShortFact('visitedAt', (f'R{n}', '"59"^^xsd:long')) for n in range(4)
+    ]
+    assert ask.facts('hasDoor(?, ?)') == []
+    assert clients[0].utils.sync_buffered_reasoner()
