@@ -57,7 +57,8 @@ class GridMap:
         xy = np.asarray(points, dtype=float).reshape(-1, 2)
         columns_rows = np.nan_to_num(np.floor((xy - self.origin) / self.resolution), nan=-1.0)
         # Far outside is outside: no larger number survives the conversion.
-        return np.clip(columns_rows, -1, 2**40).astype(np.intp)[:, ::-1]
+        cells: NDArray[np.intp] = np.clip(columns_rows, -1, 2**40).astype(np.intp)[:, ::-1]
+        return cells
 
     def centres_of(self, cells: ArrayLike) -> Points:
         """The centre of each cell (row, column), shape (n, 2), metres."""

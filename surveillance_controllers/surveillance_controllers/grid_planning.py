@@ -132,23 +132,24 @@ class GridPlanner:
         Raises:
             NoPath: There is none; the text says what blocks it.
         """
-        start, goal = np.asarray(start, float)[:2], np.asarray(goal, float)[:2]
-        goal_cell = self._cell('the goal', goal)
-        start_cell = self._free_cell_near(start)
+        begin: Points = np.asarray(start, dtype=float)[:2]
+        end: Points = np.asarray(goal, dtype=float)[:2]
+        goal_cell = self._cell('the goal', end)
+        start_cell = self._free_cell_near(begin)
         if self._costs.regions[goal_cell] == 0:
-            goal_cell = self._cell_beside(goal, goal_cell, start_cell)
-            goal = self.grid.centres_of(goal_cell)[0]
+            goal_cell = self._cell_beside(end, goal_cell, start_cell)
+            end = self.grid.centres_of(goal_cell)[0]
         if self._costs.regions[start_cell] != self._costs.regions[goal_cell]:
             raise NoPath(
-                f'no path from {_shown(start)} to {_shown(goal)}: '
+                f'no path from {_shown(begin)} to {_shown(end)}: '
                 f'{self._what_blocks(start_cell, goal_cell)}'
             )
         cells = self._search(start_cell, goal_cell)
         path = self.grid.centres_of(cells)
-        path[0] = start if self._is_free_at(start) else path[0]
-        path[-1] = goal
+        path[0] = begin if self._is_free_at(begin) else path[0]
+        path[-1] = end
         path = self._rounded(self._shortened(path))
-        return path if np.array_equal(path[0], start) else np.vstack([start, path])
+        return path if np.array_equal(path[0], begin) else np.vstack([begin, path])
 
     def _distance(self, mask: NDArray[np.bool_]) -> NDArray[np.float32]:
         # From a cell's centre to the edge of the nearest cell that is not free.

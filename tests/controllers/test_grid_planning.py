@@ -95,7 +95,7 @@ def test_a_goal_that_an_obstacle_covers_is_approached() -> None:
     planner = GridPlanner(two_rooms(), ROBOT)
     planner.set_obstacles([(3.0, 2.0)])
     path = planner.plan((0.5, 2), (3, 2))
-    assert 0.25 <= np.hypot(*(path[-1] - (3, 2))) <= 0.35
+    assert ROBOT.radius <= np.hypot(*(path[-1] - (3, 2))) <= 0.35
     planner.set_closed({'D1': (3.0, 0.0, 3.0, 4.0)})
     with pytest.raises(NoPath, match='the closed door D1 is in the way'):
         planner.plan((0.5, 2), (7, 2))
