@@ -1,0 +1,153 @@
+#!/usr/bin/env python3
+"""How long a start takes, and what the running robot needs.
+
+Warm: from the command to the first chosen room, each node its own process and all in one, beside
+the time of a bare `import rclpy` in the same run. `--cold` also measures a start from nothing, in a
+fresh copy of the checkout. Memory is the proportional set size (PSS): a page that several processes
+share is counted in part in each, so that the sum counts it once.
+
+    .venv/bin/python benchmarks/startup.py --quick
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import shutil
+import signal
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+CHECKOUT = Path(__file__).resolve().parent.parent
+BASE_PYTHON = str(getattr(sys, '_base_executable', sys.executable))
+NO_EXPLORING = '/**/robot_behavior:\n  ros__parameters:\n    exploration_seconds: 0.0\n'
+CHOSEN = re.compile(r'robot_behavior +\| decision 1:')
+STARTED = re.compile(r'started (\w+) \(process (\d+)\)')
+LONGEST = 60.0
+
+
+@dataclass
+class Start:
+    """One start: seconds until the first chosen room, and each process's memory in MB."""
+
+    seconds: float
+    memory: dict[str, float]
+
+
+def own_environ() -> dict[str, str]:
+    """This environment as a shell has it that never entered the project's."""
+    environ = dict(os.environ)
+    if environ.pop('_ROS_WHEELS_BOOTSTRAP_COMPLETE', None):
+        environ.pop('LD_LIBRARY_PATH', None)
+    return environ
+
+
+def launch(checkout: Path, *options: str, longest: float = LONGEST) -> Start:
+    """Starts the robot, waits for the first chosen room, looks at the memory, stops it."""
+    begin = time.monotonic()
+    process = subprocess.Popen(
+        [BASE_PYTHON, str(checkout / 'launch.py'), '--for', str(longest), *options],
+        env=own_environ(),
+        stdout=subprocess.PIPE,
+        text=True,
+        cwd=checkout,
+    )
+    processes: dict[str, int] = {}
+    assert process.stdout is not None
+    lines = []
+    try:
+        for line in process.stdout:
+            lines.append(line)
+            if match := STARTED.search(line):
+                processes[match[1]] = int(match[2])
+            if CHOSEN.search(line):
+                seconds = time.monotonic() - begin
+                memory = {name: proportional_size(pid) for name, pid in processes.items()}
+                memory['launch.py'] = proportional_size(process.pid)
+                return Start(seconds, memory)
+    finally:
+        process.send_signal(signal.SIGINT)
+        process.communicate()
+    sys.exit(f'no room was chosen within {longest:.0f} s:\n' + ''.join(lines[-20:]))
+
+
+def proportional_size(pid: int) -> float:
+    """The memory of a process in MB, pages shared with others counted in part."""
+    text = Path(f'/proc/{pid}/smaps_rollup').read_text()
+    match = re.search(r'^Pss: +(\d+) kB', text, re.MULTILINE)
+    assert match is not None
+    return int(match[1]) / 1000
+
+
+def time_of(words: list[str], environ: dict[str, str]) -> float:
+    begin = time.monotonic()
+    subprocess.run(words, env=environ, check=True)
+    return time.monotonic() - begin
+
+
+def cold_start() -> float:
+    """From a fresh copy without an environment to the first chosen room, seconds."""
+    with tempfile.TemporaryDirectory() as folder:
+        copy = Path(folder, 'surveillance')
+        ignored = shutil.ignore_patterns(
+            '.venv', '.git', 'build', 'runs', '__pycache__', '.*_cache'
+        )
+        shutil.copytree(CHECKOUT, copy, ignore=ignored)
+        return launch(copy, longest=900.0).seconds
+
+
+def main() -> None:
+    """Measures and prints the tables."""
+    parser = argparse.ArgumentParser(description=(__doc__ or '').partition('\n')[0])
+    parser.add_argument('--quick', action='store_true', help='two starts of each kind')
+    parser.add_argument('--cold', action='store_true', help='also a start from nothing (minutes)')
+    parser.add_argument('--domain', default='101', help='ROS domain to start in')
+    options = parser.parse_args()
+    repeats = 2 if options.quick else 5
+    python = str(CHECKOUT / '.venv' / 'bin' / 'python')
+    bare = statistics.median(
+        time_of([python, '-c', 'import rclpy'], own_environ()) for _ in range(2 * repeats)
+    )
+    with tempfile.NamedTemporaryFile('w', suffix='.yaml') as parameters:
+        parameters.write(NO_EXPLORING)
+        parameters.flush()
+        at_once = ['--params', parameters.name]
+        domain = ['--domain', options.domain]
+        kinds = {
+            'processes': domain,
+            'processes, start not explored': [*domain, *at_once],
+            'composed': [*domain, '--composed'],
+            'composed, start not explored': [*domain, '--composed', *at_once],
+        }
+        starts = {
+            kind: [launch(CHECKOUT, *words) for _ in range(repeats)]
+            for kind, words in kinds.items()
+        }
+    rows = [('import rclpy, bare', bare)]
+    rows += [
+        (f'warm, {kind}', statistics.median(start.seconds for start in done))
+        for kind, done in starts.items()
+    ]
+    if options.cold:
+        rows.append(('cold, from nothing', cold_start()))
+    print(f'from the command to the first chosen room, median of {repeats}')
+    print(f'{"start":<40} {"seconds":>8} {"x import":>9}')
+    for name, seconds in rows:
+        print(f'{name:<40} {seconds:>8.2f} {seconds / bare:>9.1f}')
+    print('\nmemory at that moment, PSS')
+    print(f'{"process":<40} {"MB":>8}')
+    for kind in ('processes', 'composed'):
+        memory = starts[kind][-1].memory
+        for name, size in memory.items():
+            print(f'{kind + ": " + name:<40} {size:>8.1f}')
+        print(f'{kind + ": all":<40} {sum(memory.values()):>8.1f}')
+
+
+if __name__ == '__main__':
+    main()
