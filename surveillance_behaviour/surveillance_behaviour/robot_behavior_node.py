@@ -1,7 +1,8 @@
 """The node `robot_behavior`: runs one of the machines until it is told to stop.
 
 Subscribes `battery_level` and `state/battery_low`, publishes `decision` and `mission_status`, and
-calls the services and actions of the machine that `behaviour` names.
+calls the services and actions of the machine that `behaviour` names. Below `robot_behavior/fsm` the
+machine can be watched, paused and stepped.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from std_msgs.msg import Bool, UInt8
 from surveillance_behaviour import behaviour_parameters, conversions, fsm
 from surveillance_behaviour.announcing import DecisionTopic, RosAnnouncer
 from surveillance_behaviour.battery_gauge import BatteryGauge
+from surveillance_behaviour.fsm_ros import IntrospectionServer
 from surveillance_behaviour.machines import MACHINES
 from surveillance_behaviour.mission import Mission, Ports
 from surveillance_behaviour.mission_record import MissionRecord, RecordError
@@ -65,7 +67,10 @@ class RobotBehavior(PatrolNode):
             self._record,
             random.Random(seed if seed >= 0 else None),
         )
-        self.machine = self._new_machine()
+        self.machine = MACHINES[self._behaviour](self.mission)
+        self._announcer.attach(self.mission, self.machine)
+        self._introspection = IntrospectionServer(self, self.get_name(), self.machine, '/')
+        self._introspection.start()
         self.create_subscription(
             UInt8, 'battery_level', lambda m: gauge.set_level(float(m.data)), STATE_QOS
         )
@@ -79,11 +84,7 @@ class RobotBehavior(PatrolNode):
     def on_stop(self) -> None:
         """Preempts the machine, so that what it started is cancelled while messages flow."""
         self.machine.request_preempt()
-
-    def _new_machine(self) -> fsm.StateMachine:
-        machine = MACHINES[self._behaviour](self.mission)
-        self._announcer.attach(self.mission, machine)
-        return machine
+        self._introspection.stop()
 
     def _run(self) -> None:
         # Under use_sim_time nothing has a time before the first clock message.
@@ -96,7 +97,6 @@ class RobotBehavior(PatrolNode):
                 except fsm.SmachError as error:
                     self._announcer.waiting_for_help(f'the machine broke: {error}')
                     self._wait.sleep(self.mission.recovery.pause(), self.stopping)
-                    self.machine = self._new_machine()
         finally:
             self.mission.ended()
             if self._record is not None:

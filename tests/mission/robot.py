@@ -1,0 +1,156 @@
+"""All nodes of a mission in one process, on simulated time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from std_srvs.srv import Empty
+
+from surveillance_behaviour.fsm.testing import Watched, watching
+from surveillance_behaviour.mission_record import Summary, read, summarize
+from surveillance_behaviour.reasoner_node import Reasoner
+from surveillance_behaviour.robot_behavior_node import RobotBehavior
+from surveillance_controllers.battery_controller_node import BatteryController
+from surveillance_controllers.motion_controller_node import MotionController
+from surveillance_controllers.planner_controller_node import PlannerController
+from surveillance_ontology.armor_server_node import ArmorServer
+from surveillance_ontology.ontology_map_builder_node import OntologyMapBuilder
+
+from .simulated_time import SimulatedTime, simulated_time
+
+CONFIG = Path(__file__).parents[2] / 'config'
+NODES: dict[str, Callable[..., Any]] = {
+    'armor_server': ArmorServer,
+    'ontology_map_builder': OntologyMapBuilder,
+    'battery_controller': BatteryController,
+    'planner_controller': PlannerController,
+    'motion_controller': MotionController,
+    'reasoner': Reasoner,
+    'robot_behavior': RobotBehavior,
+}
+BEHAVIOUR = {
+    'urgency_threshold': 60,
+    'recovery.help_seconds': 5.0,
+    'deadline.answer': 1.0,
+    'deadline.build': 5.0,
+    'deadline.plan': 1.0,
+    'deadline.move': 2.0,
+    'deadline.charge': 2.0,
+}
+
+
+def place_parameters(name: str = 'seven_rooms.yaml') -> dict[str, Any]:
+    """A place's file as the parameters of the map builder."""
+    with open(CONFIG / name, encoding='utf-8') as file:
+        place = yaml.safe_load(file)['/**']['ros__parameters']
+    values = {
+        f'{key}.{room}': value
+        for key in ('map', 'room_positions')
+        for room, value in place[key].items()
+    }
+    return {
+        **values,
+        'robot_room': place['robot_room'],
+        'recharge_rooms': place['recharge_rooms'],
+    }
+
+
+class Robot:
+    """The nodes of one mission.
+
+    Attributes:
+        time: The clock they live by.
+        nodes: By name; what is not there is away.
+        watched: The transitions of the machine.
+    """
+
+    def __init__(self, graph: Any, time: SimulatedTime, behaviour: str, record: Path) -> None:
+        self._graph = graph
+        self.time = time
+        self.record = record
+        self.nodes: dict[str, Any] = {}
+        self._parameters: dict[str, dict[str, Any]] = {
+            'armor_server': {},
+            'ontology_map_builder': place_parameters(),
+            'battery_controller': {
+                'execution_mode': 'RANDOM',
+                'random_seed': 3,
+                'random_battery_time': [200.0, 300.0],
+                'recharge_seconds': 20.0,
+            },
+            'planner_controller': {'execution_mode': 'RANDOM', 'random_seed': 1},
+            'motion_controller': {'execution_mode': 'RANDOM', 'random_seed': 2},
+            'reasoner': {'urgency_threshold': 60},
+            'robot_behavior': {**BEHAVIOUR, 'behaviour': behaviour, 'record': str(record)},
+        }
+        if behaviour == 'surveillance':
+            del self._parameters['reasoner']
+        else:
+            # `start` takes the map from the configuration here: there is nothing to look around for.
+            graph.node.create_service(Empty, 'start', lambda _request, response: response)
+
+    def configure(self, name: str, **parameters: Any) -> None:
+        """Changes parameters of a node that is not there yet."""
+        self._parameters[name].update({key.replace('__', '.'): v for key, v in parameters.items()})
+
+    def begin(self, *without: str) -> None:
+        """Starts all nodes but some, and time."""
+        for name in self._parameters:
+            if name not in without:
+                self.arrive(name)
+        self.time.start()
+
+    def arrive(self, name: str) -> None:
+        """Starts one node."""
+        parameters = {**self._parameters[name], 'use_sim_time': True}
+        self.nodes[name] = self._graph.add(NODES[name], parameters)
+
+    def leave(self, name: str) -> None:
+        """Ends one node, as when its process dies."""
+        self._graph.remove(self.nodes.pop(name))
+
+    def until(self, seconds: float, timeout: float = 60.0) -> None:
+        """Runs the mission until ``seconds`` after its start."""
+        self._graph.until(lambda: self.time.now >= 1000.0 + seconds, timeout)
+
+    def summary(self) -> Summary:
+        """What the record says."""
+        return summarize(read(self.record))
+
+    def decisions(self) -> list[tuple[str, str]]:
+        """The places that were chosen, with the rule."""
+        return [
+            (event.text('place'), event.text('rule'))
+            for event in read(self.record)
+            if event.name == 'decision'
+        ]
+
+    def visited(self, since: float = 0.0) -> set[str]:
+        """The places that were visited, from ``since`` seconds after the start on."""
+        return {
+            event.text('place')
+            for event in read(self.record)
+            if event.name == 'visit' and event.time >= 1000.0 + since
+        }
+
+
+@contextmanager
+def mission(graph: Any, patch: pytest.MonkeyPatch, behaviour: str, record: Path) -> Iterator[Robot]:
+    """A robot whose time stops when the block ends."""
+    with simulated_time(graph, patch) as time:
+        robot = Robot(graph, time, behaviour, record)
+        time.follow(lambda: list(robot.nodes.values()))
+        yield robot
+
+
+def watch(robot: Robot) -> Any:
+    """Notes the transitions of the robot's machine."""
+    return watching(robot.nodes['robot_behavior'].machine)
+
+
+__all__ = ['Robot', 'Watched', 'mission', 'watch']
