@@ -1,0 +1,39 @@
+"""The manual says what the table of directives says."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from pathlib import Path
+
+from surveillance_ontology.armor.client_manipulation import Manipulation
+from surveillance_ontology.armor.client_query import Query
+from surveillance_ontology.armor.client_utilities import Utils
+from surveillance_ontology.armor.documentation import updated
+from surveillance_ontology.armor.operations import Operation
+from surveillance_ontology.armor.settings import Settings
+
+MANUAL = (Path(__file__).parents[2] / 'docs' / 'armor.md').read_text(encoding='utf-8')
+
+
+def test_the_directives_are_those_of_the_table() -> None:
+    assert updated(MANUAL) == MANUAL, (
+        'run: python -m surveillance_ontology.armor.documentation docs/armor.md'
+    )
+
+
+def test_every_method_of_the_client_is_named() -> None:
+    for part in (Manipulation, Query, Utils):
+        for name, member in inspect.getmembers_static(part):
+            if isinstance(member, Operation):
+                assert f'`{name}`' in MANUAL
+
+
+def test_bounds_are_those_of_the_settings() -> None:
+    numbers = set(re.findall(r'[\d,]+', MANUAL))
+    default = Settings()
+    assert f'{default.max_arguments:,}' in numbers
+    assert f'{default.max_batch:,}' in numbers
+    assert f'{default.sparql_rows:,}' in numbers
+    assert f'{default.max_file_bytes >> 20}' in numbers
+    assert f'{default.max_characters >> 20}' in numbers
