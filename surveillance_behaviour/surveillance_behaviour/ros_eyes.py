@@ -33,7 +33,7 @@ class RosEyes:
         self._patience = patience
         self._wait = ClockWait(node)
         self._move = ServiceCaller(node, MarkerRoutine, 'move_arm')
-        self._scan = GoalCaller(node, ScanSurroundings, 'scan_surroundings')
+        self._scan = GoalCaller(node, ScanSurroundings, 'scan_surroundings', cancel_timeout=1.0)
         self._resting_since: Time | None = None
         self._seen = 0
         self._enough = Interrupt()

@@ -42,7 +42,7 @@ class ArucoDetector(PatrolNode):
 
     def __init__(self, **node_options: Any) -> None:
         super().__init__('aruco_detector', **node_options)
-        self._parameters = DetectorParameters(self, self._on_change)
+        self._options = DetectorParameters(self, self._on_change)
         self._field_of_view = self._changeable(
             'field_of_view',
             60.0,
@@ -62,7 +62,7 @@ class ArucoDetector(PatrolNode):
         self._camera: CameraModel | None = None
         self._rest_since: Time | None = None
         self._stale = False
-        self._watch = DetectionWatch(self._parameters.settings())
+        self._watch = DetectionWatch(self._options.settings())
         self._pictures: Latest[Image | CompressedImage] = Latest()
         self._ids = self.create_publisher(Int32, 'aruco_detector/id', IDS_QOS)
         self._detections = self.create_publisher(
@@ -123,7 +123,7 @@ class ArucoDetector(PatrolNode):
 
     def _adopt(self) -> None:
         try:
-            self._watch.adopt(self._parameters.settings())
+            self._watch.adopt(self._options.settings())
         except ValueError as error:
             self.get_logger().error(f'settings refused: {error}')
 
