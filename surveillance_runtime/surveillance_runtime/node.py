@@ -28,12 +28,12 @@ from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValu
 from rclpy.executors import (
     ExternalShutdownException,
     ShutdownException,
-    SingleThreadedExecutor,
 )
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 
+from surveillance_runtime.lean_executor import make_executor
 from surveillance_runtime.parameters import Check, ParameterError, ParameterSpec, element_type
 from surveillance_runtime.waiting import Interrupt
 
@@ -314,7 +314,7 @@ class ExecutorThread:
     """
 
     def __init__(self, context: Any = None) -> None:
-        self.executor = SingleThreadedExecutor(context=context)
+        self.executor = make_executor(context)
         self.error: BaseException | None = None
         self._thread: threading.Thread | None = None
         self._stopping = False

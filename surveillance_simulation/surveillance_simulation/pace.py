@@ -28,7 +28,7 @@ class PaceModel:
     speed: float = 1.0
     ceiling: float = 200.0
     step: float = 0.1
-    idle_step: float = 0.2
+    idle_step: float = 0.5
     window: float = 0.15
     patience: float = 0.2
 
