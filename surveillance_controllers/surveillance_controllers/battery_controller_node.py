@@ -12,22 +12,19 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, TextIO
 
-from geometry_msgs.msg import PoseWithCovarianceStamped
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.task import Future
-from sensor_msgs.msg import BatteryState, JointState
 from std_msgs.msg import Bool, UInt8
 from std_srvs.srv import Empty
 
-from surveillance_controllers import conversions, stimuli
+from surveillance_controllers import stimuli
 from surveillance_controllers.battery_model import Battery
-from surveillance_controllers.battery_use import BatteryInUse
 from surveillance_controllers.console_commands import BATTERY, BATTERY_SET, ParsedCommand
 from surveillance_controllers.controller_parameters import battery_settings, execution_mode
 from surveillance_controllers.operator_console import OperatorConsole
-from surveillance_controllers.progress_display import charge_display
+from surveillance_controllers.robot_battery import RobotBattery
 from surveillance_runtime.node import PatrolNode, run_node
-from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
+from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.waiting import ClockWait
 
 RECHARGE_STEPS = 50
@@ -63,7 +60,7 @@ class BatteryController(PatrolNode):
         elif self._mode == 'RANDOM':
             self.spawn(self._switch_at_random)
         elif self._mode == 'SIMULATED':
-            self._start_simulation()
+            self._robot = RobotBattery(self, self._settings, self._battery, self._change)
 
     def _change(self, change: Callable[[], None]) -> None:
         """Changes the charge and publishes what became different."""
@@ -101,26 +98,6 @@ class BatteryController(PatrolNode):
         while self._wait.sleep(draw.uniform(*self._settings.random_battery_time), self.stopping):
             self._set_level(100.0 if self._battery.percent == 0 else 0.0)
 
-    def _start_simulation(self) -> None:
-        s = self._settings
-        self._use = BatteryInUse(self._battery, s.station, s.dock_reach, self._wait.now())
-        self._state_topic = self.create_publisher(BatteryState, 'battery_state', STATE_QOS)
-        self.create_subscription(PoseWithCovarianceStamped, 'amcl_pose', self._on_pose, STATE_QOS)
-        self.create_subscription(JointState, 'joint_states', self._on_joints, SENSOR_QOS)
-        self.create_timer(s.update_period, self._update)
-
-    def _on_pose(self, message: PoseWithCovarianceStamped) -> None:
-        self._use.see_pose(conversions.pose_from(message.pose.pose), self._wait.now())
-
-    def _on_joints(self, message: JointState) -> None:
-        self._use.see_joints(message.position)
-
-    def _update(self) -> None:
-        self._change(partial(self._use.advance, self._wait.now()))
-        state = conversions.battery_state(self._battery, charging=self._use.docked)
-        state.header.stamp = self.get_clock().now().to_msg()
-        self._state_topic.publish(state)
-
     async def _on_recharge(self, _request: Any, response: Any) -> Any:
         done = Future()
         with self._lock:
@@ -132,6 +109,9 @@ class BatteryController(PatrolNode):
         return response
 
     def _recharge(self) -> None:
+        # Only here: a node that is never asked to recharge starts without the import.
+        from surveillance_controllers.progress_display import charge_display
+
         charge = self._await_full if self._mode == 'SIMULATED' else self._fill
         try:
             with charge_display(self._battery.level, bar=not self._console.has_terminal) as show:
@@ -153,7 +133,7 @@ class BatteryController(PatrolNode):
 
     def _await_full(self, show: Callable[[float], None]) -> None:
         while self._battery.level < 100.0:
-            problem = self._use.why_not_charging()
+            problem = self._robot.why_not_charging()
             if problem is not None:
                 self.get_logger().warn(f'recharge: {problem}; it is at {self._battery.percent} %')
                 return

@@ -13,16 +13,12 @@ import selectors
 import sys
 import threading
 from collections.abc import Callable, Iterable
-from pathlib import Path
-from typing import TextIO
+from typing import TYPE_CHECKING, TextIO
 
-from prompt_toolkit import PromptSession
-from prompt_toolkit.completion import CompleteEvent, Completer, Completion
-from prompt_toolkit.document import Document
-from prompt_toolkit.history import FileHistory, History, InMemoryHistory
-from prompt_toolkit.input import Input
-from prompt_toolkit.output import Output
-from prompt_toolkit.patch_stdout import patch_stdout
+if TYPE_CHECKING:
+    from prompt_toolkit.input import Input
+    from prompt_toolkit.output import Output
+
 
 LONGEST_UNFINISHED_LINE = 1_000_000
 """Bytes of a line without an end that are kept from a pipe before they are dropped."""
@@ -53,11 +49,11 @@ class Console:
     ) -> None:
         self._name = name
         self._on_line = on_line
-        self._completer = WordCompleter(completions)
+        self._completions = completions
         self._source = sys.stdin if source is None else source
         self._terminal = terminal
         self._stopped = False
-        self._session: PromptSession[str] | None = None
+        self._stop_reading: Callable[[], None] = lambda: None
         self.on_terminal = terminal is not None or _is_terminal(self._source)
         self._wake_read, self._wake_write = os.pipe()
         self._lock = threading.Lock()
@@ -85,9 +81,7 @@ class Console:
                 return
             self._stopped = True
             os.write(self._wake_write, b'x')
-        session = self._session
-        if session is not None and session.app.loop is not None:
-            session.app.loop.call_soon_threadsafe(_exit_prompt, session)
+        self._stop_reading()
 
     def _run_pipe(self) -> str:
         try:
@@ -127,19 +121,18 @@ class Console:
         return 'end of input'
 
     def _run_terminal(self) -> str:
-        given_input, given_output = self._terminal or (None, None)
-        self._session = PromptSession(
-            f'{self._name}> ',
-            completer=self._completer,
-            complete_while_typing=False,
-            history=_history(self._name) if self._terminal is None else InMemoryHistory(),
-            input=given_input,
-            output=given_output,
-        )
-        with patch_stdout(raw=True):
+        # Only here, for most consoles never have a terminal and need not wait for the import.
+        from surveillance_controllers.terminal_lines import TerminalLines
+
+        terminal = TerminalLines(self._name, self._completions, self._terminal)
+        with self._lock:
+            if self._stopped:
+                return 'stopped'
+            self._stop_reading = terminal.stop
+        with terminal.shown():
             while not self._stopped:
                 try:
-                    line = self._session.prompt(handle_sigint=False, pre_run=self._exit_if_stopped)
+                    line = terminal.read()
                 except EOFError:
                     return 'stopped' if self._stopped else 'end of input'
                 except KeyboardInterrupt:
@@ -147,46 +140,9 @@ class Console:
                 self._on_line(line)
         return 'stopped'
 
-    def _exit_if_stopped(self) -> None:
-        if self._stopped and self._session is not None:
-            _exit_prompt(self._session)
-
-
-class WordCompleter(Completer):
-    """Proposes to prompt_toolkit the words that a function gives for the text so far."""
-
-    def __init__(self, completions: Callable[[str], list[str]]) -> None:
-        self._completions = completions
-
-    def get_completions(
-        self, document: Document, complete_event: CompleteEvent
-    ) -> Iterable[Completion]:
-        """The words that can stand where the last one is being typed."""
-        text = document.text_before_cursor
-        typed = '' if not text or text[-1].isspace() else text.split()[-1]
-        for word in self._completions(text):
-            yield Completion(word, start_position=-len(typed))
-
-
-def _exit_prompt(session: PromptSession[str]) -> None:
-    if session.app.is_running and not session.app.is_done:
-        session.app.exit(exception=EOFError)
-
 
 def _is_terminal(source: TextIO) -> bool:
     try:
         return source.isatty() and sys.stdout.isatty()
     except (ValueError, AttributeError):
         return False
-
-
-def _history(name: str) -> History:
-    state = os.environ.get('XDG_STATE_HOME') or Path.home() / '.local' / 'state'
-    folder = Path(state) / 'surveillance'
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        path = folder / f'{name}.history'
-        path.touch()
-    except OSError:
-        return InMemoryHistory()
-    return FileHistory(str(path))

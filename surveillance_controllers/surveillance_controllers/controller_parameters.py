@@ -302,7 +302,7 @@ def motion_settings(node: PatrolNode) -> MotionSettings:
         place_reach=node.parameter(
             'place_reach',
             2.0,
-            'MANUAL and RANDOM: the robot is in the nearest place within this distance, m.',
+            'MANUAL, RANDOM and Nav2: the robot is in the nearest place within this distance, m.',
             minimum=0.0,
             maximum=1000.0,
             read_only=True,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from geometry_msgs.msg import Point, PoseWithCovarianceStamped, Quaternion, Twist
@@ -13,10 +14,12 @@ from sensor_msgs.msg import BatteryState, LaserScan, PointCloud2, PointField
 
 from surveillance_controllers.battery_model import Battery
 from surveillance_controllers.battery_use import Pose
-from surveillance_controllers.grid_map import GridMap
-from surveillance_controllers.localisation import Scan
-from surveillance_controllers.path_following import Velocity
 from surveillance_controllers.polyline import Points
+
+if TYPE_CHECKING:
+    from surveillance_controllers.grid_map import GridMap
+    from surveillance_controllers.localisation import Scan
+    from surveillance_controllers.path_following import Velocity
 
 
 def array_from_points(points: Iterable[Point]) -> Points:
@@ -101,6 +104,9 @@ def grid_from(message: OccupancyGrid) -> GridMap:
     Raises:
         ValueError: The message is not sound, or its origin is turned.
     """
+    # Only here: a node without a map starts without OpenCV.
+    from surveillance_controllers.grid_map import GridMap
+
     info = message.info
     cells = np.array(message.data, dtype=np.int8)
     if cells.size != info.width * info.height:
@@ -115,6 +121,8 @@ def grid_from(message: OccupancyGrid) -> GridMap:
 
 def scan_from(message: LaserScan) -> Scan:
     """A turn of a lidar; rays that are out of its range or not a number met nothing."""
+    from surveillance_controllers.localisation import Scan
+
     ranges = np.frombuffer(message.ranges, dtype=np.float32).astype(float)
     angles = message.angle_min + message.angle_increment * np.arange(len(ranges))
     # The lidar gives what is nearer than it can measure as its least range, or below it.

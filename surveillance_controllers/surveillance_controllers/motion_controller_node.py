@@ -8,25 +8,26 @@ operator says (MANUAL), by chance (RANDOM), or as the base drives (SIMULATED).
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 import numpy as np
 
 from surveillance_controllers import conversions, polyline, request_texts, stimuli
+from surveillance_controllers.arrival import MotionFailed, nearest_place
 from surveillance_controllers.console_commands import MOTION, ParsedCommand
 from surveillance_controllers.controller_parameters import execution_mode, motion_settings
 from surveillance_controllers.map_knowledge import KnowledgeError, MapKnowledge
-from surveillance_controllers.motion import MotionFailed
-from surveillance_controllers.nav2_motion import Nav2Motion
 from surveillance_controllers.operator_console import OperatorConsole
 from surveillance_controllers.operator_desk import OperatorDesk
 from surveillance_controllers.polyline import Points
-from surveillance_controllers.robot_parameters import robot_settings
-from surveillance_controllers.simulated_motion import SimulatedMotion
 from surveillance_controllers.stimulus_motion import glide, points_passed
 from surveillance_interfaces.action import Control, FollowPath
 from surveillance_runtime.goals import GoalAborted, GoalRun, GoalServer
 from surveillance_runtime.node import PatrolNode, run_node
+
+if TYPE_CHECKING:
+    from surveillance_controllers.nav2_motion import Nav2Motion
+    from surveillance_controllers.simulated_motion import SimulatedMotion
 
 
 class MotionController(PatrolNode):
@@ -45,16 +46,24 @@ class MotionController(PatrolNode):
         self._desk: OperatorDesk[tuple[float, float]] = OperatorDesk(self._announce)
         self._console = OperatorConsole(self, MOTION, self._carry_out, lambda: self._desk.status)
         self._robot: SimulatedMotion | Nav2Motion | None = None
-        if self._mode == 'SIMULATED' and self._settings.navigator == 'nav2':
-            self._robot = Nav2Motion(self, self._settings.peer_timeout)
-        elif self._mode == 'SIMULATED':
-            settings = robot_settings(self, self._settings)
-            self._robot = SimulatedMotion(self, settings, self._knowledge)
+        if self._mode == 'SIMULATED':
+            self._robot = self._make_robot()
         GoalServer(self, FollowPath, 'follow_path', self._follow_path)
         GoalServer(self, Control, 'motion/controller', self._control)
         self.get_logger().info(f'{self._mode} mode')
         if self._mode == 'MANUAL' and self._settings.console:
             self._console.open(console_source)
+
+    def _make_robot(self) -> SimulatedMotion | Nav2Motion:
+        # Imported only here, for the libraries behind them take their time.
+        if self._settings.navigator == 'nav2':
+            from surveillance_controllers.nav2_motion import Nav2Motion
+
+            return Nav2Motion(self, self._knowledge, self._settings)
+        from surveillance_controllers.robot_parameters import robot_settings
+        from surveillance_controllers.simulated_motion import SimulatedMotion
+
+        return SimulatedMotion(self, robot_settings(self, self._settings), self._knowledge)
 
     def _announce(self, text: str) -> None:
         self._console.announce(text)
@@ -105,26 +114,13 @@ class MotionController(PatrolNode):
         return Control.Result(reached_point=conversions.point_from(end))
 
     def _note_visit(self, goal: Points, end: Points, run: GoalRun) -> None:
-        if isinstance(self._robot, SimulatedMotion):
-            place = self._robot.place_reached(goal, end)
+        if self._robot is None:
+            place = nearest_place(self._knowledge, end, self._settings.place_reach, run)
         else:
-            place = self._nearest_place(end, run)
+            place = self._robot.place_reached(goal, end, run)
         self._knowledge.record_visit(place, run.now(), run.interrupt)
-        if isinstance(self._robot, SimulatedMotion):
+        if self._robot is not None:
             self._robot.look_around(run)
-
-    def _nearest_place(self, end: Points, run: GoalRun) -> str:
-        places = self._knowledge.places(run.interrupt)
-        gaps = {name: float(np.linalg.norm(end - at)) for name, at in places.items()}
-        nearest = min(gaps, key=lambda name: gaps[name], default=None)
-        if nearest is None or gaps[nearest] > self._settings.place_reach:
-            raise MotionFailed(
-                f'the robot stopped at {request_texts.point(end)}: expected a place within '
-                f'{self._settings.place_reach:g} m'
-                + (f', {nearest} is {gaps[nearest]:.2f} m away' if nearest else ''),
-                end,
-            )
-        return nearest
 
     def _move(
         self, path: Points, run: GoalRun, report: Callable[[Points], None], what: str

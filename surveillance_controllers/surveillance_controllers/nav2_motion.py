@@ -13,7 +13,9 @@ import numpy as np
 from geometry_msgs.msg import PoseStamped
 
 from surveillance_controllers import conversions
-from surveillance_controllers.motion import MotionFailed
+from surveillance_controllers.arrival import MotionFailed, nearest_place
+from surveillance_controllers.controller_parameters import MotionSettings
+from surveillance_controllers.map_knowledge import MapKnowledge
 from surveillance_controllers.polyline import Points
 from surveillance_runtime.calls import CallFailed, GoalCaller
 from surveillance_runtime.goals import GoalRun
@@ -41,16 +43,19 @@ class Nav2Motion:
 
     Args:
         node: The motion controller's node.
-        peer_timeout: How long Nav2 may take to appear and accept a goal, seconds.
+        knowledge: Map and ontology.
+        settings: How long Nav2 may take to appear and accept a goal, and how near a place is.
 
     Raises:
         StartError: nav2_msgs is not installed.
     """
 
-    def __init__(self, node: PatrolNode, peer_timeout: float) -> None:
+    def __init__(self, node: PatrolNode, knowledge: MapKnowledge, settings: MotionSettings) -> None:
         self._node = node
+        self._knowledge = knowledge
+        self._place_reach = settings.place_reach
         self._type = navigate_to_pose()
-        self._timeout = peer_timeout
+        self._timeout = settings.peer_timeout
         self._navigator = GoalCaller(node, self._type, 'navigate_to_pose')
 
     def follow(self, path: Points, run: GoalRun, report: Callable[[Points], None]) -> Points:
@@ -88,3 +93,15 @@ class Nav2Motion:
         if end.status != 'succeeded':
             raise MotionFailed(f'Nav2 {end.status} the goal', position)
         return path[-1] if position is None else position
+
+    def place_reached(self, _goal: Points, end: Points, run: GoalRun) -> str:
+        """The place nearest to where the robot is, shape (3,).
+
+        Raises:
+            MotionFailed: No place is within reach.
+            KnowledgeError: Map or ontology do not answer.
+        """
+        return nearest_place(self._knowledge, end, self._place_reach, run)
+
+    def look_around(self, _run: GoalRun) -> None:
+        """Nothing: Nav2's own behaviours turn the robot where that is wanted."""

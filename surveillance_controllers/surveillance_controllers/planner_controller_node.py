@@ -8,25 +8,23 @@ as equally spaced via points. Where a path comes from is the execution mode's ma
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 import numpy as np
 
 from surveillance_controllers import conversions, polyline, request_texts, stimuli
 from surveillance_controllers.console_commands import PLANNER, ParsedCommand, Point3
 from surveillance_controllers.controller_parameters import execution_mode, planner_settings
-from surveillance_controllers.door_watch import DoorWatch
-from surveillance_controllers.grid_planning import NoPath
 from surveillance_controllers.map_knowledge import KnowledgeError, MapKnowledge
-from surveillance_controllers.map_planner import MapPlanner
 from surveillance_controllers.operator_console import OperatorConsole
 from surveillance_controllers.operator_desk import OperatorDesk
 from surveillance_controllers.polyline import Points
-from surveillance_controllers.robot_parameters import door_segments, planning_parameters
-from surveillance_controllers.route_planning import NoRoute, route
 from surveillance_interfaces.action import ComputePath, Plan
 from surveillance_runtime.goals import GoalAborted, GoalRun, GoalServer
 from surveillance_runtime.node import PatrolNode, run_node
+
+if TYPE_CHECKING:
+    from surveillance_controllers.simulated_planning import SimulatedPlanning
 
 
 class PlannerController(PatrolNode):
@@ -44,11 +42,13 @@ class PlannerController(PatrolNode):
         self._knowledge = MapKnowledge(self, self._settings.peer_timeout)
         self._desk: OperatorDesk[tuple[Point3, ...]] = OperatorDesk(self._announce)
         self._console = OperatorConsole(self, PLANNER, self._carry_out, lambda: self._desk.status)
-        self._map: MapPlanner | None = None
+        self._simulated: SimulatedPlanning | None = None
         if self._mode == 'SIMULATED':
+            # Only here, for the libraries of the search take their time to import.
+            from surveillance_controllers.simulated_planning import SimulatedPlanning
+
             timeout = self._settings.peer_timeout
-            self._doors = DoorWatch(self, door_segments(self), self._knowledge, timeout)
-            self._map = MapPlanner(self, planning_parameters(self), self._doors)
+            self._simulated = SimulatedPlanning(self, self._knowledge, timeout)
         GoalServer(self, ComputePath, 'compute_path', self._compute_path)
         GoalServer(self, Plan, 'motion/planner', self._plan)
         self.get_logger().info(f'{self._mode} mode')
@@ -73,7 +73,7 @@ class PlannerController(PatrolNode):
         try:
             target = self._knowledge.position(goal.target, run.interrupt)
             start = self._start(goal.target, run)
-        except (KnowledgeError, NoRoute) as error:
+        except KnowledgeError as error:
             raise GoalAborted(f'no way to {goal.target!r}: {error}') from error
         for what, point in (('the robot', start), (f'place {goal.target!r}', target)):
             if not self._settings.environment.contains(point):
@@ -94,16 +94,10 @@ class PlannerController(PatrolNode):
         return Plan.Result(via_points=via_points)
 
     def _start(self, target: str, run: GoalRun) -> Points:
-        """Where the robot is; in SIMULATED mode the way from there is looked up first."""
+        if self._simulated is not None:
+            return self._simulated.start(target, run)
         place = self._knowledge.robot_place(run.interrupt)
-        if self._map is None:
-            return self._knowledge.position(place, run.interrupt)
-        positions = self._knowledge.places(run.interrupt)
-        rooms_of = self._doors.rooms_of(run.interrupt)
-        doors = route(rooms_of, self._doors.closed(rooms_of), place, target, positions)
-        self.get_logger().info(f'{place} to {target}: through {", ".join(doors) or "no door"}')
-        pose = self._map.pose
-        return positions[place] if pose is None else np.array([pose[0], pose[1], 0.0])
+        return self._knowledge.position(place, run.interrupt)
 
     def _path(self, start: Points, goal: Points, run: GoalRun, what: str) -> Points:
         if not (np.isfinite(start).all() and np.isfinite(goal).all()):
@@ -111,12 +105,8 @@ class PlannerController(PatrolNode):
                 f'{what} from {request_texts.point(start)} to {request_texts.point(goal)}: '
                 'expected finite coordinates'
             )
-        if self._map is not None:
-            timeout = self._settings.peer_timeout
-            try:
-                return self._map.plan(start, goal, timeout, run.interrupt)
-            except NoPath as error:
-                raise GoalAborted(f'{what}: {error}') from error
+        if self._simulated is not None:
+            return self._simulated.path(start, goal, run, what)
         between: Sequence[Point3] | None
         if self._mode == 'MANUAL':
             text = request_texts.path_request(what, start, goal)

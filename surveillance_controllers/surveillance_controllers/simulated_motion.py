@@ -8,11 +8,11 @@ from collections.abc import Callable
 import numpy as np
 
 from surveillance_controllers import conversions
+from surveillance_controllers.arrival import MotionFailed
 from surveillance_controllers.battery_use import Pose
 from surveillance_controllers.driving import Drive, Spin, State
 from surveillance_controllers.grid_planning import NoPath
 from surveillance_controllers.map_knowledge import MapKnowledge
-from surveillance_controllers.motion import MotionFailed
 from surveillance_controllers.pilot import Pilot
 from surveillance_controllers.place_tracking import PlaceTracking
 from surveillance_controllers.polyline import Points
@@ -73,12 +73,13 @@ class SimulatedMotion:
         report(end)
         return end
 
-    def place_reached(self, goal: Points, end: Points) -> str:
+    def place_reached(self, goal: Points, end: Points, _run: GoalRun) -> str:
         """The place the robot is in after a drive.
 
         Args:
             goal: Where the robot should be, shape (3,).
             end: Where it is, shape (3,).
+            _run: The goal that is carried out.
 
         Raises:
             MotionFailed: It is not in the goal's place.

@@ -13,10 +13,11 @@ from prompt_toolkit.output import DummyOutput
 from std_msgs.msg import UInt8
 
 from surveillance_controllers.battery_controller_node import BatteryController
-from surveillance_controllers.console import Console, WordCompleter
+from surveillance_controllers.console import Console
 from surveillance_controllers.console_commands import BATTERY, Grammar
 from surveillance_controllers.console_node import ConsoleNode
 from surveillance_controllers.planner_controller_node import PlannerController
+from surveillance_controllers.terminal_lines import WordCompleter
 from surveillance_runtime.qos import STATE_QOS
 
 

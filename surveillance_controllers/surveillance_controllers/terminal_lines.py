@@ -1,0 +1,99 @@
+"""Lines typed on a terminal, with editing, history and completion by prompt_toolkit."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from prompt_toolkit import PromptSession
+from prompt_toolkit.completion import CompleteEvent, Completer, Completion
+from prompt_toolkit.document import Document
+from prompt_toolkit.history import FileHistory, History, InMemoryHistory
+from prompt_toolkit.input import Input
+from prompt_toolkit.output import Output
+from prompt_toolkit.patch_stdout import patch_stdout
+
+
+class TerminalLines:
+    """Reads lines from a terminal.
+
+    Args:
+        name: Names the prompt and the file with the history.
+        completions: The words that can follow a text.
+        ends: The terminal's two ends; the process's own terminal unless given, and then without a
+            file for the history.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        completions: Callable[[str], list[str]],
+        ends: tuple[Input, Output] | None = None,
+    ) -> None:
+        self._stopped = False
+        given_input, given_output = ends or (None, None)
+        self._session: PromptSession[str] = PromptSession(
+            f'{name}> ',
+            completer=WordCompleter(completions),
+            complete_while_typing=False,
+            history=_history(name) if ends is None else InMemoryHistory(),
+            input=given_input,
+            output=given_output,
+        )
+
+    @contextmanager
+    def shown(self) -> Iterator[None]:
+        """What is printed meanwhile appears above the prompt."""
+        with patch_stdout(raw=True):
+            yield
+
+    def read(self) -> str:
+        """Waits for a line.
+
+        Raises:
+            EOFError: The input ended, or `stop` was called.
+            KeyboardInterrupt: The operator pressed Ctrl-C.
+        """
+        return self._session.prompt(handle_sigint=False, pre_run=self._exit_if_stopped)
+
+    def stop(self) -> None:
+        """Ends `read` from another thread."""
+        self._stopped = True
+        loop = self._session.app.loop
+        if loop is not None:
+            loop.call_soon_threadsafe(self._exit_if_stopped)
+
+    def _exit_if_stopped(self) -> None:
+        app = self._session.app
+        if self._stopped and app.is_running and not app.is_done:
+            app.exit(exception=EOFError)
+
+
+class WordCompleter(Completer):
+    """Proposes to prompt_toolkit the words that a function gives for the text so far."""
+
+    def __init__(self, completions: Callable[[str], list[str]]) -> None:
+        self._completions = completions
+
+    def get_completions(
+        self, document: Document, complete_event: CompleteEvent
+    ) -> Iterable[Completion]:
+        """The words that can stand where the last one is being typed."""
+        text = document.text_before_cursor
+        typed = '' if not text or text[-1].isspace() else text.split()[-1]
+        for word in self._completions(text):
+            yield Completion(word, start_position=-len(typed))
+
+
+def _history(name: str) -> History:
+    state = os.environ.get('XDG_STATE_HOME') or Path.home() / '.local' / 'state'
+    folder = Path(state) / 'surveillance'
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        path = folder / f'{name}.history'
+        path.touch()
+    except OSError:
+        return InMemoryHistory()
+    return FileHistory(str(path))
