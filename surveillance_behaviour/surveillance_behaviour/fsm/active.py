@@ -161,8 +161,9 @@ class ActiveContainer(Container):
             label: The interrupt's name, among those of the states.
             state: What runs.
             priority: An interrupt cuts short states and interrupts of lower priority.
-            transitions: From outcomes to `RESUME` (where outcomes that are not bound lead), to
-                labels of the container's states, or to its outcomes.
+            transitions: From outcomes to `RESUME`, to labels of the container's states, or to its
+                outcomes. Outcomes that are not bound lead to `RESUME`, but ``preempted`` to the
+                container's outcome of that name if it has one.
             remapping: From the state's userdata keys to the container's.
 
         Raises:
@@ -180,7 +181,8 @@ class ActiveContainer(Container):
                     f'{sorted(state.get_registered_outcomes())}'
                 )
         for outcome in state.get_registered_outcomes():
-            bound.setdefault(outcome, RESUME)
+            ends = outcome == 'preempted' and outcome in self._outcomes
+            bound.setdefault(outcome, outcome if ends else RESUME)
         self._branches[label] = Branch(label, state, priority, bound, dict(remapping or {}))
         self._table_version += 1
         return state

@@ -38,6 +38,10 @@ OutcomeCallback = Callable[[Outcomes], str | None]
 _TOGETHER = Exit('')
 
 
+def _preempt(state: State) -> None:
+    state.request_preempt()
+
+
 class Concurrence(ActiveContainer):
     """Executes all its states at the same time and ends when all have ended.
 
@@ -80,6 +84,7 @@ class Concurrence(ActiveContainer):
         self._wakeup = Interrupt()
         self._strands: dict[str, Strand] = {}
         self._nodes: dict[str, Node] = {}
+        self._making_way: set[str] = set()
         faults = []
         for outcome in (default_outcome, *self._outcome_map):
             if outcome not in self._outcomes:
@@ -225,7 +230,7 @@ class Concurrence(ActiveContainer):
         run = frame.strand.run
         strands = {}
         with run.condition:
-            frame.cut = None
+            self._making_way.clear()
             for label, state in self._states.items():
                 if self._child_outcomes[label] is None:
                     node = self._nodes[label] = self._node(label, state, run.clock)
@@ -239,7 +244,7 @@ class Concurrence(ActiveContainer):
         with run.condition:
             # What was asked before there was anybody to ask.
             if self._preempt_requested:
-                self._stop(strands, State.request_preempt)
+                self._stop(strands, _preempt)
             elif frame.suspending or self._urgent(frame):
                 self._cut(frame)
 
@@ -303,7 +308,7 @@ class Concurrence(ActiveContainer):
                 strand = running.pop(label)
                 if strand.error is not None:
                     first_error = first_error or strand.error
-                    self._stop(running, State.request_preempt)
+                    self._stop(running, _preempt)
                     continue
                 self._note_end(frame, label, strand.outcome)
                 if first_error is None:
@@ -311,7 +316,7 @@ class Concurrence(ActiveContainer):
                         self._child_ended(running)
                     except SmachError as error:
                         first_error = error
-                        self._stop(running, State.request_preempt)
+                        self._stop(running, _preempt)
         with run.condition:
             self._strands = {}
         return first_error
@@ -321,7 +326,7 @@ class Concurrence(ActiveContainer):
         with frame.strand.run.condition:
             if outcome is SUSPENDED:
                 return
-            if frame.cut is not None and not self._preempt_requested:
+            if label in self._making_way and not self._preempt_requested:
                 made_way = not state.preempt_requested() or outcome == 'preempted'
                 state.recall_preempt()
                 if made_way:
@@ -357,26 +362,22 @@ class Concurrence(ActiveContainer):
                 f"The child_termination_cb of '{self._fsm_path}' raised {describe(error)}"
             ) from error
         if stop is True:
-            self._stop(running, State.request_preempt)
+            self._stop(running, _preempt)
         elif stop:
             labels = [stop] if isinstance(stop, str) else list(stop)
             self._stop(
                 {label: strand for label, strand in running.items() if label in labels},
-                State.request_preempt,
+                _preempt,
             )
 
     def _stop(self, strands: Mapping[str, Strand], ask: Callable[[State], object]) -> None:
         for label, strand in strands.items():
             if not strand.done:
                 strand.asked()
-                state = self._states[label]
-                if ask is State.request_preempt:
-                    state.request_preempt()
-                else:
-                    ask(state)
+                ask(self._states[label])
 
     def _abandon(self, running: Mapping[str, Strand]) -> None:
-        self._stop(running, State.request_preempt)
+        self._stop(running, _preempt)
         for strand in running.values():
             strand.disown()
         raise LeftBehind
@@ -430,7 +431,7 @@ class Concurrence(ActiveContainer):
             if isinstance(current, Node):
                 frame.strand.asked()
                 current.state.request_preempt()
-            self._stop(self._strands, State.request_preempt)
+            self._stop(self._strands, _preempt)
             frame.strand.run.condition.notify_all()
 
     def _urgent(self, frame: Frame) -> bool:
@@ -454,7 +455,9 @@ class Concurrence(ActiveContainer):
             frame.strand.asked()
             stop_for_now(current.state)
         else:
-            frame.cut = frame.cut or next(iter(self._nodes.values()), None)
+            self._making_way.update(
+                label for label, strand in self._strands.items() if not strand.done
+            )
             self._stop(self._strands, stop_for_now)
 
     def _next_branch(self, frame: Frame) -> Branch | None:

@@ -80,9 +80,14 @@ class FakeClock:
         Raises:
             AssertionError: They do not, within `timeout` seconds.
         """
+
+        def asleep() -> int:
+            # One whose time is over has only not woken yet.
+            return sum(deadline > self._now for deadline in self._deadlines)
+
         with self._changed:
-            asleep = self._changed.wait_for(lambda: len(self._deadlines) >= sleepers, timeout)
-            assert asleep, f'{len(self._deadlines)} threads sleep after {timeout} s, not {sleepers}'
+            enough = self._changed.wait_for(lambda: asleep() >= sleepers, timeout)
+            assert enough, f'{asleep()} threads sleep after {timeout} s, not {sleepers}'
 
 
 Scripted = str | Callable[[Any], str]

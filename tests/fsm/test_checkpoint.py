@@ -1,0 +1,227 @@
+"""A checkpoint lets a machine in another process go on where the first was."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+
+import pytest
+
+from surveillance_behaviour import fsm
+from surveillance_behaviour.fsm import checkpoint
+from surveillance_behaviour.fsm.testing import FakeClock
+
+from .states import Answer, Background, Waiter, began
+
+
+class World:
+    """The same machine, built anew for each process."""
+
+    def __init__(self):
+        self.clock = FakeClock()
+        self.before, self.charge = Answer('done'), Waiter(5.0, progress='charged')
+        self.explore = Waiter(10.0, progress='explored')
+        inner = fsm.StateMachine(['done', 'preempted'])
+        self.root = fsm.StateMachine(['done', 'preempted'])
+        self.root.set_clock(self.clock)
+        with self.root:
+            fsm.StateMachine.add('INNER', inner)
+            with inner:
+                fsm.StateMachine.add('BEFORE', self.before, {'done': 'EXPLORE'})
+                fsm.StateMachine.add('EXPLORE', self.explore)
+        self.inner = inner
+        self.root.add_interrupt('CHARGE', self.charge, priority=5)
+
+
+def through_json(machine):
+    return json.loads(json.dumps(checkpoint.capture(machine)))
+
+
+def test_a_machine_goes_on_in_its_state_with_userdata_and_progress():
+    first, second = World(), World()
+    first.inner.userdata.visited = ['R1', 'R2']
+    first.root.userdata.socket = object()
+    run = Background(first.root)
+    began(first.explore)
+    first.clock.until_sleeping(1)
+    first.clock.advance(6.0)
+    saved = through_json(first.root)
+    first.root.request_preempt()
+    run.result()
+
+    checkpoint.restore(second.root, saved)
+    assert second.inner.userdata.visited == ['R1', 'R2']
+    assert 'socket' not in second.root.userdata
+    run = Background(second.root)
+    began(second.explore)
+    second.clock.until_sleeping(1)
+    second.clock.advance(4.0)
+    assert run.result() == 'done'
+    assert second.before.runs == 0
+
+
+def test_a_machine_goes_on_in_an_interrupt_and_then_where_that_came():
+    first, second = World(), World()
+    run = Background(first.root)
+    began(first.explore)
+    first.clock.until_sleeping(1)
+    first.clock.advance(6.0)
+    first.root.raise_interrupt('CHARGE')
+    began(first.charge)
+    first.clock.until_sleeping(1)
+    first.clock.advance(3.0)
+    saved = through_json(first.root)
+    first.root.request_preempt()
+    first.root.request_preempt()
+
+    checkpoint.restore(second.root, saved)
+    second_run = Background(second.root)
+    began(second.charge)
+    second.clock.until_sleeping(1)
+    second.clock.advance(2.0)
+    began(second.explore)
+    second.clock.until_sleeping(1)
+    second.clock.advance(4.0)
+    assert second_run.result() == 'done'
+    assert second.before.runs == 0
+    del run
+
+
+def test_an_interrupt_that_had_not_begun_is_not_lost():
+    first, second = World(), World()
+    first.root.raise_interrupt('CHARGE')
+    checkpoint.restore(second.root, through_json(first.root))
+    run = Background(second.root)
+    began(second.charge)
+    second.root.request_preempt()
+    run.result()
+
+
+def test_an_iterator_goes_on_with_its_item():
+    def build(seen):
+        iterator = fsm.Iterator(['done'], [], [], it='ABCD', it_label='x', exhausted_outcome='done')
+        saved = []
+
+        def visit(ud):
+            seen.append(ud.x)
+            saved.append(through_json(iterator))
+            return 'more'
+
+        with iterator:
+            fsm.Iterator.set_contained_state(
+                'S', fsm.CBState(visit, outcomes=['more'], input_keys=['x']), ['more']
+            )
+        return iterator, saved
+
+    first, second = [], []
+    iterator, saved = build(first)
+    iterator.execute()
+    again, _ = build(second)
+    checkpoint.restore(again, saved[2])
+    assert again.execute() == 'done'
+    assert second == ['C', 'D']
+
+
+def test_a_concurrence_goes_on_with_the_children_that_had_not_ended():
+    def build():
+        quick, slow = Answer('done'), Waiter(5.0)
+        concurrence = fsm.Concurrence(
+            ['both', 'other'], 'other', outcome_map={'both': {'QUICK': 'done', 'SLOW': 'done'}}
+        )
+        with concurrence:
+            fsm.Concurrence.add('QUICK', quick)
+            fsm.Concurrence.add('SLOW', slow)
+        concurrence.set_clock(clock := FakeClock())
+        return concurrence, quick, slow, clock
+
+    first, quick, slow, clock = build()
+    ended = []
+    first.register_transition_cb(lambda ud, active: ended.append(through_json(first)))
+    run = Background(first)
+    began(slow)
+    clock.until_sleeping(1)
+    while first.get_active_states() != ['SLOW'] or len(ended) < 2:
+        pass
+    first.request_preempt()
+    run.result()
+    second, quick, slow, clock = build()
+    checkpoint.restore(second, ended[1])
+    run = Background(second)
+    clock.until_sleeping(1)
+    clock.advance(5.0)
+    assert run.result() == 'both'
+    assert quick.runs == 0
+
+
+CHILD = """
+import os, sys
+from surveillance_behaviour import fsm
+from surveillance_behaviour.fsm import checkpoint
+path, mode = sys.argv[1:]
+def step(name, die=False):
+    def work(ud):
+        print(name, flush=True)
+        ud.trail = ud.trail + [name]
+        if die and mode == 'die':
+            os.kill(os.getpid(), 9)
+        return 'done'
+    return fsm.CBState(work, outcomes=['done'], input_keys=['trail'], output_keys=['trail'])
+machine = fsm.StateMachine(['done'])
+inner = fsm.StateMachine(['done'], ['trail'], ['trail'])
+machine.userdata.trail = []
+with machine:
+    fsm.StateMachine.add('A', step('A'), {'done': 'INNER'})
+    fsm.StateMachine.add('INNER', inner)
+    with inner:
+        fsm.StateMachine.add('B', step('B'), {'done': 'C'})
+        fsm.StateMachine.add('C', step('C', die=True), {'done': 'D'})
+        fsm.StateMachine.add('D', step('D'))
+keeper = checkpoint.Checkpointer(machine, path)
+if os.path.exists(path):
+    checkpoint.load(machine, path)
+print(machine.execute(), machine.userdata.trail)
+"""
+
+
+def test_a_process_that_was_killed_is_gone_on_from_by_the_next(tmp_path):
+    path = tmp_path / 'checkpoint.json'
+    command = [sys.executable, '-c', CHILD, str(path)]
+    dead = subprocess.run([*command, 'die'], capture_output=True, text=True, timeout=60)
+    assert dead.returncode == -signal.SIGKILL
+    assert dead.stdout.split() == ['A', 'B', 'C']
+    alive = subprocess.run([*command, 'live'], capture_output=True, text=True, timeout=60)
+    assert alive.stdout.splitlines() == ['C', 'D', "done ['A', 'B', 'C', 'D']"], alive.stderr
+    assert os.listdir(tmp_path) == []
+
+
+def test_a_checkpoint_of_another_machine_is_refused_and_changes_nothing():
+    first = World()
+    saved = through_json(first.root)
+    saved['machine']['states'] = {
+        'INNER': {
+            'at': {'current': 'GONE', 'leaving': False, 'saved': [], 'index': 0, 'outcomes': {}}
+        }
+    }
+    saved['machine']['userdata'] = {'a': 1}
+    with pytest.raises(checkpoint.CheckpointError, match=r"'StateMachine/INNER'.*'GONE'"):
+        checkpoint.restore(first.root, saved)
+    assert 'a' not in first.root.userdata
+    saved['machine']['states'] = {'OTHER': {}}
+    with pytest.raises(checkpoint.CheckpointError, match="no state 'OTHER'"):
+        checkpoint.restore(first.root, saved)
+    saved['machine'] = {'raised': ['NIX']}
+    with pytest.raises(checkpoint.CheckpointError, match="no interrupt 'NIX'"):
+        checkpoint.restore(first.root, saved)
+
+
+@pytest.mark.parametrize('text', ['', '{', '[]', '{}', '{"format": "surveillance-fsm-checkpoint"}'])
+def test_a_file_that_is_no_checkpoint_is_named(tmp_path, text):
+    path = tmp_path / 'broken.json'
+    path.write_text(text)
+    with pytest.raises(checkpoint.CheckpointError, match=r'broken\.json'):
+        checkpoint.load(World().root, path)
+    with pytest.raises(checkpoint.CheckpointError, match=r'absent\.json'):
+        checkpoint.load(World().root, tmp_path / 'absent.json')

@@ -1,0 +1,171 @@
+"""Timeouts, deadlines and retries of states, on the machine's clock."""
+
+from __future__ import annotations
+
+import pytest
+
+from surveillance_behaviour import fsm
+from surveillance_behaviour.fsm.testing import FakeClock
+
+from .states import Answer, Background, Deaf, Waiter, began
+
+
+def machine_of(state, transitions=None, clock=None, outcomes=('done', 'late'), **limits):
+    machine = fsm.StateMachine(outcomes)
+    machine.set_name('ROOT')
+    machine.set_clock(clock or FakeClock())
+    with machine:
+        fsm.StateMachine.add('STATE', state, transitions, **limits)
+    return machine
+
+
+def test_a_state_is_stopped_after_its_timeout_on_the_machines_clock(caplog):
+    clock, waiter = FakeClock(), Waiter(seconds=100.0)
+    machine = machine_of(waiter, {'timeout': 'late', 'preempted': 'late'}, clock, timeout=5.0)
+    run = Background(machine)
+    # The state sleeps, and the watcher for it.
+    clock.until_sleeping(2)
+    clock.advance(4.9)
+    assert machine.is_running()
+    clock.advance(0.2)
+    assert run.result() == 'late'
+    assert "'ROOT/STATE' was stopped after its timeout of 5 s" in caplog.text
+    assert not waiter.preempt_requested()
+
+
+@pytest.mark.parametrize(
+    ('outcomes', 'expected'),
+    [(('done', 'aborted', 'preempted'), 'aborted'), (('done', 'preempted'), 'preempted')],
+)
+def test_without_a_timeout_transition_it_counts_as_aborted_or_preempted(outcomes, expected):
+    clock, waiter = FakeClock(), Waiter(seconds=100.0)
+    waiter.register_outcomes(outcomes)
+    machine = machine_of(waiter, None, clock, ('done', 'aborted', 'preempted'), timeout=1.0)
+    run = Background(machine)
+    clock.until_sleeping(2)
+    clock.advance(1.0)
+    assert run.result() == expected
+
+
+def test_a_state_that_ends_in_time_keeps_its_outcome():
+    machine = machine_of(Answer('done'), {'timeout': 'late'}, timeout=1.0, deadline=2.0)
+    assert machine.execute() == 'done'
+
+
+def test_the_machine_goes_on_without_a_state_that_is_over_its_deadline(caplog):
+    clock, deaf = FakeClock(), Deaf()
+    machine = machine_of(deaf, {'timeout': 'late', 'preempted': 'late'}, clock, deadline=3.0)
+    run = Background(machine)
+    began(deaf)
+    clock.until_sleeping(1)
+    clock.advance(3.0)
+    assert run.result() == 'late'
+    assert "'ROOT/STATE' did not return within its deadline of 3 s" in caplog.text
+    assert machine.control.left_behind() == ['ROOT/STATE']
+    deaf.release.set()
+
+
+def test_a_nested_machine_has_a_deadline_as_a_whole():
+    clock, deaf, after = FakeClock(), Deaf(), Answer('done')
+    inner = fsm.StateMachine(['done', 'preempted'])
+    with inner:
+        fsm.StateMachine.add('DEAF', deaf)
+    machine = machine_of(
+        inner, {'timeout': 'AFTER', 'preempted': 'late', 'done': 'late'}, clock, deadline=3.0
+    )
+    with machine:
+        fsm.StateMachine.add('AFTER', after)
+    run = Background(machine)
+    began(deaf)
+    clock.until_sleeping(1)
+    clock.advance(3.0)
+    assert run.result() == 'done'
+    assert after.runs == 1
+    assert not inner.is_running()
+    assert not inner.preempt_requested()
+    deaf.release.set()
+    assert deaf.ended.wait(5.0)
+    # The inner machine is good for another run.
+    assert inner.execute() == 'done'
+
+
+def test_deadlines_hold_for_children_of_a_concurrence_and_of_an_iterator():
+    for kind in ('concurrence', 'iterator'):
+        clock, deaf = FakeClock(), Deaf()
+        if kind == 'concurrence':
+            machine = fsm.Concurrence(
+                ['late', 'other'], 'other', outcome_map={'late': {'DEAF': 'preempted'}}
+            )
+            with machine:
+                fsm.Concurrence.add('DEAF', deaf, deadline=2.0)
+        else:
+            machine = fsm.Iterator(['late'], [], [], it=[1, 2])
+            with machine:
+                fsm.Iterator.set_contained_state(
+                    'DEAF', deaf, ['done'], [], {'preempted': 'late'}, deadline=2.0
+                )
+        machine.set_clock(clock)
+        run = Background(machine)
+        began(deaf)
+        clock.until_sleeping(1)
+        clock.advance(2.0)
+        assert run.result() == 'late'
+        deaf.release.set()
+
+
+def test_failures_are_retried_so_often_and_no_more():
+    state = Answer('aborted', 'aborted', 'done')
+    machine = machine_of(state, {'aborted': 'late'}, retry=2)
+    assert machine.execute() == 'done'
+    assert state.runs == 3
+    state = Answer('aborted', outcomes=['aborted', 'done'])
+    machine = machine_of(state, {'aborted': 'late'}, retry=2)
+    assert machine.execute() == 'late'
+    assert state.runs == 3
+
+
+def test_other_outcomes_can_count_as_failures():
+    state = Answer('blocked', 'blocked', 'done')
+    machine = machine_of(state, {'blocked': 'late'}, retry=5, retry_on=['blocked'])
+    assert machine.execute() == 'done'
+
+
+def test_running_out_of_time_is_retried_too():
+    clock, waiter = FakeClock(), Waiter(seconds=100.0)
+    machine = machine_of(
+        waiter, {'timeout': 'late', 'preempted': 'late'}, clock, timeout=1.0, retry=1
+    )
+    run = Background(machine)
+    for _ in range(2):
+        clock.until_sleeping(2)
+        began(waiter)
+        clock.advance(1.0)
+    assert run.result() == 'late'
+    assert waiter.runs == 2
+
+
+def test_a_preempt_is_no_failure_to_retry():
+    waiter = Waiter()
+    machine = machine_of(waiter, {'preempted': 'late'}, retry=3, retry_on=['preempted'])
+    run = Background(machine)
+    began(waiter)
+    machine.request_preempt()
+    assert run.result() == 'late'
+    assert waiter.runs == 1
+    assert not machine.preempt_requested()
+
+
+@pytest.mark.parametrize(
+    ('limits', 'words'),
+    [
+        ({'timeout': 0}, 'timeout 0'),
+        ({'deadline': -1.0}, 'deadline -1.0'),
+        ({'retry': -1}, 'retry -1'),
+        ({'timeout': 1.0}, "no outcome for it: bind 'timeout'"),
+        ({'retry': 1}, 'none of the outcomes'),
+    ],
+)
+def test_limits_that_cannot_work_are_refused(limits, words):
+    with pytest.raises(fsm.InvalidTransitionError, match=words) as caught:
+        machine_of(Answer('done'), **limits)
+    assert 'ROOT/STATE' in str(caught.value)
