@@ -16,12 +16,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+import cv2
 import numpy as np
 import numpy.typing as npt
 
 from surveillance_perception.dictionaries import MarkerCodes, dictionary_named
 from surveillance_perception.marker_reading import MarkerReader, Readings
-from surveillance_perception.picture_preparation import PreparedPicture, prepare
+from surveillance_perception.picture_preparation import Grey, PreparedPicture, prepare
 from surveillance_perception.picture_sampling import (
     Array,
     PicturePyramid,
@@ -33,6 +34,7 @@ from surveillance_perception.ring_test import RingTest
 
 _SAME_QUAD = 1.0
 _SAME_MARKER = 0.5
+_LARGE_CELL = 8.0
 
 
 @dataclass(frozen=True)
@@ -125,7 +127,8 @@ class MarkerDetector:
             quads = np.concatenate([np.asarray(expected, dtype=float), quads])
         if not len(quads):
             return []
-        return self._accepted(self._reader.read(pyramid, homographies_of(quads)))
+        readings = self._reader.read(pyramid, homographies_of(quads))
+        return self._accepted(readings, prepared.grey)
 
     def _candidates(self, prepared: PreparedPicture, pyramid: PicturePyramid) -> Quads:
         settings = self.settings
@@ -142,7 +145,7 @@ class MarkerDetector:
         quads = quads[order[correlation[order] > 0.0][: 4 * settings.max_candidates]]
         return np.asarray(quads[distinct(quads, _SAME_QUAD)][: settings.max_candidates])
 
-    def _accepted(self, readings: Readings) -> list[Detection]:
+    def _accepted(self, readings: Readings, grey: Grey) -> list[Detection]:
         settings, codes = self.settings, self._reader.codes
         ids = codes.ids[readings.entries]
         known = np.ones(len(ids), bool)
@@ -165,10 +168,24 @@ class MarkerDetector:
             outline = np.roll(corners[index], -int(codes.turns[readings.entries[index]]), axis=0)
             if any(_overlap(outline, other.corners) for other in detections):
                 continue
+            outline = _sharpened(outline, grey, codes.side)
             detections.append(
                 Detection(int(ids[index]), outline, float(confidence[index]), bool(known[index]))
             )
         return detections
+
+
+def _sharpened(outline: Array, grey: Grey, side: int) -> Array:
+    """Corners of a large marker, which was read from halved pictures, found in the whole one."""
+    cell = float(np.linalg.norm(np.roll(outline, -1, axis=0) - outline, axis=1).min()) / side
+    if cell < _LARGE_CELL:
+        return outline
+    reach = (min(int(cell / 2.5), 8),) * 2
+    limits = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 20, 0.01)
+    start = outline.astype(np.float32).reshape(-1, 1, 2)
+    refined = cv2.cornerSubPix(grey, start.copy(), reach, (-1, -1), limits)
+    moved = np.linalg.norm(refined - start, axis=2)
+    return np.where(moved[:, :, None] < cell / 2.0, refined, start).reshape(4, 2).astype(float)
 
 
 def _overlap(first: Array, second: Array) -> bool:

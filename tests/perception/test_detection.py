@@ -1,0 +1,158 @@
+"""Known ids in rendered pictures, and pictures that are no pictures."""
+
+from __future__ import annotations
+
+import math
+
+import cv2
+import numpy as np
+import pytest
+
+from surveillance_perception.camera_model import CameraModel
+from surveillance_perception.detection import DetectorSettings, MarkerDetector
+from surveillance_perception.dictionaries import DICTIONARY_NAMES, dictionary_named
+from surveillance_perception.marker_scene import (
+    BACKDROPS,
+    Degradation,
+    Panel,
+    backdrop_of,
+    corners_in_picture,
+    picture_of,
+)
+
+CAMERA = CameraModel.from_field_of_view(640, 480, math.radians(60))
+DICTIONARY = dictionary_named('DICT_5X5_100')
+KNOWN = frozenset(range(11, 18))
+DETECTOR = MarkerDetector(DetectorSettings(known_ids=KNOWN))
+
+
+def seen(panels, degradation=None, backdrop='clouds', seed=1, dictionary=DICTIONARY):
+    generator = np.random.default_rng(seed)
+    scene = backdrop_of(backdrop, CAMERA, generator)
+    return picture_of(
+        panels, CAMERA, dictionary, scene, degradation or Degradation(blur=0.8), generator
+    )
+
+
+def found(detections):
+    return {each.marker_id: each for each in detections}
+
+
+@pytest.mark.parametrize(
+    ('distance', 'degrees'),
+    [(0.4, 20), (1, 60), (2, 0), (2, 70), (3, 75), (5, 45), (5, 65), (7, 0), (7, 45), (9, 0), (9, 30)],
+)
+def test_marker_is_found_where_it_is(distance, degrees):
+    panel = Panel(14, distance, math.radians(degrees), roll=0.05, offset=(12.3, -20.7))
+    detections = found(DETECTOR.detect(seen([panel])))
+    assert set(detections) == {14}
+    truth = corners_in_picture(panel, CAMERA)
+    assert np.abs(detections[14].corners - truth).max() < 0.6
+    assert 0.0 < detections[14].confidence <= 1.0
+
+
+@pytest.mark.parametrize(
+    'degradation',
+    [
+        Degradation(blur=2.0),
+        Degradation(motion=6.0, direction=0.3),
+        Degradation(light=0.06),
+        Degradation(light=1.8),
+        Degradation(light=0.7, slope=0.7),
+        Degradation(noise=30.0),
+    ],
+    ids=['blurred', 'moving', 'dark', 'bright', 'uneven', 'noisy'],
+)
+def test_marker_is_found_in_a_poor_picture(degradation):
+    panel = Panel(16, 3.0, 0.4, offset=(-40.0, 30.0))
+    assert set(found(DETECTOR.detect(seen([panel], degradation)))) == {16}
+
+
+@pytest.mark.parametrize('quarter', range(4))
+def test_corners_begin_at_the_markers_own_top_left(quarter):
+    panel = Panel(11, 2.0, 0.3, roll=quarter * math.pi / 2 + 0.1)
+    detection = found(DETECTOR.detect(seen([panel])))[11]
+    assert np.abs(detection.corners - corners_in_picture(panel, CAMERA)).max() < 0.5
+
+
+def test_all_markers_of_a_picture_are_found_also_two_of_one_id():
+    panels = [Panel(11 + k % 4, 2.0 + k * 0.4, offset=(-240.0 + 80 * k, 40.0)) for k in range(7)]
+    ids = sorted(each.marker_id for each in DETECTOR.detect(seen(panels)))
+    assert ids == sorted(panel.marker_id for panel in panels)
+
+
+def test_other_ids_are_told_apart_from_known_ones():
+    panels = [Panel(13, 2.0, offset=(-90.0, 0.0)), Panel(70, 2.0, offset=(90.0, 0.0))]
+    detections = found(DETECTOR.detect(seen(panels)))
+    assert detections[13].known
+    assert not detections[70].known
+
+
+@pytest.mark.parametrize('backdrop', BACKDROPS)
+def test_no_known_id_is_seen_where_there_is_none(backdrop):
+    for seed in range(4):
+        assert not [each for each in DETECTOR.detect(seen([], None, backdrop, seed)) if each.known]
+
+
+@pytest.mark.parametrize('other', ['DICT_4X4_50', 'DICT_6X6_50', 'DICT_APRILTAG_36h11'])
+def test_markers_of_another_dictionary_are_not_known_ids(other):
+    dictionary = dictionary_named(other)
+    for marker_id in range(6):
+        picture = seen([Panel(marker_id, 2.5, 0.3)], seed=marker_id, dictionary=dictionary)
+        assert not [each for each in DETECTOR.detect(picture) if each.known]
+
+
+def test_colour_and_grey_pictures_show_the_same():
+    grey = seen([Panel(15, 3.0, 0.5)])
+    colour = cv2.cvtColor(grey, cv2.COLOR_GRAY2BGR)
+    assert [each.marker_id for each in DETECTOR.detect(colour)] == [15]
+
+
+def test_marker_expected_from_the_picture_before_is_found_again():
+    panel = Panel(12, 4.0, 0.4)
+    truth = corners_in_picture(panel, CAMERA)
+    assert set(found(DETECTOR.detect(seen([panel]), [truth + 1.0]))) == {12}
+
+
+@pytest.mark.parametrize('name', DICTIONARY_NAMES)
+def test_every_dictionary_of_opencv_is_read(name):
+    dictionary = dictionary_named(name)
+    detector = MarkerDetector(DetectorSettings(dictionary=name))
+    marker_id = 5
+    picture = seen([Panel(marker_id, 1.5, 0.4)], dictionary=dictionary)
+    assert marker_id in found(detector.detect(picture))
+
+
+@pytest.mark.parametrize(
+    ('picture', 'reason'),
+    [
+        (np.zeros((0, 0), np.uint8), '0x0'),
+        (np.zeros((4, 4, 2), np.uint8), '4x4x2'),
+        (np.zeros((4, 4), np.uint16), 'uint16'),
+        (np.zeros((4, 4), np.float64), 'float64'),
+    ],
+)
+def test_what_is_no_picture_is_refused_in_one_line(picture, reason):
+    with pytest.raises(ValueError, match=reason) as error:
+        DETECTOR.detect(picture)
+    assert '\n' not in str(error.value)
+
+
+@pytest.mark.parametrize('shape', [(1, 1), (2, 700), (5, 5), (30, 30)])
+@pytest.mark.parametrize('level', [0, 255])
+def test_tiny_and_empty_pictures_show_nothing(shape, level):
+    assert DETECTOR.detect(np.full(shape, level, np.uint8)) == []
+
+
+@pytest.mark.parametrize(
+    ('options', 'reason'),
+    [
+        ({'dictionary': 'DICT_9X9'}, "unknown marker dictionary 'DICT_9X9'"),
+        ({'known_ids': frozenset({100})}, 'known id 100 is not in the dictionary, expected 0 to 99'),
+        ({'windows': (4,)}, 'windows must be odd'),
+        ({'bridges': (1,)}, 'bridges must be at least 2'),
+    ],
+)
+def test_settings_that_cannot_be_are_refused(options, reason):
+    with pytest.raises(ValueError, match=reason):
+        MarkerDetector(DetectorSettings(**options))
