@@ -45,6 +45,8 @@ def own_environ() -> dict[str, str]:
     environ = dict(os.environ)
     if environ.pop('_ROS_WHEELS_BOOTSTRAP_COMPLETE', None):
         environ.pop('LD_LIBRARY_PATH', None)
+    # Without its cache of compiled modules Python takes twice as long.
+    environ.pop('PYTHONDONTWRITEBYTECODE', None)
     return environ
 
 

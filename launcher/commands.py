@@ -119,6 +119,9 @@ def main(argv: Sequence[str]) -> int:
     except (system.MissingError, SetupError, ValueError) as error:
         print(f'launch.py: {error}', file=sys.stderr)
         return EXIT_BAD_INPUT
+    except BrokenPipeError:  # as when the output goes to `head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
     except KeyboardInterrupt:
         print('\nlaunch.py: interrupted; the next start goes on from here', file=sys.stderr)
         return EXIT_INTERRUPTED
@@ -209,7 +212,7 @@ def _setup(argv: list[str]) -> int:
 def _test(argv: list[str]) -> int:
     _enter(['test', *argv])
     spread = any(a.startswith(('-n', '--numprocesses', '--pdb', '-p')) for a in argv)
-    _exec(['-m', 'pytest', *([] if spread else ['-n', '2']), *argv])
+    _exec(['-m', 'pytest', *([] if spread else ['-n', '2', '--dist', 'loadfile']), *argv])
     return 0
 
 
