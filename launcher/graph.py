@@ -88,7 +88,7 @@ NODES = (
     Node(
         'reasoner',
         'surveillance_behaviour',
-        'ReasonerNode',
+        'Reasoner',
         'answers which place comes next',
     ),
     Node(

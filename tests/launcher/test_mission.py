@@ -1,0 +1,163 @@
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+import yaml
+
+from launcher.commands import CONFIG, make_parser, wanted_run
+from launcher.mission import (
+    Run,
+    RunError,
+    command,
+    make_folder,
+    node_environ,
+    parameter_files,
+    ros_arguments,
+    summary,
+    write_own_parameters,
+)
+from surveillance_behaviour.mission_record import MissionRecord
+
+
+def error_of(run: Run) -> str:
+    with pytest.raises(RunError) as caught:
+        run.check()
+    message = str(caught.value)
+    assert '\n' not in message
+    return message
+
+
+@pytest.mark.parametrize('namespace', ['', '1robot', 'a b', 'a//b', '/a/', '../x', 'ä'])
+def test_a_namespace_that_ros_refuses_is_named(namespace):
+    assert f'--namespace {namespace!r}' in error_of(Run(namespace=namespace))
+
+
+@pytest.mark.parametrize('domain', [-1, 102, 10**6])
+def test_a_domain_out_of_range_is_named(domain):
+    assert error_of(Run(domain=domain)) == f'--domain {domain}: expected a number from 0 to 101'
+
+
+def test_a_place_that_is_none_is_named_with_file_and_line(tmp_path):
+    assert 'no.yaml: No such file' in error_of(Run(place=tmp_path / 'no.yaml'))
+    bad = tmp_path / 'bad.yaml'
+    text = (CONFIG / 'seven_rooms.yaml').read_text()
+    bad.write_text(text.replace('R4: [D4]', 'R4: [D9]'))
+    assert 'bad.yaml:' in error_of(Run(place=bad))
+    assert 'D9' in error_of(Run(place=bad))
+
+
+@pytest.mark.parametrize(
+    ('content', 'wrong'),
+    [
+        ('battery_controler: {ros__parameters: {a: 1}}', "no node is called 'battery_controler'"),
+        ('battery_controller: {a: 1}', "expected 'ros__parameters:'"),
+        ('- 1', 'got no mapping'),
+        ('a: [', ':1: not valid YAML'),
+        ('', 'got no mapping'),
+    ],
+)
+def test_a_wrong_parameter_file_is_named(content, wrong, tmp_path):
+    file = tmp_path / 'own.yaml'
+    file.write_text(content)
+    assert f'--params {file}' in error_of(Run(parameters=file))
+    assert wrong in error_of(Run(parameters=file))
+
+
+def test_a_missing_or_binary_parameter_file_is_named(tmp_path):
+    assert 'No such file' in error_of(Run(parameters=tmp_path / 'none'))
+    (tmp_path / 'binary').write_bytes(b'\xff\xfe\x00')
+    assert 'not UTF-8' in error_of(Run(parameters=tmp_path / 'binary'))
+
+
+def test_every_place_and_parameter_file_of_the_project_can_be_run():
+    for behaviour in ('surveillance', 'patrol'):
+        run = Run(behaviour=behaviour)
+        files = parameter_files(CONFIG, run)
+        assert all(file.exists() for file in files)
+        Run(place=files[1]).check()
+    Run(parameters=CONFIG / 'parameters.yaml').check()
+
+
+def test_the_users_file_comes_after_the_projects_and_the_launchers_own_last(tmp_path):
+    own = tmp_path / 'own.yaml'
+    run = Run(parameters=own, place=tmp_path / 'place.yaml')
+    names = [path.name for path in parameter_files(CONFIG, run)]
+    assert names == ['parameters.yaml', 'place.yaml', 'own.yaml']
+
+
+def own_parameters(folder: Path, run: Run) -> dict[str, dict[str, object]]:
+    content = yaml.safe_load(write_own_parameters(folder, run).read_text())
+    return {key: section['ros__parameters'] for key, section in content.items()}
+
+
+def test_a_mode_on_the_command_line_counts_more_than_one_in_the_users_file(tmp_path):
+    file = tmp_path / 'own.yaml'
+    file.write_text('battery_controller: {ros__parameters: {execution_mode: MANUAL}}')
+    asked = own_parameters(tmp_path, Run(mode='RANDOM', parameters=file))
+    assert asked['/**/battery_controller']['execution_mode'] == 'RANDOM'
+    assert '/**/battery_controller' not in own_parameters(tmp_path, Run(parameters=file))
+    assert '/**/motion_controller' in own_parameters(tmp_path, Run())
+
+
+def test_in_one_process_a_console_node_reads_for_all_controllers(tmp_path):
+    run = Run(mode='MANUAL', composed=True)
+    assert [node.name for node in run.nodes()][-1] == 'console'
+    assert own_parameters(tmp_path, run)['/**/planner_controller']['console'] is False
+    assert 'console' not in [node.name for node in Run(mode='MANUAL').nodes()]
+
+
+def test_ros_arguments_of_all_nodes():
+    run = Run(namespace='/robot1', log_level='debug')
+    arguments = ros_arguments([Path('/a.yaml'), Path('/b.yaml')], run)
+    expected = '--ros-args --params-file /a.yaml --params-file /b.yaml -r __ns:=/robot1'
+    assert ' '.join(arguments) == expected + ' --log-level debug'
+
+
+def test_the_behaviour_is_last_in_one_process_so_that_it_stops_first():
+    targets = command(Run().nodes(), [], 1)[4].split(',')
+    assert len(targets) == 6
+    assert targets[-1].startswith('robot_behavior=')
+
+
+def test_a_domain_and_quiet_transports_reach_the_nodes(tmp_path, monkeypatch):
+    monkeypatch.delenv('FASTDDS_BUILTIN_TRANSPORTS', raising=False)
+    environ = node_environ(Run(domain=7), tmp_path)
+    assert environ['ROS_DOMAIN_ID'] == '7'
+    assert environ['FASTDDS_BUILTIN_TRANSPORTS'] == 'UDPv4'
+    assert node_environ(Run()).get('ROS_DOMAIN_ID') == os.environ.get('ROS_DOMAIN_ID')
+
+
+def test_each_run_has_a_folder_of_its_own(tmp_path):
+    assert make_folder(tmp_path) != make_folder(tmp_path)
+
+
+def test_runs_where_nothing_can_be_written(tmp_path):
+    (tmp_path / 'runs').write_text('a file')
+    with pytest.raises(RunError, match='cannot be made'):
+        make_folder(tmp_path / 'runs')
+
+
+def test_a_summary_is_given_also_without_a_record(tmp_path):
+    assert summary(tmp_path / 'none') == 'Mission: nothing was recorded.'
+    with MissionRecord(tmp_path / 'record') as record:
+        record.start(0.0, 'surveillance', 'E', ['E', 'C1'])
+        record.visit(5.0, 'C1', 3.0)
+    assert '2 places visited' in summary(tmp_path / 'record')
+    (tmp_path / 'record').write_text('nonsense\n')
+    assert 'Mission: ' in summary(tmp_path / 'record')
+
+
+def test_the_options_of_the_command_line_become_a_run():
+    options = make_parser().parse_args(
+        ['--mode', 'random', '--map', 'm.yaml', '--params', 'p.yaml', '--only', 'a,b', '--for', '3']
+    )
+    assert wanted_run(options) == Run(
+        mode='RANDOM',
+        place=Path('m.yaml'),
+        parameters=Path('p.yaml'),
+        only=['a', 'b'],
+        without=[],
+        seconds=3.0,
+    )
