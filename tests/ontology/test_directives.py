@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import threading
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import pytest
@@ -623,3 +626,83 @@ def test_an_ontology_with_the_older_form_of_all_different(
 
 def test_the_service_is_told_of_its_data() -> None:
     assert (DATA / 'surveillance.owl').is_file()
+
+
+def test_disjointness_of_very_many_classes_is_refused(ask: Ask) -> None:
+    answer = ask('DISJOINT CLASS', *(f'K{number}' for number in range(501)))
+    assert (answer.success, answer.exit_code) == (False, 205)
+    assert answer.error_description == 'DISJOINT CLASS: 501 arguments, at most 500'
+
+
+def test_what_may_take_long_is_not_done_at_once(service: ArmorService, ask: Ask) -> None:
+    assert service.execute_at_once(request('QUERY IND CLASS', 'ROOM')) is not None
+    for slow in (
+        request('QUERY SPARQL', 'SELECT * { ?a ?b ?c }'),
+        request('LOAD FILE', ONTOLOGY, IRI, 'false', '', 'false', reference='other'),
+        request('ADD CLASS CLASS', 'A', 'B'),
+        request('DISJOINT IND', *(f'X{number}' for number in range(2000))),
+    ):
+        assert service.execute_at_once(slow) is None
+    assert ask('GET ALL REFS').queried_objects == ['map'], 'nothing was done'
+    ask('LOAD FILE', ONTOLOGY, IRI, 'true', '', 'true')
+    assert service.execute_at_once(request('REASON')) is not None
+    ask('ADD CLASS CLASS', 'A', 'B')
+    assert service.execute_at_once(request('REASON')) is None, 'classes changed'
+
+
+UNSUPPORTED = """<?xml version="1.0"?>
+<rdf:RDF xmlns="http://example.org/u#" xml:base="http://example.org/u"
+     xmlns:owl="http://www.w3.org/2002/07/owl#" xmlns:rdfs="http://www.w3.org/2000/01/rdf-schema#"
+     xmlns:rdf="http://www.w3.org/1999/02/22-rdf-syntax-ns#">
+  <owl:Class rdf:about="#A">
+    <rdfs:subClassOf>
+      <owl:Class>
+        <owl:unionOf rdf:parseType="Collection">
+          <owl:Class rdf:about="#B"/>
+          <owl:Class rdf:about="#C"/>
+        </owl:unionOf>
+      </owl:Class>
+    </rdfs:subClassOf>
+  </owl:Class>
+</rdf:RDF>
+"""
+
+
+def test_what_the_reasoner_does_not_support_is_reported_at_load(
+    service: ArmorService, tmp_path: Path
+) -> None:
+    (tmp_path / 'u.owl').write_text(UNSUPPORTED)
+    ask = asker(service)
+    answer = ask('LOAD FILE', 'u.owl', 'http://example.org/u', 'false', '', 'false')
+    assert answer.success
+    assert 'not supported by the reasoner' in answer.error_description
+    listed = ask('QUERY UNSUPPORTED').queried_objects
+    assert listed
+    assert listed[0] in answer.error_description
+
+
+def test_the_web_when_it_is_allowed(tmp_path: Path) -> None:
+    class Quiet(SimpleHTTPRequestHandler):
+        def log_message(self, *_: object) -> None:
+            pass
+
+    handler = partial(Quiet, directory=str(DATA))
+    with ThreadingHTTPServer(('127.0.0.1', 0), handler) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        base = f'http://127.0.0.1:{server.server_address[1]}'
+        service = ArmorService(Settings(directories=(tmp_path,), allow_web=True))
+        ask = asker(service)
+        good = ask('LOAD WEB MOUNTED', f'{base}/surveillance.owl', IRI, 'false', '', 'false')
+        assert good.success
+        assert ask('GET REF CLIENT', 'map').queried_objects == ['tester']
+        assert 'expected a path' in ask('SAVE', '').error_description
+        for url, words in (
+            (f'{base}/none.owl', 'not found'),
+            ('file:///etc/passwd', 'not an http address'),
+            ('http://127.0.0.1:1/x', 'refused'),
+        ):
+            bad = ask('LOAD WEB', url, IRI, 'false', '', 'false', reference='bad')
+            assert (bad.success, bad.exit_code) == (False, 205)
+            assert words in bad.error_description
+        server.shutdown()
+        service.close()

@@ -43,6 +43,8 @@ from surveillance_ontology.axioms import (
     SubClassOf,
 )
 
+MOST_CLASSES = 500
+"""Classes in one statement of disjointness; what it costs grows with their square."""
 _OTHER = Argument('value individual', Read.INDIVIDUAL)
 _NEW_IND = Argument('new individual', Read.INDIVIDUAL)
 _OLD_IND = Argument('old individual', Read.INDIVIDUAL)
@@ -65,12 +67,16 @@ def _add_ind_class(_: Reference, ind: str, cls: str) -> list[Change]:
     return [AddAxiom(ClassAssertion(cls, ind))]
 
 
-@manipulation('ADD CLASS', CLS, summary='Makes a class known, as a subclass of owl:Thing.')
+@manipulation(
+    'ADD CLASS', CLS, summary='Makes a class known, as a subclass of owl:Thing.', schema=True
+)
 def _add_class(_: Reference, cls: str) -> list[Change]:
     return [AddAxiom(SubClassOf(cls, THING))]
 
 
-@manipulation('ADD CLASS CLASS', CLS, _SUPER, summary='Makes a class a subclass of another.')
+@manipulation(
+    'ADD CLASS CLASS', CLS, _SUPER, summary='Makes a class a subclass of another.', schema=True
+)
 def _add_class_class(_: Reference, cls: str, above: str) -> list[Change]:
     return [AddAxiom(SubClassOf(cls, above))]
 
@@ -100,6 +106,7 @@ def _add_objectprop(_: Reference, prop: str, ind: str, other: str) -> list[Chang
     summary='States that each instance of a class is related to so many of another class at least.',
     differs='Both orders of the specifications are accepted: the manual has the one, the code the '
     'other.',
+    schema=True,
 )
 def _add_min(_: Reference, cls: str, prop: str, count: int, filler: str) -> list[Change]:
     return [AddAxiom(SubClassOf(cls, ObjectMinCardinality(count, prop, filler)))]
@@ -131,7 +138,12 @@ def _different(inds: tuple[str, ...]) -> list[Change]:
 
 
 @manipulation(
-    'DISJOINT CLASS', CLS, rest=1, summary='States that no two of the classes share an instance.'
+    'DISJOINT CLASS',
+    CLS,
+    rest=1,
+    summary='States that no two of the classes share an instance.',
+    schema=True,
+    most=MOST_CLASSES,
 )
 def _disjoint_class(_: Reference, *classes: str) -> list[Change]:
     return _disjoint(classes)
@@ -142,6 +154,7 @@ def _disjoint_class(_: Reference, *classes: str) -> list[Change]:
     CLS,
     summary='States that no two subclasses of a class, direct or not, share an instance.',
     differs='owl:Nothing is left out of the axiom, in which it says nothing.',
+    schema=True,
 )
 def _disjoint_class_class(ref: Reference, cls: str) -> list[Change]:
     return _disjoint(tuple(ref.kb.subclasses(cls) - {NOTHING}))
@@ -156,6 +169,7 @@ def _disjoint(classes: tuple[str, ...]) -> list[Change]:
     'MAKE EQUIVALENT CLASS|MAKE EQUIVALENT',
     CLS,
     summary='Turns all that a class is asserted to be a subclass of into its definition.',
+    schema=True,
 )
 def _make_equivalent(ref: Reference, cls: str) -> list[Change]:
     above = [
@@ -194,12 +208,15 @@ def _remove_ind_class(_: Reference, ind: str, cls: str) -> list[Change]:
     CLS,
     summary='Removes a class with all that is asserted of it.',
     differs='ARMOR only retracts that it is a subclass of owl:Thing, which changes nothing.',
+    schema=True,
 )
 def _remove_class(_: Reference, cls: str) -> list[Change]:
     return [RemoveEntity('class', cls)]
 
 
-@manipulation('REMOVE CLASS CLASS', CLS, _SUPER, summary='Retracts a subclass relation.')
+@manipulation(
+    'REMOVE CLASS CLASS', CLS, _SUPER, summary='Retracts a subclass relation.', schema=True
+)
 def _remove_class_class(_: Reference, cls: str, above: str) -> list[Change]:
     return [RemoveAxiom(SubClassOf(cls, above))]
 
@@ -265,6 +282,7 @@ def _rename_ind(_: Reference, old: str, new: str) -> list[Change]:
     'RENAME CLASS',
     *_renamed(Read.CLASS),
     summary='Gives a class another name everywhere; merges it with one that has the name.',
+    schema=True,
 )
 def _rename_class(_: Reference, old: str, new: str) -> list[Change]:
     return [RenameEntity('class', old, new)]
@@ -274,6 +292,7 @@ def _rename_class(_: Reference, old: str, new: str) -> list[Change]:
     'RENAME DATAPROP',
     *_renamed(Read.DATA_PROPERTY),
     summary='Gives a data property another name everywhere; merges it with one that has the name.',
+    schema=True,
 )
 def _rename_dataprop(_: Reference, old: str, new: str) -> list[Change]:
     return [RenameEntity('data_property', old, new)]
@@ -283,6 +302,7 @@ def _rename_dataprop(_: Reference, old: str, new: str) -> list[Change]:
     'RENAME OBJECTPROP',
     *_renamed(Read.OBJECT_PROPERTY),
     summary='Gives an object property another name everywhere; merges it with one that has it.',
+    schema=True,
 )
 def _rename_objectprop(_: Reference, old: str, new: str) -> list[Change]:
     return [RenameEntity('object_property', old, new)]

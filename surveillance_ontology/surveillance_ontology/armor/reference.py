@@ -50,6 +50,7 @@ class Reference:
         mounted: The client that may change it, `NOBODY` for all.
         queue: Changes that wait.
         backlog: Changes since the last reasoning, queued ones included; a measure of its cost.
+        heavy: Classes or properties changed since the last reasoning; the next takes longer.
         revision: Counts what may have changed an answer, so that copies know when they are old.
         serial: Tells this reference from any other of the same name.
         dropped: The name does not stand for it any more.
@@ -63,6 +64,7 @@ class Reference:
     mounted: str = NOBODY
     queue: list[Change] = field(default_factory=list)
     backlog: int = 0
+    heavy: bool = False
     revision: int = 0
     dropped: bool = False
     serial: int = field(default_factory=itertools.count().__next__)
@@ -98,7 +100,7 @@ class Reference:
             queued, self.queue = self.queue, []
             apply_all(self.kb, queued)
         self.revision += 1
-        self.backlog = 0
+        self.backlog, self.heavy = 0, False
         return self.kb.reason()
 
     def restore(self, other: Reference) -> None:
@@ -117,4 +119,4 @@ class Reference:
         self.revision += 1
         if not self.buffered_reasoner:
             self.kb.reason()
-            self.backlog = 0
+            self.backlog, self.heavy = 0, False

@@ -118,7 +118,7 @@ class ArmorService:
             directive = look_up(request)
         except DirectiveError:
             return self.execute(request)
-        if directive.slow or len(request.args) > LONG_ARGUMENTS:
+        if directive.slow or directive.schema or len(request.args) > LONG_ARGUMENTS:
             return None
         ref = self._references.get(request.reference_name)
         if ref is None:
@@ -126,7 +126,7 @@ class ArmorService:
         if not ref.lock.acquire(blocking=False):
             return None
         try:
-            if ref.backlog > LONG_BACKLOG and directive.kind.may_reason:
+            if directive.kind.may_reason and (ref.heavy or ref.backlog > LONG_BACKLOG):
                 return None
             return self.execute(request)
         finally:
@@ -386,6 +386,7 @@ class ArmorService:
         changes: list[Change] = directive.run(ref, *self._values(directive, request, ref))
         if self._store and changes:
             self._store.changed(ref.name, changes)
+        ref.heavy |= directive.schema
         ref.submit(changes)
 
     def _values(self, directive: Directive, request: DirectiveRequest, ref: Reference) -> list[Any]:

@@ -36,7 +36,7 @@ class Settings:
     sparql_derived: bool = True
     sparql_timeout: float = 30.0
     sparql_rows: int = 100_000
-    max_file_bytes: int = 256 * 1024 * 1024
+    max_file_bytes: int = 64 * 1024 * 1024
     max_arguments: int = 100_000
     max_characters: int = 16 * 1024 * 1024
     max_batch: int = 100_000

@@ -101,7 +101,9 @@ class Directive:
         summary: One sentence or two for the documentation.
         differs: How and why it differs from ARMOR 2.2, for the documentation.
         rest: The last argument may be repeated, at least this many times; 0: not repeated.
+        most: How many arguments it takes at most; 0: as many as the service allows.
         slow: It may take long and must not run where other directives wait.
+        schema: It changes classes or properties, after which reasoning takes longer.
         native: It stands in ARMOR 2.2 too.
         type_error_succeeds: An unsupported type is answered with success, as ARMOR does.
         verb: How ARMOR words what did not happen then.
@@ -116,7 +118,9 @@ class Directive:
     summary: str
     differs: str = ''
     rest: int = 0
+    most: int = 0
     slow: bool = False
+    schema: bool = False
     native: bool = True
     type_error_succeeds: bool = True
     verb: str = ''
@@ -159,6 +163,8 @@ class Directive:
                 f'{self.words}: expected {wanted} argument{"s" if self.required != 1 else ""} '
                 f'({self.signature}), got {count}'
             )
+        if 0 < self.most < count:
+            raise DirectiveError(f'{self.words}: {count} arguments, at most {self.most}')
         values: list[Any] = []
         type_word = ''
         index = 0
