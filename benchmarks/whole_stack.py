@@ -10,7 +10,6 @@ import importlib
 import json
 import sys
 import tempfile
-import threading
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -20,12 +19,11 @@ if str(ROOT) not in sys.path:
     sys.path.insert(0, str(ROOT))
 
 import rclpy  # noqa: E402
-from surveillance_interfaces.msg import FactChanges  # noqa: E402
+
+from launcher import graph  # noqa: E402
 from surveillance_runtime.node import ExecutorThread, PatrolNode  # noqa: E402
 from surveillance_simulation.robot import Robot  # noqa: E402
 from surveillance_simulation.simulator_node import Simulator  # noqa: E402
-
-from launcher import graph  # noqa: E402
 
 
 class Stack:
@@ -68,10 +66,6 @@ class Stack:
         simulator = self.nodes['simulator']
         assert isinstance(simulator, Simulator)
         self.robot: Robot = simulator.robot
-        self._place_told = ''
-        self._place_at = 0.0
-        self.observer.create_subscription(FactChanges, 'armor/changes', self._on_changes, 100)
-        self._changed = threading.Condition()
 
     def _add(self, name: str, node: PatrolNode) -> PatrolNode:
         self.nodes[name] = node
@@ -91,9 +85,6 @@ class Stack:
             node.destroy_node()
         rclpy.try_shutdown(context=self.context)
         self._folder.cleanup()
-
-    def _on_changes(self, message: FactChanges) -> None:
-        pass
 
 
 def _own_parameters(parameters: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
