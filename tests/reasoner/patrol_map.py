@@ -177,8 +177,7 @@ ROBOT_FACTS: list[Axiom] = [
     value('urgencyThreshold', 'Robot1', 7),
 ]
 VISITS: list[Axiom] = [
-    value('visitedAt', place, NOW - place_number)
-    for place_number, place in enumerate(SEVEN_ROOMS)
+    value('visitedAt', place, NOW - place_number) for place_number, place in enumerate(SEVEN_ROOMS)
 ]
 PLACES_DIFFER, DOORS_DIFFER = different(SEVEN_ROOMS), different(DOORS)
 

@@ -71,7 +71,9 @@ class RandomOntology:
         if choice == 6:
             return ax.ObjectSomeValuesFrom(self.prop(), self.filler())
         if choice == 7:
-            return ax.ObjectMinCardinality(self.random.choice([1, 2, 2, 3]), self.prop(), self.filler())
+            return ax.ObjectMinCardinality(
+                self.random.choice([1, 2, 2, 3]), self.prop(), self.filler()
+            )
         if choice == 8:
             if self.random.random() < 0.5:
                 return ax.ObjectHasValue(self.prop(), self.random.choice(INDIVIDUALS))
@@ -93,7 +95,9 @@ class RandomOntology:
         if choice == 6:
             return ax.ObjectAllValuesFrom(self.prop(), self.named())
         if choice == 7:
-            return ax.ObjectMaxCardinality(self.random.choice([0, 1, 1, 2]), self.prop(), self.filler())
+            return ax.ObjectMaxCardinality(
+                self.random.choice([0, 1, 1, 2]), self.prop(), self.filler()
+            )
         if choice == 8:
             return ax.ObjectHasValue(self.prop(), self.random.choice(INDIVIDUALS))
         if choice == 9:
@@ -138,7 +142,10 @@ class RandomOntology:
             body = (value(s, _X, _V), link(p, _X, _Y), value(t, _Y, _W))
             body = (*body, ax.BuiltinAtom(compare, (_V, _W)))
             return ax.Rule(body, (link(q, _Y, _X),))
-        body = (value(s, _X, _V), ax.BuiltinAtom(SWRLB + 'add', (_W, _V, Literal('1', XSD + 'integer'))))
+        body = (
+            value(s, _X, _V),
+            ax.BuiltinAtom(SWRLB + 'add', (_W, _V, Literal('1', XSD + 'integer'))),
+        )
         limit = ax.BuiltinAtom(SWRLB + 'lessThan', (_V, Literal('5', XSD + 'integer')))
         return ax.Rule((*body, limit), (value(t, _X, _W),))
 
@@ -158,7 +165,9 @@ class RandomOntology:
         if choice == 9:
             return ax.InverseObjectProperties(objects, self.random.choice(OBJECTS))
         if choice == 10:
-            return self.random.choice([ax.SymmetricObjectProperty, ax.TransitiveObjectProperty])(objects)
+            return self.random.choice([ax.SymmetricObjectProperty, ax.TransitiveObjectProperty])(
+                objects
+            )
         if choice == 11:
             return ax.SubPropertyChainOf((prop, self.prop()), objects)
         if choice == 12:
@@ -179,7 +188,7 @@ class RandomOntology:
         if choice == 19:
             if self.random.random() < 0.5:
                 return ax.HasKey(self.named(), (), (self.random.choice(DATAS),))
-            return ax.DisjointObjectProperties((prop, self.random.choice(OBJECTS)))
+            return ax.DisjointObjectProperties(tuple(self.random.sample(OBJECTS, 2)))
         return self.rule()
 
     def assertion(self) -> Axiom:

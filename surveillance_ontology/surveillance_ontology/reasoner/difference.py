@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import Protocol
 
 from surveillance_ontology.axioms import DifferentIndividuals
-from surveillance_ontology.reasoner.clauses import Predicate, Premises, Program
+from surveillance_ontology.reasoner.clauses import Fact, Predicate, Premises, Program
 
 _MAX_DEPTH = 6
 
@@ -191,6 +191,10 @@ class DisjointPropertyEvidence:
 
     def premises(self, x: str, y: str) -> Iterator[Premises]:
         first, second = self._first, self._second
+        if first.kind == 'object':
+            ours, theirs = _among(first, x, y), _among(second, x, y)
+            if ours is not None and theirs is not None:
+                yield (ours, theirs)
         if self._turned:
             of_subject, of_value = second.pred, second.succ
         else:
@@ -203,6 +207,16 @@ class DisjointPropertyEvidence:
                 for subject in first.pred.get(one, set()) & of_value.get(other, set()):
                     fact = (second, other, subject) if self._turned else (second, subject, other)
                     yield ((first, subject, one), fact)
+
+
+def _among(predicate: Predicate, x: str, y: str) -> Fact | None:
+    """A fact that relates the two, or one of them to itself: a loop, were they one."""
+    for subject in (x, y):
+        values = predicate.succ.get(subject, ())
+        for value in (x, y):
+            if value in values:
+                return (predicate, subject, value)
+    return None
 
 
 def clique(

@@ -7,8 +7,9 @@ reported, with the axiom, in `Program.unsupported`.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from itertools import product
+from typing import Any
 
 from surveillance_ontology import axioms as ax
 from surveillance_ontology.axiom_text import axiom_text, expression_text
@@ -67,6 +68,7 @@ class Normaliser:
         self._recognised: set[ClassExpression] = set()
         self._complements: dict[str, Predicate] = {}
         self._origin: Axiom | None = None
+        self._context = 'the ontology'
         tbox = [
             axiom
             for axiom in axioms
@@ -80,17 +82,11 @@ class Normaliser:
         self.hierarchy = PropertyHierarchy(tbox)
         for axiom in tbox:
             self._origin = axiom
-            try:
-                self._axiom(axiom)
-            except Unsupported as reason:
-                self.program.unsupported.append(f'{axiom_text(axiom)}: {reason}')
+            self._attempt(self._axiom, axiom)
         self._origin = None
         for expression in asserted:
-            try:
-                self.label_asserted(expression)
-            except Unsupported as reason:
-                text = expression_text(expression)
-                self.program.unsupported.append(f'assertions of {text}: {reason}')
+            self._context = f'assertions of {expression_text(expression)}'
+            self._attempt(self.label_asserted, expression)
         for kind, iri in negated:
             self._negate(kind, iri)
         self._complement_labels()
@@ -100,6 +96,16 @@ class Normaliser:
             for clause in self.program.clauses
         ):
             self._contradict((self._differs(_X, _X),), _X)
+
+    def _attempt(self, add: Callable[..., None], *parts: Any) -> None:
+        """Adds what can be added of an axiom; the rest is reported."""
+        try:
+            add(*parts)
+        except Unsupported as reason:
+            subject = self._context if self._origin is None else axiom_text(self._origin)
+            text = f'{subject}: {reason}'
+            if text not in self.program.unsupported:
+                self.program.unsupported.append(text)
 
     def _differs(self, x: Term, y: Term) -> PredicateAtom:
         return PredicateAtom(self.program.different, (x, y))
@@ -313,7 +319,7 @@ class Normaliser:
                 self._clause(body, PredicateAtom(self.program.cls(expression), (x,)))
         elif isinstance(expression, ax.ObjectIntersectionOf):
             for operand in expression.operands:
-                self._imply(body, operand, x)
+                self._attempt(self._imply, body, operand, x)
         elif isinstance(expression, ax.ObjectUnionOf):
             self._imply_union(body, expression, x)
         elif isinstance(expression, ax.ObjectOneOf):
@@ -441,14 +447,14 @@ class Normaliser:
             for sub in axiom.classes:
                 for sup in axiom.classes:
                     if sub is not sup:
-                        self._sub_class(sub, sup)
+                        self._attempt(self._sub_class, sub, sup)
         elif isinstance(axiom, ax.DisjointClasses):
             self._all_disjoint(axiom.classes)
         elif isinstance(axiom, ax.DisjointUnion):
             self._all_disjoint(axiom.classes)
             for part in axiom.classes:
-                self._sub_class(part, axiom.cls)
-            self._sub_class(axiom.cls, ax.ObjectUnionOf(axiom.classes))
+                self._attempt(self._sub_class, part, axiom.cls)
+            self._attempt(self._sub_class, axiom.cls, ax.ObjectUnionOf(axiom.classes))
         elif isinstance(axiom, ax.Rule):
             from surveillance_ontology.reasoner.swrl_rules import normalise_rule
 
@@ -466,7 +472,7 @@ class Normaliser:
         sub, sup = normal(sub), normal(sup)
         if isinstance(sub, ax.ObjectUnionOf):
             for operand in sub.operands:
-                self._sub_class(operand, sup)
+                self._attempt(self._sub_class, operand, sup)
             return
         if isinstance(sub, str) and isinstance(sup, ax.ObjectComplementOf):
             if isinstance(sup.operand, str):

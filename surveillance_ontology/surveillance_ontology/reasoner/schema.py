@@ -16,21 +16,30 @@ from surveillance_ontology import axioms as ax
 from surveillance_ontology.axioms import Axiom, ClassExpression
 from surveillance_ontology.reasoner.clauses import (
     Clause,
+    Constant,
     Existential,
     Fact,
     Predicate,
     PredicateAtom,
     Program,
 )
+from surveillance_ontology.reasoner.datatypes import Value
 from surveillance_ontology.reasoner.engine import Engine
 from surveillance_ontology.reasoner.normalisation import Normaliser
 from surveillance_ontology.reasoner.simplification import simplify
 
 _ROOT = '_:prototype'
+_MADE_UP = '_:made'
 _MAX_DEPTH = 3
 _MAX_MADE_UP = 200
 _MAX_PAIRS = 400
 _MAX_COUNT = 12
+_MAX_PROPERTIES = 24
+
+
+# What a prototype turned out to be: a member of a class, or related to a named individual or a value, as
+# (predicate, whether it is the second argument, the other argument).
+Finding = Predicate | tuple[Predicate, bool, Value]
 
 
 class Schema:
@@ -61,7 +70,10 @@ class Schema:
             for axiom in tbox
             if isinstance(axiom, ax.Declaration) and axiom.kind == 'class'
         ]
-        self._hierarchy(tbox, asserted)
+        without_rules = [axiom for axiom in tbox if not isinstance(axiom, ax.Rule)]
+        prototypes = _Prototypes(Normaliser(without_rules, asserted, abstract=True))
+        self._hierarchy(prototypes)
+        self._exclusions(prototypes)
         labels = [self.program.labels[expression] for expression in asserted]
         simplify(self.program, labels)
 
@@ -86,10 +98,7 @@ class Schema:
         """Named classes that can have no members."""
         return set(self._impossible)
 
-    def _hierarchy(self, tbox: list[Axiom], asserted: tuple[ClassExpression, ...]) -> None:
-        without_rules = [axiom for axiom in tbox if not isinstance(axiom, ax.Rule)]
-        normaliser = Normaliser(without_rules, asserted, abstract=True)
-        prototypes = _Prototypes(normaliser)
+    def _hierarchy(self, prototypes: _Prototypes) -> None:
         names = dict.fromkeys([*self._classes, *self.program.classes])
         for name in names:
             self._above[name] = frozenset()
@@ -102,15 +111,17 @@ class Schema:
                 extra[self._clause((own,), None)] = None
                 continue
             self._above[name] = frozenset(
-                predicate.expression for predicate in found if isinstance(predicate.expression, str)
+                finding.expression
+                for finding in found
+                if isinstance(finding, Predicate) and isinstance(finding.expression, str)
             )
             plain = prototypes.consequences((own,), make_up=False) or set()
-            for predicate in found - plain:
-                extra[self._clause((own,), predicate)] = None
+            for finding in found - plain:
+                extra[self._clause((own,), finding)] = None
         existentials = list(
             dict.fromkeys(existential.label for existential in prototypes.program.existentials)
         )
-        alone: dict[Predicate, set[Predicate]] = {}
+        alone: dict[Predicate, set[Finding]] = {}
         for label in existentials:
             found = prototypes.consequences((label,))
             plain = prototypes.consequences((label,), make_up=False) or set()
@@ -118,8 +129,8 @@ class Schema:
             if found is None:
                 extra[self._clause((label,), None)] = None
             else:
-                for predicate in found - plain:
-                    extra[self._clause((label,), predicate)] = None
+                for finding in found - plain:
+                    extra[self._clause((label,), finding)] = None
         pairs = 0
         for label in existentials:
             for other in prototypes.interacting(label):
@@ -134,9 +145,28 @@ class Schema:
                 if both is None:
                     extra[self._clause((label, other), None)] = None
                     continue
-                for predicate in both - known - alone[label] - alone.get(other, set()):
-                    extra[self._clause((label, other), predicate)] = None
+                for finding in both - known - alone[label] - alone.get(other, set()):
+                    extra[self._clause((label, other), finding)] = None
         self.program.clauses += [clause for clause in extra if clause.head not in clause.body]
+
+    def _exclusions(self, prototypes: _Prototypes) -> None:
+        """Finds the properties that can relate nothing to itself, or never the same two individuals."""
+        program = self.program
+        if not (program.irreflexive or program.asymmetric or program.disjoint_properties):
+            return
+        props = list(program.objects)[:_MAX_PROPERTIES]
+        known = set(program.irreflexive)
+        for name in props:
+            if program.objects[name] not in known and prototypes.excludes((name, False)):
+                program.irreflexive.append(program.objects[name])
+        pairs = set(program.disjoint_properties)
+        for place, name in enumerate(props):
+            for other in props[place:]:
+                for turned in (False, True):
+                    pair = (program.objects[name], False, program.objects[other], turned)
+                    if (name != other or turned) and pair not in pairs:
+                        if prototypes.excludes((name, False), (other, turned), loop=False):
+                            program.disjoint_properties.append(pair)
 
     def _own(self, predicate: Predicate) -> Predicate:
         """The predicate of this program that stands for the same expression."""
@@ -148,9 +178,18 @@ class Schema:
             self.program.labels[predicate.expression] = found
         return found
 
-    def _clause(self, body: tuple[Predicate, ...], head: Predicate | None) -> Clause:
-        conclusion = self.program.nothing if head is None else self._own(head)
+    def _clause(self, body: tuple[Predicate, ...], head: Finding | None) -> Clause:
+        program = self.program
         atoms = tuple(PredicateAtom(self._own(predicate), (0,)) for predicate in body)
+        if isinstance(head, tuple):
+            predicate, turned, other = head
+            if predicate.kind == 'data':
+                atom = PredicateAtom(program.data(predicate.name), (0, Constant(other, True)))
+            else:
+                terms = (Constant(other), 0) if turned else (0, Constant(other))
+                atom = PredicateAtom(program.object(predicate.name), terms)
+            return Clause(atoms, atom)
+        conclusion = program.nothing if head is None else self._own(head)
         return Clause(atoms, PredicateAtom(conclusion, (0,)))
 
 
@@ -197,7 +236,7 @@ class _Prototypes:
 
     def consequences(
         self, labels: tuple[Predicate, ...], make_up: bool = True
-    ) -> set[Predicate] | None:
+    ) -> set[Finding] | None:
         """What a member of all labels is, the labels included; None where there can be none."""
         engine = self._engine
         engine.restart([(label, _ROOT) for label in labels])
@@ -206,8 +245,32 @@ class _Prototypes:
         if not engine.consistent:
             return None
         root = engine.equality.find(_ROOT)
-        found = [*self.program.classes.values(), *self.program.labels.values()]
-        return {predicate for predicate in found if root in predicate.members}
+        classes = [*self.program.classes.values(), *self.program.labels.values()]
+        found: set[Finding] = {predicate for predicate in classes if root in predicate.members}
+        for predicate in self.program.objects.values():
+            for turned, related in ((False, predicate.succ), (True, predicate.pred)):
+                found.update(
+                    (predicate, turned, other)
+                    for other in related.get(root, ())
+                    if not other.startswith((_ROOT, _MADE_UP))
+                )
+        for predicate in self.program.datas.values():
+            found.update(
+                (predicate, False, value)
+                for value in predicate.succ.get(root, ())
+                if not (isinstance(value, tuple) and value[0] == 'some')
+            )
+        return found
+
+    def excludes(self, *props: tuple[str, bool], loop: bool = True) -> bool:
+        """Whether the properties (IRI, turned) cannot all relate one individual to itself, or to another."""
+        target = _ROOT if loop else _ROOT + '2'
+        facts: list[Fact] = []
+        for name, turned in props:
+            pair = (target, _ROOT) if turned else (_ROOT, target)
+            facts.append((self.program.object(name), *pair))
+        self._engine.restart(facts)
+        return not self._engine.consistent
 
     def _make_up(self) -> None:
         engine, numbers = self._engine, count()
@@ -236,7 +299,7 @@ class _Prototypes:
         if prop.kind == 'data':
             return [(prop, owner, ('some', existential.filler, next(numbers))) for _ in range(n)]
         filler = self._filled(existential)
-        names = [f'_:made{next(numbers)}' for _ in range(n)]
+        names = [f'{_MADE_UP}{next(numbers)}' for _ in range(n)]
         for name in names:
             depth[name] = depth[owner] + 1
             facts.append((prop, name, owner) if existential.inverse else (prop, owner, name))

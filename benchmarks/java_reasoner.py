@@ -1,0 +1,87 @@
+"""Resident Java reasoners (the copies that owlready2 brings) as subprocesses, for comparison only."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import select
+import shutil
+import subprocess
+from pathlib import Path
+
+SOURCE = Path(__file__).parent / 'java' / 'ResidentReasoner.java'
+KINDS = ('pellet', 'hermit')
+
+
+class JavaFailed(Exception):
+    """The reasoner refused, failed, or took too long; the text is one line."""
+
+
+def absent() -> str:
+    """Why no Java reasoner can run here; '' when one can."""
+    if shutil.which('java') is None or shutil.which('javac') is None:
+        return 'no Java development kit'
+    if importlib.util.find_spec('owlready2') is None:
+        return 'owlready2 is not installed'
+    return ''
+
+
+def _classpath() -> str:
+    found = importlib.util.find_spec('owlready2')
+    assert found is not None and found.origin is not None
+    folder = Path(found.origin).parent
+    jars = sorted((folder / 'pellet').glob('*.jar'))
+    return os.pathsep.join([*map(str, jars), str(folder / 'hermit' / 'HermiT.jar')])
+
+
+class JavaReasoner:
+    """One reasoner in a JVM of its own.
+
+    Args:
+        kind: One of `KINDS`.
+        memory: Largest heap, megabytes.
+        timeout: Longest wait for one answer, seconds.
+
+    Raises:
+        JavaFailed: From every method, when the JVM fails or does not answer in time.
+    """
+
+    def __init__(self, kind: str, memory: int = 2000, timeout: float = 60.0) -> None:
+        command = ['java', f'-Xmx{memory}m', '-cp', _classpath(), str(SOURCE), kind]
+        self._timeout = timeout
+        self._process = subprocess.Popen(
+            command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            text=True,
+        )
+
+    def ask(self, *words: str) -> str:
+        """Sends a command; its answer."""
+        process = self._process
+        assert process.stdin is not None and process.stdout is not None
+        try:
+            process.stdin.write('\t'.join(words) + '\n')
+            process.stdin.flush()
+        except BrokenPipeError:
+            raise JavaFailed('the JVM ended') from None
+        ready, _, _ = select.select([process.stdout], [], [], self._timeout)
+        if not ready:
+            self.close()
+            raise JavaFailed(f'no answer within {self._timeout:g} s')
+        answer = process.stdout.readline().strip()
+        if not answer or answer.startswith('error'):
+            raise JavaFailed(answer.removeprefix('error ') or 'the JVM ended')
+        return answer
+
+    def close(self) -> None:
+        """Ends the JVM."""
+        self._process.kill()
+        self._process.wait()
+
+    def __enter__(self) -> JavaReasoner:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
