@@ -123,6 +123,9 @@ class Outgoing:
         """
         # A copy: the caller's message is used again by the next execution.
         message = copy.deepcopy(self.message) if self.message is not None else self.message_type()
+        # Messages check their fields' types on request only, and there is no public way to ask
+        # for it after construction.
+        message._check_fields = True
         try:
             if self.key is not None:
                 message = ud[self.key]

@@ -1,0 +1,522 @@
+"""No state that talks to ROS can hang: each fault ends in a declared outcome, within its time."""
+
+from __future__ import annotations
+
+import threading
+
+import pytest
+import rclpy
+from action_msgs.msg import GoalStatus
+from geometry_msgs.msg import Point
+from rclpy.action import ActionServer, CancelResponse, GoalResponse
+from rclpy.duration import Duration
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.task import Future
+from std_msgs.msg import Int32
+from std_srvs.srv import SetBool, Trigger
+
+from surveillance_behaviour import fsm
+from surveillance_behaviour.fsm_ros import (
+    ActionServerWrapper,
+    ConditionState,
+    MonitorState,
+    ServiceState,
+    SimpleActionState,
+    set_preempt_handler,
+)
+from surveillance_interfaces.action import FollowPath
+from surveillance_runtime.goals import GoalAborted, GoalServer
+from surveillance_runtime.node import PatrolNode
+
+from .states import Answer, Background, Waiter, began
+
+SHORT = 0.3
+LONG = 20.0
+
+
+def machine_of(state, userdata=None):
+    machine = fsm.StateMachine(state.get_registered_outcomes())
+    machine.set_name('ROOT')
+    for key, value in (userdata or {}).items():
+        machine.userdata[key] = value
+    with machine:
+        fsm.StateMachine.add('STATE', state)
+    return machine
+
+
+class SilentServer(PatrolNode):
+    """A service that never answers."""
+
+    def __init__(self, **options):
+        super().__init__('silent', **options)
+        self.asked = threading.Event()
+        self.create_service(Trigger, 'trigger', self._serve)
+
+    async def _serve(self, request, response):
+        self.asked.set()
+        await Future()
+        return response
+
+
+class ScriptedActionServer(PatrolNode):
+    """An action server that accepts, refuses or drops as it is told."""
+
+    accept = True
+    cancel = CancelResponse.ACCEPT
+
+    def __init__(self, **options):
+        super().__init__('scripted', **options)
+        self.began = threading.Event()
+        self.cancelled = threading.Event()
+        self._hold = Future()
+        self._server = ActionServer(
+            self,
+            FollowPath,
+            'follow_path',
+            self._execute,
+            goal_callback=lambda _: GoalResponse.ACCEPT if self.accept else GoalResponse.REJECT,
+            cancel_callback=self._cancel,
+        )
+        self.own(self._server)
+
+    def _cancel(self, _handle):
+        self.cancelled.set()
+        return self.cancel
+
+    async def _execute(self, handle):
+        self.began.set()
+        await self._hold
+        return FollowPath.Result()
+
+
+class Refusing(ScriptedActionServer):
+    accept = False
+
+
+class Stubborn(ScriptedActionServer):
+    cancel = CancelResponse.REJECT
+
+
+def service(node, **arguments):
+    return ServiceState(node, 'trigger', Trigger, **{'timeout': LONG, **arguments})
+
+
+def action(node, **arguments):
+    times = {'server_wait_timeout': LONG, 'preempt_timeout': LONG}
+    return SimpleActionState(node, 'follow_path', FollowPath, **{**times, **arguments})
+
+
+# Services.
+
+
+def test_a_service_that_is_absent_aborts_in_time(graph, caplog):
+    assert machine_of(service(graph.node, timeout=SHORT)).execute() == 'aborted'
+    assert "Service 'trigger'" in caplog.text
+
+
+def test_a_service_that_never_answers_aborts_in_time(graph):
+    graph.add(SilentServer)
+    state = service(graph.node, timeout=Duration(seconds=SHORT))
+    assert machine_of(state).execute() == 'aborted'
+
+
+def test_a_preempt_ends_waiting_for_a_service_and_for_its_answer(graph):
+    for present in (False, True):
+        server = graph.add(SilentServer) if present else None
+        machine = machine_of(service(graph.node))
+        run = Background(machine)
+        if server is not None:
+            assert server.asked.wait(10.0)
+        machine.request_preempt()
+        assert run.result() == 'preempted'
+        assert not machine.preempt_requested()
+
+
+def test_a_service_server_that_dies_before_it_answers(graph):
+    server = graph.add(SilentServer)
+    machine = machine_of(service(graph.node, timeout=1.0))
+    run = Background(machine)
+    assert server.asked.wait(10.0)
+    graph.remove(server)
+    assert run.result() == 'aborted'
+
+
+def unspun_node():
+    context = rclpy.Context()
+    rclpy.init(context=context)
+    return context, PatrolNode('unspun', context=context, use_global_arguments=False)
+
+
+@pytest.mark.parametrize('kind', [service, action])
+def test_an_executor_that_does_not_spin_aborts_in_time(graph, kind):
+    context, node = unspun_node()
+    try:
+        graph.add(SilentServer)
+        graph.add(ScriptedActionServer)
+        if kind is service:
+            state = service(node, timeout=SHORT)
+        else:
+            state = action(node, server_wait_timeout=SHORT)
+        assert machine_of(state).execute() == 'aborted'
+    finally:
+        node.destroy_node()
+        rclpy.try_shutdown(context=context)
+
+
+def test_a_service_gets_its_request_from_userdata_and_gives_its_response_back(graph):
+    def serve(request, response):
+        response.success = request.data
+        response.message = 'served'
+        return response
+
+    graph.node.create_service(SetBool, 'switch', serve)
+    request = SetBool.Request()
+
+    @fsm.cb_interface(input_keys=['wanted'], outcomes=['refused'])
+    def judge(ud, response):
+        return None if response.success == ud.wanted else 'refused'
+
+    state = ServiceState(
+        graph.node,
+        'switch',
+        SetBool,
+        request,
+        request_slots=['data'],
+        response_cb=judge,
+        response_key='answer',
+        response_slots=['message'],
+        timeout=LONG,
+    )
+    machine = machine_of(state, {'data': True, 'wanted': True})
+    assert machine.execute() == 'succeeded'
+    assert machine.userdata.message == 'served'
+    assert machine.userdata.answer.success
+    assert not request.data
+    machine.userdata.wanted = False
+    assert machine.execute() == 'refused'
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'userdata', 'words'),
+    [
+        ({'request_slots': ['data']}, {}, "'data'"),
+        ({'request_slots': ['data']}, {'data': 'no bool'}, 'data'),
+        ({'request_key': 'request'}, {'request': 5}, 'int'),
+        ({'request_cb': lambda ud, request: 1 / 0}, {}, 'ZeroDivisionError'),
+        ({'request_cb': lambda ud, request: 'text'}, {}, 'str'),
+        ({'response_cb': lambda ud, response: 'nix'}, {}, "'nix'"),
+        ({'response_cb': lambda ud, response: ud.nix}, {}, "'nix'"),
+    ],
+)
+def test_a_wrong_request_or_callback_aborts_with_a_word(graph, caplog, arguments, userdata, words):
+    graph.node.create_service(SetBool, 'switch', lambda request, response: response)
+    state = ServiceState(graph.node, 'switch', SetBool, timeout=LONG, **arguments)
+    assert machine_of(state, userdata).execute() == 'aborted'
+    assert words in caplog.text
+
+
+@pytest.mark.parametrize(
+    'arguments',
+    [
+        {'request_slots': ['nix']},
+        {'response_slots': ['nix']},
+        {'request_cb': 5},
+        {'response_cb': 5},
+        {'request': 5},
+    ],
+)
+def test_wrong_arguments_are_refused_at_construction(graph, arguments):
+    with pytest.raises(fsm.InvalidStateError):
+        ServiceState(graph.node, 'switch', SetBool, **arguments)
+
+
+# Actions.
+
+
+def test_an_action_server_that_is_absent_aborts_in_time(graph):
+    assert machine_of(action(graph.node, server_wait_timeout=SHORT)).execute() == 'aborted'
+
+
+def test_a_goal_that_is_rejected_aborts(graph, caplog):
+    graph.add(Refusing)
+    assert machine_of(action(graph.node)).execute() == 'aborted'
+    assert 'rejected the goal' in caplog.text
+
+
+def test_an_action_server_that_dies_in_the_middle_aborts(graph):
+    server = graph.add(ScriptedActionServer)
+    run = Background(machine_of(action(graph.node)))
+    assert server.began.wait(10.0)
+    graph.remove(server)
+    assert run.result() == 'aborted'
+
+
+def test_a_result_that_comes_too_late_is_not_waited_for(graph):
+    server = graph.add(ScriptedActionServer)
+    state = action(graph.node, exec_timeout=SHORT, preempt_timeout=SHORT)
+    assert machine_of(state).execute() == 'aborted'
+    assert server.cancelled.wait(10.0)
+
+
+def test_a_preempt_cancels_the_goal(graph):
+    ends = []
+
+    def execute(goal, run):
+        began_event.set()
+        ends.append(run.sleep(LONG))
+        return FollowPath.Result()
+
+    began_event = threading.Event()
+    server = graph.add(PatrolNode, name='server')
+    GoalServer(server, FollowPath, 'follow_path', execute)
+    machine = machine_of(action(graph.node))
+    run = Background(machine)
+    assert began_event.wait(10.0)
+    machine.request_preempt()
+    assert run.result() == 'preempted'
+    assert ends == [False]
+    assert not machine.preempt_requested()
+
+
+def test_a_server_that_refuses_to_cancel_is_given_up_in_time(graph):
+    server = graph.add(Stubborn)
+    machine = machine_of(action(graph.node, preempt_timeout=SHORT))
+    run = Background(machine)
+    assert server.began.wait(10.0)
+    machine.request_preempt()
+    assert run.result() == 'preempted'
+    assert server.cancelled.is_set()
+
+
+def test_a_preempt_ends_waiting_for_an_action_server(graph):
+    machine = machine_of(action(graph.node))
+    run = Background(machine)
+    machine.request_preempt()
+    assert run.result() == 'preempted'
+
+
+def test_an_executor_that_stops_in_the_middle_aborts(graph):
+    graph.add(ScriptedActionServer)
+    from surveillance_runtime.node import ExecutorThread
+
+    context = rclpy.Context()
+    rclpy.init(context=context)
+    node = PatrolNode('client', context=context, use_global_arguments=False)
+    spinner = ExecutorThread(context)
+    spinner.executor.add_node(node)
+    spinner.start()
+    state = action(node, server_wait_timeout=1.5, preempt_timeout=SHORT)
+    server = next(n for n in graph._nodes if isinstance(n, ScriptedActionServer))
+    run = Background(machine_of(state))
+    try:
+        assert server.began.wait(10.0)
+        spinner.stop()
+        assert run.result() == 'aborted'
+    finally:
+        node.destroy_node()
+        rclpy.try_shutdown(context=context)
+
+
+def test_an_action_gets_its_goal_from_userdata_and_gives_its_result_back(graph):
+    seen = []
+
+    def execute(goal, run):
+        for point in goal.path:
+            run.feedback(FollowPath.Feedback(position=point))
+        return FollowPath.Result(position=goal.path[-1])
+
+    server = graph.add(PatrolNode, name='server')
+    GoalServer(server, FollowPath, 'follow_path', execute)
+
+    @fsm.cb_interface(input_keys=['path'], output_keys=['status'], outcomes=['arrived'])
+    def result_cb(ud, status, result, tolerance):
+        ud.status = status
+        return 'arrived' if abs(result.position.x - ud.path[-1].x) < tolerance else None
+
+    state = action(
+        graph.node,
+        goal_slots=['path'],
+        result_slots=['position'],
+        result_cb=result_cb,
+        result_cb_args=[0.1],
+        feedback_cb=lambda ud, feedback: seen.append(feedback.position.x),
+    )
+    path = [Point(x=1.0), Point(x=2.0)]
+    machine = machine_of(state, {'path': path})
+    assert machine.execute() == 'arrived'
+    assert machine.userdata.status == GoalStatus.STATUS_SUCCEEDED
+    assert machine.userdata.position.x == 2.0
+    graph.until(lambda: seen == [1.0, 2.0])
+
+
+def test_an_aborted_goal_aborts(graph):
+    def execute(goal, run):
+        raise GoalAborted('no path')
+
+    server = graph.add(PatrolNode, name='server')
+    GoalServer(server, FollowPath, 'follow_path', execute)
+    assert machine_of(action(graph.node)).execute() == 'aborted'
+
+
+# Topics and conditions.
+
+
+@pytest.mark.parametrize(
+    ('values', 'max_checks', 'expected'), [((50, 3), -1, 'invalid'), ((50,), 3, 'valid')]
+)
+def test_a_topic_is_watched_until_a_message_is_wrong_or_enough_were_right(
+    graph, values, max_checks, expected
+):
+    publisher = graph.node.create_publisher(Int32, 'level', 10)
+    seen = []
+
+    def condition(ud, message):
+        seen.append(message.data)
+        return message.data > ud.low
+
+    state = MonitorState(graph.node, 'level', Int32, condition, max_checks, ['low'])
+    machine = machine_of(state, {'low': 10})
+    run = Background(machine)
+    for value in values:
+        graph.until(lambda value=value: publisher.publish(Int32(data=value)) or value in seen)
+    graph.until(lambda: publisher.publish(Int32(data=values[-1])) or not machine.is_running())
+    assert run.result() == expected
+
+
+def test_a_topic_that_falls_silent_is_invalid_in_time(graph):
+    state = MonitorState(graph.node, 'level', Int32, lambda ud, message: True, timeout=SHORT)
+    assert machine_of(state).execute() == 'invalid'
+
+
+def test_a_preempt_ends_watching(graph):
+    machine = machine_of(MonitorState(graph.node, 'level', Int32, lambda ud, message: True))
+    run = Background(machine)
+    machine.request_preempt()
+    assert run.result() == 'preempted'
+
+
+def test_a_condition_callback_that_raises_makes_a_topic_invalid(graph, caplog):
+    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    graph.node.create_publisher(Int32, 'level', latched).publish(Int32(data=5))
+    state = MonitorState(graph.node, 'level', Int32, lambda ud, message: 1 / 0, qos=latched)
+    assert machine_of(state).execute() == 'invalid'
+    assert 'ZeroDivisionError' in caplog.text
+
+
+def test_a_condition_is_checked_so_often_and_no_longer(graph):
+    checks = []
+    state = ConditionState(
+        graph.node, lambda ud: checks.append(1) and False, poll_rate=0.01, max_checks=3
+    )
+    assert machine_of(state).execute() == 'false'
+    assert len(checks) == 3
+    checks.clear()
+    state = ConditionState(
+        graph.node,
+        lambda ud: checks.append(1) or len(checks) == 2,
+        poll_rate=Duration(seconds=0.01),
+        max_checks=-1,
+    )
+    assert machine_of(state).execute() == 'true'
+    state = ConditionState(graph.node, lambda ud: False, timeout=0.05, max_checks=-1)
+    assert machine_of(state).execute() == 'false'
+
+
+def test_a_preempt_ends_checking_a_condition(graph):
+    checked = threading.Event()
+    state = ConditionState(graph.node, lambda ud: checked.set(), poll_rate=1000.0, max_checks=-1)
+    machine = machine_of(state)
+    run = Background(machine)
+    assert checked.wait(5.0)
+    machine.request_preempt()
+    assert run.result() == 'preempted'
+
+
+# A machine as an action server, and its end with the node.
+
+
+def wrapped(graph, container, **arguments):
+    server = graph.add(PatrolNode, name='server')
+    wrapper = ActionServerWrapper(
+        server,
+        'follow_path',
+        FollowPath,
+        container,
+        succeeded_outcomes=['done'],
+        aborted_outcomes=['aborted'],
+        preempted_outcomes=['preempted'],
+        **arguments,
+    )
+    wrapper.run_server()
+    return wrapper
+
+
+def container_of(state):
+    container = fsm.StateMachine(
+        ['done', 'aborted', 'preempted'], input_keys=['path'], output_keys=['position']
+    )
+    with container:
+        fsm.StateMachine.add('STATE', state)
+    return container
+
+
+def test_a_machine_serves_an_action(graph):
+    def drive(ud):
+        ud.position = ud.path[-1]
+        return 'done'
+
+    state = fsm.CBState(drive, outcomes=['done'], input_keys=['path'], output_keys=['position'])
+    wrapped(graph, container_of(state), expand_goal_slots=True, pack_result_slots=True)
+    client = machine_of(
+        action(graph.node, goal_slots=['path'], result_slots=['position']),
+        {'path': [Point(x=4.0)]},
+    )
+    for _ in range(2):
+        assert client.execute() == 'succeeded'
+        assert client.userdata.position.x == 4.0
+
+
+@pytest.mark.parametrize(
+    'state', [Answer('aborted'), Answer(RuntimeError('broken'), outcomes=['done'])]
+)
+def test_a_machine_that_fails_aborts_the_goal(graph, state):
+    wrapped(graph, container_of(state), expand_goal_slots=True)
+    assert machine_of(action(graph.node)).execute() == 'aborted'
+
+
+def test_a_cancel_preempts_the_machine_and_the_next_goal_starts_afresh(graph):
+    waiter = Waiter(LONG)
+    wrapped(graph, container_of(waiter), expand_goal_slots=True)
+    for _ in range(2):
+        client = machine_of(action(graph.node))
+        run = Background(client)
+        began(waiter, 10.0)
+        client.request_preempt()
+        assert run.result() == 'preempted'
+
+
+def test_outcomes_of_a_wrapper_are_named_once_and_exist(graph):
+    for outcomes in (['done', 'nix'], ['preempted']):
+        with pytest.raises(fsm.InvalidStateError):
+            ActionServerWrapper(
+                graph.node,
+                'follow_path',
+                FollowPath,
+                container_of(Answer('done')),
+                succeeded_outcomes=outcomes,
+                preempted_outcomes=['preempted'],
+            )
+
+
+def test_a_machine_is_preempted_when_its_node_stops_or_ros_goes_down():
+    for stop in (lambda context, node: node.stop(), lambda context, node: context.shutdown()):
+        context, node = unspun_node()
+        waiter = Waiter(LONG)
+        machine = machine_of(waiter)
+        set_preempt_handler(node, machine)
+        run = Background(machine)
+        began(waiter)
+        stop(context, node)
+        assert run.result() == 'preempted'
+        node.destroy_node()
+        rclpy.try_shutdown(context=context)
