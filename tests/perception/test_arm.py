@@ -1,0 +1,235 @@
+"""The arm's aim, its motions and the driver that watches over them."""
+
+from __future__ import annotations
+
+import math
+import threading
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from surveillance_perception.arm_driver import ArmDriver, ArmError
+from surveillance_perception.arm_kinematics import (
+    AIM_TOLERANCE,
+    UnreachableError,
+    direction_of,
+    look_at,
+)
+from surveillance_perception.arm_trajectory import (
+    ArmState,
+    TrajectoryError,
+    motion_to,
+    motion_to_rest,
+)
+from surveillance_runtime.robot_arm import ARM, Arm, Joint
+
+HOME = np.array(ARM.home)
+LIMITED = settings(max_examples=60, derandomize=True, deadline=None)
+joint_positions = st.tuples(
+    *(st.floats(joint.lower, joint.upper) for joint in ARM.joints)
+).map(np.array)
+
+
+@LIMITED
+@given(
+    azimuth=st.floats(-math.pi, math.pi),
+    elevation=st.floats(-1.5, 1.5),
+    distance=st.floats(1.0, 20.0),
+)
+def test_camera_looks_at_any_point_around_upright(azimuth, elevation, distance):
+    target = np.array([0.0, 0.0, 0.7]) + distance * direction_of(azimuth, elevation)
+    aim = look_at(ARM, target, HOME)
+    assert (aim.positions >= ARM.lower).all()
+    assert (aim.positions <= ARM.upper).all()
+    frame = ARM.camera_frame(aim.positions)
+    sight = target - frame[:3, 3]
+    assert math.acos(min(1.0, frame[:3, 2] @ sight / np.linalg.norm(sight))) < AIM_TOLERANCE
+    assert abs(frame[2, 0]) < math.sin(AIM_TOLERANCE)
+
+
+def test_point_beyond_the_limits_is_refused_and_says_what_is_left():
+    narrow = Arm(
+        joints=tuple(
+            Joint(joint.name, joint.offset, joint.axis, -0.3, 0.3) for joint in ARM.joints
+        ),
+        camera_offset=ARM.camera_offset,
+        home=(0.0,) * 5,
+    )
+    look_at(narrow, np.array([4.0, 0.5, 0.8]), np.zeros(5))
+    with pytest.raises(UnreachableError, match=r'cannot look at \(-4.00, 0.00, 0.80\): .* degrees'):
+        look_at(narrow, np.array([-4.0, 0.0, 0.8]), np.zeros(5))
+
+
+@pytest.mark.parametrize('target', [[math.nan, 0, 0], [math.inf, 0, 0], [1.0, 2.0]])
+def test_what_is_no_point_is_refused(target):
+    with pytest.raises(UnreachableError, match='three finite numbers'):
+        look_at(ARM, np.array(target), HOME)
+
+
+def test_point_at_the_lens_is_refused():
+    lens = ARM.camera_frame(HOME)[:3, 3]
+    with pytest.raises(UnreachableError):
+        look_at(ARM, lens, HOME)
+
+
+@LIMITED
+@given(start=joint_positions, goal=joint_positions)
+def test_motion_keeps_all_limits_and_ends_at_rest(start, goal):
+    motion = motion_to(ARM, ArmState.resting(start), goal)
+    assert np.allclose(motion.positions[0], start)
+    assert np.allclose(motion.goal, goal, atol=1e-6)
+    assert np.allclose(motion.speeds[[0, -1]], 0.0, atol=1e-6)
+    assert (np.abs(motion.speeds) <= [j.speed + 1e-6 for j in ARM.joints]).all()
+    assert (np.abs(motion.accelerations) <= [j.acceleration + 1e-6 for j in ARM.joints]).all()
+    if motion.duration > 0:
+        jerks = np.diff(motion.accelerations, axis=0) / np.diff(motion.times)[:, None]
+        assert (np.abs(jerks) <= [j.jerk + 1e-3 for j in ARM.joints]).all()
+
+
+def test_stop_in_the_middle_is_smooth():
+    motion = motion_to(ARM, ArmState.resting(HOME), HOME + [2.5, 0, 0, 0, 0])
+    middle = motion.at(motion.duration / 2)
+    stop = motion_to_rest(ARM, middle)
+    assert np.allclose(stop.positions[0], middle.positions)
+    assert np.allclose(stop.speeds[0], middle.speeds)
+    assert np.allclose(stop.speeds[-1], 0.0, atol=1e-6)
+    assert stop.duration < 1.5
+
+
+@pytest.mark.parametrize('goal', [[9.0, 0, 0, 0, 0], [0.0, 0.0], [math.nan] * 5])
+def test_goal_outside_the_limits_is_refused(goal):
+    with pytest.raises(TrajectoryError):
+        motion_to(ARM, ArmState.resting(HOME), np.array(goal))
+
+
+class FollowingArm:
+    """An arm that does what it is sent when `run` is called, on a clock of its own."""
+
+    def __init__(self, follows: float = 1.0, patience: float = 5.0) -> None:
+        self.time = 0.0
+        self.sent = []
+        self.rests = []
+        self.follows = follows
+        self.got = threading.Semaphore(0)
+        self.driver = ArmDriver(
+            ARM, self._take, lambda: self.time, self.rests.append, patience=patience
+        )
+
+    def _take(self, motion):
+        self.sent.append((self.time, motion))
+        self.got.release()
+
+    def report(self):
+        state = ArmState.resting(HOME)
+        if self.sent:
+            began, motion = self.sent[-1]
+            state = motion.at((self.time - began) * self.follows)
+        self.driver.report(ARM.names, state.positions.tolist(), state.speeds.tolist())
+
+    def run(self, seconds, step=0.05):
+        for _ in range(round(seconds / step)):
+            self.time += step
+            self.report()
+
+    def wait_for_motion(self):
+        assert self.got.acquire(timeout=5)
+
+
+def in_thread(work):
+    outcome = []
+
+    def body():
+        try:
+            work()
+            outcome.append(None)
+        except ArmError as error:
+            outcome.append(error)
+
+    thread = threading.Thread(target=body)
+    thread.start()
+
+    def join():
+        thread.join(10)
+        assert not thread.is_alive()
+        return outcome[0]
+
+    return join
+
+
+def test_driver_returns_when_the_arm_rests_at_its_goal():
+    arm = FollowingArm()
+    arm.report()
+    goal = HOME + [1.0, 0, 0, 0, 0]
+    done = in_thread(lambda: arm.driver.move(goal))
+    arm.wait_for_motion()
+    assert arm.rests[-1] is False
+    arm.run(arm.sent[-1][1].duration + 0.3)
+    assert done() is None
+    assert np.allclose(arm.driver.positions, goal, atol=0.01)
+    assert arm.rests[-1] is True
+
+
+def test_newer_motion_takes_over_from_where_the_arm_is():
+    arm = FollowingArm()
+    arm.report()
+    first = in_thread(lambda: arm.driver.move(HOME + [2.0, 0, 0, 0, 0]))
+    arm.wait_for_motion()
+    arm.run(0.8)
+    second = in_thread(lambda: arm.driver.move(HOME - [1.0, 0, 0, 0, 0]))
+    arm.wait_for_motion()
+    assert 'took over' in str(first())
+    begun = arm.sent[-1][1]
+    assert abs(begun.speeds[0][0]) > 0.1
+    arm.run(begun.duration + 0.3)
+    assert second() is None
+
+
+def test_motion_that_is_given_up_stops_the_arm():
+    arm = FollowingArm()
+    arm.report()
+    ended = threading.Event()
+    done = in_thread(lambda: arm.driver.move(HOME + [2.0, 0, 0, 0, 0], ended.is_set))
+    arm.wait_for_motion()
+    arm.run(0.6)
+    ended.set()
+    arm.driver.wake()
+    assert 'given up' in str(done())
+    assert np.allclose(arm.sent[-1][1].speeds[-1], 0.0, atol=1e-6)
+
+
+def test_halt_waits_for_the_standstill():
+    arm = FollowingArm()
+    arm.report()
+    moving = in_thread(lambda: arm.driver.move(HOME + [2.0, 0, 0, 0, 0]))
+    arm.wait_for_motion()
+    arm.run(0.6)
+    halted = in_thread(arm.driver.halt)
+    arm.wait_for_motion()
+    arm.run(2.0)
+    assert halted() is None
+    assert 'took over' in str(moving())
+
+
+def test_arm_that_never_reports_is_named():
+    with pytest.raises(ArmError, match='does not report'):
+        FollowingArm(patience=0.05).driver.move(HOME)
+
+
+def test_arm_that_stops_short_is_named():
+    arm = FollowingArm(follows=0.3, patience=0.05)
+    arm.report()
+    done = in_thread(lambda: arm.driver.move(HOME + [2.0, 0, 0, 0, 0]))
+    arm.wait_for_motion()
+    arm.run(arm.sent[-1][1].duration + 0.1)
+    assert 'away from its goal' in str(done())
+
+
+def test_reports_of_other_joints_are_not_taken():
+    arm = FollowingArm()
+    arm.driver.report(['wheel_left', 'wheel_right'], [0.0, 0.0], [])
+    assert arm.driver.positions is None
+    names = ['wheel_left', *reversed(ARM.names)]
+    arm.driver.report(names, [9.0, 5.0, 4.0, 3.0, 2.0, 1.0], [])
+    assert arm.driver.positions.tolist() == [1.0, 2.0, 3.0, 4.0, 5.0]

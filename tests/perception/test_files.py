@@ -1,0 +1,164 @@
+"""What is read from files: pictures, videos, the registry of markers, and the detect command."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from surveillance_perception.camera_model import CameraModel
+from surveillance_perception.detect_command import main
+from surveillance_perception.dictionaries import dictionary_named
+from surveillance_perception.marker_registry import RegistryError, read_registry
+from surveillance_perception.marker_scene import Degradation, Panel, backdrop_of, picture_of
+from surveillance_perception.picture_files import PictureError, decode_picture, read_picture
+from surveillance_perception.video_frames import open_source
+
+CONFIG = Path(__file__).parents[2] / 'config'
+
+
+@pytest.fixture(scope='module')
+def picture():
+    generator = np.random.default_rng(3)
+    camera = CameraModel.from_field_of_view(320, 240, math.radians(60))
+    scene = backdrop_of('plain', camera, generator)
+    panels = [Panel(12, 1.5, offset=(-60.0, 0.0)), Panel(17, 1.5, offset=(60.0, 0.0))]
+    dictionary = dictionary_named('DICT_5X5_100')
+    return picture_of(panels, camera, dictionary, scene, Degradation(), generator)
+
+
+def test_detect_prints_ids_and_writes_the_annotated_picture(tmp_path, capsys, picture):
+    path = tmp_path / 'room.png'
+    cv2.imwrite(str(path), picture)
+    assert main([str(path), '--known', '12']) == 0
+    said = capsys.readouterr().out
+    assert '2 markers' in said
+    assert 'id   12' in said
+    assert 'not on the known list' in said.splitlines()[-1]
+    drawn = cv2.imread(str(tmp_path / 'room_markers.png'))
+    assert drawn.shape == (240, 320, 3)
+    assert (drawn != cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR)).any()
+
+
+def test_detect_names_each_file_that_is_no_picture_and_goes_on(tmp_path, capsys, picture):
+    good, bad = tmp_path / 'good.png', tmp_path / 'bad.png'
+    cv2.imwrite(str(good), picture)
+    bad.write_bytes(b'not a picture')
+    assert main([str(bad), str(tmp_path / 'none.png'), str(good), '--out', str(tmp_path / 'o')]) == 1
+    captured = capsys.readouterr()
+    assert captured.err.splitlines() == [
+        f'detect: {bad} is no picture that OpenCV can decode',
+        f'detect: {tmp_path / "none.png"}: No such file or directory',
+    ]
+    assert '2 markers' in captured.out
+    assert (tmp_path / 'o' / 'good_markers.png').exists()
+
+
+@pytest.mark.parametrize(
+    ('options', 'reason'),
+    [
+        (['--dictionary', 'DICT_1'], "detect: unknown marker dictionary 'DICT_1'"),
+        (['--known', '500'], 'detect: known id 500 is not in the dictionary'),
+    ],
+)
+def test_detect_refuses_wrong_options_in_one_line(capsys, options, reason):
+    assert main(['x.png', *options]) == 2
+    assert capsys.readouterr().err.startswith(reason)
+
+
+@pytest.mark.parametrize('data', [b'', b'\x89PNG\r\n\x1a\n', b'\xff\xd8\xff\xe0junk', b'BM'])
+def test_corrupted_pictures_are_refused_in_one_line(data):
+    with pytest.raises(PictureError) as error:
+        decode_picture(data, 'picture')
+    assert '\n' not in str(error.value)
+
+
+def test_truncated_picture_is_refused_or_read(tmp_path, picture):
+    data = cv2.imencode('.png', picture)[1].tobytes()
+    path = tmp_path / 'half.png'
+    path.write_bytes(data[: len(data) // 8])
+    try:
+        assert read_picture(path).shape == (240, 320, 3)
+    except PictureError as error:
+        assert 'half.png' in str(error)
+
+
+def test_folder_is_played_in_order_of_names(tmp_path, picture):
+    for index, level in enumerate((10, 20, 30)):
+        cv2.imwrite(str(tmp_path / f'{index}.png'), np.full((8, 8), level, np.uint8))
+    (tmp_path / 'notes.txt').write_text('no picture')
+    (tmp_path / '1b.png').write_bytes(b'broken')
+    frames = list(open_source(str(tmp_path)).frames())
+    assert [int(each[0, 0, 0]) for each in frames if not isinstance(each, PictureError)] == [
+        10, 20, 30,
+    ]
+    assert '1b.png' in str(frames[2])
+
+
+def test_video_file_is_played_at_its_own_rate(tmp_path):
+    path = tmp_path / 'video.avi'
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*'MJPG'), 12.5, (64, 48))
+    for level in (0, 100, 200):
+        writer.write(np.full((48, 64, 3), level, np.uint8))
+    writer.release()
+    source = open_source(str(path))
+    assert source.rate == pytest.approx(12.5)
+    assert [round(float(np.mean(each)), -1) for each in source.frames()] == [0, 100, 200]
+    source.close()
+
+
+def test_source_that_is_not_there_is_named(tmp_path):
+    with pytest.raises(PictureError, match='no such camera number, video file or folder'):
+        open_source(str(tmp_path / 'none.avi'))
+    with pytest.raises(PictureError, match='holds no pictures'):
+        open_source(str(tmp_path))
+
+
+def test_registry_holds_the_seven_markers():
+    markers = read_registry(CONFIG / 'markers.yaml')
+    assert {marker_id: place.room for marker_id, place in markers.items()} == {
+        11: 'E', 12: 'C1', 13: 'C2', 14: 'R1', 15: 'R2', 16: 'R3', 17: 'R4',
+    }
+    assert (markers[16].x, markers[16].y) == (9.0, 3.0)
+    assert dict(markers[12].connections) == {'D5': 'E', 'D7': 'C2', 'D1': 'R1', 'D2': 'R2'}
+
+
+@pytest.mark.parametrize(
+    ('text', 'reason'),
+    [
+        ('', "expected a mapping 'markers'"),
+        ('markers: []', "expected a mapping 'markers'"),
+        ('markers: {}', "'markers' is empty"),
+        ('markers: {1: {room: A, x: 0, y: 0, connections: {D: B}}', 'line 1'),
+        ('markers: {a: {room: A, x: 0, y: 0, connections: {D: B}}}', 'marker a: an id must be'),
+        ('markers: {-1: {room: A, x: 0, y: 0, connections: {D: B}}}', 'marker -1: an id must be'),
+        ('markers: {1: E}', "marker 1: expected 'room', 'x', 'y' and 'connections'"),
+        ('markers: {1: {room: 3, x: 0, y: 0, connections: {D: B}}}', "marker 1: 'room' must be"),
+        ('markers: {1: {room: A, x: no, y: 0, connections: {D: B}}}', "'x' must be a number"),
+        ('markers: {1: {room: A, x: .nan, y: 0, connections: {D: B}}}', "'x' must be finite"),
+        ('markers: {1: {room: A, x: 0, y: 0, connections: {}}}', "'connections' must be"),
+        ('markers: {1: {room: A, x: 0, y: 0, connections: {D: A}}}', 'D leads from A to itself'),
+        ('markers: {1: {room: A, z: 0, x: 0, y: 0, connections: {D: B}}}', "unknown 'z'"),
+        (
+            'markers:\n  1: {room: A, x: 0, y: 0, connections: {D: B}}\n'
+            '  1: {room: B, x: 0, y: 0, connections: {D: A}}\n',
+            '1 is given twice',
+        ),
+    ],
+)
+def test_wrong_registry_is_refused_in_one_line_that_names_the_file(tmp_path, text, reason):
+    path = tmp_path / 'markers.yaml'
+    path.write_text(text)
+    with pytest.raises(RegistryError) as error:
+        read_registry(path)
+    assert str(error.value).startswith(str(path))
+    assert reason in str(error.value)
+    assert '\n' not in str(error.value)
+
+
+def test_registry_that_is_not_there_is_named(tmp_path):
+    with pytest.raises(RegistryError, match='No such file'):
+        read_registry(tmp_path / 'none.yaml')
