@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 MODES = ('SIMULATED', 'RANDOM', 'MANUAL')
-DEFAULT_MODE = 'RANDOM'
+DEFAULT_MODE = 'SIMULATED'
 BEHAVIOURS = ('surveillance', 'patrol')
 CONSOLE = 'console'
 

@@ -31,7 +31,7 @@ PLACES = {'surveillance': 'seven_rooms.yaml', 'patrol': 'patrol_world.yaml'}
 ARGUMENTS = [
     DeclareLaunchArgument(
         'mode',
-        default_value='RANDOM',
+        default_value='SIMULATED',
         choices=['SIMULATED', 'RANDOM', 'MANUAL'],
         description='How the controllers work. For MANUAL start the prompt in a terminal of its '
         'own: ros2 run surveillance_controllers console',

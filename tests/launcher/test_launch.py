@@ -59,7 +59,7 @@ def process_of(launched: Started, node: str, after: int = 0) -> int:
 
 
 def test_ctrl_c_ends_a_mission_with_its_summary_and_leaves_nothing_behind(launch, clock, tmp_path):
-    mission = launch()
+    mission = launch('--mode', 'RANDOM')
     processes = [process_of(mission, node) for node in NODES]
     mission.until(r'robot_behavior +\| decision 1:', timeout=60)
     mission.until(r'robot_behavior +\| arrived in', timeout=30)
@@ -79,7 +79,7 @@ def test_ctrl_c_ends_a_mission_with_its_summary_and_leaves_nothing_behind(launch
 
 
 def test_the_mission_goes_on_when_each_node_is_killed_once(launch, clock):
-    mission = launch()
+    mission = launch('--mode', 'RANDOM')
     mission.until(r'robot_behavior +\| arrived in', timeout=60)
     for node in NODES:
         seen = len(mission.lines)
@@ -95,7 +95,7 @@ def test_the_mission_goes_on_when_each_node_is_killed_once(launch, clock):
 
 
 def test_all_nodes_in_one_process(launch, clock):
-    mission = launch('--composed')
+    mission = launch('--mode', 'RANDOM', '--composed')
     process = process_of(mission, 'composed')
     mission.until(r'robot_behavior +\| arrived in', timeout=60)
     assert sum('started' in line for line in mission.lines) == 1
