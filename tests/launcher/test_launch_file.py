@@ -1,4 +1,4 @@
-"""The launch file for an installed ROS starts what `launch.py` starts; `launch` is not needed here."""
+"""The launch file for an installed ROS starts what `launch.py` starts."""
 
 from __future__ import annotations
 
