@@ -1,0 +1,265 @@
+"""Records of transitions, their replay, and the test kit's view of them."""
+
+from __future__ import annotations
+
+import json
+import threading
+
+import pytest
+
+from surveillance_behaviour import fsm
+from surveillance_behaviour.fsm.record import (
+    Recorder,
+    RecordError,
+    TransitionFeed,
+    play,
+    read_record,
+    replay,
+)
+from surveillance_behaviour.fsm.testing import FakeClock, script, watching
+
+from .states import Answer, Background, Waiter, began
+
+
+def patrol():
+    inner = fsm.StateMachine(['done', 'preempted'])
+    root = fsm.StateMachine(['done', 'preempted'])
+    root.set_name('PATROL')
+    with root:
+        fsm.StateMachine.add('CHOOSE', Answer('go', 'go', 'done'), {'go': 'MOVE'})
+        fsm.StateMachine.add('MOVE', inner, {'done': 'CHOOSE'})
+        with inner:
+            fsm.StateMachine.add('PLAN', Answer('done'), {'done': 'FOLLOW'})
+            fsm.StateMachine.add('FOLLOW', Answer('done'))
+    return root
+
+
+def test_a_record_is_written_read_and_replayed(tmp_path):
+    path, machine = tmp_path / 'record.jsonl', patrol()
+    machine.userdata.battery = 80
+    machine.userdata.handle = object()
+    with Recorder(machine, path):
+        assert machine.execute() == 'done'
+    transitions = read_record(path)
+    assert [t.sequence for t in transitions] == list(range(1, 10))
+    assert transitions[0].userdata == {'battery': 80}
+    assert [(t.path, t.from_state, t.outcome, t.to_state, t.kind) for t in transitions[:4]] == [
+        ('PATROL', 'CHOOSE', 'go', 'MOVE', 'transition'),
+        ('PATROL/MOVE', 'PLAN', 'done', 'FOLLOW', 'transition'),
+        ('PATROL/MOVE', 'FOLLOW', 'done', 'done', 'exit'),
+        ('PATROL', 'MOVE', 'done', 'CHOOSE', 'transition'),
+    ]
+    assert [t.visits for t in transitions if t.to_state == 'MOVE'] == [1, 2]
+    steps = list(replay(patrol(), transitions))
+    assert steps[0].active == ('PATROL/MOVE', 'PATROL/MOVE/PLAN')
+    assert steps[1].active == ('PATROL/MOVE', 'PATROL/MOVE/FOLLOW')
+    assert steps[-1].active == ()
+
+
+def test_a_replay_stops_where_the_machine_is_another(tmp_path):
+    path, machine = tmp_path / 'record.jsonl', patrol()
+    with Recorder(machine, path):
+        machine.execute()
+    other = fsm.StateMachine(['done', 'preempted'])
+    other.set_name('PATROL')
+    with other:
+        fsm.StateMachine.add('CHOOSE', Answer('go', 'done'), {'go': 'done'})
+    with pytest.raises(RecordError, match="Transition 1 in 'PATROL': 'CHOOSE' does not lead to"):
+        list(replay(other, read_record(path)))
+
+
+def test_interrupts_and_concurrences_are_replayed(tmp_path):
+    def build():
+        waiter, quick = Waiter(100.0), Answer('done')
+        both = fsm.Concurrence(['done', 'preempted'], 'preempted')
+        root = fsm.StateMachine(['done', 'preempted'])
+        with root:
+            fsm.StateMachine.add('BOTH', both)
+            with both:
+                fsm.Concurrence.add('WAITER', waiter)
+                fsm.Concurrence.add('QUICK', quick)
+        root.add_interrupt('STOP', Answer('done'), transitions={'done': fsm.RESUME})
+        return root, waiter
+
+    root, waiter = build()
+    path = tmp_path / 'record.jsonl'
+    with Recorder(root, path):
+        run = Background(root)
+        began(waiter)
+        root.raise_interrupt('STOP')
+        began(waiter)
+        root.request_preempt()
+        run.result()
+    steps = list(replay(build()[0], read_record(path)))
+    assert [step.transition.kind for step in steps if step.transition.path == 'StateMachine'] == [
+        'interrupt',
+        'resume',
+        'exit',
+    ]
+
+
+def test_a_record_that_was_cut_off_is_read_as_far_as_it_goes(tmp_path):
+    path, machine = tmp_path / 'record.jsonl', patrol()
+    with Recorder(machine, path):
+        machine.execute()
+    whole = path.read_text()
+    path.write_text(whole[: len(whole) - 40])
+    assert len(read_record(path)) == 8
+    lines = whole.splitlines(keepends=True)
+    path.write_text(''.join([lines[0], '{broken\n', *lines[2:]]))
+    with pytest.raises(RecordError, match=r'record\.jsonl:2: '):
+        read_record(path)
+    path.write_text('something else\n')
+    with pytest.raises(RecordError, match=r'record\.jsonl:1: not a surveillance-fsm-record'):
+        read_record(path)
+    with pytest.raises(RecordError, match=r'absent\.jsonl'):
+        read_record(tmp_path / 'absent.jsonl')
+
+
+def test_a_record_plays_at_its_pace(tmp_path):
+    clock, machine = FakeClock(leaps=True), patrol()
+    machine.set_clock(clock)
+    script(
+        machine,
+        {
+            'PATROL/CHOOSE': ['go', 'done'],
+            'PATROL/MOVE/PLAN': [lambda ud: clock.sleep(4.0, fsm.Interrupt()) and 'done'],
+            'PATROL/MOVE/FOLLOW': ['done'],
+        },
+    )
+    path = tmp_path / 'record.jsonl'
+    with Recorder(machine, path):
+        machine.execute()
+    transitions = read_record(path)
+    assert [t.duration for t in transitions] == [0.0, 4.0, 0.0, 4.0, 0.0]
+    player, shown = FakeClock(leaps=True), []
+    assert play(
+        replay(patrol(), transitions),
+        lambda step: shown.append(player.now()),
+        speed=2.0,
+        clock=player,
+    )
+    assert shown == [0.0, 2.0, 2.0, 2.0, 2.0]
+    stop = fsm.Interrupt()
+    stop.set()
+    assert not play(replay(patrol(), transitions), shown.append, clock=player, interrupt=stop)
+
+
+def test_a_feed_survives_its_consumer_and_reports_all_that_ran(caplog):
+    machine, seen = patrol(), []
+
+    def consume(transition):
+        seen.append(transition.sequence)
+        if len(seen) == 2:
+            raise OSError('disk full')
+
+    feed = TransitionFeed(machine, consume)
+    machine.execute()
+    assert feed.flush(5.0)
+    feed.close()
+    assert seen == list(range(1, 10))
+    assert 'disk full' in caplog.text
+    machine.set_initial_state(['CHOOSE'])
+    machine.execute()
+    assert len(seen) == 9
+
+
+def test_tracing_can_begin_while_a_machine_runs():
+    waiter, seen = Waiter(100.0), []
+    machine = fsm.StateMachine(['done', 'preempted'])
+    with machine:
+        fsm.StateMachine.add('WAIT', waiter)
+    run = Background(machine)
+    began(waiter)
+    machine.control.set_trace(seen.append)
+    machine.request_preempt()
+    run.result()
+    assert len(seen) == 1
+
+
+# The test kit.
+
+
+def test_scripted_outcomes_take_the_place_of_the_work():
+    machine = patrol()
+    script(machine, {'PATROL/CHOOSE': ['go', 'done'], 'PATROL/MOVE/PLAN': ['done']})
+    with watching(machine) as watched:
+        machine.execute()
+    watched.assert_path('CHOOSE', 'MOVE', 'CHOOSE')
+    watched.assert_path('PLAN', 'FOLLOW', container='PATROL/MOVE')
+    with pytest.raises(AssertionError, match='they agree in the first 1'):
+        watched.assert_path('CHOOSE', 'CHOOSE')
+    assert watched.untaken() == [('PATROL', 'MOVE', 'preempted')]
+    watched.assert_covered(except_for=watched.untaken())
+
+
+def test_coverage_names_the_transitions_that_were_not_taken():
+    machine = patrol()
+    script(machine, {'PATROL/CHOOSE': ['done']})
+    with watching(machine) as watched:
+        machine.execute()
+    assert ('PATROL', 'MOVE', 'preempted') in watched.untaken()
+    with pytest.raises(AssertionError, match="PATROL/MOVE/PLAN : 'done'"):
+        watched.assert_covered(except_for=[('PATROL', 'MOVE', 'preempted')])
+    assert 0.0 < watched.coverage() < 0.5
+
+
+@pytest.mark.parametrize(
+    ('outcomes', 'error'),
+    [
+        ({'PATROL/NIX': ['done']}, KeyError),
+        ({'OTHER/CHOOSE': ['done']}, KeyError),
+        ({'PATROL/MOVE': ['done']}, fsm.InvalidStateError),
+        ({'PATROL/CHOOSE': ['nix']}, fsm.InvalidTransitionError),
+    ],
+)
+def test_a_script_is_held_to_the_machine(outcomes, error):
+    with pytest.raises(error):
+        script(patrol(), outcomes)
+
+
+def test_a_script_that_runs_out_says_so():
+    machine = patrol()
+    script(machine, {'PATROL/CHOOSE': ['go']})
+    with pytest.raises(fsm.InvalidUserCodeError, match='more often than it has scripted outcomes'):
+        machine.execute()
+
+
+def test_a_fake_clock_wakes_whom_it_should():
+    clock, ends = FakeClock(), []
+    stop = fsm.Interrupt()
+    threads = [
+        threading.Thread(target=lambda s=s: ends.append((s, clock.sleep(s, stop))))
+        for s in (1.0, 2.0)
+    ]
+    for thread in threads:
+        thread.start()
+    clock.until_sleeping(2)
+    clock.advance(1.5)
+    threads[0].join(5.0)
+    assert ends == [(1.0, True)]
+    stop.set()
+    threads[1].join(5.0)
+    assert ends == [(1.0, True), (2.0, False)]
+    with pytest.raises(AssertionError, match='0 threads sleep'):
+        clock.until_sleeping(1, timeout=0.01)
+
+
+def test_the_record_is_json_that_others_can_read(tmp_path):
+    path, machine = tmp_path / 'record.jsonl', patrol()
+    with Recorder(machine, path):
+        machine.execute()
+    header, *rest = map(json.loads, path.read_text().splitlines())
+    assert header == {'format': 'surveillance-fsm-record', 'version': 1, 'root': 'PATROL'}
+    assert set(rest[0]) == {
+        'sequence',
+        'time',
+        'path',
+        'from_state',
+        'outcome',
+        'to_state',
+        'kind',
+        'duration',
+        'visits',
+        'userdata',
+    }
