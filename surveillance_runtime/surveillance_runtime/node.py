@@ -61,12 +61,13 @@ class PatrolNode(Node):  # type: ignore[misc]
 
     Attributes:
         stopping: Raised when the node stops; give it to every wait.
+        ended: Raised when the node's process shall end, wanted (`finish`) or not (`fail`).
         failure: Why the node cannot go on, once `fail` was called.
     """
 
     def __init__(self, name: str, **node_options: Any) -> None:
         self.stopping = Interrupt()
-        self.failed = Interrupt()
+        self.ended = Interrupt()
         self.failure: str | None = None
         self._specs: dict[str, ParameterSpec] = {}
         self._on_change: dict[str, Callable[[Any], None]] = {}
@@ -196,11 +197,11 @@ class PatrolNode(Node):  # type: ignore[misc]
         if self.failure is None:
             self.failure = reason
             self.get_logger().fatal(reason)
-            self.failed.set()
+            self.ended.set()
 
     def finish(self) -> None:
         """End the node's process as wanted, as SIGTERM does: the exit code is 0."""
-        self.failed.set()
+        self.ended.set()
 
     def on_stop(self) -> None:
         """Called once when the node stops, while messages still flow."""
@@ -279,7 +280,7 @@ def run_nodes(
         for factory in factories:
             nodes.append(factory())
             spinner.executor.add_node(nodes[-1])
-            nodes[-1].failed.subscribe(ended.set)
+            nodes[-1].ended.subscribe(ended.set)
         spinner.start(on_end=ended.set)
         ended.wait()
     except (ParameterError, StartError) as error:

@@ -89,7 +89,7 @@ def test_one_console_addresses_every_controller(graph: Any, operator: Any, capfd
     operator.type('move 1 0')
     operator.type('jump')
     operator.type('exit')
-    assert node.failed.wait(5)
+    assert node.ended.wait(5)
     assert node.failure is None
     shown = capfd.readouterr().out
     assert 'The battery is at 42 %.' in shown

@@ -99,7 +99,7 @@ def test_exception_in_a_thread_fails_the_node(graph, capsys):
         raise LookupError('no such place')
 
     node.spawn(work)
-    assert node.failed.wait(5)
+    assert node.ended.wait(5)
     assert node.failure == 'LookupError: no such place'
 
 
