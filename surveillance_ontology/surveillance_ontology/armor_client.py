@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -48,6 +49,7 @@ __all__ = [
     'value_in',
 ]
 
+RETRY_SECONDS = 0.1
 CHANGES_TOPIC = 'fact_changes'
 CHANGES_QOS = QoSProfile(
     depth=100,  # The publisher keeps one; a subscriber that is busy may catch up with a burst.
@@ -172,6 +174,10 @@ class FactSubscription:
         self._callback = callback
         self._asking = False
         self._ask_again = False
+        # Steady time: a simulated clock may stand still.
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._retry = node.create_timer(RETRY_SECONDS, self._on_retry, clock=steady)
+        self._retry.cancel()
         self._subscription = node.create_subscription(
             FactChanges,
             CHANGES_TOPIC,
@@ -201,6 +207,10 @@ class FactSubscription:
         else:
             self._tell(told)
 
+    def _on_retry(self) -> None:
+        self._retry.cancel()
+        self._resynchronise()
+
     def _resynchronise(self) -> None:
         if self._asking:
             self._ask_again = True
@@ -217,8 +227,10 @@ class FactSubscription:
                     break
             self._tell(self._set.replace(facts))
         except ArmorServiceCallError as error:
-            # The server's next message or its return brings the next attempt.
             self._node.get_logger().debug(f'facts {self._set.pattern}: {error}')
+            if self._subscription.get_publisher_count() > 0:
+                # Its topic is discovered, its service not yet. Without it, its return is told.
+                self._retry.reset()
         except ArmorServiceInternalError:
             # There is no such reference: no facts either. Its loading is announced.
             self._tell(self._set.replace([]))

@@ -6,7 +6,6 @@ one, the map is built again, with the rooms and doors as they are by then.
 
 from __future__ import annotations
 
-import queue
 import sys
 from collections.abc import Callable
 from typing import Any
@@ -15,22 +14,13 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.task import Future
 
 from surveillance_interfaces.msg import OntologyMap
-from surveillance_interfaces.srv import (
-    AddRoom,
-    ReferenceName,
-    RemoveRoom,
-    RoomPosition,
-    SetDoor,
-)
+from surveillance_interfaces.srv import AddRoom, ReferenceName, RemoveRoom, RoomPosition, SetDoor
 from surveillance_ontology.armor.settings import DATA
-from surveillance_ontology.armor_client import (
-    ArmorClient,
-    ArmorServiceCallError,
-    ArmorServiceInternalError,
-    FactSubscription,
-)
+from surveillance_ontology.armor_client import ArmorClient, FactSubscription
+from surveillance_ontology.awaited_work import AwaitedWork
 from surveillance_ontology.conversions import point_to_ros, position_from_ros, room_note_from_ros
-from surveillance_ontology.map_building import ROBOT, MapBuilding, RoomNote, extended
+from surveillance_ontology.map_building import ROBOT, MapBuilding
+from surveillance_ontology.map_keeper import MapKeeper, Reports
 from surveillance_ontology.place import Place, PlaceError, make_place
 from surveillance_runtime.node import PatrolNode, StartError, run_node
 from surveillance_runtime.qos import STATE_QOS
@@ -53,19 +43,27 @@ class OntologyMapBuilder(PatrolNode):
         timeout = self.parameter(
             'armor_timeout', 5.0, 'Longest wait for an answer of the server, seconds.', minimum=0.1
         )
-        self._place = self._described_place()
-        self.robot_room = self._place.start if self._place else ''
-        self._built = False
-        self._waiting: list[Future] = []
-        self._work: queue.SimpleQueue[Callable[[], None] | None] = queue.SimpleQueue()
         armor = ArmorClient(
             self, self.get_name(), self._reference, timeout=timeout, interrupt=self.stopping
         )
-        self._building = MapBuilding(armor, path, uri)
+        log = self.get_logger()
+        self._keeper = MapKeeper(
+            MapBuilding(armor, path, uri),
+            self._described_place(),
+            lambda: int(self.get_clock().now().nanoseconds // 1_000_000_000),
+            self.stopping.is_set,
+            Reports(log.info, log.warn, log.error, self.fail),
+            lambda: self.executor.create_task(self._answer_waiting),
+        )
+        self._waiting: list[Future] = []
+        self._work = AwaitedWork(self, 1)
         pattern = f'isIn({ROBOT}, ?)'
         self._is_in = FactSubscription(self, armor, pattern, self._on_moved, self._look)
+        self._serve()
+        self._look()
+
+    def _serve(self) -> None:
         group = ReentrantCallbackGroup()
-        prefix = 'ontology_map/'
         for kind, name, callback in (
             (ReferenceName, 'reference_name', self._on_reference_name),
             (RoomPosition, 'room_position', self._on_room_position),
@@ -73,27 +71,16 @@ class OntologyMapBuilder(PatrolNode):
             (RemoveRoom, 'remove_room', self._on_remove_room),
             (SetDoor, 'set_door', self._on_set_door),
         ):
-            self.create_service(kind, prefix + name, callback, callback_group=group)
+            self.create_service(kind, f'ontology_map/{name}', callback, callback_group=group)
         self.create_subscription(
-            OntologyMap, prefix + 'build_map', self._on_build_map, STATE_QOS, callback_group=group
+            OntologyMap, 'ontology_map/build_map', self._on_build_map, STATE_QOS
         )
-        self._look()
-        self.spawn(self._run_work, 'map building')
 
     def on_stop(self) -> None:
         """End the worker."""
-        self._work.put(None)
+        self._work.stop()
 
     def _described_place(self) -> Place | None:
-        source = self.parameter(
-            'map_source',
-            'configuration',
-            'Where the map comes from: the parameters, or ontology_map/build_map alone.',
-            choices=('configuration', 'markers'),
-            read_only=True,
-        )
-        if source == 'markers':
-            return None
         rooms = self.parameters_under('map')
         positions = self.parameters_under('room_positions')
         robot_room = self.parameter('robot_room', '', 'Room in which the robot starts.')
@@ -107,10 +94,16 @@ class OntologyMapBuilder(PatrolNode):
         except PlaceError as error:
             raise StartError(f'{self.get_name()}: parameter {error}') from None
 
-    # --- callbacks ---
+    def _look(self) -> None:
+        self._work.put(self._keeper.ensure_built)
+
+    def _answer_waiting(self) -> None:
+        waiting, self._waiting = self._waiting, []
+        for future in waiting:
+            future.set_result(None)
 
     async def _on_reference_name(self, _request: Any, response: Any) -> Any:
-        if not self._built:
+        if not self._keeper.is_built:
             future = Future(executor=self.executor)
             self._waiting.append(future)
             await future
@@ -118,7 +111,8 @@ class OntologyMapBuilder(PatrolNode):
         return response
 
     def _on_room_position(self, request: Any, response: Any) -> Any:
-        position = self._place.positions.get(request.room_name) if self._place else None
+        place = self._keeper.place
+        position = place.positions.get(request.room_name) if place else None
         response.valid = position is not None
         if position is not None:
             response.position = point_to_ros(position)
@@ -126,129 +120,37 @@ class OntologyMapBuilder(PatrolNode):
 
     async def _on_add_room(self, request: Any, response: Any) -> Any:
         name, position = request.room_name, position_from_ros(request.position)
-        return await self._edited(
-            lambda place: place.with_room(name, position, request.doors),
-            f'{name} has {", ".join(request.doors)}',
-            response,
+        done = f'{name} has {", ".join(request.doors)}'
+        return await self._edit(
+            lambda place: place.with_room(name, position, request.doors), done, response
         )
 
     async def _on_remove_room(self, request: Any, response: Any) -> Any:
         name = request.room_name
-
-        def edit(place: Place) -> Place:
-            left = place.without_room(name)
-            if self._building.robot_room() == name:
-                raise PlaceError(('map', name), 'the robot is in it, it cannot be removed')
-            return left
-
-        return await self._edited(edit, f'{name} removed', response)
-
-    async def _on_set_door(self, request: Any, response: Any) -> Any:
-        state = 'open' if request.open else 'closed'
-        return await self._edited(
-            lambda place: place.with_door(request.door, is_open=request.open),
-            f'{request.door} is {state}',
-            response,
+        return await self._edit(
+            lambda place: self._keeper.without_room(place, name), f'{name} removed', response
         )
 
-    def _on_build_map(self, msg: OntologyMap) -> None:
-        notes = [room_note_from_ros(place) for place in msg.places]
-        self._work.put(lambda: self._extend(notes, msg.robot_room))
+    async def _on_set_door(self, request: Any, response: Any) -> Any:
+        door, is_open = request.door, request.open
+        done = f'{door} is {"open" if is_open else "closed"}'
+        return await self._edit(
+            lambda place: place.with_door(door, is_open=is_open), done, response
+        )
 
-    def _on_moved(self, fact: Any, came: bool) -> None:
-        if came:
-            self.robot_room = fact.arguments[1]
-
-    # --- work, on the worker's thread ---
-
-    def _look(self) -> None:
-        self._work.put(self._ensure_built)
-
-    def _run_work(self) -> None:
-        while (work := self._work.get()) is not None and not self.stopping.is_set():
-            work()
-
-    def _ensure_built(self) -> None:
-        told = False
-        while self._place is not None and not self.stopping.is_set():
-            try:
-                if self._built and self._building.is_loaded():
-                    return
-                self._built = False
-                self._place = self._building.build(self._place, self._now(), self.robot_room)
-            except ArmorServiceCallError as error:
-                if not told and not self.stopping.is_set():
-                    self.get_logger().warn(f'waiting for the armor server: {error}')
-                    told = True
-            except ArmorServiceInternalError as error:
-                self.fail(f'cannot build the map: {error}')
-                return
-            else:
-                self._announce()
-                return
-
-    def _announce(self) -> None:
-        assert self._place is not None
-        rooms, doors = len(self._place.rooms), len(self._place.doors)
-        self.get_logger().info(f'map {self._reference} is built: {rooms} rooms, {doors} doors')
-
-        self._built = True
-
-        def answer() -> None:
-            waiting, self._waiting = self._waiting, []
-            for future in waiting:
-                future.set_result(None)
-
-        self.executor.create_task(answer)
-
-    def _extend(self, notes: list[RoomNote], robot_room: str) -> None:
-        try:
-            place = extended(self._place, notes, robot_room)
-        except PlaceError as error:
-            self.get_logger().error(f'ontology_map/build_map refused: {error}')
-            return
-        if robot_room or not self.robot_room:
-            self.robot_room = place.start
-        before, self._place = self._place, place
-        if before is not None and self._built:
-            try:
-                self._building.change(before, place, self._now())
-            except (ArmorServiceCallError, ArmorServiceInternalError) as error:
-                self.get_logger().warn(f'ontology_map/build_map: {error}; building anew')
-            else:
-                return
-        self._built = False
-        self._ensure_built()
-
-    async def _edited(self, edit: Callable[[Place], Place], done: str, response: Any) -> Any:
-        future = Future(executor=self.executor)
-
-        def work() -> None:
-            future.set_result(self._edit(edit))
-            self.executor.wake()
-
-        self._work.put(work)
-        problem = await future
+    async def _edit(self, change: Callable[[Place], Place], done: str, response: Any) -> Any:
+        problem = await self._work.run(lambda: self._keeper.edit(change))
         response.success = not problem
         response.message = problem or done
         return response
 
-    def _edit(self, edit: Callable[[Place], Place]) -> str:
-        """Change the place and the ontology; what went wrong, empty if nothing did."""
-        if self._place is None:
-            return 'there is no map yet'
-        try:
-            after = edit(self._place)
-            self._building.change(self._place, after, self._now())
-        except PlaceError as error:
-            return str(error)
-        except (ArmorServiceCallError, ArmorServiceInternalError) as error:
-            return f'the ontology was not changed: {error}'
-        self._place = after
-        return ''
+    def _on_build_map(self, msg: OntologyMap) -> None:
+        notes = [room_note_from_ros(place) for place in msg.places]
+        self._work.put(lambda: self._keeper.extend(notes, msg.robot_room))
 
-    def _now(self) -> int:
-        return int(self.get_clock().now().nanoseconds // 1_000_000_000)
+    def _on_moved(self, fact: Any, came: bool) -> None:
+        if came:
+            self._keeper.robot_room = fact.arguments[1]
 
 
 def main(args: list[str] | None = None) -> int:

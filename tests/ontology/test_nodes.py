@@ -234,7 +234,7 @@ def test_a_server_that_comes_back_empty_gets_the_map_again(
     armor.manipulation.replace_objectprop_b2_ind('isIn', 'Robot1', 'C1', 'E')
     armor.utils.sync_buffered_reasoner()
     assert reach(armor) == ['C2', 'E', 'R2']
-    graph.until(lambda: built.robot_room == 'C1')
+    graph.until(lambda: built._keeper.robot_room == 'C1')
     armor.utils.drop_ref()
     graph.until(lambda: armor.utils.get_all_refs())
     graph.until(lambda: armor.query.ind_b2_class('CORRIDOR') and reach(armor))
@@ -349,3 +349,16 @@ def test_an_ontology_that_cannot_be_loaded_ends_the_builder(graph: Any, tmp_path
         assert builder.failure.startswith('cannot build the map: ')
         assert path.name in builder.failure
         graph.remove(builder)
+
+
+def test_a_server_that_dies_and_comes_back_gets_the_map_again(
+    graph: Any, call: Caller, armor: ArmorClient
+) -> None:
+    server = graph.add(ArmorServer)
+    graph.add(OntologyMapBuilder, {**PLACE, 'armor_timeout': 0.3})
+    assert call('reference_name').name == 'surveillance'
+    graph.drop(server)
+    graph.add(ArmorServer)
+    graph.until(lambda: armor.utils.get_all_refs() and armor.query.check_ind_exists('C1'))
+    assert call('reference_name').name == 'surveillance'
+    graph.until(lambda: reach(armor) == ['C1', 'C2'])
