@@ -13,7 +13,8 @@ programs = []
 for argument in sys.argv[1:]:
     name, _, script = argument.partition('=')
     command = [sys.executable, '-u', '-c', script]
-    programs.append(Program(name, command, os.environ, takes_input=True))
+    leads = name.startswith('lead')
+    programs.append(Program(name, command, os.environ, takes_input=True, leads=leads))
 supervisor = Supervisor(
     programs, MergedLog(None, [p.name for p in programs], colour=False), pauses=(0.01, 0.02)
 )

@@ -57,6 +57,21 @@ def test_a_child_that_heeds_no_signal_is_killed_within_three_seconds(start):
     assert 'Traceback' not in '\n'.join(launch.lines)
 
 
+def test_what_uses_the_others_is_stopped_before_them(start):
+    polite = (
+        'import signal, sys\n'
+        'signal.signal(signal.SIGTERM, lambda *_: (print("leaving", flush=True), sys.exit(0)))\n'
+        'print("up", flush=True)\n'
+        'signal.pause()'
+    )
+    launch = start(DRIVER, f'lead={polite}', f'last={polite}', environ=ENVIRON)
+    launch.until(r'lead +\| up')
+    launch.until(r'last +\| up')
+    assert launch.end(signal.SIGINT)[0] == 0
+    leaving = [line.split()[1] for line in launch.lines if line.endswith('leaving')]
+    assert leaving == ['lead', 'last']
+
+
 def test_a_child_that_dies_comes_back_and_the_rest_goes_on(start):
     launch = start(DRIVER, f'one={WAIT}', f'two={WAIT}', environ=ENVIRON)
     first = int(launch.until(r'started one \(process (\d+)\)')[1])
