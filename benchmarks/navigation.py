@@ -1,0 +1,371 @@
+"""Navigation measured: planning beside its peers, one step of control, and the whole stack's speed.
+
+    python benchmarks/navigation.py [--quick] [planning] [control] [stack]
+
+Without a section's name all are run. Every figure stands beside its peer's from the same run.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import logging
+import os
+import signal
+import statistics
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import networkx
+import numpy as np
+import numpy.typing as npt
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import dijkstra
+from skimage.graph import MCP_Geometric
+from whole_stack import ROOT, Stack
+
+from surveillance_controllers import polyline
+from surveillance_controllers.driving import Drive
+from surveillance_controllers.grid_map import GridMap
+from surveillance_controllers.grid_planning import GridPlanner, PlanningParameters
+from surveillance_controllers.localisation import Scan
+from surveillance_controllers.pilot import Pilot
+from surveillance_simulation import occupancy_grid, place_generation
+from surveillance_simulation.place_file import read_world
+from surveillance_simulation.robot import Robot
+from surveillance_simulation.world import World
+
+Mask = npt.NDArray[np.bool_]
+
+
+def table(title: str, head: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """Print an aligned table."""
+    widths = [max(len(row[column]) for row in [head, *rows]) for column in range(len(head))]
+    print(f'\n{title}')
+    for row in [head, *rows]:
+        print('  '.join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)))
+
+
+def median_ms(work: Callable[[], Any], budget: float) -> float:
+    """Return the median CPU time of a call in milliseconds, within a budget of seconds."""
+    times: list[float] = []
+    end = time.perf_counter() + budget
+    while not times or (time.perf_counter() < end and len(times) < 15):
+        begun = time.process_time()
+        work()
+        times.append((time.process_time() - begun) * 1e3)
+    return statistics.median(times)
+
+
+def grid_of(side: int) -> tuple[GridMap, npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """Return a map of about side x side cells full of rooms, and two of its opposite corners."""
+    rooms = max(2, round(side / 90))
+    world = World.from_parameters(place_generation.grid(rooms, rooms))
+    cell = rooms * place_generation.ROOM / side
+    drawn = occupancy_grid.draw(world.plan, cell, margin=0.0)
+    half = place_generation.ROOM / 2
+    first = np.array([half, half])
+    return GridMap(drawn.cells, drawn.resolution, drawn.origin), first, rooms * 2 * half - first
+
+
+def planning(*, quick: bool) -> None:
+    """Time and length of paths beside the bare library, networkx and an optimal reference."""
+    rows = []
+    for side in (100, 300, 1000) if quick else (100, 200, 500, 1000, 1500, 2000):
+        grid, start, goal = grid_of(side)
+        planner = GridPlanner(grid)
+        cost = planner._costs.cost
+        first, last = (tuple(int(i) for i in grid.cells_of(p)[0]) for p in (start, goal))
+
+        def search(cost: Any = cost, first: Any = first, last: Any = last) -> Any:
+            bare = MCP_Geometric(cost)
+            bare.find_costs([first], [last])
+            return bare.traceback(last)
+
+        budget = 1.0 if quick else 4.0
+        ours = median_ms(lambda p=planner, s=start, g=goal: p.plan(s, g), budget)
+        library = median_ms(search, budget)
+        path = planner.plan(start, goal)
+        shortest = GridPlanner(grid, PlanningParameters(aversion=0.0)).plan(start, goal)
+        free = cost > 0
+        peer = '-'
+        if side <= 300:
+            peer = f'{median_ms(lambda f=free, a=first, b=last: _networkx(f, a, b), 0.0):.0f}'
+        reference = '-'
+        if side <= 500:
+            best = _optimum(free, first, last) * grid.resolution
+            reference = f'{best:.2f}'
+        bare_length = polyline.length(grid.centres_of(np.array(search())))
+        rows.append(
+            (
+                f'{grid.cells.shape[1]}x{grid.cells.shape[0]}',
+                f'{ours:.1f}',
+                f'{library:.1f}',
+                f'{ours / library:.2f}',
+                peer,
+                f'{polyline.length(path):.2f}',
+                f'{polyline.length(shortest):.2f}',
+                f'{bare_length:.2f}',
+                reference,
+            )
+        )
+    table(
+        'Planning from corner to corner, median CPU time. Length in metres: ours, which keeps away '
+        'from walls;\nwith `aversion` 0; of the bare search on the same costs; the optimum over 32 '
+        'directions.',
+        ('cells', 'ours ms', 'MCP ms', 'ratio', 'nx ms', 'ours', 'short', 'MCP', 'optimum'),
+        rows,
+    )
+
+
+def _networkx(free: Mask, first: tuple[int, int], last: tuple[int, int]) -> float:
+    graph = networkx.Graph()
+    for offset, length in (((0, 1), 1.0), ((1, 0), 1.0), ((1, 1), 2**0.5), ((1, -1), 2**0.5)):
+        both, there = _pairs(free, offset)
+        graph.add_weighted_edges_from(
+            (int(a), int(b), length) for a, b in zip(both, there, strict=True)
+        )
+    columns = free.shape[1]
+    source, target = (row * columns + column for row, column in (first, last))
+    return float(networkx.dijkstra_path_length(graph, source, target))
+
+
+def _optimum(free: Mask, first: tuple[int, int], last: tuple[int, int]) -> float:
+    """Return the length in cells of the shortest path over 32 directions through free cells."""
+    origins, ends, lengths = [], [], []
+    for offset in _directions():
+        both, there = _pairs(free, offset)
+        origins.append(both)
+        ends.append(there)
+        lengths.append(np.full(len(both), np.hypot(*offset)))
+    size, columns = free.size, free.shape[1]
+    network = coo_array(
+        (np.concatenate(lengths), (np.concatenate(origins), np.concatenate(ends))), (size, size)
+    ).tocsr()
+    source, target = (row * columns + column for row, column in (first, last))
+    return float(dijkstra(network, directed=False, indices=source)[target])
+
+
+def _directions() -> Iterator[tuple[int, int]]:
+    for row in range(4):
+        for column in range(-3, 4):
+            coprime = np.gcd(row, abs(column)) == 1
+            if coprime and (row > 0 or column > 0) and max(row, abs(column)) <= 3:
+                yield row, column
+
+
+def _pairs(free: Mask, offset: tuple[int, int]) -> tuple[Any, Any]:
+    """Return the cells (numbers) from which a step leads through free cells, and where to."""
+    rows, columns = free.shape
+    steps = 8 * max(abs(offset[0]), abs(offset[1]))
+    covered = {
+        (round(offset[0] * step / steps), round(offset[1] * step / steps))
+        for step in range(steps + 1)
+    }
+    height, width = rows - offset[0], columns - abs(offset[1])
+    west = max(0, -offset[1])
+    clear = np.ones((height, width), bool)
+    for row, column in covered:
+        clear &= free[row : row + height, west + column : west + column + width]
+    y, x = np.nonzero(clear)
+    numbers = y * columns + x + west
+    return numbers, numbers + offset[0] * columns + offset[1]
+
+
+def control(*, quick: bool) -> None:
+    """Time of one step of each part of a drive through the seven rooms, without any ROS."""
+    world = read_world(ROOT / 'config' / 'seven_rooms.yaml')
+    robot = Robot(world, rng=np.random.default_rng(1))
+    drawn = occupancy_grid.draw(world.plan)
+    grid = GridMap(drawn.cells, drawn.resolution, drawn.origin)
+    planner = GridPlanner(grid)
+    pilot = Pilot()
+    pilot.set_map(grid)
+    angles = robot.lidar.angles
+    spent: dict[str, list[float]] = {'lidar': [], 'pilot': [], 'physics': []}
+
+    def timed(part: str, work: Callable[[], Any]) -> Any:
+        begun = time.process_time()
+        result = work()
+        spent[part].append((time.process_time() - begun) * 1e3)
+        return result
+
+    stops = ('R1', 'R4') if quick else ('R1', 'R4', 'E', 'R3', 'R2', 'E')
+    for stop in stops:
+        goal = world.plan.place.positions[stop][:2]
+        pilot.move(robot.base.odometry)
+        pilot.task = Drive(planner.plan(robot.base.pose[:2], goal))
+        while not pilot.task.state.ended:
+            ranges = timed('lidar', robot.scan).astype(float)
+            scan = Scan(angles, ranges, robot.lidar.range_max)
+            pilot.move(robot.base.odometry)
+            velocity = timed('pilot', lambda scan=scan: pilot.see(scan, robot.time))
+            robot.base.command(velocity.speed, velocity.turn)
+            timed('physics', lambda: robot.advance(0.1))
+    rows = [
+        (
+            part,
+            f'{statistics.median(times):.2f}',
+            f'{np.percentile(times, 99):.2f}',
+            f'{statistics.median(times) / 100:.1%}',
+        )
+        for part, times in spent.items()
+    ]
+    table(
+        f'One step of a drive of {robot.base.travelled:.0f} m in {robot.time:.0f} s, '
+        f'{robot.base.collisions} collisions; a step is due every 100 ms.',
+        ('part', 'median CPU ms', '99 % CPU ms', 'of the step'),
+        rows,
+    )
+
+
+def stack(*, quick: bool) -> None:
+    """Simulated seconds per real second of the whole patrol."""
+    seconds = 8.0 if quick else 30.0
+    rows = []
+    for name, measure in (
+        ('composed', lambda: composed(seconds)),
+        ("composed, rclpy's executor", lambda: composed(seconds, plain=True)),
+        ('a process per node', lambda: processes(seconds)),
+    ):
+        rate, cpu, distance = measure()
+        rows.append((name, f'{rate:.1f}', f'{cpu:.1f}', f'{distance:.0f}'))
+    table(
+        f'The whole stack patrolling the seven rooms for {seconds:.0f} real seconds each.',
+        ('how', 'simulated s / real s', 'simulated s / CPU s', 'metres driven'),
+        rows,
+    )
+
+
+def composed(seconds: float, *, plain: bool = False) -> tuple[float, float, float]:
+    """Return simulated seconds per real and per CPU second and metres driven, in one process."""
+    from rclpy.executors import SingleThreadedExecutor
+
+    from surveillance_runtime import node
+
+    made = node.make_executor
+    if plain:
+        node.make_executor = lambda context=None: SingleThreadedExecutor(context=context)
+    try:
+        patrol = Stack(ROOT / 'config' / 'seven_rooms.yaml')
+    finally:
+        node.make_executor = made
+    patrol.start()
+    try:
+        _await(lambda: patrol.robot.base.travelled > 1.0, 60.0)
+        begun, used, simulated = time.monotonic(), time.process_time(), patrol.robot.time
+        driven = patrol.robot.base.travelled
+        time.sleep(seconds)
+        passed = patrol.robot.time - simulated
+        rate, cpu = passed / (time.monotonic() - begun), passed / (time.process_time() - used)
+        return rate, cpu, patrol.robot.base.travelled - driven
+    finally:
+        patrol.close()
+
+
+def processes(seconds: float) -> tuple[float, float, float]:
+    """Return the same with a process for each node, started by the launcher."""
+    import rclpy
+    from geometry_msgs.msg import PoseStamped
+
+    from surveillance_runtime.node import ExecutorThread, PatrolNode
+    from surveillance_runtime.qos import SENSOR_QOS
+
+    domain = int(os.environ.get('ROS_DOMAIN_ID', '0'))
+    poses: list[tuple[float, float, float]] = []
+    context = rclpy.Context()
+    rclpy.init(context=context, domain_id=domain)
+    node = PatrolNode('observer', context=context, use_global_arguments=False)
+
+    def heard(message: PoseStamped) -> None:
+        stamp = message.header.stamp
+        position = message.pose.position
+        poses.append((stamp.sec + stamp.nanosec / 1e9, position.x, position.y))
+
+    node.create_subscription(PoseStamped, 'ground_truth', heard, SENSOR_QOS)
+    spinner = ExecutorThread(context)
+    spinner.executor.add_node(node)
+    spinner.start()
+    with tempfile.TemporaryDirectory() as folder:
+        fast = Path(folder) / 'fast.yaml'
+        fast.write_text(
+            json.dumps(
+                {
+                    '/**': {'ros__parameters': {'use_sim_time': True}},
+                    '/**/simulator': {'ros__parameters': {'speed': 0.0}},
+                }
+            )
+        )
+        words = [sys.executable, 'launch.py', '--mode', 'SIMULATED', '--params', str(fast)]
+        launched = subprocess.Popen(
+            [*words, '--domain', str(domain)], cwd=ROOT, stdout=subprocess.DEVNULL
+        )
+        try:
+            _await(lambda: poses and _driven(poses) > 1.0, 90.0)
+            first, used, begun = len(poses), _cpu(launched.pid), time.monotonic()
+            time.sleep(seconds)
+            passed = poses[-1][0] - poses[first - 1][0]
+            rate = passed / (time.monotonic() - begun)
+            cpu = passed / (_cpu(launched.pid) - used)
+            return rate, cpu, _driven(poses[first:])
+        finally:
+            launched.send_signal(signal.SIGINT)
+            launched.wait(30)
+            node.stop()
+            spinner.stop()
+            node.destroy_node()
+            rclpy.try_shutdown(context=context)
+
+
+def _driven(poses: Sequence[tuple[float, float, float]]) -> float:
+    return polyline.length(np.array([pose[1:] for pose in poses])) if len(poses) > 1 else 0.0
+
+
+def _cpu(parent: int) -> float:
+    """Return the CPU seconds that a process and its children have used (Linux)."""
+    ticks = 0.0
+    for stat in Path('/proc').glob('[0-9]*/stat'):
+        try:
+            fields = stat.read_text().rpartition(') ')[2].split()
+        except OSError:
+            continue
+        if parent in (int(fields[1]), int(stat.parent.name)):
+            ticks += int(fields[11]) + int(fields[12])
+    return ticks / os.sysconf('SC_CLK_TCK')
+
+
+def _await(condition: Callable[[], Any], patience: float) -> None:
+    end = time.monotonic() + patience
+    while not condition():
+        if time.monotonic() > end:
+            raise SystemExit('the robot does not drive: is everything set up?')
+        threading.Event().wait(0.05)
+
+
+SECTIONS: dict[str, Callable[..., None]] = {
+    'planning': planning,
+    'control': control,
+    'stack': stack,
+}
+
+
+def main() -> int:
+    """Run the sections asked for."""
+    parser = argparse.ArgumentParser(description=__doc__.split('\n')[0])
+    parser.add_argument('sections', nargs='*', choices=[*SECTIONS, []], help='default: all')
+    parser.add_argument('--quick', action='store_true', help='a run below 50 s')
+    options = parser.parse_args()
+    logging.disable()
+    for name in options.sections or SECTIONS:
+        SECTIONS[name](quick=options.quick)
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())
