@@ -140,7 +140,7 @@ class StateMachine(DrivenContainer):
         if made is not None:
             self._limits[label] = made
         group = self._group_transitions() if self.is_opened() else {}
-        for outcome in state.get_registered_outcomes():
+        for outcome in sorted(state.get_registered_outcomes()):
             bound.setdefault(outcome, group.get(outcome))
         self._states[label] = state
         self._transitions[label] = bound
