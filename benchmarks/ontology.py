@@ -1,0 +1,328 @@
+"""How fast the ontology follows a patrol: loading, reasoning, one visit, queries, memory.
+
+    python benchmarks/ontology.py [--quick] [--places 7 57 ...]
+
+A generated map is a chain of corridors, each joined to the next by a door, with seven rooms on each. A visit
+replaces `isIn`, `now` and the place's `visitedAt`, reasons, and asks what a decision asks: what the robot can
+reach, which places are URGENT, which are CORRIDORs, where the robot is. Each size runs in a process of its
+own. Peers in the same run: the same reasoner recomputing everything, and the Java reasoners that owlready2
+brings, resident in a JVM. `benchmarks/armor_calls.py` adds the directives inside the server and over ROS.
+"""
+
+from __future__ import annotations
+
+import argparse
+import gc
+import importlib
+import json
+import resource
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT))
+
+from benchmarks.java_reasoner import KINDS, JavaFailed, JavaReasoner, absent  # noqa: E402
+from surveillance_ontology.axioms import (  # noqa: E402
+    XSD,
+    Axiom,
+    DataPropertyAssertion,
+    DifferentIndividuals,
+    Literal,
+    ObjectPropertyAssertion,
+)
+from surveillance_ontology.knowledge_base import KnowledgeBase  # noqa: E402
+from surveillance_ontology.owl_reading import read_ontology  # noqa: E402
+from surveillance_ontology.owl_writing import write_ontology  # noqa: E402
+
+IRI = 'http://bnc/exp-rob-lab/2022-23'
+SCHEMA = ROOT / 'surveillance_ontology' / 'surveillance_ontology' / 'data' / 'surveillance.owl'
+START = 1_665_579_740
+ROOMS_ON_A_CORRIDOR = 7
+SIZES = (7, 57, 225, 1125, 10_000)
+JAVA_SIZES = (7, 57)
+VISITS = 300
+
+
+@dataclass
+class Figures:
+    """What one size took; times in seconds, memory in bytes."""
+
+    places: int
+    load: float
+    first: float
+    visit: float
+    reason: float
+    query: float
+    full: float
+    memory: int
+
+
+def named(name: str) -> str:
+    return f'{IRI}#{name}'
+
+
+def seconds(value: int) -> Literal:
+    return Literal(str(value), XSD + 'long')
+
+
+class Patrol:
+    """A generated map and a robot that walks from place to place on it."""
+
+    def __init__(self, places: int) -> None:
+        corridors = max(1, round(places / (ROOMS_ON_A_CORRIDOR + 1)))
+        self.robot = named('Robot1')
+        names = [named(f'C{number}') for number in range(1, corridors + 1)]
+        self.doors: dict[str, list[str]] = {name: [] for name in names}
+        self.beyond: dict[str, list[str]] = {name: [] for name in names}
+        self._door_number = 0
+        for one, other in zip(names, names[1:], strict=False):
+            self._join(one, other)
+        for number in range(places - corridors):
+            room = named(f'R{number + 1}')
+            self.doors[room], self.beyond[room] = [], []
+            self._join(room, names[number * corridors // (places - corridors)])
+        self.visited = {name: START + order for order, name in enumerate(self.doors)}
+        self.place, self.now = names[0], START + places
+        self.threshold = max(3, places - 3)
+        self._steps = 0
+
+    def _join(self, one: str, other: str) -> None:
+        self._door_number += 1
+        for place, neighbour in ((one, other), (other, one)):
+            self.doors[place].append(named(f'D{self._door_number}'))
+            self.beyond[place].append(neighbour)
+
+    def assertions(self) -> Iterator[Axiom]:
+        """The map and the robot."""
+        for place, doors in self.doors.items():
+            for door in doors:
+                yield ObjectPropertyAssertion(named('hasDoor'), place, door)
+            yield self._visit(place)
+        yield DifferentIndividuals(frozenset(self.doors))
+        doors = frozenset(door for doors in self.doors.values() for door in doors)
+        if len(doors) > 1:
+            yield DifferentIndividuals(doors)
+        yield self._is_in()
+        yield self._now()
+        yield DataPropertyAssertion(named('urgencyThreshold'), self.robot, seconds(self.threshold))
+
+    def _visit(self, place: str) -> Axiom:
+        return DataPropertyAssertion(named('visitedAt'), place, seconds(self.visited[place]))
+
+    def _is_in(self) -> Axiom:
+        return ObjectPropertyAssertion(named('isIn'), self.robot, self.place)
+
+    def _now(self) -> Axiom:
+        return DataPropertyAssertion(named('now'), self.robot, seconds(self.now))
+
+    def step(self) -> tuple[list[Axiom], list[Axiom], tuple[str, ...]]:
+        """Goes to a neighbour: assertions that go, those that come, and the words of a Java `visit`."""
+        self._steps += 1
+        neighbours = self.beyond[self.place]
+        target = neighbours[self._steps % len(neighbours)]
+        gone = [self._is_in(), self._now(), self._visit(target)]
+        words = [self.robot, self.place, target, str(self.now)]
+        self.now += 1
+        words += [str(self.now), str(self.visited[target]), str(self.now)]
+        self.place, self.visited[target] = target, self.now
+        return gone, [self._is_in(), self._now(), self._visit(target)], tuple(words)
+
+
+def schema() -> list[Axiom]:
+    """The project's own ontology without what it states of individuals' values."""
+    axioms = read_ontology(SCHEMA, IRI).axioms
+    return [axiom for axiom in axioms if not isinstance(axiom, DataPropertyAssertion)]
+
+
+def resident_bytes() -> int:
+    return int(Path('/proc/self/statm').read_text().split()[1]) * resource.getpagesize()
+
+
+def measure(places: int, visits: int) -> Figures:
+    """All figures of one size, in this process."""
+    patrol = Patrol(places)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / 'map.owl'
+        write_ontology([*schema(), *patrol.assertions()], IRI, path)
+        gc.collect()
+        before = resident_bytes()
+        start = time.perf_counter()
+        kb = KnowledgeBase(IRI, read_ontology(path, IRI).axioms)
+        load = time.perf_counter() - start
+    start = time.perf_counter()
+    consistent = kb.reason()
+    first = time.perf_counter() - start
+    if not consistent or kb.unsupported:
+        raise SystemExit(f'{places} places: the generated map does not suit the ontology')
+    gc.collect()
+    memory = resident_bytes() - before
+    whole: list[float] = []
+    reasoning: list[float] = []
+    asking: list[float] = []
+    for _ in range(visits):
+        gone, come, _ = patrol.step()
+        begin = time.perf_counter()
+        for old, new in zip(gone, come, strict=True):
+            kb.remove(old)
+            kb.add(new)
+        replaced = time.perf_counter()
+        kb.reason()
+        reasoned = time.perf_counter()
+        reach = kb.object_values(named('canReach'), patrol.robot)
+        urgent = kb.instances(named('URGENT'))
+        corridors = kb.instances(named('CORRIDOR'))
+        here = kb.object_values(named('isIn'), patrol.robot)
+        end = time.perf_counter()
+        whole.append(end - begin)
+        reasoning.append(reasoned - replaced)
+        asking.append(end - reasoned)
+        if here != {patrol.place} or reach != set(patrol.beyond[patrol.place]):
+            raise SystemExit(f'{places} places: wrong answer at {patrol.place}')
+    due = {place for place, seen in patrol.visited.items() if patrol.now - seen > patrol.threshold}
+    if urgent != due or corridors != {p for p, doors in patrol.doors.items() if len(doors) > 1}:
+        raise SystemExit(f'{places} places: wrong classes')
+    start = time.perf_counter()
+    kb.recompute()
+    full = time.perf_counter() - start
+    middle = statistics.median
+    return Figures(
+        places, load, first, middle(whole), middle(reasoning), middle(asking), full, memory
+    )
+
+
+def measure_apart(places: int, visits: int) -> Figures:
+    """All figures of one size, in a process of its own."""
+    command = [sys.executable, __file__, '--one', str(places), '--visits', str(visits)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise SystemExit(done.stderr.strip() or f'{places} places: failed')
+    return Figures(**json.loads(done.stdout))
+
+
+def measure_java(kind: str, places: int, visits: int) -> tuple[float, float]:
+    """Median seconds of REASON and of the decision's queries after a visit, in a resident JVM."""
+    patrol = Patrol(places)
+    with tempfile.TemporaryDirectory() as folder, JavaReasoner(kind) as java:
+        path = Path(folder) / 'map.owl'
+        write_ontology([*schema(), *patrol.assertions()], IRI, path)
+        java.ask('load', str(path))
+        reasoning: list[float] = []
+        asking: list[float] = []
+        for _ in range(visits):
+            answer = java.ask('visit', *patrol.step()[2]).split()
+            reasoning.append(int(answer[0]) / 1e9)
+            asking.append(int(answer[1]) / 1e9)
+    # The JVM compiles as it goes: the second half of the visits is what a long patrol sees.
+    half = len(reasoning) // 2
+    return statistics.median(reasoning[half:]), statistics.median(asking[half:])
+
+
+# --- the table ---
+
+
+def duration(value: float) -> str:
+    """Seconds with three significant digits in a unit that suits."""
+    for unit, scale in (('s', 1.0), ('ms', 1e-3), ('us', 1e-6)):
+        if value >= scale or unit == 'us':
+            return f'{value / scale:.3g} {unit}'
+    raise AssertionError
+
+
+def table(rows: list[list[str]]) -> str:
+    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
+    lines = []
+    for row in rows:
+        first = row[0].ljust(widths[0])
+        rest = [cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True)]
+        lines.append('  '.join([first, *rest]).rstrip())
+    lines.insert(1, '  '.join('-' * width for width in widths))
+    return '\n'.join(lines)
+
+
+def java_rows(figures: list[Figures], quick: bool) -> list[list[str]]:
+    """REASON and QUERY of the resident Java reasoners beside ours; absent ones named as absent."""
+    rows: list[list[str]] = []
+    ours = {entry.places: entry for entry in figures}
+    missing = absent()
+    for kind in KINDS:
+        for places in JAVA_SIZES[: 1 if quick else None]:
+            if places not in ours:
+                continue
+            title = f'resident {kind}, {places} places'
+            if missing:
+                rows.append([title, 'absent', '', missing])
+                break
+            try:
+                reason, query = measure_java(kind, places, 40 if quick else 200)
+            except JavaFailed as error:
+                rows.append([title, 'refuses', '', str(error).rpartition(': ')[2]])
+                break
+            ratio = (reason + query) / ours[places].visit
+            rows.append([title, duration(reason), duration(query), f'{ratio:.0f} x ours'])
+    return rows
+
+
+def directive_rows(quick: bool) -> list[list[str]]:
+    """Directives inside the server and over ROS, as `benchmarks/armor_calls.py` measures them."""
+    try:
+        calls = importlib.import_module('benchmarks.armor_calls')
+        return [[what, duration(ms / 1e3), beside] for what, ms, beside in calls.rows(quick)]
+    except ImportError as error:
+        return [['over ROS', 'absent', str(error)]]
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.partition('\n')[0])
+    parser.add_argument('--quick', action='store_true', help='fewer visits, sizes and peers')
+    parser.add_argument('--places', type=int, nargs='+', default=list(SIZES))
+    parser.add_argument('--visits', type=int, default=0, help='visits per size')
+    parser.add_argument('--one', type=int, help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    visits = options.visits or (100 if options.quick else VISITS)
+    if options.one:
+        print(json.dumps(asdict(measure(options.one, visits))))
+        return 0
+    figures = [measure_apart(places, visits) for places in options.places]
+    base = figures[0].visit
+    rows = [
+        ['places', 'LOAD', 'first REASON', 'visit in all', 'x smallest', 'its REASON', 'its QUERYs']
+        + ['full recompute', 'memory']
+    ]
+    for entry in figures:
+        rows.append(
+            [
+                str(entry.places),
+                duration(entry.load),
+                duration(entry.first),
+                duration(entry.visit),
+                f'{entry.visit / base:.2f}',
+                duration(entry.reason),
+                duration(entry.query),
+                duration(entry.full),
+                f'{entry.memory / 1e6:.1f} MB',
+            ]
+        )
+    print(table(rows))
+    print()
+    print(
+        table(
+            [
+                ['peer, after a visit', 'REASON', 'QUERYs', 'in all'],
+                *java_rows(figures, options.quick),
+            ]
+        )
+    )
+    print()
+    print(table([['directive, 7 places', 'median', 'beside'], *directive_rows(options.quick)]))
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())
