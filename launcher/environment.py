@@ -82,6 +82,8 @@ class Environment:
             system.install_packages(missing)
             if still := system.missing_packages():
                 raise system.MissingError(f'still missing after installing: {" ".join(still)}')
+        if note := system.note_of_unused_ros(self.checkout):
+            print(note, flush=True)
         with self._alone() as lock:
             if not self.ready():  # another launch may have done it in the meantime
                 self._set_up(lock)

@@ -71,9 +71,21 @@ def sourced_ros(environ: Mapping[str, str] | None = None) -> bool:
 
 def sourced_workspace() -> bool:
     """Whether this very interpreter imports ROS and the compiled interfaces already."""
-    return all(
-        importlib.util.find_spec(name) is not None
+    # The folders of the checkout look like packages without a file to load: those do not count.
+    specs = [
+        importlib.util.find_spec(name)
         for name in ('rclpy', 'surveillance_interfaces', 'surveillance_behaviour')
+    ]
+    return all(spec is not None and spec.origin is not None for spec in specs)
+
+
+def note_of_unused_ros(checkout: Path, ros_prefix: Path = ROS_PREFIX) -> str:
+    """Says, where a ROS is installed but not active, how to use it; empty where none is."""
+    if not ros_prefix.exists():
+        return ''
+    return (
+        f'ROS 2 Jazzy is installed in {ros_prefix}, but not active in this shell: this set-up brings '
+        f'its own. To use the installed one:\n{colcon_advice(checkout)}'
     )
 
 

@@ -1,10 +1,14 @@
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
-from launcher.system import Machine, no_wheels_advice, sourced_ros
+from launcher.environment import clean_environ
+from launcher.system import Machine, no_wheels_advice, note_of_unused_ros, sourced_ros
+from tests.launcher.conftest import ROOT
 
 HERE = Machine('Linux', 'x86_64', 'glibc', (3, 12))
 CHECKOUT = Path('/somewhere/surveillance')
@@ -39,6 +43,26 @@ def test_without_wheels_but_with_ros_the_advice_is_to_build(tmp_path):
     assert 'ROS 2 Jazzy is installed' in advice
     assert f'ln -s {CHECKOUT}' in advice
     assert 'ros2 launch surveillance_behaviour surveillance.launch.py' in advice
+
+
+def test_an_installed_ros_that_is_not_active_is_pointed_out(tmp_path):
+    assert 'colcon build' in note_of_unused_ros(CHECKOUT, tmp_path)
+    assert note_of_unused_ros(CHECKOUT, tmp_path / 'none') == ''
+
+
+def test_the_folders_of_the_checkout_are_no_built_workspace():
+    code = (
+        'import sys; sys.path.insert(0, sys.argv[1])\n'
+        'from launcher.system import sourced_workspace; print(sourced_workspace())'
+    )
+    done = subprocess.run(
+        [sys.executable, '-S', '-c', code, str(ROOT)],
+        env=clean_environ(),
+        stdout=subprocess.PIPE,
+        text=True,
+        check=True,
+    )
+    assert done.stdout == 'False\n'
 
 
 def test_a_sourced_jazzy_is_seen():
