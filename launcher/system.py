@@ -84,8 +84,8 @@ def note_of_unused_ros(checkout: Path, ros_prefix: Path = ROS_PREFIX) -> str:
     if not ros_prefix.exists():
         return ''
     return (
-        f'ROS 2 Jazzy is installed in {ros_prefix}, but not active in this shell: this set-up brings '
-        f'its own. To use the installed one:\n{colcon_advice(checkout)}'
+        f'ROS 2 Jazzy is installed in {ros_prefix}, but not active in this shell: this set-up '
+        f'brings its own. To use the installed one:\n{colcon_advice(checkout)}'
     )
 
 
