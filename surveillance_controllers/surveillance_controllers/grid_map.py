@@ -15,6 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from surveillance_controllers.polyline import Points
 
+OCCUPIED = 100
+"""The value of a cell that certainly is occupied."""
+
 OCCUPIED_FROM = 65
 """Cells of this value and above are taken as occupied, as map_server and AMCL do by default."""
 
@@ -121,6 +124,13 @@ def drawn_lines(grid: GridMap, lines: ArrayLike) -> NDArray[np.bool_]:
         share = np.linspace(0.0, 1.0, steps)[:, None]
         mask |= marked(grid, (1 - share) * (x1, y1) + share * (x2, y2))
     return mask
+
+
+def with_walls(grid: GridMap, lines: ArrayLike) -> GridMap:
+    """The map with further walls: segments x1, y1, x2, y2, shape (n, 4), metres."""
+    cells = grid.cells.copy()
+    cells[drawn_lines(grid, lines)] = OCCUPIED
+    return GridMap(cells, grid.resolution, grid.origin)
 
 
 def marked(grid: GridMap, points: ArrayLike) -> NDArray[np.bool_]:

@@ -68,7 +68,10 @@ class LocalisationParameters:
         doubt_below: The robot looks for a better pose when a smaller part of the rays agrees.
         lost_below: It counts as lost when none is found and a smaller part than this agrees.
         sure_from: A pose near the last one that explains this part ends the search.
-        better: A pose must explain this much more to be taken instead of the present one.
+        better: A pose near the last one must explain this much more to be taken instead.
+        far_better: A pose far away must explain this much more, and win in several searches: that
+            somebody carried the robot there is unlikely, and rooms look alike.
+        far_wins: In so many, one after the other.
         doubts: Doubtful scans in a row before it looks.
         lost_pause: Scans between two looks while it is lost.
         top_step: Odometry that jumps further than this between two readings is not believed, m.
@@ -90,6 +93,8 @@ class LocalisationParameters:
     lost_below: float = 0.55
     sure_from: float = 0.93
     better: float = 0.1
+    far_better: float = 0.2
+    far_wins: int = 3
     doubts: int = 3
     lost_pause: int = 10
     top_step: float = 0.3
@@ -126,6 +131,7 @@ class Localiser:
         self._odometry: Pose | None = None
         self._doubts = 0
         self._tolerated = 1.0
+        self._rival: tuple[Pose, int] | None = None
         self._moved = (0.0, 0.0)
         self._used_at: float | None = None
         self.set_map(grid)
@@ -211,9 +217,12 @@ class Localiser:
             return
         self._doubts = 0
         found = self.search(thin)
-        if found is not None and found[1] >= max(agreement + p.better, p.lost_below):
+        if found is not None and self._is_convincing(found, agreement):
             self.jumps += 1
             self._settle(*found)
+        elif self._rival is not None:
+            # Somewhere far away fits better: the next scans decide.
+            self._doubts = p.doubts - 1
         elif agreement >= p.lost_below:
             # Nothing explains the scan better: what is seen is not on the map.
             self._tolerated = agreement
@@ -221,10 +230,28 @@ class Localiser:
         else:
             self.lost = True
 
+    def _is_convincing(self, found: tuple[Pose, float], agreement: float) -> bool:
+        p = self.parameters
+        pose, explained = found
+        if explained < p.lost_below or explained < agreement + p.better:
+            self._rival = None
+            return False
+        if math.dist(pose[:2], self.pose[:2]) <= p.near:
+            return True
+        if explained < agreement + p.far_better:
+            self._rival = None
+            return False
+        wins = 1
+        if self._rival is not None and math.dist(pose[:2], self._rival[0][:2]) <= p.near / 2:
+            wins = self._rival[1] + 1
+        self._rival = pose, wins
+        return wins >= p.far_wins
+
     def _settle(self, pose: Pose, agreement: float) -> None:
         self.pose, self.agreement = pose, agreement
         self.lost = False
         self._doubts = 0
+        self._rival = None
 
     def search(self, scan: Scan) -> tuple[Pose, float] | None:
         """Looks for the pose that explains a scan: near the last one first, then everywhere.

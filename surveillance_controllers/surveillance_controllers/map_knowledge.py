@@ -5,7 +5,7 @@ Every method blocks for at most the peers' deadline, so it belongs on a worker t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 
 from surveillance_controllers import conversions
@@ -145,22 +145,20 @@ class MapKnowledge:
             raise KnowledgeError(f'the ontology has {ROBOT} in {what}')
         return str(found[0])
 
-    def record_place(self, place: str, interrupt: Interrupt) -> bool:
-        """Writes that the robot is in a place (isIn).
+    def record_place(self, place: str, before: Iterable[str], interrupt: Interrupt) -> None:
+        """Writes that the robot is in a place (isIn), in one exchange with the ontology.
 
-        Returns:
-            Whether the ontology had it elsewhere before.
+        Args:
+            place: The place.
+            before: Where the ontology has it so far.
+            interrupt: Ends the wait for the ontology.
 
         Raises:
             KnowledgeError: The ontology does not answer.
         """
         with _answered():
             armor = self._client(interrupt)
-            before = armor.query.objectprop_b2_ind('isIn', ROBOT)
-            if before == [place]:
-                return False
             _carry_out(armor, _moved(armor, before, place))
-        return True
 
     def record_visit(self, place: str, now: float, interrupt: Interrupt) -> None:
         """Writes that the robot is in a place now: isIn, now, and the place's visitedAt.
@@ -199,8 +197,10 @@ class MapKnowledge:
         return self._armor
 
 
-def _moved(armor: ArmorClient, before: list[str], place: str) -> list[DirectiveRequest]:
-    leave = [armor.request('REMOVE OBJECTPROP IND', 'isIn', ROBOT, old) for old in before]
+def _moved(armor: ArmorClient, before: Iterable[str], place: str) -> list[DirectiveRequest]:
+    leave = [
+        armor.request('REMOVE OBJECTPROP IND', 'isIn', ROBOT, old) for old in before if old != place
+    ]
     return [*leave, armor.request('ADD OBJECTPROP IND', 'isIn', ROBOT, place)]
 
 

@@ -35,13 +35,21 @@ class ObstacleMemory:
         reach: float = 4.0,
         keep: float = 120.0,
     ) -> None:
-        self._grid = grid
-        self._known = distance_to(grid.occupied, grid.resolution)
         self._cell = cell
         self._apart = apart
         self._reach = reach
         self._keep = keep
         self._seen: dict[tuple[int, int], float] = {}
+        self.set_map(grid)
+
+    def set_map(self, grid: GridMap) -> None:
+        """Replaces the map; obstacles that it has are the map's from now on."""
+        self._grid = grid
+        self._known = distance_to(grid.occupied, grid.resolution)
+        for cell in list(self._seen):
+            at = (np.array(cell, dtype=float) + 0.5) * self._cell
+            if grid.interpolated(self._known, at)[0] <= self._apart:
+                del self._seen[cell]
 
     @property
     def points(self) -> Points:

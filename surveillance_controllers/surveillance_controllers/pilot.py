@@ -14,14 +14,14 @@ from numpy.typing import ArrayLike
 
 from surveillance_controllers.battery_use import Pose
 from surveillance_controllers.driving import Drive, Spin
-from surveillance_controllers.grid_map import GridMap
+from surveillance_controllers.grid_map import GridMap, with_walls
 from surveillance_controllers.localisation import LocalisationParameters, Localiser, Scan
 from surveillance_controllers.obstacle_memory import ObstacleMemory
 from surveillance_controllers.path_following import Velocity
 from surveillance_controllers.place_regions import PlaceRegions, Segment
 from surveillance_controllers.polyline import Points
 
-SETTLE_SECONDS = 0.4
+SETTLE_SECONDS = 0.2
 """A place counts once the robot has been in it for this long, so that a doorway does not
 flicker."""
 
@@ -30,7 +30,7 @@ class Pilot:
     """What drives one robot.
 
     Args:
-        doors: Segments of all doors, by which the map is divided into places.
+        doors: All doors by name, as segments; they divide the map into places.
         localisation: How the pose is estimated.
 
     Attributes:
@@ -41,10 +41,11 @@ class Pilot:
 
     def __init__(
         self,
-        doors: Iterable[Segment] = (),
+        doors: Mapping[str, Segment] | None = None,
         localisation: LocalisationParameters | None = None,
     ) -> None:
-        self._doors = tuple(doors)
+        self._doors = dict(doors or {})
+        self._closed: frozenset[str] = frozenset()
         self._localisation = localisation
         self._positions: dict[str, Points] = {}
         self._grid: GridMap | None = None
@@ -78,6 +79,11 @@ class Pilot:
         return self._odometry
 
     @property
+    def jumps(self) -> int:
+        """How often the robot found itself elsewhere than it thought."""
+        return 0 if self._localiser is None else self._localiser.jumps
+
+    @property
     def lost(self) -> bool:
         """Whether the robot does not know where it is."""
         return self._localiser is not None and self._localiser.lost
@@ -90,11 +96,15 @@ class Pilot:
     def set_map(self, grid: GridMap) -> None:
         """Takes the map, or another one."""
         self._grid = grid
-        self._memory = ObstacleMemory(grid)
-        self.obstacles_changed = True
-        if self._localiser is not None:
-            self._localiser.set_map(grid)
+        self._redraw()
         self._divide()
+
+    def set_closed(self, doors: Iterable[str]) -> None:
+        """Takes which doors are closed: the lidar sees them as walls."""
+        closed = frozenset(doors) & self._doors.keys()
+        if closed != self._closed:
+            self._closed = closed
+            self._redraw()
 
     def set_positions(self, positions: Mapping[str, ArrayLike]) -> None:
         """Takes the places: a point in each, metres."""
@@ -128,10 +138,12 @@ class Pilot:
         if self._localiser is None:
             # Odometry begins where the robot begins, unless somebody says where that is.
             first = self._believed or self._odometry
-            self._localiser = Localiser(self._grid, first, self._localisation)
+            self._localiser = Localiser(self._seen_map, first, self._localisation)
             self._localiser.move(self._odometry)
-        if self._localiser.see(scan, now):
-            self._notice(scan, now)
+        if self._localiser.see(scan, now) and self._localiser.certain:
+            self._remember(scan, now)
+        if self._localiser.certain:
+            self._settle_place(now)
         pose = self._localiser.pose
         if isinstance(self.task, Drive):
             return self.task.step(now, pose, scan.points, lost=self._localiser.lost)
@@ -139,15 +151,15 @@ class Pilot:
             return self.task.step(pose[2])
         return None
 
-    def _notice(self, scan: Scan, now: float) -> None:
+    def _remember(self, scan: Scan, now: float) -> None:
         assert self._localiser is not None
-        if not self._localiser.certain:
-            return
         if self._memory is not None and self._memory.update(self._localiser.pose, scan, now):
             self.obstacles_changed = True
             if isinstance(self.task, Drive):
                 self.task.heed(self._memory.points)
-        if self._regions is None:
+
+    def _settle_place(self, now: float) -> None:
+        if self._regions is None or self._localiser is None:
             return
         place = self._regions.place_at(self._localiser.pose[:2])
         if self._candidate is None or self._candidate[0] != place:
@@ -155,9 +167,21 @@ class Pilot:
         if self.place is None or now - self._candidate[1] >= SETTLE_SECONDS:
             self.place = place
 
+    def _redraw(self) -> None:
+        if self._grid is None:
+            return
+        self._seen_map = with_walls(self._grid, [self._doors[name] for name in self._closed])
+        if self._memory is None:
+            self._memory = ObstacleMemory(self._seen_map)
+        else:
+            self._memory.set_map(self._seen_map)
+        self.obstacles_changed = True
+        if self._localiser is not None:
+            self._localiser.set_map(self._seen_map)
+
     def _divide(self) -> None:
         if self._grid is not None and self._positions:
-            self._regions = PlaceRegions(self._grid, self._doors, self._positions)
+            self._regions = PlaceRegions(self._grid, self._doors.values(), self._positions)
             self._candidate = None
 
     def place_at(self, point: ArrayLike) -> str | None:

@@ -86,5 +86,5 @@ class PlaceTracking:
         known = {fact.arguments[1] for fact in self._where.facts}
         if place is None or not known or known == {place}:
             return
-        if self._knowledge.record_place(place, self._node.stopping):
-            self._node.get_logger().info(f'the robot is in {place}')
+        self._knowledge.record_place(place, known, self._node.stopping)
+        self._node.get_logger().info(f'the robot is in {place}')

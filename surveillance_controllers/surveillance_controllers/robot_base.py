@@ -1,7 +1,7 @@
 """The robot for `motion_controller` in SIMULATED mode: its sensors and its drive, as topics.
 
-Reads `map`, `odom`, `scan` and `initialpose`; commands `cmd_vel`; publishes where the robot is
-(`amcl_pose`) and what stands about that the map does not have (`obstacles`).
+Reads `map`, `door_states`, `odom`, `scan` and `initialpose`; commands `cmd_vel`; publishes where
+the robot is (`amcl_pose`) and what stands about that the map does not have (`obstacles`).
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from surveillance_controllers.path_following import Velocity
 from surveillance_controllers.pilot import Pilot
 from surveillance_controllers.polyline import Points
 from surveillance_controllers.tf_correction import TfCorrection
+from surveillance_interfaces.msg import DoorStates
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 from surveillance_runtime.waiting import ClockWait, Interrupt
@@ -62,11 +63,13 @@ class RobotBase:
         self._steps = 0
         self._pose_sent = float('-inf')
         self._was_lost = False
+        self._jumps = 0
         self._commands = node.create_publisher(Twist, 'cmd_vel', 1)
         self._poses = node.create_publisher(PoseWithCovarianceStamped, 'amcl_pose', STATE_QOS)
         self._obstacles = node.create_publisher(PointCloud2, 'obstacles', STATE_QOS)
         self._tf = TfCorrection(node)
         node.create_subscription(OccupancyGrid, 'map', self._on_map, STATE_QOS)
+        node.create_subscription(DoorStates, 'door_states', self._on_doors, STATE_QOS)
         node.create_subscription(Odometry, 'odom', self._on_odometry, SENSOR_QOS)
         node.create_subscription(LaserScan, 'scan', self._on_scan, SENSOR_QOS)
         node.create_subscription(PoseWithCovarianceStamped, 'initialpose', self._on_initial_pose, 1)
@@ -181,6 +184,10 @@ class RobotBase:
         with self._lock:
             self._pilot.set_map(grid)
 
+    def _on_doors(self, message: DoorStates) -> None:
+        with self._lock:
+            self._pilot.set_closed(message.closed)
+
     def _on_odometry(self, message: Odometry) -> None:
         with self._lock:
             self._pilot.move(conversions.pose_from(message.pose.pose))
@@ -210,9 +217,12 @@ class RobotBase:
             return
         if pilot.lost != self._was_lost:
             self._was_lost = pilot.lost
-            self._node.get_logger().info(
-                'lost: what is seen does not fit the map' if pilot.lost else 'found itself again'
-            )
+            if pilot.lost:
+                self._node.get_logger().warn('lost: what is seen does not fit the map')
+        if pilot.jumps != self._jumps:
+            self._jumps = pilot.jumps
+            x, y, _ = pilot.pose
+            self._node.get_logger().info(f'found itself at ({x:.2f}, {y:.2f})')
         if pilot.obstacles_changed:
             pilot.obstacles_changed = False
             cloud = conversions.cloud_from_points(pilot.obstacles)
