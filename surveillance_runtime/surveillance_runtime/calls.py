@@ -224,20 +224,23 @@ class GoalCaller:
             def feedback(message: Any) -> None:
                 told(message.feedback)
 
+        # From before the goal is sent: a server that goes right after its yes is seen going.
+        wake = Interrupt()
+        watch = self._watch = _ServerWatch(wake)
         sent = self._client.send_goal_async(goal, feedback_callback=feedback)
         try:
             handle = _block_on(sent, deadline, interrupt, what)
         except CallFailed:
+            self._watch = None
             # The goal may be accepted yet; it must not run on unseen.
             sent.add_done_callback(_cancel_when_accepted)
             raise
         if not handle.accepted:
+            self._watch = None
             return GoalEnd('rejected', None)
-        wake = Interrupt()
         ended = handle.get_result_async()
         ended.add_done_callback(lambda _future: wake.set())
         remove = interrupt.subscribe(wake.set) if interrupt is not None else None
-        watch = self._watch = _ServerWatch(wake)
         try:
             lost = self._wait_for_end(handle, ended, watch, result_timeout, interrupt)
         finally:

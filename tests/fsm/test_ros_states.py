@@ -245,7 +245,7 @@ def test_a_goal_that_is_rejected_aborts(graph, caplog):
 
 def test_an_action_server_that_dies_in_the_middle_aborts(graph):
     server = graph.add(ScriptedActionServer)
-    run = Background(machine_of(action(graph.node)))
+    run = Background(machine_of(action(graph.node, server_wait_timeout=3.0)))
     assert server.began.wait(10.0)
     graph.remove(server)
     assert run.result() == 'aborted'
