@@ -214,6 +214,8 @@ class _Prototypes:
     def _filled(self, existential: Existential) -> Predicate | None:
         filler = existential.filler
         if isinstance(filler, str):
+            if filler == ax.NOTHING:
+                return self.program.nothing
             return None if filler == ax.THING else self.program.cls(filler)
         return self._labels[filler]
 
