@@ -42,6 +42,9 @@ from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 LONGEST_WRONG = 2.0
 """Simulated seconds that the ontology may be wrong about the robot's place."""
 
+TOP_SPEED = 60.0
+"""Simulated seconds per real second at most: what a node thinks costs the robot that much time."""
+
 
 class Watch:
     """Looks on from outside and notes what went wrong.
@@ -274,17 +277,22 @@ def run(
     tell: Callable[[str], None] = lambda _: None,
     domain: int | None = None,
 ) -> tuple[Watch, Trouble]:
-    """Patrol for simulated seconds with trouble every `pause` seconds; return what was seen."""
+    """Patrol for simulated seconds with trouble every `pause` seconds; return what was seen.
+
+    The seconds count from when the robot first drives.
+    """
     rng = random.Random(seed)
-    stack = Stack(place, {'simulator': {'random_seed': seed}}, domain)
+    stack = Stack(place, {'simulator': {'random_seed': seed, 'top_speed': TOP_SPEED}}, domain)
     watch = Watch(stack)
     trouble = Trouble(stack, watch, rng)
     stack.start()
     try:
-        watch.until(10.0)
+        while stack.robot.base.travelled < 0.5:
+            watch.until(watch.now + 1.0)
+        end = watch.now + seconds
         next_trouble = watch.now + rng.uniform(*pause)
-        while watch.now < seconds:
-            watch.until(min(next_trouble, trouble.next_mend, seconds))
+        while watch.now < end:
+            watch.until(min(next_trouble, trouble.next_mend, end))
             trouble.mend()
             if watch.now >= next_trouble:
                 tell(f'{watch.now:8.1f} s  {trouble.make()}')

@@ -8,7 +8,6 @@ Without a section's name all are run. Every figure stands beside its peer's from
 from __future__ import annotations
 
 import argparse
-import json
 import logging
 import os
 import signal
@@ -28,8 +27,9 @@ import numpy.typing as npt
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 from skimage.graph import MCP_Geometric
-from whole_stack import ROOT, Stack
+from whole_stack import ROOT, Stack, ros_arguments
 
+from launcher import graph, mission
 from surveillance_controllers import polyline
 from surveillance_controllers.driving import Drive
 from surveillance_controllers.grid_map import GridMap
@@ -270,7 +270,7 @@ def composed(seconds: float, *, plain: bool = False) -> tuple[float, float, floa
 
 
 def processes(seconds: float) -> tuple[float, float, float]:
-    """Return the same with a process for each node, started by the launcher."""
+    """Return the same with a process for each node, started as the launcher does."""
     import rclpy
     from geometry_msgs.msg import PoseStamped
 
@@ -292,31 +292,25 @@ def processes(seconds: float) -> tuple[float, float, float]:
     spinner = ExecutorThread(context)
     spinner.executor.add_node(node)
     spinner.start()
+    started: list[subprocess.Popen[bytes]] = []
     with tempfile.TemporaryDirectory() as folder:
-        fast = Path(folder) / 'fast.yaml'
-        fast.write_text(
-            json.dumps(
-                {
-                    '/**': {'ros__parameters': {'use_sim_time': True}},
-                    '/**/simulator': {'ros__parameters': {'speed': 0.0}},
-                }
-            )
-        )
-        words = [sys.executable, 'launch.py', '--mode', 'SIMULATED', '--params', str(fast)]
-        launched = subprocess.Popen(
-            [*words, '--domain', str(domain)], cwd=ROOT, stdout=subprocess.DEVNULL
-        )
+        arguments = ros_arguments(ROOT / 'config' / 'seven_rooms.yaml', Path(folder))
+        environ = mission.node_environ(mission.Run(domain=domain))
         try:
+            for each in graph.select('SIMULATED'):
+                words = mission.command([each], arguments, os.getpid())
+                started.append(subprocess.Popen(words, env=environ))
             _await(lambda: poses and _driven(poses) > 1.0, 90.0)
-            first, used, begun = len(poses), _cpu(launched.pid), time.monotonic()
+            first, used, begun = len(poses), _cpu(started), time.monotonic()
             time.sleep(seconds)
             passed = poses[-1][0] - poses[first - 1][0]
-            rate = passed / (time.monotonic() - begun)
-            cpu = passed / (_cpu(launched.pid) - used)
+            rate, cpu = passed / (time.monotonic() - begun), passed / (_cpu(started) - used)
             return rate, cpu, _driven(poses[first:])
         finally:
-            launched.send_signal(signal.SIGINT)
-            launched.wait(30)
+            for process in started:
+                process.send_signal(signal.SIGINT)
+            for process in started:
+                process.wait(30)
             node.stop()
             spinner.stop()
             node.destroy_node()
@@ -327,16 +321,12 @@ def _driven(poses: Sequence[tuple[float, float, float]]) -> float:
     return polyline.length(np.array([pose[1:] for pose in poses])) if len(poses) > 1 else 0.0
 
 
-def _cpu(parent: int) -> float:
-    """Return the CPU seconds that a process and its children have used (Linux)."""
+def _cpu(processes: Sequence[subprocess.Popen[bytes]]) -> float:
+    """Return the CPU seconds that processes have used (Linux)."""
     ticks = 0.0
-    for stat in Path('/proc').glob('[0-9]*/stat'):
-        try:
-            fields = stat.read_text().rpartition(') ')[2].split()
-        except OSError:
-            continue
-        if parent in (int(fields[1]), int(stat.parent.name)):
-            ticks += int(fields[11]) + int(fields[12])
+    for process in processes:
+        fields = Path(f'/proc/{process.pid}/stat').read_text().rpartition(') ')[2].split()
+        ticks += int(fields[11]) + int(fields[12])
     return ticks / os.sysconf('SC_CLK_TCK')
 
 

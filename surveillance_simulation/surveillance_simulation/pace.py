@@ -26,7 +26,7 @@ class PaceModel:
     """
 
     speed: float = 1.0
-    ceiling: float = 200.0
+    ceiling: float = 100.0
     step: float = 0.1
     idle_step: float = 0.5
     window: float = 0.15

@@ -1,0 +1,97 @@
+"""Paths and drives against the geometry itself, not against the grid they were planned on."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from surveillance_controllers import polyline
+from surveillance_controllers.driving import Drive, State
+from surveillance_controllers.grid_map import GridMap
+from surveillance_controllers.grid_planning import GridPlanner, NoPath
+from surveillance_controllers.localisation import Scan
+from surveillance_controllers.pilot import Pilot
+from surveillance_simulation import occupancy_grid
+from surveillance_simulation.place_file import read_world
+from surveillance_simulation.robot import Robot
+from surveillance_simulation.world import World
+
+from .places import CONFIG
+
+RADIUS = 0.22
+DOORS = ('D1', 'D2', 'D3', 'D4', 'D5', 'D6', 'D7')
+points = st.tuples(st.floats(2.0, 18.0), st.floats(2.0, 18.0))
+
+
+@pytest.fixture(scope='module')
+def planner() -> GridPlanner:
+    drawn = occupancy_grid.draw(read_world(CONFIG / 'seven_rooms.yaml').plan)
+    return GridPlanner(GridMap(drawn.cells, drawn.resolution, drawn.origin))
+
+
+@settings(max_examples=40, deadline=None, derandomize=True)
+@given(start=points, goal=points, closed=st.sets(st.sampled_from(DOORS), max_size=4))
+def test_a_path_never_touches_a_wall_or_a_closed_door(
+    planner: GridPlanner,
+    start: tuple[float, float],
+    goal: tuple[float, float],
+    closed: set[str],
+) -> None:
+    world = read_world(CONFIG / 'seven_rooms.yaml')
+    for door in closed:
+        world.set_door(door, False)
+    planner.set_closed(
+        {
+            name: (*door.ends[0], *door.ends[1])
+            for name, door in world.plan.doors.items()
+            if name in closed
+        }
+    )
+    assume(world.is_free(*start, RADIUS + 0.05))
+    try:
+        path = planner.plan(start, goal)
+    except NoPath:
+        return
+    for x, y in polyline.equally_spaced(path, 0.02):
+        assert world.is_free(float(x), float(y), RADIUS)
+
+
+def driven(world: World, seed: int, goals: list[str]) -> tuple[Robot, float]:
+    """Drive through places on cores alone; return the robot and how far it left its paths."""
+    robot = Robot(world, rng=np.random.default_rng(seed))
+    drawn = occupancy_grid.draw(world.plan)
+    grid = GridMap(drawn.cells, drawn.resolution, drawn.origin)
+    planner, pilot = GridPlanner(grid), Pilot()
+    pilot.set_map(grid)
+    furthest = 0.0
+    for goal in goals:
+        path = planner.plan(robot.base.pose[:2], world.plan.place.positions[goal][:2])
+        drive = pilot.task = Drive(path)
+        line = polyline.equally_spaced(path, 0.02)
+        pilot.move(robot.base.odometry)
+        for _ in range(1200):
+            if drive.state.ended:
+                break
+            scan = Scan(robot.lidar.angles, robot.scan().astype(float), robot.lidar.range_max)
+            pilot.move(robot.base.odometry)
+            velocity = pilot.see(scan, robot.time)
+            assert velocity is not None
+            robot.base.command(velocity.speed, velocity.turn)
+            robot.advance(0.1)
+            here = np.array(robot.base.pose[:2])
+            furthest = max(furthest, float(np.hypot(*(line - here).T).min()))
+        assert drive.state is State.ARRIVED, drive.reason
+    return robot, furthest
+
+
+@pytest.mark.parametrize('seed', [1, 2, 3])
+def test_a_drive_stays_in_the_corridor_around_its_path_and_arrives(seed: int) -> None:
+    world = read_world(CONFIG / 'seven_rooms.yaml')
+    goals = [['R1', 'R4', 'E'], ['R3', 'C1', 'R2'], ['C2', 'E', 'R1']][seed - 1]
+    robot, furthest = driven(world, seed, goals)
+    assert robot.base.collisions == 0
+    assert furthest < 0.2
+    x, y, _ = world.plan.place.positions[goals[-1]]
+    assert np.hypot(robot.base.pose[0] - x, robot.base.pose[1] - y) < 0.2

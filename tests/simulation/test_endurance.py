@@ -1,0 +1,21 @@
+"""The whole patrol in one process while doors close, things stand about and the robot is pushed."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+sys.path.insert(0, str(ROOT / 'benchmarks'))
+
+import endurance  # noqa: E402
+
+
+def test_minutes_of_trouble_cost_neither_collisions_nor_the_way_home(ros_domain: int) -> None:
+    watch, trouble = endurance.run(
+        ROOT / 'config' / 'seven_rooms.yaml', 150.0, seed=3, pause=(8.0, 20.0), domain=ros_domain
+    )
+    assert sum(trouble.made.values()) >= 5
+    assert watch.collisions == 0
+    assert not watch.empty
+    assert sum(watch.visits.values()) >= 3
