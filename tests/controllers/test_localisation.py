@@ -1,0 +1,122 @@
+"""Localisation: precise tracking, recovery from pushes and slips, and no panic about obstacles."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from surveillance_controllers.localisation import Localiser, Scan, composed, relative
+
+POSES = st.tuples(st.floats(-5, 5), st.floats(-5, 5), st.floats(-3, 3))
+
+
+def error(localiser: Localiser, true: tuple[float, float, float]) -> tuple[float, float]:
+    gap = math.dist(localiser.pose[:2], true[:2])
+    return gap, abs(math.remainder(localiser.pose[2] - true[2], math.tau))
+
+
+@given(POSES, POSES)
+@settings(max_examples=60, deadline=None)
+def test_a_step_between_two_poses_leads_from_one_to_the_other(
+    first: tuple[float, float, float], second: tuple[float, float, float]
+) -> None:
+    reached = composed(first, relative(first, second))
+    assert reached[:2] == pytest.approx(second[:2], abs=1e-9)
+    assert math.remainder(reached[2] - second[2], math.tau) == pytest.approx(0, abs=1e-9)
+
+
+def test_a_drive_with_drifting_odometry_is_tracked(flat: Any) -> None:
+    true = (1.0, 1.5, 0.0)
+    localiser = Localiser(flat.grid, true)
+    odometry = (7.0, -3.0, 1.0)
+    localiser.move(odometry)
+    for step in range(60):
+        turn = 0.05 * math.sin(step / 9)
+        true = composed(true, (0.05, 0.0, turn))
+        odometry = composed(odometry, (0.05 * 1.08, 0.002, turn + 0.006))
+        localiser.move(odometry)
+        localiser.see(flat.scan(true), now=0.1 * step)
+        assert localiser.certain
+    gap, turn = error(localiser, true)
+    assert gap < 0.05
+    assert turn < 0.02
+    assert localiser.jumps == 0
+
+
+@given(st.floats(-0.8, 0.8), st.floats(-0.6, 0.6), st.floats(-3.1, 3.1))
+@settings(
+    max_examples=8, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+def test_a_pushed_robot_finds_itself(flat: Any, dx: float, dy: float, dyaw: float) -> None:
+    localiser = Localiser(flat.grid, (2.2, 1.4, 0.3))
+    true = (2.2 + dx, 1.4 + dy, 0.3 + dyaw)
+    for step in range(6):
+        localiser.see(flat.scan(true), now=float(step))
+    gap, turn = error(localiser, true)
+    assert gap < 0.06
+    assert turn < 0.04
+    assert localiser.certain
+
+
+def test_a_robot_carried_into_another_room_finds_itself_after_some_scans(flat: Any) -> None:
+    localiser = Localiser(flat.grid, (1.0, 1.0, 0.0))
+    true = (6.0, 2.2, 2.0)
+    for step in range(20):
+        localiser.see(flat.scan(true), now=float(step))
+    assert error(localiser, true)[0] < 0.06
+    assert localiser.jumps == 1
+
+
+def test_a_slip_of_the_odometry_is_not_believed(flat: Any) -> None:
+    true = (2.0, 1.5, 0.5)
+    localiser = Localiser(flat.grid, true)
+    localiser.move((0, 0, 0))
+    localiser.see(flat.scan(true), now=0)
+    localiser.move((1.5, 0.4, 0.9))
+    localiser.see(flat.scan(true), now=1)
+    assert error(localiser, true)[0] < 0.05
+    localiser.move((1.6, 0.45, 1.1))
+    for step in range(4):
+        localiser.see(flat.scan(true), now=2.0 + step)
+    assert error(localiser, true)[0] < 0.05
+
+
+def test_obstacles_and_a_closed_door_do_not_carry_the_estimate_away(flat: Any) -> None:
+    true = (3.2, 1.5, 0.1)
+    localiser = Localiser(flat.grid, true)
+    obstacles = [(2.5, 1.9, 0.2), (3.6, 0.8, 0.15)]
+    for step in range(12):
+        localiser.see(flat.scan(true, obstacles, closed=True), now=float(step))
+    assert error(localiser, true)[0] < 0.06
+    assert localiser.jumps == 0
+    assert not localiser.lost
+
+
+def test_a_robot_that_sees_nothing_of_its_map_is_lost_and_found_again(flat: Any) -> None:
+    true = (2.0, 1.5, 0.0)
+    localiser = Localiser(flat.grid, true)
+    scan = flat.scan(true)
+    nonsense = np.random.default_rng(2).uniform(0.3, 7.0, len(scan.angles))
+    for step in range(6):
+        localiser.see(Scan(scan.angles, nonsense, scan.range_max), now=float(step))
+    assert localiser.lost
+    for step in range(30):
+        localiser.see(flat.scan(true), now=10.0 + step)
+    assert not localiser.lost
+    assert error(localiser, true)[0] < 0.06
+
+
+def test_scans_that_tell_nothing_new_are_not_used(flat: Any) -> None:
+    localiser = Localiser(flat.grid, (2.0, 1.5, 0.0))
+    scan = flat.scan((2.0, 1.5, 0.0))
+    assert localiser.see(scan, now=0.0)
+    assert not localiser.see(scan, now=0.1)
+    assert localiser.see(scan, now=0.6)
+    localiser.move((0, 0, 0))
+    localiser.move((0.2, 0, 0))
+    assert localiser.see(flat.scan((2.2, 1.5, 0.0)), now=0.65)

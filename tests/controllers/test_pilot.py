@@ -1,0 +1,171 @@
+"""The pilot's sense of place, what it remembers of obstacles, and the places of a map."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from surveillance_controllers.driving import Drive, State
+from surveillance_controllers.localisation import composed
+from surveillance_controllers.obstacle_memory import ObstacleMemory
+from surveillance_controllers.path_following import Velocity
+from surveillance_controllers.pilot import Pilot
+from surveillance_controllers.place_regions import PlaceRegions, door_segment
+from surveillance_controllers.route_planning import NoRoute, route
+
+
+@pytest.fixture
+def pilot(flat: Any) -> Pilot:
+    pilot = Pilot({'D1': flat.DOOR})
+    pilot.set_positions(flat.POSITIONS)
+    pilot.set_map(flat.grid)
+    return pilot
+
+
+def test_a_pilot_says_what_it_waits_for(flat: Any) -> None:
+    pilot = Pilot()
+    scan = flat.scan((2, 1.5, 0))
+    assert pilot.see(scan, 0.0) is None
+    assert pilot.missing == 'map'
+    pilot.set_map(flat.grid)
+    assert pilot.missing == 'odom'
+    pilot.move((2, 1.5, 0))
+    assert pilot.missing == 'scan'
+    pilot.see(scan, 0.1)
+    assert pilot.missing is None
+    assert pilot.pose == pytest.approx((2, 1.5, 0), abs=0.05)
+
+
+def test_a_drive_through_the_door_changes_the_place_once(flat: Any, pilot: Pilot) -> None:
+    true = (2.0, 1.5, 0.0)
+    pilot.move(true)
+    pilot.task = Drive([[2.0, 1.5], [5.5, 1.5]])
+    places: list[str | None] = []
+    for step in range(300):
+        velocity = pilot.see(flat.scan(true), 0.1 * step)
+        assert velocity is not None
+        if not places or places[-1] != pilot.place:
+            places.append(pilot.place)
+        if pilot.task.state.ended:
+            break
+        true = composed(true, (velocity.speed * 0.1, 0.0, velocity.turn * 0.1))
+        pilot.move(true)
+    assert pilot.task.state is State.ARRIVED
+    assert places == ['A', 'B']
+    assert true[:2] == pytest.approx((5.5, 1.5), abs=0.12)
+
+
+def test_a_pose_that_is_told_is_taken(flat: Any, pilot: Pilot) -> None:
+    pilot.believe((5.5, 1.0, 1.0))
+    pilot.move((0.0, 0.0, 0.0))
+    pilot.see(flat.scan((5.5, 1.0, 1.0)), 0.0)
+    assert pilot.pose == pytest.approx((5.5, 1.0, 1.0), abs=0.05)
+    assert pilot.place == 'B'
+
+
+def test_an_obstacle_on_the_path_makes_the_drive_ask(flat: Any, pilot: Pilot) -> None:
+    true = (1.0, 1.5, 0.0)
+    pilot.move(true)
+    pilot.task = Drive([[1.0, 1.5], [3.5, 1.5]])
+    pilot.see(flat.scan(true), 0.0)
+    pilot.obstacles_changed = False
+    pilot.see(flat.scan(true, [(2.6, 1.5, 0.15)]), 1.0)
+    assert pilot.obstacles_changed
+    assert pilot.task.state is State.ASKING
+    gaps = np.hypot(*(pilot.obstacles - (2.6, 1.5)).T)
+    assert len(gaps) > 3
+    assert np.abs(gaps - 0.15).max() < 0.1
+
+
+def test_a_closed_door_is_no_obstacle_once_it_is_known(flat: Any, pilot: Pilot) -> None:
+    true = (2.5, 1.5, 0.0)
+    pilot.move(true)
+    pilot.see(flat.scan(true, closed=True), 0.0)
+    assert len(pilot.obstacles) > 3
+    pilot.set_closed(['D1', 'unheard of'])
+    assert len(pilot.obstacles) == 0
+    pilot.see(flat.scan(true, closed=True), 1.0)
+    assert len(pilot.obstacles) == 0
+
+
+def test_without_a_task_nothing_is_commanded(flat: Any, pilot: Pilot) -> None:
+    pilot.move((2, 1.5, 0))
+    assert pilot.see(flat.scan((2, 1.5, 0)), 0.0) is None
+    pilot.task = Drive([[2, 1.5]])
+    assert pilot.see(flat.scan((2, 1.5, 0)), 0.1) == Velocity()
+
+
+def test_obstacles_are_forgotten_when_rays_go_through_them(flat: Any) -> None:
+    memory = ObstacleMemory(flat.grid)
+    pose = (1.0, 1.5, 0.0)
+    assert memory.update(pose, flat.scan(pose, [(2.5, 1.2, 0.15)]), 0.0)
+    assert len(memory.points) > 3
+    behind = flat.scan(pose, [(1.6, 1.34, 0.25)])
+    memory.update(pose, behind, 1.0)
+    near = np.hypot(*(memory.points - (2.5, 1.2)).T) < 0.3
+    assert near.any(), 'what is hidden is not forgotten'
+    memory.update(pose, flat.scan(pose), 2.0)
+    assert len(memory.points) == 0
+
+
+def test_obstacles_that_stay_unseen_are_forgotten_in_the_end(flat: Any) -> None:
+    memory = ObstacleMemory(flat.grid, keep=10.0)
+    pose = (1.0, 1.5, 0.0)
+    memory.update(pose, flat.scan(pose, [(2.5, 1.2, 0.15)]), 0.0)
+    memory.update((6.0, 2.5, 0.0), flat.scan((6.0, 2.5, 0.0)), 11.0)
+    assert len(memory.points) == 0
+
+
+def test_a_map_without_obstacles_shows_none(flat: Any) -> None:
+    memory = ObstacleMemory(flat.grid)
+    for pose in [(1.0, 1.5, 0.0), (3.7, 1.5, 2.0), (5.5, 2.5, -1.0)]:
+        assert not memory.update(pose, flat.scan(pose), 0.0)
+
+
+def test_regions_are_divided_by_the_door(flat: Any) -> None:
+    regions = PlaceRegions(flat.grid, [flat.DOOR], flat.POSITIONS)
+    assert regions.place_at((0.5, 2.8)) == 'A'
+    assert regions.place_at((3.95, 1.5)) == 'A'
+    assert regions.place_at((4.2, 1.5)) == 'B'
+    assert regions.place_at((5.2, 3.15)) == 'B'
+    assert regions.place_at((40, 1)) is None
+    assert regions.place_at((math.nan, 1)) is None
+
+
+def test_places_in_one_region_are_told_apart_by_their_points(flat: Any) -> None:
+    regions = PlaceRegions(flat.grid, [], flat.POSITIONS)
+    assert regions.place_at((3.0, 1.5)) == 'A'
+    assert regions.place_at((4.5, 1.5)) == 'B'
+
+
+def test_a_door_s_segment_lies_along_its_yaw() -> None:
+    assert door_segment(1, 2, math.pi / 2, 1.2) == pytest.approx((1, 1.4, 1, 2.6))
+
+
+DOORS = {'D1': {'R1', 'C1'}, 'D2': {'C1', 'C2'}, 'D3': {'C2', 'R1'}, 'D4': {'C2', 'R2'}}
+POINTS = {'R1': (0, 0), 'C1': (2, 0), 'C2': (4, 0), 'R2': (6, 0)}
+
+
+def test_the_shortest_route_over_open_doors_is_taken() -> None:
+    assert route(DOORS, [], 'R1', 'R2', POINTS) == ['D3', 'D4']
+    assert route(DOORS, ['D3'], 'R1', 'R2', POINTS) == ['D1', 'D2', 'D4']
+    assert route(DOORS, [], 'R1', 'R1', POINTS) == []
+
+
+@pytest.mark.parametrize(
+    ('closed', 'goal', 'text'),
+    [
+        (['D4'], 'R2', 'no route from R1 to R2: the door D4 is closed'),
+        (['D3', 'D1', 'D4'], 'R2', 'no route from R1 to R2: the doors D3, D4 are closed'),
+        ([], 'R9', 'no route from R1 to R9: no doors lead there'),
+    ],
+)
+def test_without_a_route_the_closed_doors_are_named(
+    closed: list[str], goal: str, text: str
+) -> None:
+    with pytest.raises(NoRoute) as caught:
+        route(DOORS, closed, 'R1', goal, POINTS)
+    assert str(caught.value) == text
