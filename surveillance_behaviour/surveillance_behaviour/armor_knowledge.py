@@ -12,6 +12,7 @@ from typing import Protocol
 
 from surveillance_behaviour import fsm
 from surveillance_behaviour.ports import (
+    AwayError,
     Beliefs,
     InterruptedWaitError,
     LostRobotError,
@@ -167,7 +168,7 @@ class ArmorKnowledge:
         except ArmorServiceCallError as error:
             if interrupt.is_set():
                 raise InterruptedWaitError from None
-            raise PeerError('armor', str(error)) from None
+            raise AwayError('armor', str(error)) from None
         finally:
             forget()
             self._wake.clear()

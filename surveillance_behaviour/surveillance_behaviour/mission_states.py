@@ -8,7 +8,7 @@ from typing import Any
 from surveillance_behaviour import fsm
 from surveillance_behaviour.mission import Mission
 from surveillance_behaviour.policy.rules import NowhereToGoError
-from surveillance_behaviour.ports import InterruptedWaitError, PeerError
+from surveillance_behaviour.ports import AwayError, InterruptedWaitError, PeerError
 from surveillance_behaviour.recovery import Step
 
 PREEMPTED = 'preempted'
@@ -50,6 +50,9 @@ class MissionState(fsm.State):
             if self.preempt_requested():
                 return self._preempted()
             return self.interrupted(ud)
+        except AwayError as error:
+            self.mission.failed(self.task, str(error))
+            return FAILED
         except (PeerError, NowhereToGoError) as error:
             self.mission.failed(self.task, str(error), self.goal(ud), charging=self.charging)
             return FAILED

@@ -33,6 +33,10 @@ class PeerError(Exception):
         self.reason = reason
 
 
+class AwayError(PeerError):
+    """A peer is not there, or went away: no other path or place helps, only its return."""
+
+
 class UnknownPlaceError(PeerError):
     """A place is not there, or not any more."""
 

@@ -6,8 +6,14 @@ from collections.abc import Callable
 from typing import Any
 
 from surveillance_behaviour.fsm import Interrupt
-from surveillance_behaviour.ports import InterruptedWaitError, PeerError
-from surveillance_runtime.calls import CallFailed, GoalCaller, Interrupted, ServiceCaller
+from surveillance_behaviour.ports import AwayError, InterruptedWaitError, PeerError
+from surveillance_runtime.calls import (
+    CallFailed,
+    GoalCaller,
+    Interrupted,
+    ServiceCaller,
+    Unavailable,
+)
 
 
 def call(caller: ServiceCaller, request: Any, deadline: float, interrupt: Interrupt) -> Any:
@@ -71,4 +77,5 @@ def run(
 
 
 def _peer_error(name: str, error: CallFailed) -> PeerError:
-    return PeerError(name, str(error).partition(f'{name}: ')[2] or str(error))
+    kind = AwayError if isinstance(error, Unavailable) else PeerError
+    return kind(name, str(error).partition(f'{name}: ')[2] or str(error))

@@ -336,7 +336,10 @@ class ScriptedRoutine:
 
 
 def fails(
-    method: str, times: float = math.inf, reason: str = 'scripted fault'
+    method: str,
+    times: float = math.inf,
+    reason: str = 'scripted fault',
+    kind: type[PeerError] = PeerError,
 ) -> Callable[[str], None]:
     """A fault: the first ``times`` calls of a port method fail."""
     left = [times]
@@ -344,6 +347,6 @@ def fails(
     def fault(call: str) -> None:
         if call == method and left[0] > 0:
             left[0] -= 1
-            raise PeerError(method, reason)
+            raise kind(method, reason)
 
     return fault

@@ -15,7 +15,7 @@ from surveillance_behaviour.fsm.testing import watching
 from surveillance_behaviour.machines import MACHINES
 from surveillance_behaviour.mission import Mission, MissionSettings
 from surveillance_behaviour.mission_record import MissionRecord, read, summarize
-from surveillance_behaviour.ports import LostRobotError, PeerError, Point
+from surveillance_behaviour.ports import AwayError, LostRobotError, PeerError, Point
 
 from .scripted_world import POSITIONS, SEVEN_ROOMS, World, fails
 
@@ -221,6 +221,15 @@ def test_a_preempt_during_any_call_ends_the_machine(name: str, call: str) -> Non
     run.world.set_level(10.0)
     assert run.machine.execute() == 'preempted'
     assert world.clock.time < 200.0
+
+
+def test_a_peer_that_is_away_is_waited_for_at_once(machine: str) -> None:
+    world = World()
+    world.faults = fails('plan', 3, 'no server', AwayError)
+    Run(machine, world).until(60.0)
+    assert len([cry for cry in world.cries if 'no server' in cry]) == 3
+    assert not any('another' in text for text in world.said)
+    assert world.arrivals
 
 
 WRONG_PATHS: list[tuple[list[Point], str]] = [
