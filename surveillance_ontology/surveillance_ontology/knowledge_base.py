@@ -188,7 +188,8 @@ class KnowledgeBase:
         Returns:
             The number of axioms rewritten.
         """
-        affected = [axiom for axiom in self.axioms_about(old) if (kind, old) in entities_of(axiom)]
+        roles = {(kind, old), ('annotated', old)}
+        affected = [axiom for axiom in self.axioms_about(old) if roles & set(entities_of(axiom))]
         self.change([renamed(axiom, kind, old, new) for axiom in affected], affected)
         return len(affected)
 

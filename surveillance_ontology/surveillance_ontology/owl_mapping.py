@@ -58,6 +58,7 @@ class Mapping:
         self.unsupported: list[str] = []
         self.iri = ''
         self._places = graph.places
+        self._subject_read = ''
         self._nodes: dict[str, dict[str, list[Node]]] = {}
         self._kinds: dict[str, set[str]] = {}
         self._expressions: dict[str, ax.ClassExpression] = {}
@@ -75,8 +76,23 @@ class Mapping:
                     self._kinds.setdefault(subject, set()).add('object_property')
                 elif value == SWRL + 'Variable':
                     self._variables.add(subject)
+        self._guess_kinds()
         for subject, properties in self._nodes.items():
             self._subject(subject, properties)
+
+    def _guess_kinds(self) -> None:
+        """Undeclared properties with a datatype as range, or a literal as value, are data properties."""
+        guessed: set[str] = set()
+        for subject, properties in self._nodes.items():
+            for predicate, values in properties.items():
+                if predicate == RDFS + 'range':
+                    if any(isinstance(v, str) and self._is_data_range(v) for v in values):
+                        guessed.add(subject)
+                elif any(isinstance(value, Literal) for value in values):
+                    guessed.add(predicate)
+        for name in guessed - _ANNOTATIONS:
+            if not name.startswith(_BUILT_IN):
+                self._kinds.setdefault(name, {'data_property'})
 
     # --- reporting ---
 
@@ -88,7 +104,8 @@ class Mapping:
         self.unsupported.append(self._where(node) + what)
 
     def _fail(self, node: str, message: str) -> RdfSyntaxError:
-        return RdfSyntaxError(message, *self._places.get(node, (0, 0)))
+        place = self._places.get(node) or self._places.get(self._subject_read, (0, 0))
+        return RdfSyntaxError(message, *place)
 
     # --- reading parts ---
 
@@ -264,6 +281,7 @@ class Mapping:
         self.axioms[axiom] = None
 
     def _subject(self, subject: str, properties: dict[str, list[Node]]) -> None:
+        self._subject_read = subject
         types = [value for value in properties.get(_TYPE, ()) if isinstance(value, str)]
         special = next((_SPECIAL[name] for name in types if name in _SPECIAL), None)
         if special is not None:
@@ -313,6 +331,8 @@ class Mapping:
                 self._add(ax.AnnotationAssertion(predicate, subject, value))
         elif predicate.startswith(SWRL):
             pass
+        elif predicate.startswith(XSD) and subject.startswith('_:'):
+            pass  # A facet of a datatype restriction.
         elif predicate.startswith(_BUILT_IN[:3]):
             self._report(subject, f'{predicate} on {subject} is not understood')
         elif isinstance(value, Literal):

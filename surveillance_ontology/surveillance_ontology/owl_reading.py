@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from surveillance_ontology.owl_mapping import Mapping
 from surveillance_ontology.rdf_ntriples import parse_ntriples
 from surveillance_ontology.rdf_xml import RdfSyntaxError, parse_rdf_xml
 
+_NTRIPLES = re.compile(rb'<[^\s<>]*>\s+[<_]')
 DEFAULT_SIZE_LIMIT = 256 * 1024 * 1024
 
 
@@ -67,11 +69,7 @@ def read_ontology(
         raise OntologyFileError(name, 0, 0, f'larger than the limit of {size_limit} bytes')
     start = data.lstrip(b'\xef\xbb\xbf \t\r\n')
     try:
-        if (
-            start.startswith(b'<')
-            and start[1:2] not in b'hu'
-            or start[:2] in (b'\xff\xfe', b'\xfe\xff')
-        ):
+        if not _NTRIPLES.match(start) and start[:1] in (b'<', b'\xff', b'\xfe'):
             graph, form = parse_rdf_xml(data, iri), 'rdfxml'
         elif not start:
             raise RdfSyntaxError('the document is empty', 1, 1)

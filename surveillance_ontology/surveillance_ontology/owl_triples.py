@@ -301,9 +301,24 @@ class _Mapping:
 
 
 def triples_of(axioms: Iterable[Axiom], iri: str) -> Iterator[Triple]:
-    """The triples of an ontology, its header first."""
+    """The triples of an ontology, its header first.
+
+    Classes, properties and datatypes that are used but not declared are declared: without, a reader could not
+    tell an object property from a data property.
+    """
     mapping = _Mapping(iri)
     mapping.add(iri, _TYPE, OWL + 'Ontology')
+    declared: set[tuple[str, str]] = set()
+    used: dict[tuple[str, str], None] = {}
     for axiom in axioms:
         mapping.axiom(axiom)
+        if isinstance(axiom, ax.Declaration):
+            declared.add((axiom.kind, axiom.iri))
+        elif not isinstance(axiom, (ax.SameIndividual, ax.DifferentIndividuals)):
+            for kind, name in ax.entities_of(axiom):
+                if kind not in ('individual', 'annotated'):
+                    used[kind, name] = None
+    for kind, name in used:
+        if (kind, name) not in declared and not name.startswith((OWL, RDF, RDFS, XSD)):
+            mapping.add(name, _TYPE, _KIND_TYPES[kind])
     return iter(mapping.triples)

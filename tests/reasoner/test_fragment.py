@@ -138,8 +138,14 @@ def same(*individuals: str) -> SameIndividual:
             [has(S, i, 5)],
         ),
         (DataSomeValuesFrom(S, DataOneOf((num(4), num(5)))), [has(S, i, 5)]),
-        (ObjectSomeValuesFrom(P, ObjectSomeValuesFrom(P, B)), [rel(P, i, j), rel(P, j, k), is_a(B, k)]),
-        (ObjectMinCardinality(2, P, ObjectUnionOf((B, C))), [rel(P, i, j), rel(P, i, k), differ(j, k), is_a(B, j), is_a(C, k)]),
+        (
+            ObjectSomeValuesFrom(P, ObjectSomeValuesFrom(P, B)),
+            [rel(P, i, j), rel(P, j, k), is_a(B, k)],
+        ),
+        (
+            ObjectMinCardinality(2, P, ObjectUnionOf((B, C))),
+            [rel(P, i, j), rel(P, i, k), differ(j, k), is_a(B, j), is_a(C, k)],
+        ),
     ],
 )
 def test_definitions_recognise_members(definition: ClassExpression, facts: list[Axiom]) -> None:

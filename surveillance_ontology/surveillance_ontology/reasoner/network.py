@@ -74,7 +74,7 @@ class Network:
             if not counter.is_data:
                 self.touch_insert.append(counter.touch_insert)
                 self.touch_delete.append(counter.touch_delete)
-        for at_most in program.at_most:
+        for at_most in sorted(program.at_most, key=lambda condition: condition.label is not None):
             watcher = AtMostCounter(at_most, difference, program.nothing, push, doom, merge)
             self.counters.append(watcher)
             if not watcher.is_data:
