@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import random
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from surveillance_behaviour.battery_gauge import BatteryGauge
@@ -193,14 +194,15 @@ class Mission:
         """The robot leaves the place it is in; until it arrives it may be anywhere."""
         self.astray = True
 
-    def arrived(self, place: str, distance: float) -> None:
-        """The robot is in ``place``, after ``distance`` metres."""
+    def arrived(self, place: str, distance: float, path: Sequence[Point] = ()) -> None:
+        """The robot is in ``place``, after ``distance`` metres along ``path``."""
         self.place = place
         self.astray = False
         self.chooser.saw(place, self.now())
         self.recovery.arrived(place)
         self.failure = None
-        self._write('visit', place=place, distance=distance)
+        way = {'path': [[round(x, 2), round(y, 2)] for x, y, *_ in path]} if path else {}
+        self._write('visit', place=place, distance=distance, **way)
         self.say(f'arrived in {place}')
 
     def came_back(self, distance: float) -> None:

@@ -10,7 +10,7 @@ and the event's own fields::
 
     {"event": "start", "time": 0.0, "machine": "surveillance", "place": "E", "places": ["C1", "E"]}
     {"event": "decision", "time": 2.0, "place": "C1", "rule": "URGENT", "reason": "..."}
-    {"event": "visit", "time": 9.4, "place": "C1", "distance": 5.4}
+    {"event": "visit", "time": 9.4, "place": "C1", "distance": 5.4, "path": [[5, 10], ...]}
 """
 
 from __future__ import annotations

@@ -142,7 +142,8 @@ class Controlling(MovingState):
         super().__init__(mission, 'reached', heeds_battery, ('target', 'via_points'))
 
     def move(self, ud: Any, interrupt: fsm.Interrupt) -> None:
-        self.mission.arrived(ud.target, drive(self, ud.target, ud.via_points, interrupt))
+        distance = drive(self, ud.target, ud.via_points, interrupt)
+        self.mission.arrived(ud.target, distance, ud.via_points)
 
 
 class GoBack(RoutineState):

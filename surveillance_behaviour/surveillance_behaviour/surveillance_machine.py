@@ -148,12 +148,12 @@ class Move(MissionState):
         knowledge, before = mission.ports.knowledge, mission.place
         knowledge.note_visit(before, mission.now(), interrupt)
         mission.chooser.saw(before, mission.now())
-        distance = self._drive(before, place, interrupt)
+        path = self._drive(before, place, interrupt)
         knowledge.note_arrival(before, place, mission.now(), interrupt)
-        mission.arrived(place, distance)
+        mission.arrived(place, path_length(path), path)
         return self._outcome
 
-    def _drive(self, before: str, place: str, interrupt: fsm.Interrupt) -> float:
+    def _drive(self, before: str, place: str, interrupt: fsm.Interrupt) -> list[Point]:
         mission = self.mission
         motion = mission.ports.motion
         assert motion is not None
@@ -167,7 +167,7 @@ class Move(MissionState):
         mission.departs()
         end = motion.follow(path, interrupt)
         check_arrival(end, path[-1], mission.settings.arrival_tolerance, 'follow_path')
-        return path_length(path)
+        return path
 
     def _stops(self, before: str, place: str, goal: Point, interrupt: fsm.Interrupt) -> list[Point]:
         """The goal, at the last try after the places of a way round if the map has one."""
@@ -207,7 +207,7 @@ class ReturnToLastPlace(Move):
 
     def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
         mission = self.mission
-        mission.came_back(self._drive(mission.place, mission.place, interrupt))
+        mission.came_back(path_length(self._drive(mission.place, mission.place, interrupt)))
         return 'returned'
 
 
