@@ -47,7 +47,11 @@ class InitialState(PatrolNode):
             'poses', [1, 2, 3, 4], "The arm's poses for looking around.", minimum=1, maximum=4
         )
         deadline = self.parameter(
-            'deadline', 45.0, 'Seconds after which what was found has to do.', minimum=0.0
+            'deadline',
+            45.0,
+            'Seconds after which what was found has to do.',
+            minimum=0.0,
+            on_change=lambda value: setattr(self._looking, 'deadline', value),
         )
         dwell = self.parameter('dwell', 0.5, 'Rest at each view of a scan, seconds.', minimum=0.0)
         pictures = self.parameter('pictures', 6, 'Pictures to take at each pose.', minimum=1)

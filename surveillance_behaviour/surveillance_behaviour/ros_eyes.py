@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from rclpy.time import Time
-
 from surveillance_interfaces.action import ScanSurroundings
-from surveillance_interfaces.msg import MarkerDetectionArray
 from surveillance_interfaces.srv import MarkerRoutine
 from surveillance_runtime.calls import CallFailed, GoalCaller, ServiceCaller
 from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.rested_pictures import RestedPictures
 from surveillance_runtime.waiting import ClockWait, Interrupt
 
 _ARM_SECONDS = 30.0
@@ -34,18 +32,12 @@ class RosEyes:
         self._wait = ClockWait(node)
         self._move = ServiceCaller(node, MarkerRoutine, 'move_arm')
         self._scan = GoalCaller(node, ScanSurroundings, 'scan_surroundings', cancel_timeout=1.0)
-        self._resting_since: Time | None = None
-        self._seen = 0
-        self._enough = Interrupt()
-        node.stopping.subscribe(self._enough.set)
-        node.create_subscription(
-            MarkerDetectionArray, 'aruco_detector/detections', self._on_picture, 10
-        )
+        self._read = RestedPictures(node)
 
     def pose(self, number: int) -> None:
         """Take one of the arm's poses and look."""
         if self._moved(number):
-            self._look()
+            self._read.wait(self._pictures, 0.0, self._patience, self._node.stopping)
 
     def home(self) -> None:
         """Fold the arm for driving."""
@@ -84,21 +76,6 @@ class RosEyes:
         if not answer.success:
             self._complain(f'move_arm to pose {number}: {answer.message}')
         return bool(answer.success)
-
-    def _look(self) -> None:
-        self._seen = 0
-        if not self._node.stopping.is_set():
-            self._enough.clear()
-        self._resting_since = self._node.get_clock().now()
-        self._wait.sleep(self._patience, self._enough)
-        self._resting_since = None
-
-    def _on_picture(self, message: MarkerDetectionArray) -> None:
-        since = self._resting_since
-        if since is not None and Time.from_msg(message.header.stamp) >= since:
-            self._seen += 1
-            if self._seen >= self._pictures:
-                self._enough.set()
 
     def _complain(self, reason: str) -> None:
         if not self._node.stopping.is_set():

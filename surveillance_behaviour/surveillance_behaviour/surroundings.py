@@ -27,13 +27,13 @@ class Eyes(Protocol):
         """Fold the arm for driving."""
 
 
-@dataclass(frozen=True)
+@dataclass
 class LookingAround:
     """How to look around.
 
     Attributes:
         poses: Numbers of the poses, in order.
-        deadline: Seconds after which what was found has to do.
+        deadline: Seconds after which what was found has to do; may change while it runs.
         dwell: Rest at each view of the first scan, seconds.
     """
 
@@ -58,23 +58,27 @@ class LookingAround:
             say: Told what goes on.
             stopping: Tells whether to give up.
         """
-        end = now() + self.deadline
+        begin = now()
+
+        def late() -> bool:
+            return now() - begin >= self.deadline
 
         def enough() -> bool:
-            return stopping() or judge().complete or (now() >= end and bool(judge().places))
+            report = judge()
+            return stopping() or report.complete or (late() and bool(report.places))
 
         for number in self.poses:
             eyes.pose(number)
             if enough():
                 break
-        overlap, dwell, late = 0.2, self.dwell, False
+        overlap, dwell, told = 0.2, self.dwell, False
         while not enough():
             for sentence in judge().sentences():
                 say(f'looking on: {sentence}')
             eyes.scan(overlap, dwell, enough)
             overlap, dwell = min(overlap + 0.15, 0.5), min(dwell * 2.0, 4.0 * self.dwell)
-            if now() >= end and not judge().places and not late:
-                late = True
+            if late() and not judge().places and not told:
+                told = True
                 say('nothing to patrol was found yet; looking on')
         if not stopping():
             eyes.home()

@@ -25,6 +25,7 @@ from surveillance_perception.view_coverage import View
 from surveillance_runtime.goals import GoalAborted, GoalRun, GoalServer
 from surveillance_runtime.node import PatrolNode, run_node
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
+from surveillance_runtime.rested_pictures import RestedPictures
 from surveillance_runtime.robot_arm import ARM
 
 _POSES = {
@@ -48,6 +49,20 @@ class ArmController(PatrolNode):
             'Rest at each view of a scan, seconds.',
             minimum=0.0,
             on_change=lambda value: setattr(self, '_dwell', value),
+        )
+        self._pictures = self.parameter(
+            'pictures',
+            4,
+            'Pictures that the marker detector must have looked at before a view is left.',
+            minimum=0,
+            read_only=True,
+        )
+        self._patience = self.parameter(
+            'patience',
+            1.5,
+            'Seconds after which a view is left without them.',
+            minimum=0.0,
+            read_only=True,
         )
         fields = (('horizontal', 60.0), ('vertical', 46.8))
         self._field_of_view = tuple(
@@ -80,6 +95,7 @@ class ArmController(PatrolNode):
             lambda msg: self._driver.report(msg.name, msg.position, msg.velocity),
             SENSOR_QOS,
         )
+        self._read = RestedPictures(self)
         self.create_subscription(Odometry, 'odom', self._on_odometry, SENSOR_QOS)
         self.create_service(MarkerRoutine, 'move_arm', self._on_move, callback_group=group)
         self.create_service(PointCamera, 'point_camera', self._on_point, callback_group=group)
@@ -147,7 +163,7 @@ class ArmController(PatrolNode):
         return np.array(ARM.home) if positions is None else positions
 
     async def _off_executor(self, work: Callable[[], str]) -> tuple[bool, str]:
-        """Do blocking work on a thread of its own; whether it went well, and what there is to say."""
+        """Do blocking work on a thread of its own; whether it went well, and what to say."""
         done = Future(executor=self.executor)
 
         def body() -> None:
@@ -177,11 +193,14 @@ class ArmController(PatrolNode):
             feedback.azimuth, feedback.elevation = view.azimuth, view.elevation
             run.feedback(feedback)
 
+        def rest() -> bool:
+            return self._read.wait(self._pictures, dwell, self._patience, run.interrupt)
+
         outcome = ScanOutcome([], [])
         failure = ''
         wake = run.interrupt.subscribe(self._driver.wake)
         try:
-            scan(self._driver, views, lambda: run.sleep(dwell), tell, run.interrupt.is_set, outcome)
+            scan(self._driver, views, rest, tell, run.interrupt.is_set, outcome)
         except (ArmError, TrajectoryError) as error:
             failure = str(error)
         finally:

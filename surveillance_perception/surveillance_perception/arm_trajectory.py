@@ -120,7 +120,8 @@ def _solve(request: ruckig.InputParameter, start: ArmState) -> ArmTrajectory:
     result = ruckig.Ruckig(joints).calculate(request, trajectory)
     if result not in (ruckig.Result.Working, ruckig.Result.Finished):
         raise TrajectoryError(f'no motion from {start.positions.round(3).tolist()}: {result.name}')
-    duration = float(trajectory.duration)
+    # also a motion to where the arm is takes its time: its points must follow one another
+    duration = max(float(trajectory.duration), SAMPLE_PERIOD)
     count = max(2, int(np.ceil(duration / SAMPLE_PERIOD)) + 1)
     times = np.linspace(0.0, duration, count)
     rows = [trajectory.at_time(float(time)) for time in times]

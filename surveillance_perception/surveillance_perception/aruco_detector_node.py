@@ -34,15 +34,17 @@ from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 IDS_QOS = QoSProfile(depth=200, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """Each id is sent once, so whoever comes late gets those that were sent before."""
 
-_DIAGNOSTICS_PERIOD = 1.0
-
 
 class ArucoDetector(PatrolNode):
-    """Finds ArUco markers in the camera's pictures."""
+    """Finds ArUco markers in the camera's pictures.
+
+    Attributes:
+        skipped: How many pictures were left out because the arm moved.
+    """
 
     def __init__(self, **node_options: Any) -> None:
         super().__init__('aruco_detector', **node_options)
-        self._options = DetectorParameters(self, self._on_change)
+        self._options = DetectorParameters(self, self._settings_changed)
         self._field_of_view = self._changeable(
             'field_of_view',
             60.0,
@@ -57,11 +59,14 @@ class ArucoDetector(PatrolNode):
             minimum=1,
         )
         self._only_at_rest = self._changeable(
-            'only_at_rest', False, 'Look only at pictures taken while arm/at_rest is true.'
+            'only_at_rest',
+            True,
+            'Leave out pictures taken while arm/at_rest is false; without an arm it is never told.',
         )
         self._camera: CameraModel | None = None
-        self._rest_since: Time | None = None
+        self._rest_since: Time | None = Time(clock_type=self.get_clock().clock_type)
         self._stale = False
+        self.skipped = 0
         self._watch = DetectionWatch(self._options.settings())
         self._pictures: Latest[Image | CompressedImage] = Latest()
         self._ids = self.create_publisher(Int32, 'aruco_detector/id', IDS_QOS)
@@ -80,7 +85,14 @@ class ArucoDetector(PatrolNode):
             CameraInfo, 'camera/rgb/camera_info', self._on_camera_info, SENSOR_QOS
         )
         self.create_subscription(Bool, 'arm/at_rest', self._on_rest, STATE_QOS)
-        self.create_timer(_DIAGNOSTICS_PERIOD, self._diagnose)
+        period = self.parameter(
+            'diagnostics_period',
+            1.0,
+            'Seconds between two messages on diagnostics.',
+            minimum=0.01,
+            read_only=True,
+        )
+        self.create_timer(period, self._diagnose)
         self.spawn(self._work, 'marker detection')
 
     def on_stop(self) -> None:
@@ -96,7 +108,7 @@ class ArucoDetector(PatrolNode):
             **limits,
         )
 
-    def _on_change(self) -> None:
+    def _settings_changed(self) -> None:
         self._stale = True
 
     def _on_camera_info(self, message: CameraInfo) -> None:
@@ -114,6 +126,7 @@ class ArucoDetector(PatrolNode):
                 self._stale = False
                 self._adopt()
             if self._only_at_rest and not self._taken_at_rest(message):
+                self.skipped += 1
                 continue
             try:
                 self._look(message)
@@ -177,6 +190,7 @@ class ArucoDetector(PatrolNode):
             'pictures': counts.pictures,
             'refused': counts.refused,
             'dropped in all': self._pictures.dropped,
+            'taken in motion in all': self.skipped,
             'ms per picture': f'{mean:.1f}',
             'confirmed ids': ' '.join(str(each) for each in sorted(self._watch.confirmed)),
         }

@@ -1,4 +1,4 @@
-"""What a picture needs before markers are looked for: grey, stretched when dark, smoothed when noisy."""
+"""What a picture needs before its markers are read: stretched when dark, smoothed when noisy."""
 
 from __future__ import annotations
 

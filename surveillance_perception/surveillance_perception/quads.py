@@ -89,7 +89,7 @@ def quads_around(
 
 
 def distinct(quads: Quads, distance: float) -> npt.NDArray[np.int64]:
-    """Indices of the quads whose corners do not lie within `distance` pixels of an earlier one's."""
+    """Indices of the quads with no corner within `distance` pixels of an earlier one's."""
     kept: list[int] = []
     for index, quad in enumerate(quads):
         others = quads[kept]

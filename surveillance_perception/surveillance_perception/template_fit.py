@@ -207,6 +207,6 @@ def _warps(parameters: Patches) -> Array:
 
 
 def _normal_distribution(value: Array) -> Array:
-    """Cumulative normal distribution, to 2e-4 (Page, "Approximations ...", Appl. Stat. 26, 1977)."""
+    """Cumulative normal distribution, to 2e-4 (Page, Applied Statistics 26(1), 1977)."""
     clipped = np.clip(value, -8.0, 8.0)
     return np.asarray(0.5 + 0.5 * np.tanh(0.7978845608 * (clipped + 0.044715 * clipped**3)))

@@ -27,9 +27,9 @@ from surveillance_runtime.robot_arm import ARM, Arm, Joint
 
 HOME = np.array(ARM.home)
 LIMITED = settings(max_examples=60, derandomize=True, deadline=None)
-joint_positions = st.tuples(
-    *(st.floats(joint.lower, joint.upper) for joint in ARM.joints)
-).map(np.array)
+joint_positions = st.tuples(*(st.floats(joint.lower, joint.upper) for joint in ARM.joints)).map(
+    np.array
+)
 
 
 @LIMITED
@@ -89,7 +89,7 @@ def test_motion_keeps_all_limits_and_ends_at_rest(start, goal):
 
 
 def test_stop_in_the_middle_is_smooth():
-    motion = motion_to(ARM, ArmState.resting(HOME), HOME + [2.5, 0, 0, 0, 0])
+    motion = motion_to(ARM, ArmState.resting(HOME), HOME + np.array([2.5, 0, 0, 0, 0]))
     middle = motion.at(motion.duration / 2)
     stop = motion_to_rest(ARM, middle)
     assert np.allclose(stop.positions[0], middle.positions)
@@ -161,7 +161,7 @@ def in_thread(work):
 def test_driver_returns_when_the_arm_rests_at_its_goal():
     arm = FollowingArm()
     arm.report()
-    goal = HOME + [1.0, 0, 0, 0, 0]
+    goal = HOME + np.array([1.0, 0, 0, 0, 0])
     done = in_thread(lambda: arm.driver.move(goal))
     arm.wait_for_motion()
     assert arm.rests[-1] is False
@@ -174,10 +174,10 @@ def test_driver_returns_when_the_arm_rests_at_its_goal():
 def test_newer_motion_takes_over_from_where_the_arm_is():
     arm = FollowingArm()
     arm.report()
-    first = in_thread(lambda: arm.driver.move(HOME + [2.0, 0, 0, 0, 0]))
+    first = in_thread(lambda: arm.driver.move(HOME + np.array([2.0, 0, 0, 0, 0])))
     arm.wait_for_motion()
     arm.run(0.8)
-    second = in_thread(lambda: arm.driver.move(HOME - [1.0, 0, 0, 0, 0]))
+    second = in_thread(lambda: arm.driver.move(HOME - np.array([1.0, 0, 0, 0, 0])))
     arm.wait_for_motion()
     assert 'took over' in str(first())
     begun = arm.sent[-1][1]
@@ -190,7 +190,7 @@ def test_motion_that_is_given_up_stops_the_arm():
     arm = FollowingArm()
     arm.report()
     ended = threading.Event()
-    done = in_thread(lambda: arm.driver.move(HOME + [2.0, 0, 0, 0, 0], ended.is_set))
+    done = in_thread(lambda: arm.driver.move(HOME + np.array([2.0, 0, 0, 0, 0]), ended.is_set))
     arm.wait_for_motion()
     arm.run(0.6)
     ended.set()
@@ -202,7 +202,7 @@ def test_motion_that_is_given_up_stops_the_arm():
 def test_halt_waits_for_the_standstill():
     arm = FollowingArm()
     arm.report()
-    moving = in_thread(lambda: arm.driver.move(HOME + [2.0, 0, 0, 0, 0]))
+    moving = in_thread(lambda: arm.driver.move(HOME + np.array([2.0, 0, 0, 0, 0])))
     arm.wait_for_motion()
     arm.run(0.6)
     halted = in_thread(arm.driver.halt)
@@ -220,7 +220,7 @@ def test_arm_that_never_reports_is_named():
 def test_arm_that_stops_short_is_named():
     arm = FollowingArm(follows=0.3, patience=0.05)
     arm.report()
-    done = in_thread(lambda: arm.driver.move(HOME + [2.0, 0, 0, 0, 0]))
+    done = in_thread(lambda: arm.driver.move(HOME + np.array([2.0, 0, 0, 0, 0])))
     arm.wait_for_motion()
     arm.run(arm.sent[-1][1].duration + 0.1)
     assert 'away from its goal' in str(done())

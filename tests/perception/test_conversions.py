@@ -102,9 +102,7 @@ def test_camera_there_and_back():
 
 
 @settings(max_examples=50, derandomize=True, deadline=None)
-@given(
-    st.floats(0.5, 8.0), st.floats(-1.2, 1.2), st.floats(-3.1, 3.1), st.floats(-100, 100)
-)
+@given(st.floats(0.5, 8.0), st.floats(-1.2, 1.2), st.floats(-3.1, 3.1), st.floats(-100, 100))
 def test_pose_of_exact_corners_is_exact(distance, turn, roll, offset):
     panel = Panel(0, distance, turn, roll=roll, offset=(offset, -offset / 2))
     pose = pose_of(corners_in_picture(panel, CAMERA), panel.size, CAMERA)
@@ -136,7 +134,7 @@ def test_quaternion_turns_as_the_matrix_does(vector):
 
 def test_trajectory_keeps_names_times_and_values():
     home = np.array(ARM.home)
-    motion = motion_to(ARM, ArmState.resting(home), home + [0.5, 0, 0, 0, 0])
+    motion = motion_to(ARM, ArmState.resting(home), home + np.array([0.5, 0, 0, 0, 0]))
     message = conversions.trajectory_to_ros(motion, ARM.names)
     assert list(message.joint_names) == list(ARM.names)
     times = [p.time_from_start.sec + p.time_from_start.nanosec / 1e9 for p in message.points]

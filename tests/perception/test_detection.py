@@ -40,7 +40,19 @@ def found(detections):
 
 @pytest.mark.parametrize(
     ('distance', 'degrees'),
-    [(0.4, 20), (1, 60), (2, 0), (2, 70), (3, 75), (5, 45), (5, 65), (7, 0), (7, 45), (9, 0), (9, 30)],
+    [
+        (0.4, 20),
+        (1, 60),
+        (2, 0),
+        (2, 70),
+        (3, 75),
+        (5, 45),
+        (5, 65),
+        (7, 0),
+        (7, 45),
+        (9, 0),
+        (9, 30),
+    ],
 )
 def test_marker_is_found_where_it_is(distance, degrees):
     panel = Panel(14, distance, math.radians(degrees), roll=0.05, offset=(12.3, -20.7))
@@ -148,7 +160,10 @@ def test_tiny_and_empty_pictures_show_nothing(shape, level):
     ('options', 'reason'),
     [
         ({'dictionary': 'DICT_9X9'}, "unknown marker dictionary 'DICT_9X9'"),
-        ({'known_ids': frozenset({100})}, 'known id 100 is not in the dictionary, expected 0 to 99'),
+        (
+            {'known_ids': frozenset({100})},
+            'known id 100 is not in the dictionary, expected 0 to 99',
+        ),
         ({'windows': (4,)}, 'windows must be odd'),
         ({'bridges': (1,)}, 'bridges must be at least 2'),
     ],

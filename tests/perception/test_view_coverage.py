@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import pytest
 from hypothesis import given, settings
@@ -41,7 +42,7 @@ def test_one_view_covers_little():
 
 def test_views_follow_each_other_closely():
     views = views_covering(1.0, 0.8, 0.2, -0.5, 0.5)
-    for first, second in zip(views, views[1:], strict=False):
+    for first, second in pairwise(views):
         assert abs(first.azimuth - second.azimuth) < 1.1
 
 

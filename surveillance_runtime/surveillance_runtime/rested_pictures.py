@@ -1,0 +1,62 @@
+"""Waiting until the camera has been read while the arm rests.
+
+A dwell in seconds alone would guarantee nothing: on a busy machine no picture may fall into it.
+"""
+
+from __future__ import annotations
+
+from rclpy.time import Time
+
+from surveillance_interfaces.msg import MarkerDetectionArray
+from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.waiting import ClockWait, Interrupt
+
+
+class RestedPictures:
+    """Counts the pictures that the marker detector has looked at.
+
+    Args:
+        node: The node that waits; its threads call `wait`.
+    """
+
+    def __init__(self, node: PatrolNode) -> None:
+        self._node = node
+        self._clock = ClockWait(node)
+        self._since: Time | None = None
+        self._wanted = 0
+        self._changed = Interrupt()
+        node.create_subscription(
+            MarkerDetectionArray, 'aruco_detector/detections', self._on_picture, 10
+        )
+
+    def wait(self, pictures: int, dwell: float, patience: float, interrupt: Interrupt) -> bool:
+        """Wait for pictures that were taken from now on; from a worker thread only.
+
+        Args:
+            pictures: How many to wait for.
+            dwell: Shortest wait, seconds of ROS time.
+            patience: Seconds after that at which the wait ends without them.
+            interrupt: Ends the wait early.
+
+        Returns:
+            False when the interrupt came.
+        """
+        self._changed.clear()
+        self._wanted = pictures
+        self._since = self._node.get_clock().now()
+        remove = interrupt.subscribe(self._changed.set)
+        try:
+            if not self._clock.sleep(dwell, interrupt):
+                return False
+            self._clock.sleep(patience, self._changed)
+        finally:
+            remove()
+            self._since = None
+        return not interrupt.is_set()
+
+    def _on_picture(self, message: MarkerDetectionArray) -> None:
+        since = self._since
+        if since is not None and Time.from_msg(message.header.stamp) >= since:
+            self._wanted -= 1
+            if self._wanted <= 0:
+                self._changed.set()

@@ -1,0 +1,323 @@
+"""The perception nodes among real publishers and clients."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from geometry_msgs.msg import Point, PoseArray
+from rcl_interfaces.srv import SetParameters
+from rclpy.parameter import Parameter
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState
+from std_msgs.msg import Bool, Header, Int32
+from trajectory_msgs.msg import JointTrajectory
+
+from surveillance_interfaces.action import ScanSurroundings
+from surveillance_interfaces.msg import MarkerDetectionArray
+from surveillance_interfaces.srv import MarkerRoutine, PointCamera, RoomInformation
+from surveillance_perception.arm_controller_node import ArmController
+from surveillance_perception.aruco_detector_node import IDS_QOS, ArucoDetector
+from surveillance_perception.camera_model import CameraModel
+from surveillance_perception.conversions import camera_to_ros, picture_to_ros
+from surveillance_perception.dictionaries import dictionary_named
+from surveillance_perception.marker_scene import Degradation, Panel, backdrop_of, picture_of
+from surveillance_perception.marker_server_node import MarkerServer
+from surveillance_perception.video_source_node import VideoSource
+from surveillance_runtime.calls import GoalCaller, Interrupted, ServiceCaller
+from surveillance_runtime.node import StartError
+from surveillance_runtime.parameters import ParameterError
+from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
+from surveillance_runtime.robot_arm import ARM
+from surveillance_runtime.waiting import Interrupt
+
+CAMERA = CameraModel.from_field_of_view(320, 240, math.radians(60))
+
+
+def picture(*panels: Panel, dictionary: str = 'DICT_5X5_100') -> np.ndarray:
+    generator = np.random.default_rng(5)
+    scene = backdrop_of('plain', CAMERA, generator)
+    return picture_of(
+        list(panels), CAMERA, dictionary_named(dictionary), scene, Degradation(), generator
+    )
+
+
+ROOM = picture(Panel(12, 1.5, 0.3, offset=(-60.0, 0.0)), Panel(70, 1.5, offset=(60.0, 0.0)))
+
+
+class Camera:
+    """Publishes pictures and listens to what the detector makes of them."""
+
+    def __init__(self, graph: Any) -> None:
+        self.graph = graph
+        self.images = graph.node.create_publisher(Image, 'camera/rgb/image_raw', SENSOR_QOS)
+        self.compressed = graph.node.create_publisher(
+            CompressedImage, 'camera/rgb/image_raw/compressed', SENSOR_QOS
+        )
+        self.info = graph.node.create_publisher(CameraInfo, 'camera/rgb/camera_info', SENSOR_QOS)
+        self.ids = graph.listen(Int32, 'aruco_detector/id', IDS_QOS)
+        self.detections = graph.listen(MarkerDetectionArray, 'aruco_detector/detections')
+        self.poses = graph.listen(PoseArray, 'aruco_detector/poses')
+        self.drawn = graph.listen(Image, 'aruco_detector/annotated', SENSOR_QOS)
+        self.diagnostics = graph.listen(DiagnosticArray, 'diagnostics')
+
+    def ready(self) -> None:
+        self.graph.until(lambda: self.images.get_subscription_count())
+        self.graph.until(lambda: self.compressed.get_subscription_count())
+
+    def show(self, shown: np.ndarray) -> Any:
+        """Publish a picture until the detector has looked at it; its detections."""
+        before = len(self.detections)
+        header = Header(frame_id='lens', stamp=self.graph.node.get_clock().now().to_msg())
+        self.images.publish(picture_to_ros(shown, header))
+        self.graph.until(lambda: len(self.detections) > before)
+        return self.detections[-1]
+
+
+def detector(graph: Any, **parameters: Any) -> tuple[Camera, ArucoDetector]:
+    camera = Camera(graph)
+    node = graph.add(ArucoDetector, parameters={'known_ids': [11, 12, 13]} | parameters)
+    camera.ready()
+    return camera, node
+
+
+def test_each_marker_is_announced_once_when_enough_pictures_agree(graph: Any) -> None:
+    camera, _ = detector(graph, confirmation_frames=2, unknown_confirmation_frames=3)
+    for _ in range(5):
+        camera.show(ROOM)
+    graph.until(lambda: len(camera.ids) == 2)
+    assert [message.data for message in camera.ids] == [12, 70]
+    late = graph.listen(Int32, 'aruco_detector/id', IDS_QOS)
+    graph.until(lambda: len(late) == 2)
+
+
+def test_detections_are_typed_posed_and_drawn(graph: Any) -> None:
+    camera, _ = detector(graph, confirmation_frames=1)
+    camera.info.publish(camera_to_ros(CAMERA, Header()))
+    camera.show(ROOM)
+    message = camera.show(ROOM)
+    by_id = {each.id: each for each in message.detections}
+    assert message.header.frame_id == 'lens'
+    assert (by_id[12].known, by_id[12].confirmed, by_id[12].size) == (True, True, 0.2)
+    assert (by_id[70].known, by_id[70].confirmed) == (False, False)
+    position = by_id[12].pose.position
+    assert math.dist((position.x, position.y, position.z), (0, 0, 0)) == pytest.approx(
+        1.5, abs=0.03
+    )
+    assert by_id[12].reprojection_error < 0.5
+    assert 0.5 < by_id[12].confidence <= 1.0
+    assert len(camera.poses[-1].poses) == 1
+    graph.until(lambda: camera.drawn)
+    assert (camera.drawn[-1].width, camera.drawn[-1].encoding) == (320, 'bgr8')
+
+
+def test_compressed_pictures_are_looked_at_too(graph: Any) -> None:
+    camera, _ = detector(graph)
+    data = cv2.imencode('.jpg', ROOM)[1].tobytes()
+    camera.compressed.publish(CompressedImage(format='jpeg', data=data))
+    graph.until(lambda: camera.detections)
+    assert {each.id for each in camera.detections[-1].detections} == {12, 70}
+
+
+def test_pictures_that_are_none_are_named_and_the_node_goes_on(graph: Any) -> None:
+    camera, node = detector(graph, diagnostics_period=0.02)
+    good = picture_to_ros(ROOM, Header())
+
+    def named(reason: str) -> bool:
+        return any(
+            status.level == DiagnosticStatus.ERROR and reason in status.message
+            for message in camera.diagnostics
+            for status in message.status
+        )
+
+    for encoding, width, reason in (
+        ('yuv422', 320, "encoded as 'yuv422'"),
+        ('mono8', 100000, 'larger than'),
+        ('bgr8', 320, 'rows of 320 bytes'),
+        ('mono8', 0, 'is empty'),
+    ):
+        wrong = Image(encoding=encoding, width=width, height=good.height, step=good.step)
+        wrong.data = good.data
+        camera.images.publish(wrong)
+        graph.until(lambda reason=reason: named(reason))
+    camera.compressed.publish(CompressedImage(data=b'junk'))
+    graph.until(lambda: named('compressed picture is no picture'))
+    assert len(camera.show(ROOM).detections) == 2
+    assert not node.stopping.is_set()
+
+
+def test_settings_change_while_it_runs(graph: Any) -> None:
+    camera, node = detector(graph)
+    other = picture(Panel(7, 1.5), dictionary='DICT_4X4_50')
+    assert not camera.show(other).detections
+    setter = ServiceCaller(graph.node, SetParameters, 'aruco_detector/set_parameters')
+
+    def change(name: str, value: Any) -> Any:
+        request = SetParameters.Request(
+            parameters=[Parameter(name, value=value).to_parameter_msg()]
+        )
+        return setter.call(request, 5.0).results[0]
+
+    assert change('known_ids', [7]).successful
+    assert change('dictionary', 'DICT_4X4_50').successful
+    assert change('marker_sizes', ['7:0.4']).successful
+    shown = camera.show(other).detections
+    assert [(each.id, each.known, each.size) for each in shown] == [(7, True, 0.4)]
+    refused = change('dictionary', 'DICT_77')
+    assert not refused.successful
+    assert 'DICT_77' in refused.reason
+    refused = change('known_ids', [70])
+    assert 'known id 70 is not in the dictionary, expected 0 to 49' in refused.reason
+    assert not change('marker_sizes', ['big']).successful
+    assert not change('windows', [4]).successful
+    assert not node.stopping.is_set()
+
+
+def test_pictures_taken_while_the_arm_moves_are_not_read(graph: Any) -> None:
+    rest = graph.node.create_publisher(Bool, 'arm/at_rest', STATE_QOS)
+    camera, node = detector(graph)
+    graph.until(lambda: rest.get_subscription_count())
+    assert len(camera.show(ROOM).detections) == 2
+    rest.publish(Bool(data=False))
+    graph.until(lambda: node._rest_since is None)
+    moving = Header(stamp=graph.node.get_clock().now().to_msg())
+    camera.images.publish(picture_to_ros(ROOM, moving))
+    graph.until(lambda: node.skipped == 1)
+    rest.publish(Bool(data=True))
+    graph.until(lambda: node._rest_since is not None)
+    camera.images.publish(picture_to_ros(ROOM, moving))
+    graph.until(lambda: node.skipped == 2)
+    camera.show(ROOM)
+    assert len(camera.detections) == 2
+
+
+@pytest.mark.parametrize(
+    'wrong', [{'dictionary': 'DICT_0'}, {'known_ids': [500]}, {'blur': -1.0}, {'marker_size': 0.0}]
+)
+def test_wrong_parameters_are_refused_at_the_start(graph: Any, wrong: dict[str, Any]) -> None:
+    with pytest.raises(ParameterError, match=next(iter(wrong))):
+        graph.add(ArucoDetector, parameters=wrong)
+
+
+def test_marker_server_answers_from_its_file(graph: Any) -> None:
+    graph.add(MarkerServer)
+    client = ServiceCaller(graph.node, RoomInformation, 'room_info')
+    answer = client.call(RoomInformation.Request(id=16), 5.0)
+    assert (answer.room, answer.x, answer.y) == ('R3', 9.0, 3.0)
+    assert [(c.connected_to, c.through_door) for c in answer.connections] == [('C2', 'D3')]
+    unknown = client.call(RoomInformation.Request(id=99), 5.0)
+    assert unknown.room == 'no room associated with this marker id'
+    assert not unknown.connections
+
+
+def test_marker_server_does_not_start_without_its_file(graph: Any) -> None:
+    with pytest.raises((StartError, ParameterError), match='No such file'):
+        graph.add(MarkerServer, parameters={'markers_file': 'none.yaml'})
+
+
+def test_video_source_sends_a_folder_as_the_camera(graph: Any, tmp_path: Any) -> None:
+    images = graph.listen(Image, 'camera/rgb/image_raw', SENSOR_QOS)
+    infos = graph.listen(CameraInfo, 'camera/rgb/camera_info', SENSOR_QOS)
+    cv2.imwrite(str(tmp_path / 'a.png'), ROOM)
+    (tmp_path / 'b.png').write_bytes(b'broken')
+    graph.add(VideoSource, parameters={'source': str(tmp_path), 'rate': 50.0, 'loop': True})
+    graph.until(lambda: len(images) >= 2 and infos)
+    assert (images[0].width, images[0].height, images[0].encoding) == (320, 240, 'bgr8')
+    assert infos[0].k[0] == pytest.approx(CAMERA.matrix[0, 0])
+
+
+def test_video_source_does_not_start_without_a_source(graph: Any) -> None:
+    with pytest.raises(StartError, match='no such camera number, video file or folder'):
+        graph.add(VideoSource, parameters={'source': 'none.mp4'})
+
+
+class FollowingArm:
+    """Reports joints that do what they are told."""
+
+    def __init__(self, graph: Any) -> None:
+        self.node = graph.node
+        self.states = self.node.create_publisher(JointState, 'joint_states', SENSOR_QOS)
+        self.motions: list[JointTrajectory] = []
+        self._began = 0.0
+        self._at = np.array(ARM.home)
+        self.node.create_subscription(JointTrajectory, 'arm/joint_trajectory', self._take, 10)
+        self._timer = self.node.create_timer(0.02, self._report)
+
+    def _now(self) -> float:
+        return float(self.node.get_clock().now().nanoseconds) / 1e9
+
+    def _take(self, message: JointTrajectory) -> None:
+        self.motions.append(message)
+        self._began = self._now()
+
+    def _report(self) -> None:
+        speeds = np.zeros(5)
+        if self.motions:
+            points = self.motions[-1].points
+            times = [p.time_from_start.sec + p.time_from_start.nanosec / 1e9 for p in points]
+            now = self._now() - self._began
+            columns = np.array([p.positions for p in points]).T
+            self._at = np.array([np.interp(now, times, column) for column in columns])
+            columns = np.array([p.velocities for p in points]).T
+            speeds = np.array([np.interp(now, times, column) for column in columns])
+        self.states.publish(
+            JointState(name=list(ARM.names), position=self._at.tolist(), velocity=speeds.tolist())
+        )
+
+    def camera_direction(self) -> np.ndarray:
+        return ARM.camera_frame(self._at)[:3, 2]
+
+
+def test_arm_takes_its_poses_and_looks_at_points(graph: Any) -> None:
+    arm = FollowingArm(graph)
+    rests = graph.listen(Bool, 'arm/at_rest', STATE_QOS)
+    graph.add(ArmController)
+    move = ServiceCaller(graph.node, MarkerRoutine, 'move_arm')
+    answer = move.call(MarkerRoutine.Request(pos=MarkerRoutine.Request.LEFT), 10.0)
+    assert (answer.success, answer.message) == (True, 'at pose left')
+    assert np.allclose(arm.camera_direction(), [0, 1, 0], atol=0.03)
+    assert [each.data for each in rests][-2:] == [False, True]
+    wrong = move.call(MarkerRoutine.Request(pos=9), 10.0)
+    assert (wrong.success, wrong.message) == (False, 'no pose 9, expected 1 to 5')
+    assert move.call(MarkerRoutine.Request(pos=MarkerRoutine.Request.STOP), 10.0).success
+    point = ServiceCaller(graph.node, PointCamera, 'point_camera')
+    answer = point.call(PointCamera.Request(point=Point(x=1.0, y=3.0, z=1.5)), 10.0)
+    assert answer.success
+    lens = ARM.camera_frame(arm._at)[:3, 3]
+    sight = np.array([1.0, 3.0, 1.5]) - lens
+    assert arm.camera_direction() @ sight / np.linalg.norm(sight) > math.cos(math.radians(2))
+    unknown = point.call(PointCamera.Request(point=Point(x=1.0), frame_id='moon'), 10.0)
+    assert unknown.message == "frame 'moon' is not known, expected 'base_link'"
+
+
+def test_scan_rests_at_each_view_and_can_be_cancelled(graph: Any) -> None:
+    FollowingArm(graph)
+    rests = graph.listen(Bool, 'arm/at_rest', STATE_QOS)
+    graph.add(ArmController, parameters={'horizontal_field_of_view': 150.0, 'patience': 0.0})
+    scan = GoalCaller(graph.node, ScanSurroundings, 'scan_surroundings')
+    views = []
+    goal = ScanSurroundings.Goal(lowest=-0.1, highest=0.1, dwell=0.01)
+    end = scan.run(goal, accept_timeout=10.0, on_feedback=views.append)
+    assert end.status == 'succeeded'
+    assert end.result.views == views[-1].views >= 3
+    assert end.result.coverage == 1.0
+    assert [view.resting for view in views] == [False, True] * end.result.views
+    assert len([each for each in rests if each.data]) >= end.result.views
+    interrupt = Interrupt()
+    with pytest.raises(Interrupted):
+        scan.run(
+            goal, accept_timeout=10.0, interrupt=interrupt, on_feedback=lambda _: interrupt.set()
+        )
+    wrong = scan.run(ScanSurroundings.Goal(overlap=0.95), accept_timeout=10.0)
+    assert wrong.status == 'aborted'
+
+
+def test_arm_that_does_not_report_is_named(graph: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    node = graph.add(ArmController)
+    monkeypatch.setattr(node._driver, '_patience', 0.05)
+    move = ServiceCaller(graph.node, MarkerRoutine, 'move_arm')
+    answer = move.call(MarkerRoutine.Request(pos=1), 10.0)
+    assert (answer.success, answer.message) == (False, 'the arm does not report its joints')
