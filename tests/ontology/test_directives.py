@@ -427,7 +427,7 @@ def test_mounting_can_be_left_unenforced(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ('reasoner', 'note'),
-    [('', ''), ('pellet', ''), ('NATIVE', ''), ('FACT', "'FACT'"), ('HERMIT', "'HERMIT'")],
+    [('', ''), ('pellet', ''), ('NATIVE', ''), ('FACT', "'FACT'"), ('SNOROCKET', "'SNOROCKET'")],
 )
 def test_reasoner_names(service: ArmorService, reasoner: str, note: str) -> None:
     answer = asker(service)('LOAD FILE', ONTOLOGY, IRI, 'false', reasoner, 'false')

@@ -4,17 +4,22 @@ from __future__ import annotations
 
 import urllib.error
 import urllib.request
+from collections.abc import Iterable
 
 from surveillance_ontology.armor.paths import SafePaths
 from surveillance_ontology.armor.protocol import DirectiveError
 from surveillance_ontology.armor.reference import Origin, Reference
 from surveillance_ontology.armor.rendering import parse_entity, shown
 from surveillance_ontology.armor.settings import Settings
+from surveillance_ontology.axioms import Axiom
+from surveillance_ontology.java_reasoning import JavaKnowledgeBase, JavaReasonerError
 from surveillance_ontology.knowledge_base import KnowledgeBase
 from surveillance_ontology.owl_reading import OntologyFileError, read_ontology
 
 NATIVE = ('', 'PELLET', 'NATIVE')
 """Names of the reasoner of this package; PELLET is what ARMOR's clients send."""
+JAVA = {'HERMIT': 'hermit', 'OPENLLET': 'pellet', 'PELLET_JAVA': 'pellet'}
+"""Names of the Java reasoners, see `java_reasoning`."""
 WEB_TIMEOUT = 20.0
 MAX_NAMED = 5
 """How many unsupported statements a description names."""
@@ -52,9 +57,7 @@ def load_document(
         base = parse_entity(f'<{iri}>', '').rstrip('#')
     except ValueError as error:
         raise DirectiveError(f'LOAD: argument iri {error}') from None
-    notes = []
-    if reasoner.upper() not in NATIVE:
-        notes.append(f'reasoner {shown(reasoner)} is not available, the native one is used')
+    notes: list[str] = []
     try:
         if web:
             document = read_ontology(
@@ -69,15 +72,36 @@ def load_document(
         raise DirectiveError(f'LOAD: {error}') from None
     if document.iri and document.iri.rstrip('#') != base:
         notes.append(f'the document is of {document.iri}, names are completed with {base}')
-    kb = KnowledgeBase(base, document.axioms)
-    if not kb.reason():
+    kb = _reasoned(base, document.axioms, reasoner, notes)
+    if not kb.consistent:
         notes.append('the ontology is inconsistent')
     unsupported = [*document.unsupported, *kb.unsupported]
     if unsupported:
         more = f' and {len(unsupported) - MAX_NAMED} more' if len(unsupported) > MAX_NAMED else ''
         named = '; '.join(unsupported[:MAX_NAMED])
         notes.append(f'{len(unsupported)} statements not supported by the reasoner: {named}{more}')
-    return Reference(name, kb, Origin(path, document.format, document.prefixes)), notes
+    used = reasoner if isinstance(kb, JavaKnowledgeBase) else ''
+    return Reference(name, kb, Origin(path, document.format, document.prefixes, used)), notes
+
+
+def knowledge_base(base: str, axioms: Iterable[Axiom], reasoner: str) -> KnowledgeBase:
+    """Make a knowledge base with the reasoner of a name; the native one for unknown names."""
+    kind = JAVA.get(reasoner.upper())
+    return JavaKnowledgeBase(base, axioms, kind) if kind else KnowledgeBase(base, axioms)
+
+
+def _reasoned(base: str, axioms: list[Axiom], reasoner: str, notes: list[str]) -> KnowledgeBase:
+    kb = knowledge_base(base, axioms, reasoner)
+    try:
+        kb.reason()
+    except JavaReasonerError as error:
+        notes.append(f'reasoner {shown(reasoner)} cannot be used, the native one is: {error}')
+        kb = KnowledgeBase(base, axioms)
+        kb.reason()
+    else:
+        if reasoner.upper() not in NATIVE and not isinstance(kb, JavaKnowledgeBase):
+            notes.append(f'reasoner {shown(reasoner)} is not available, the native one is used')
+    return kb
 
 
 def _fetch(url: str, settings: Settings) -> bytes:

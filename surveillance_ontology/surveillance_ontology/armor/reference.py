@@ -11,6 +11,8 @@ from pathlib import Path
 from surveillance_ontology.armor.changes import Change, apply_all
 from surveillance_ontology.knowledge_base import KnowledgeBase
 
+LONG_BACKLOG = 500
+"""Changes since the last reasoning from which on the next counts as slow."""
 NOBODY = 'none'
 """How ARMOR says that no client is mounted; a client of this name counts as none."""
 
@@ -23,11 +25,13 @@ class Origin:
         path: File or URL that was loaded; the target of SAVE without a path. Empty: none.
         format: Format of that file, in which SAVE writes.
         prefixes: Namespace prefixes of that file, which SAVE uses.
+        reasoner: The Java reasoner that was asked for, empty for the native one.
     """
 
     path: str
     format: str
     prefixes: Mapping[str, str] = field(default_factory=dict)
+    reasoner: str = ''
 
     @property
     def file(self) -> Path | None:
@@ -99,7 +103,8 @@ class Reference:
         if self.queue:
             queued, self.queue = self.queue, []
             apply_all(self.kb, queued)
-        self.revision += 1
+        if self.kb.stale:
+            self.revision += 1
         self.backlog, self.heavy = 0, False
         return self.kb.reason()
 
@@ -109,6 +114,11 @@ class Reference:
         self.buffered_manipulation = other.buffered_manipulation
         self.backlog = len(other.queue)
         self.revision += 1
+
+    @property
+    def is_slow(self) -> bool:
+        """Whether the next reasoning may take long."""
+        return self.heavy or self.backlog > LONG_BACKLOG or bool(self.origin.reasoner)
 
     def is_free_for(self, client: str) -> bool:
         """Tell whether a client may change the reference or mount on it."""

@@ -39,11 +39,10 @@ from surveillance_ontology.armor.settings import Settings
 from surveillance_ontology.armor.sparql import SparqlEngine
 from surveillance_ontology.armor.store import Store
 from surveillance_ontology.armor.table import Directive, Kind, look_up
+from surveillance_ontology.java_reasoning import JavaReasonerError
 from surveillance_ontology.knowledge_base import Changes
 from surveillance_ontology.owl_writing import OntologyWriteError, write_ontology
 
-LONG_BACKLOG = 500
-"""Changes since the last reasoning from which on REASON counts as slow."""
 LONG_ARGUMENTS = 1000
 Watcher = Callable[[str, Changes | None], None]
 """Told of a reference's name and what changed in it; None: it was loaded or dropped."""
@@ -95,6 +94,8 @@ class ArmorService:
             )
         except JournalError as error:
             response = _refusal(f'{request.words}: nothing was done: {error}')
+        except JavaReasonerError as error:
+            response = _refusal(f'{request.words}: {error}; native derivations only')
         except Exception as error:
             problem = f'{request.words}: internal error, {type(error).__name__}: {error}'
             problem = ' '.join(problem.split())
@@ -126,7 +127,7 @@ class ArmorService:
         if not ref.lock.acquire(blocking=False):
             return None
         try:
-            if directive.kind.may_reason and (ref.heavy or ref.backlog > LONG_BACKLOG):
+            if directive.kind.may_reason and ref.is_slow:
                 return None
             return self.execute(request)
         finally:

@@ -9,15 +9,16 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 from surveillance_ontology.armor.changes import Change, apply_all, decode, encode
 from surveillance_ontology.armor.journal import Journal, JournalError
+from surveillance_ontology.armor.loading import knowledge_base
 from surveillance_ontology.armor.reference import Origin, Reference
 from surveillance_ontology.axioms import Axiom
-from surveillance_ontology.knowledge_base import KnowledgeBase
+from surveillance_ontology.java_reasoning import JavaReasonerError
 
 Record = list[Any]
 """``[what, reference name, ...]``."""
@@ -56,7 +57,8 @@ class Store:
             except (KeyError, IndexError, TypeError, ValueError) as error:
                 raise JournalError(f'record {record!r:.80} cannot be read: {error}') from None
         for ref in recovery.references.values():
-            ref.kb.reason()
+            with suppress(JavaReasonerError):
+                ref.kb.reason()
         return list(recovery.references.values())
 
     def loaded(self, ref: Reference) -> None:
@@ -153,6 +155,7 @@ def _state(ref: Reference) -> _State:
         'path': ref.origin.path,
         'format': ref.origin.format,
         'prefixes': dict(ref.origin.prefixes),
+        'reasoner': ref.origin.reasoner,
         'buffered_manipulation': ref.buffered_manipulation,
         'buffered_reasoner': ref.buffered_reasoner,
         'mounted': ref.mounted,
@@ -180,8 +183,15 @@ class _Recovery:
             settings, axioms, queue = rest
             self.references[name] = Reference(
                 name,
-                KnowledgeBase(settings['iri'], [decode(axiom) for axiom in axioms]),
-                Origin(settings['path'], settings['format'], settings['prefixes']),
+                knowledge_base(
+                    settings['iri'], [decode(axiom) for axiom in axioms], settings['reasoner']
+                ),
+                Origin(
+                    settings['path'],
+                    settings['format'],
+                    settings['prefixes'],
+                    settings['reasoner'],
+                ),
                 settings['buffered_manipulation'],
                 settings['buffered_reasoner'],
                 settings['mounted'],
