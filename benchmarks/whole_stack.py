@@ -10,7 +10,7 @@ import importlib
 import json
 import sys
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +39,7 @@ class Stack:
         place: Path,
         parameters: Mapping[str, Mapping[str, Any]] | None = None,
         domain: int | None = None,
+        nodes: Sequence[str] = (),
     ) -> None:
         """Create all nodes; `start` lets them run.
 
@@ -46,6 +47,7 @@ class Stack:
             place: The place's file.
             parameters: Further parameters by node; those of '*' are for every node.
             domain: ROS domain; None takes that of the environment.
+            nodes: Only these nodes; it needs the simulator. All those of a patrol by default.
         """
         self._folder = tempfile.TemporaryDirectory(prefix='patrol-')
         arguments = ros_arguments(place, Path(self._folder.name), parameters)
@@ -54,7 +56,7 @@ class Stack:
         self._spinner = ExecutorThread(self.context)
         options = {'context': self.context, 'cli_args': arguments, 'use_global_arguments': False}
         self.nodes: dict[str, PatrolNode] = {}
-        for node in graph.select('SIMULATED'):
+        for node in graph.select('SIMULATED', only=nodes):
             kind = getattr(importlib.import_module(node.module), node.class_name)
             self._add(node.name, kind(**options))
         self.observer = self._add('observer', PatrolNode('observer', **options))

@@ -18,7 +18,6 @@ from surveillance_simulation.world import Obstacle, Panel, World
 DOOR_HEIGHT = 2.05
 OBSTACLE_HEIGHT = 0.8
 _STATION_SIDE = 0.6
-_LEAF_THICKNESS = 0.05
 
 
 @dataclass(frozen=True)
@@ -128,14 +127,20 @@ def _box(
             (float(second[0]), float(second[1])),
             bottom,
             top,
-            texture if math.dist(first, second) > 2 * _LEAF_THICKNESS else None,
+            texture if math.dist(first, second) > 2 * thickness else None,
         )
 
 
 def _door(door: Door, *, is_open: bool) -> Iterator[Face]:
     yield from _box(*door.ends, WALL_THICKNESS, DOOR_HEIGHT, WALL_HEIGHT, None)
     if not is_open:
-        yield from _box(*door.ends, _LEAF_THICKNESS, 0.0, DOOR_HEIGHT, textures.leaf())
+        yield from _box(*door.ends, WALL_THICKNESS, 0.0, DOOR_HEIGHT, textures.leaf())
+        return
+    along = np.array([math.cos(door.yaw), math.sin(door.yaw), 0.0]) * door.width
+    across = np.array([-math.sin(door.yaw), math.cos(door.yaw), 0.0]) * WALL_THICKNESS
+    corner = np.array([door.x, door.y, DOOR_HEIGHT]) - along / 2 - across / 2
+    crop = (0.0, 0.0, min(1.0, door.width / TILE), WALL_THICKNESS / TILE)
+    yield Face(corner, along, across, textures.plaster(), crop, shade=0.7)
 
 
 def _barrel(obstacle: Obstacle, sides: int = 12) -> Iterator[Face]:

@@ -70,9 +70,7 @@ class Simulator(PatrolNode):
 
     def _tick(self) -> None:
         with self._changing:
-            passed = self._pace.due(
-                self.robot.time, time.monotonic(), moving=self.robot.is_moving
-            )
+            passed = self._pace.due(self.robot.time, time.monotonic(), moving=self.robot.is_moving)
             if not passed:
                 return
             self.robot.advance(passed)

@@ -1,0 +1,147 @@
+"""Draws the pictures of the documentation anew: the places, a run, and what the camera sees.
+
+    python docs/pictures.py
+
+The camera's pictures come from the topic camera/rgb/image_raw of a running simulator.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+import threading
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT / 'benchmarks'))
+
+from builtin_interfaces.msg import Duration  # noqa: E402
+from PIL import Image as Picture  # noqa: E402
+from sensor_msgs.msg import Image, JointState  # noqa: E402
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint  # noqa: E402
+from whole_stack import Stack  # noqa: E402
+
+from surveillance_behaviour import map_command  # noqa: E402
+from surveillance_interfaces.srv import PlaceObstacle, SetDoor, SetMarker  # noqa: E402
+from surveillance_runtime.calls import ServiceCaller  # noqa: E402
+from surveillance_runtime.qos import SENSOR_QOS  # noqa: E402
+from surveillance_runtime.robot_arm import ARM  # noqa: E402
+
+IMAGES = ROOT / 'docs' / 'images'
+PATROL_SECONDS = 1500.0
+
+
+def places() -> None:
+    """Draw every place."""
+    for name in ('seven_rooms', 'patrol_world', 'office'):
+        place = ROOT / 'config' / f'{name}.yaml'
+        assert map_command.main([str(place), '-o', str(IMAGES / f'{name}.png')]) == 0
+
+
+def run() -> None:
+    """Patrol the seven rooms for a while and draw the run."""
+    place = ROOT / 'config' / 'seven_rooms.yaml'
+    with tempfile.TemporaryDirectory() as folder:
+        record = Path(folder) / 'run.jsonl'
+        stack = Stack(
+            place, {'robot_behavior': {'record': str(record)}, 'simulator': {'top_speed': 60.0}}
+        )
+        stack.start()
+        try:
+            while stack.robot.time < PATROL_SECONDS:
+                threading.Event().wait(0.2)
+        finally:
+            stack.close()
+        arguments = [str(place), '--record', str(record), '-o', str(IMAGES / 'run.png')]
+        assert map_command.main(arguments) == 0
+
+
+class Photographer:
+    """Turns the arm of a simulated robot and keeps what its camera publishes."""
+
+    def __init__(self, stack: Stack) -> None:
+        self._node = stack.observer
+        self._arm = self._node.create_publisher(JointTrajectory, 'arm/joint_trajectory', 1)
+        self._arrived = threading.Condition()
+        self._joints: list[float] = []
+        self._moving = True
+        self._picture: Any = None
+        self._node.create_subscription(JointState, 'joint_states', self._on_joints, SENSOR_QOS)
+        self._node.create_subscription(Image, 'camera/rgb/image_raw', self._on_picture, SENSOR_QOS)
+
+    def take(self, pan: float, tilt: float) -> Picture.Image:
+        """Return what the camera sees with the arm turned to `pan` and the camera tilted, rad."""
+        wanted = (pan, *ARM.home[1:3], ARM.home[3] + tilt, 0.0)
+        point = JointTrajectoryPoint(positions=wanted, time_from_start=Duration(sec=1))
+        while not self._arm.get_subscription_count():
+            threading.Event().wait(0.05)
+        self._arm.publish(JointTrajectory(joint_names=ARM.names, points=[point]))
+        with self._arrived:
+            self._arrived.wait_for(lambda: np.allclose(self._joints, wanted, atol=1e-3), 30.0)
+            for _ in range(2):
+                self._picture = None
+                self._arrived.wait_for(lambda: self._picture is not None, 30.0)
+            message = self._picture
+        pixels = np.frombuffer(bytes(message.data), np.uint8)
+        return Picture.fromarray(pixels.reshape(message.height, message.width, 3))
+
+    def _on_joints(self, message: JointState) -> None:
+        with self._arrived:
+            self._joints = list(message.position)
+            self._arrived.notify_all()
+
+    def _on_picture(self, message: Image) -> None:
+        with self._arrived:
+            self._picture = message
+            self._arrived.notify_all()
+
+
+def camera() -> None:
+    """Take six pictures in the room with the markers."""
+    stack = Stack(
+        ROOT / 'config' / 'patrol_world.yaml',
+        {'simulator': {'speed': 5.0}},
+        nodes=['simulator'],
+    )
+    photographer = Photographer(stack)
+    stack.start()
+    try:
+        calls = {
+            kind: ServiceCaller(stack.observer, kind, f'simulation/{name}')
+            for kind, name in (
+                (SetDoor, 'set_door'),
+                (PlaceObstacle, 'place_obstacle'),
+                (SetMarker, 'set_marker'),
+            )
+        }
+        calls[SetDoor].call(SetDoor.Request(door='D6', open=False), timeout=20.0)
+        calls[PlaceObstacle].call(
+            PlaceObstacle.Request(name='barrel', x=-0.9, y=6.3, radius=0.25), timeout=20.0
+        )
+        pictures = [
+            photographer.take(0.15, 0.0),
+            photographer.take(1.3, -0.1),
+            photographer.take(2.45, -0.1),
+            photographer.take(-2.2, 0.2),
+            photographer.take(-1.1, 0.0),
+        ]
+        request = SetMarker.Request(name='m13', state=SetMarker.Request.BROKEN)
+        calls[SetMarker].call(request, timeout=20.0)
+        pictures.append(photographer.take(1.6, -0.05))
+    finally:
+        stack.close()
+    width, height = pictures[0].size
+    sheet = Picture.new('RGB', (3 * width + 16, 2 * height + 8), 'white')
+    for number, picture in enumerate(pictures):
+        sheet.paste(picture, ((number % 3) * (width + 8), (number // 3) * (height + 8)))
+    sheet.resize((sheet.width // 2, sheet.height // 2), Picture.Resampling.LANCZOS).save(
+        IMAGES / 'camera.jpg', quality=88
+    )
+
+
+if __name__ == '__main__':
+    for draw in [globals()[name] for name in sys.argv[1:]] or [places, run, camera]:
+        draw()
