@@ -20,7 +20,7 @@ from surveillance_controllers.map_knowledge import KnowledgeError, MapKnowledge
 from surveillance_controllers.operator_console import OperatorConsole
 from surveillance_controllers.operator_desk import OperatorDesk
 from surveillance_controllers.polyline import Points
-from surveillance_controllers.stimulus_motion import glide, points_passed
+from surveillance_controllers.stimulus_motion import glide
 from surveillance_interfaces.action import Control, FollowPath
 from surveillance_runtime.goals import GoalAborted, GoalRun, GoalServer
 from surveillance_runtime.node import PatrolNode, run_node
@@ -89,15 +89,13 @@ class MotionController(PatrolNode):
 
     def _control(self, goal: Any, run: GoalRun) -> Control.Result:
         path = _checked(goal.point_set)
-        total = polyline.length(path)
         passed = 0
 
         def report(position: Points) -> None:
             nonlocal passed
-            ahead = polyline.length([position, *path[passed:]])
-            now_passed = max(passed, points_passed(path, total - ahead))
-            if now_passed > passed:
-                passed = now_passed
+            behind = polyline.points_passed(path, polyline.distance_nearest(path, position))
+            if behind > passed:
+                passed = behind
                 point = conversions.point_from(path[passed - 1])
                 run.feedback(Control.Feedback(reached_point=point))
 

@@ -81,8 +81,14 @@ class PlaceTracking:
         self._base.set_positions(self._positions)
 
     def _correct(self) -> None:
-        assert self._where is not None
         place = self._base.place
+        try:
+            self._write(place)
+        finally:
+            self._base.release()
+
+    def _write(self, place: str | None) -> None:
+        assert self._where is not None
         known = {fact.arguments[1] for fact in self._where.facts}
         if place is None or not known or known == {place}:
             return

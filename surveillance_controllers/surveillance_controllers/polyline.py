@@ -60,3 +60,26 @@ def equally_spaced(path: ArrayLike, spacing: float) -> Points:
         return np.asarray(path, dtype=float)[:1]
     count = max(1, int(np.ceil(total / spacing - 1e-9)))
     return point_at(path, np.linspace(0.0, total, count + 1))
+
+
+def distance_nearest(path: ArrayLike, position: ArrayLike) -> float:
+    """How far along a path its point nearest to a position lies, metres.
+
+    Args:
+        path: At least one point, shape (n, d).
+        position: Shape (d,).
+    """
+    points, at = np.asarray(path, dtype=float), np.asarray(position, dtype=float)
+    if len(points) == 1:
+        return 0.0
+    steps = np.diff(points, axis=0)
+    squares = np.maximum((steps**2).sum(axis=1), 1e-12)
+    shares = np.clip(((at - points[:-1]) * steps).sum(axis=1) / squares, 0.0, 1.0)
+    gaps = np.linalg.norm(points[:-1] + shares[:, None] * steps - at, axis=1)
+    nearest = int(np.argmin(gaps))
+    return float(distances_along(points)[nearest] + shares[nearest] * np.sqrt(squares[nearest]))
+
+
+def points_passed(path: ArrayLike, distance: float) -> int:
+    """How many of a path's points lie at most `distance` metres along it."""
+    return int(np.searchsorted(distances_along(path), distance + 1e-6, side='right'))

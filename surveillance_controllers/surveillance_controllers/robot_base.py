@@ -43,7 +43,8 @@ class RobotBase:
         node: The motion controller's node.
         pilot: What steers.
         sensor_timeout: How long the sensors may be silent during a task, seconds of steady time.
-        on_place: Called in the executor's thread when the robot's place changed.
+        on_place: Called in the executor's thread when the robot's place changed; returns whether
+            somebody writes it down and will call `release`.
     """
 
     def __init__(
@@ -51,7 +52,7 @@ class RobotBase:
         node: PatrolNode,
         pilot: Pilot,
         sensor_timeout: float,
-        on_place: Callable[[], None],
+        on_place: Callable[[], bool],
     ) -> None:
         self._node = node
         self._pilot = pilot
@@ -62,6 +63,7 @@ class RobotBase:
         self._stepped = threading.Condition(self._lock)
         self._steps = 0
         self._pose_sent = float('-inf')
+        self._held: Velocity | None = None
         self._was_lost = False
         self._jumps = 0
         self._commands = node.create_publisher(Twist, 'cmd_vel', 1)
@@ -92,6 +94,13 @@ class RobotBase:
         """Takes the places: a point in each."""
         with self._lock:
             self._pilot.set_positions(positions)
+
+    def release(self) -> None:
+        """Gives out the command that was held until the ontology knew the robot's place."""
+        with self._lock:
+            if self._held is not None and self._pilot.task is not None:
+                self._commands.publish(conversions.twist_from(self._held))
+            self._held = None
 
     def drive(
         self,
@@ -203,13 +212,19 @@ class RobotBase:
         with self._stepped:
             place = self.place
             velocity = self._pilot.see(conversions.scan_from(message), now)
-            if velocity is not None:
+            moved_on = self.place != place
+            self._held = None
+            if velocity is not None and moved_on and self._on_place():
+                # In another place now: the ontology shall know before the robot goes on. What is
+                # held goes out when it knows, or else with the next scan's command.
+                self._held = velocity
+            elif velocity is not None:
                 self._commands.publish(conversions.twist_from(velocity))
+            elif moved_on:
+                self._on_place()
             self._steps += 1
             self._stepped.notify_all()
         self._tell(now, message.header.stamp)
-        if self.place != place:
-            self._on_place()
 
     def _tell(self, now: float, stamp: Any) -> None:
         pilot = self._pilot

@@ -105,8 +105,9 @@ class SimulatedMotion:
         pose = self._base.pose
         return None if pose is None else _point(pose)
 
-    def _on_place(self) -> None:
+    def _on_place(self) -> bool:
         self._tracking.wake()
+        return self._settings.track_place
 
     def _ask_planner(self, start: Points, goal: Points, run: GoalRun) -> Points:
         request = ComputePath.Goal(

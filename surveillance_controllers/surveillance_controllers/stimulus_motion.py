@@ -54,8 +54,3 @@ def glide(
             return position
     on_position(end)
     return np.asarray(end, dtype=float)
-
-
-def points_passed(path: Points, distance: float) -> int:
-    """How many of a path's points lie at most `distance` metres along it."""
-    return int(np.searchsorted(polyline.distances_along(path), distance + 1e-9, side='right'))

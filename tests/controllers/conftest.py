@@ -6,10 +6,12 @@ import math
 import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 from typing import Any, ClassVar, TextIO
 
 import numpy as np
 import pytest
+import yaml
 
 from surveillance_controllers.grid_map import GridMap, with_walls
 from surveillance_controllers.localisation import Scan
@@ -97,6 +99,19 @@ class Flat:
             hit |= np.hypot(x - at_x, y - at_y) <= radius
         first = way[hit.argmax(axis=1)] + self.noise.normal(0, 0.01, len(angles))
         return Scan(angles, np.where(hit.any(axis=1), first, np.inf), 8.0)
+
+
+@pytest.fixture
+def seven_rooms() -> dict[str, Any]:
+    """The seven rooms' file as flat parameter overrides."""
+    file = Path(__file__).parents[2] / 'config' / 'seven_rooms.yaml'
+    flat: dict[str, Any] = {}
+    for name, value in yaml.safe_load(file.read_text())['/**']['ros__parameters'].items():
+        if isinstance(value, dict):
+            flat.update({f'{name}.{key}': entry for key, entry in value.items()})
+        else:
+            flat[name] = value
+    return flat
 
 
 @pytest.fixture(scope='session')

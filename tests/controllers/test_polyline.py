@@ -12,8 +12,8 @@ from surveillance_controllers import polyline
 PATHS = st.lists(st.tuples(*[st.floats(-50, 50)] * 3), min_size=1, max_size=12)
 
 
-@given(PATHS, st.floats(0.01, 30))
-@settings(max_examples=80, deadline=None)
+@given(PATHS, st.floats(0.2, 30))
+@settings(max_examples=50, deadline=None)
 def test_spaced_points_keep_the_ends_and_the_spacing(
     path: list[tuple[float, float, float]], spacing: float
 ) -> None:
@@ -38,3 +38,18 @@ def test_a_point_along_is_held_at_the_ends() -> None:
 def test_a_path_without_points_is_refused() -> None:
     with pytest.raises(ValueError, match='no points'):
         polyline.point_at(np.zeros((0, 3)), 0)
+
+
+@given(PATHS, st.floats(0, 1))
+@settings(max_examples=60, deadline=None)
+def test_a_point_of_a_path_is_found_on_it(
+    path: list[tuple[float, float, float]], share: float
+) -> None:
+    at = polyline.point_at(path, share * polyline.length(path))
+    found = polyline.point_at(path, polyline.distance_nearest(path, at))
+    assert found == pytest.approx(at, abs=1e-4)
+
+
+def test_points_passed_are_counted_from_the_start() -> None:
+    path = [(0, 0), (1, 0), (1, 2)]
+    assert [polyline.points_passed(path, d) for d in (0, 0.9, 1, 2.9, 3, 9)] == [1, 1, 2, 2, 3, 3]

@@ -7,11 +7,9 @@ import itertools
 import math
 import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import pytest
-import yaml
 from geometry_msgs.msg import Point, PoseStamped
 from std_msgs.msg import UInt32
 
@@ -26,27 +24,12 @@ from surveillance_runtime.calls import GoalCaller, ServiceCaller
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 from surveillance_simulation.simulator_node import Simulator
 
-PLACE_FILE = Path(__file__).parents[2] / 'config' / 'seven_rooms.yaml'
-
-
-def place_parameters() -> dict[str, Any]:
-    """The place's file as flat parameter overrides."""
-    nested = yaml.safe_load(PLACE_FILE.read_text())['/**']['ros__parameters']
-    flat: dict[str, Any] = {}
-    for name, value in nested.items():
-        if isinstance(value, dict):
-            flat.update({f'{name}.{key}': entry for key, entry in value.items()})
-        else:
-            flat[name] = value
-    return flat
-
 
 class World:
     """The nodes of one robot in the seven rooms, and a client of their actions."""
 
-    def __init__(self, graph: Any) -> None:
+    def __init__(self, graph: Any, place: dict[str, Any]) -> None:
         self.graph = graph
-        place = place_parameters()
         timed = {**place, 'use_sim_time': True, 'execution_mode': 'SIMULATED'}
         graph.add(ArmorServer)
         graph.add(OntologyMapBuilder, place)
@@ -108,8 +91,8 @@ class World:
 
 
 @pytest.fixture
-def world(graph: Any) -> World:
-    return World(graph)
+def world(graph: Any, seven_rooms: dict[str, Any]) -> World:
+    return World(graph, seven_rooms)
 
 
 def test_a_visit_is_planned_driven_and_noted(world: World) -> None:
