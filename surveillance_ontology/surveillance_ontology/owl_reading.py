@@ -6,6 +6,7 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
+from surveillance_ontology import foreign_formats
 from surveillance_ontology.axioms import Axiom
 from surveillance_ontology.owl_mapping import Mapping
 from surveillance_ontology.rdf_ntriples import parse_ntriples
@@ -31,7 +32,7 @@ class OntologyDocument:
     Attributes:
         axioms: In document order, without repeats.
         unsupported: One sentence for each statement that was not understood.
-        format: 'rdfxml' or 'ntriples'.
+        format: 'rdfxml', 'ntriples', 'owlxml' or 'turtle'.
         iri: The IRI in the document's owl:Ontology header, '' without one.
         prefixes: Namespace prefixes declared by the document.
     """
@@ -46,7 +47,7 @@ class OntologyDocument:
 def read_ontology(
     source: str | Path | bytes, iri: str, *, size_limit: int = DEFAULT_SIZE_LIMIT
 ) -> OntologyDocument:
-    """Reads a document; the format (RDF/XML, N-Triples) is told by its first character.
+    """Reads a document: RDF/XML, OWL/XML, Turtle or N-Triples, told by how it begins.
 
     Args:
         source: A path, or the document itself as bytes.
@@ -69,7 +70,13 @@ def read_ontology(
         raise OntologyFileError(name, 0, 0, f'larger than the limit of {size_limit} bytes')
     start = data.lstrip(b'\xef\xbb\xbf \t\r\n')
     try:
-        if not _NTRIPLES.match(start) and start[:1] in (b'<', b'\xff', b'\xfe'):
+        if foreign_formats.is_owl_xml(start):
+            triples, form = foreign_formats.owl_xml_to_ntriples(data, iri), 'owlxml'
+            graph = parse_ntriples(triples)
+        elif start[:1] != b'<' and foreign_formats.is_turtle(start):
+            triples, form = foreign_formats.turtle_to_ntriples(data, iri), 'turtle'
+            graph = parse_ntriples(triples)
+        elif not _NTRIPLES.match(start) and start[:1] in (b'<', b'\xff', b'\xfe'):
             graph, form = parse_rdf_xml(data, iri), 'rdfxml'
         elif not start:
             raise RdfSyntaxError('the document is empty', 1, 1)
