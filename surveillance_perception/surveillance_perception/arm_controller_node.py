@@ -181,7 +181,8 @@ class ArmController(PatrolNode):
         lowest, highest = goal.lowest, goal.highest
         if lowest == highest == 0.0:
             lowest, highest = -math.pi / 2, math.pi / 2
-        plan = ScanPlan(*self._field_of_view, goal.overlap, lowest, highest)
+        horizontal, vertical = self._field_of_view
+        plan = ScanPlan(horizontal, vertical, goal.overlap, lowest, highest)
         try:
             views = plan.views()
         except ValueError as error:

@@ -34,9 +34,9 @@ class Readings:
 
     homographies: Array
     entries: Indices
-    correlation: Array
-    inner: Array
-    lead: Array
+    correlation: Patches
+    inner: Patches
+    lead: Patches
 
 
 class MarkerReader:
@@ -61,7 +61,7 @@ class MarkerReader:
         homographies, entries = homographies[likely], entries[likely]
         correlation, blur = correlation[likely], blur[likely]
         if not len(homographies):
-            empty = np.zeros(0)
+            empty = np.zeros(0, np.float32)
             return Readings(homographies, np.zeros(0, np.int64), empty, empty, empty)
         close = correlation[:, :_HYPOTHESES] > correlation[:, :1] - _HYPOTHESIS_GAP
         owner, column = np.nonzero(close)
@@ -77,7 +77,7 @@ class MarkerReader:
         entries, correlation, patches, footprint = self._score(pyramid, aligned, blur)
         inner = fit.inner_correlation(patches, entries[:, 0], footprint)
         unexplained = 1.0 - np.square(np.maximum(correlation[:, :2], 0.0)) + 1e-6
-        lead = unexplained[:, -1] / unexplained[:, 0]
+        lead = np.asarray(unexplained[:, -1] / unexplained[:, 0], dtype=np.float32)
         return Readings(aligned, entries[:, 0], correlation[:, 0], inner, lead)
 
     def _score(

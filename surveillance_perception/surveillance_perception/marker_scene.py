@@ -107,8 +107,9 @@ def degrade(
         result = result * ramp.astype(np.float32)
     result = result * degradation.light
     if degradation.noise > 0:
-        result = result + generator.normal(0.0, degradation.noise, result.shape)
-    return np.clip(np.rint(result), 0, 255).astype(np.uint8)
+        grain = generator.standard_normal(result.shape, dtype=np.float32)
+        result = result + np.float32(degradation.noise) * grain
+    return np.asarray(np.clip(np.rint(result), 0, 255), dtype=np.uint8)
 
 
 def backdrop_of(
@@ -146,7 +147,7 @@ def backdrop_of(
         drawn = level + 160.0 * cv2.GaussianBlur(noise, (0, 0), generator.uniform(1.0, 3.0))
     else:
         raise ValueError(f"unknown backdrop '{kind}', expected one of {', '.join(BACKDROPS)}")
-    return np.clip(drawn, 0, 255).astype(np.float32)
+    return np.asarray(np.clip(drawn, 0, 255), dtype=np.float32)
 
 
 def _panel_points(panel: Panel, camera: CameraModel, half: float) -> Array:
@@ -255,7 +256,7 @@ def _boxes(base: Array, generator: np.random.Generator) -> Array:
         size = generator.uniform(6, 90, 2)
         box = cv2.boxPoints((centre.tolist(), size.tolist(), float(generator.uniform(0, 180))))
         cv2.fillConvexPoly(drawn, np.rint(box).astype(np.int32), float(generator.uniform(0, 255)))
-    return drawn
+    return drawn.astype(float)
 
 
 def _letters(base: Array, generator: np.random.Generator) -> Array:

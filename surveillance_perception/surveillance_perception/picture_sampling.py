@@ -62,14 +62,14 @@ class PicturePyramid:
             cv2.INTER_LINEAR,
             borderMode=cv2.BORDER_REPLICATE,
         )
-        return sampled.astype(np.float32)
+        return np.asarray(sampled, dtype=np.float32)
 
 
 def levels_for(homographies: Array, cells: int, cell_pixels: float) -> npt.NDArray[np.int64]:
     """How often to halve the picture so that a cell is at most `cell_pixels` wide."""
     side = np.linalg.norm(jacobians_of(homographies), axis=1).min(axis=1) * 2.0 / cells
     level = np.floor(np.log2(np.maximum(side / cell_pixels, 1e-3))) + 1
-    return np.clip(level, 0, _LAST_LEVEL).astype(np.int64)
+    return np.asarray(np.clip(level, 0, _LAST_LEVEL), dtype=np.int64)
 
 
 def homographies_of(quads: Array) -> Array:

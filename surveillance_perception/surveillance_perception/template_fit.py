@@ -54,7 +54,7 @@ class TemplateFit:
         self._flat = codes.cells.reshape(len(codes.ids), cells * cells)
         step = 2.0 / codes.side / _SAMPLES_PER_CELL
         self._count = codes.side * _SAMPLES_PER_CELL + 2 * _MARGIN_SAMPLES
-        positions = (np.arange(self._count) - (self._count - 1) / 2.0) * step
+        positions: Array = (np.arange(self._count, dtype=float) - (self._count - 1) / 2.0) * step
         x, y = (each.ravel() for each in np.meshgrid(positions, positions))
         self._grid = np.stack([x, y, np.ones_like(x)])
         within = np.abs(positions) < 1.0 - 2.0 / codes.side
@@ -152,10 +152,11 @@ class TemplateFit:
             patches = self.sample(pyramid, result, levels)[:, :, None]
             contrast = (flat[:, None] @ patches)[:, 0, 0] / energy
             contrast = np.where(np.abs(contrast) < 1.0, 1.0, contrast)
-            change = (solve @ (steepest @ patches))[:, :, 0] / contrast[:, None]
+            change = np.asarray((solve @ (steepest @ patches))[:, :, 0], dtype=float)
+            change /= contrast[:, None]
             largest = np.abs(change).max(axis=1, keepdims=True)
             change *= np.minimum(1.0, _LARGEST_STEP / np.maximum(largest, 1e-9))
-            result = result @ np.linalg.inv(_warps(change))
+            result = np.asarray(result @ np.linalg.inv(_warps(change)))
             result = result / result[:, 2:, 2:]
         return result
 
@@ -198,7 +199,7 @@ def _profiles(positions: Array, side: int) -> tuple[Patches, Patches]:
     return profile.astype(np.float32), slope.astype(np.float32)
 
 
-def _warps(parameters: Patches) -> Array:
+def _warps(parameters: Array) -> Array:
     result = np.zeros((len(parameters), 3, 3))
     result[:, 0] = parameters[:, :3]
     result[:, 1] = parameters[:, 3:6]

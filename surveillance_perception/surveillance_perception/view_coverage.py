@@ -92,9 +92,9 @@ def coverage(
 ) -> float:
     """Share of the directions between two elevations that lie in at least one view's picture."""
     # evenly spread directions: the golden angle between neighbours on a spiral
-    index = np.arange(samples) + 0.5
+    index: Array = np.arange(samples, dtype=float) + 0.5
     sine = math.sin(lowest) + (math.sin(highest) - math.sin(lowest)) * index / samples
-    elevation = np.arcsin(np.clip(sine, -1.0, 1.0))
+    elevation = np.asarray(np.arcsin(np.clip(sine, -1.0, 1.0)), dtype=float)
     azimuth = index * math.pi * (3.0 - math.sqrt(5.0))
     seen = np.zeros(samples, bool)
     for view in views:
