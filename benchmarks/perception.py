@@ -1,0 +1,394 @@
+"""How many markers are found, how exactly and how fast, beside OpenCV's detector with its defaults.
+
+    python benchmarks/perception.py [--quick] [--picture FILE]
+
+Both detectors get the same rendered pictures: 640x480 pixels, 60 degrees field of view, markers of
+0.20 m from DICT_5X5_100, a lens blur of 0.8 pixels and a noise of 2 grey levels. Seven ids are on
+the known list; what OpenCV finds is held against the same list. Times are processor time of one
+thread. `--picture` draws recall over distance and angle for both.
+"""
+
+# ruff: noqa: E402 - the number of threads must be set before numpy is imported
+from __future__ import annotations
+
+import argparse
+import math
+import os
+import sys
+import time
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+for variable in ('OPENBLAS_NUM_THREADS', 'OMP_NUM_THREADS'):
+    os.environ.setdefault(variable, '1')
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from surveillance_perception.camera_model import CameraModel
+from surveillance_perception.detection import DetectorSettings, MarkerDetector
+from surveillance_perception.dictionaries import dictionary_named
+from surveillance_perception.marker_scene import (
+    BACKDROPS,
+    Degradation,
+    Panel,
+    Picture,
+    backdrop_of,
+    corners_in_picture,
+    picture_of,
+)
+
+CAMERA = CameraModel.from_field_of_view(640, 480, math.radians(60))
+DICTIONARY = dictionary_named('DICT_5X5_100')
+KNOWN = frozenset(range(11, 18))
+DISTANCES = tuple(range(2, 10))
+ANGLES = tuple(range(0, 81, 10))
+SHARP = Degradation(blur=0.8, noise=2.0)
+DEGRADED = {
+    'blur 1.2 px': replace(SHARP, blur=1.2),
+    'blur 1.6 px': replace(SHARP, blur=1.6),
+    'blur 2.0 px': replace(SHARP, blur=2.0),
+    'motion 4 px': replace(SHARP, motion=4.0, direction=0.3),
+    'motion 8 px': replace(SHARP, motion=8.0, direction=0.3),
+    'light 25 %': replace(SHARP, light=0.25),
+    'light 10 %': replace(SHARP, light=0.10),
+    'light 160 %': replace(SHARP, light=1.6),
+    'light uneven': replace(SHARP, light=0.7, slope=0.7),
+    'noise 10': replace(SHARP, noise=10.0),
+    'noise 20': replace(SHARP, noise=20.0),
+    'noise 30': replace(SHARP, noise=30.0),
+}
+DECOYS = ('DICT_4X4_50', 'DICT_6X6_250', 'DICT_APRILTAG_36h11')
+
+Found = list[tuple[int, npt.NDArray[np.float64]]]
+Detect = Callable[[Picture], Found]
+
+
+def opencv_defaults() -> Detect:
+    """OpenCV's detector as it comes."""
+    detector = cv2.aruco.ArucoDetector(DICTIONARY)
+
+    def detect(picture: Picture) -> Found:
+        corners, ids, _ = detector.detectMarkers(picture)
+        if ids is None:
+            return []
+        # (N, 1) in OpenCV 4, (N,) in OpenCV 5
+        pairs = zip(np.ravel(ids).tolist(), corners, strict=True)
+        return [(marker_id, outline.reshape(4, 2)) for marker_id, outline in pairs]
+
+    return detect
+
+
+def this_project(known: frozenset[int] | None = KNOWN) -> Detect:
+    """The detector of surveillance_perception."""
+    detector = MarkerDetector(DetectorSettings(known_ids=known))
+    return lambda picture: [(each.marker_id, each.corners) for each in detector.detect(picture)]
+
+
+@dataclass
+class Tally:
+    """What one detector did with some pictures."""
+
+    pictures: int = 0
+    found: int = 0
+    shown: int = 0
+    wrong_known: int = 0
+    wrong_other: int = 0
+    seconds: list[float] = field(default_factory=list)
+    errors: list[float] = field(default_factory=list)
+
+    def look(self, detect: Detect, picture: Picture, panels: Sequence[Panel]) -> None:
+        """Have one picture looked at and hold it against the truth."""
+        start = time.thread_time()
+        found = detect(picture)
+        self.seconds.append(time.thread_time() - start)
+        self.pictures += 1
+        self.shown += len(panels)
+        truths = [(panel.marker_id, corners_in_picture(panel, CAMERA)) for panel in panels]
+        for marker_id, corners in found:
+            errors = [
+                float(np.linalg.norm(corners - truth, axis=1).mean())
+                for shown_id, truth in truths
+                if shown_id == marker_id
+            ]
+            if errors and min(errors) < 8.0:
+                self.found += 1
+                self.errors.append(min(errors))
+            elif marker_id in KNOWN:
+                self.wrong_known += 1
+            else:
+                self.wrong_other += 1
+
+    @property
+    def recall(self) -> float:
+        """Share of the markers that were found."""
+        return self.found / self.shown if self.shown else math.nan
+
+
+Tallies = dict[str, Tally]
+
+
+def panel(distance: float, degrees: float, generator: np.random.Generator) -> Panel:
+    """A known marker somewhere in the picture, turned about an upright or a level axis."""
+    upright = generator.random() < 0.75
+    return Panel(
+        int(generator.choice(sorted(KNOWN))),
+        distance,
+        math.radians(degrees) * float(generator.choice([-1, 1])),
+        axis=(math.pi / 2 if upright else 0.0) + float(generator.uniform(-0.1, 0.1)),
+        roll=float(generator.uniform(-0.15, 0.15)),
+        offset=(float(generator.uniform(-170, 170)), float(generator.uniform(-120, 120))),
+    )
+
+
+def scene(
+    panels: Sequence[Panel],
+    backdrop: str,
+    degradation: Degradation,
+    generator: np.random.Generator,
+    dictionary: cv2.aruco.Dictionary = DICTIONARY,
+) -> Picture:
+    """A picture of panels in front of a backdrop."""
+    ground = backdrop_of(backdrop, CAMERA, generator)
+    return picture_of(list(panels), CAMERA, dictionary, ground, degradation, generator)
+
+
+def indoors(generator: np.random.Generator) -> str:
+    """Backdrops of rooms, most often a plain or a stained wall."""
+    return str(generator.choice(['plain', 'clouds', 'boxes', 'bricks'], p=[0.4, 0.4, 0.15, 0.05]))
+
+
+def grid(detectors: dict[str, Detect], samples: int) -> dict[tuple[int, int], Tallies]:
+    """Recall over distance and angle."""
+    cells = {}
+    for distance in DISTANCES:
+        for degrees in ANGLES:
+            generator = np.random.default_rng([1, distance, degrees])
+            tallies = {name: Tally() for name in detectors}
+            for _ in range(samples):
+                panels = [panel(distance, degrees, generator)]
+                picture = scene(panels, indoors(generator), SHARP, generator)
+                for name, detect in detectors.items():
+                    tallies[name].look(detect, picture, panels)
+            cells[distance, degrees] = tallies
+    return cells
+
+
+def degraded(detectors: dict[str, Detect], samples: int) -> dict[str, Tallies]:
+    """Recall under each condition, at 2 to 5 m and up to 60 degrees."""
+    result = {}
+    for index, (condition, degradation) in enumerate(DEGRADED.items()):
+        generator = np.random.default_rng([2, index])
+        tallies = {name: Tally() for name in detectors}
+        for distance in (2, 3, 4, 5):
+            for degrees in (0, 20, 40, 60):
+                for _ in range(samples):
+                    panels = [panel(distance, degrees, generator)]
+                    picture = scene(panels, indoors(generator), degradation, generator)
+                    for name, detect in detectors.items():
+                        tallies[name].look(detect, picture, panels)
+        result[condition] = tallies
+    return result
+
+
+def without_markers(count: int) -> Iterator[tuple[str, Picture]]:
+    """Pictures without a marker of the dictionary: textures, and markers of other dictionaries."""
+    kinds = [*BACKDROPS, 'other dictionaries']
+    conditions = [SHARP, *DEGRADED.values()]
+    for index in range(count):
+        generator = np.random.default_rng([3, index])
+        kind = kinds[index % len(kinds)]
+        degradation = SHARP if index % 2 else conditions[(index // 2) % len(conditions)]
+        if kind in BACKDROPS:
+            yield kind, scene([], kind, degradation, generator)
+            continue
+        dictionary = dictionary_named(DECOYS[(index // len(kinds)) % len(DECOYS)])
+        decoys = [
+            replace(
+                panel(generator.uniform(1, 7), generator.uniform(0, 75), generator),
+                marker_id=int(generator.integers(0, 50)),
+            )
+            for _ in range(3)
+        ]
+        yield kind, scene(decoys, indoors(generator), degradation, generator, dictionary)
+
+
+def summed(tallies: Sequence[Tally]) -> Tally:
+    """Several tallies as one."""
+    total = Tally()
+    for each in tallies:
+        total.pictures += each.pictures
+        total.found += each.found
+        total.shown += each.shown
+        total.wrong_known += each.wrong_known
+        total.wrong_other += each.wrong_other
+        total.seconds += each.seconds
+        total.errors += each.errors
+    return total
+
+
+def print_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """Print an aligned table, the first column to the left."""
+    widths = [max(len(row[column]) for row in [head, *rows]) for column in range(len(head))]
+    for row in [head, ['-' * width for width in widths], *rows]:
+        cells = [row[0].ljust(widths[0])]
+        cells += [cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True)]
+        print('  '.join(cells))
+    print()
+
+
+def ratio(ours: float, theirs: float) -> str:
+    """How many times as much."""
+    return f'{ours / theirs:.2f}x' if theirs else '-'
+
+
+def print_recall(title: str, groups: dict[str, Tallies]) -> None:
+    """Recall, corner error and time of both detectors for groups of pictures."""
+    rows = []
+    for name, tallies in groups.items():
+        theirs, ours = tallies['OpenCV'], tallies['here']
+        rows.append(
+            [
+                name,
+                f'{theirs.recall:.3f}',
+                f'{ours.recall:.3f}',
+                ratio(ours.recall, theirs.recall),
+                f'{np.mean(theirs.errors or [math.nan]):.2f}',
+                f'{np.mean(ours.errors or [math.nan]):.2f}',
+                f'{1e3 * np.mean(theirs.seconds):.1f}',
+                f'{1e3 * np.mean(ours.seconds):.1f}',
+                f'{1e3 * np.quantile(ours.seconds, 0.95):.1f}',
+                f'{len(ours.seconds)}',
+            ]
+        )
+    print_table(
+        [
+            title,
+            'recall OpenCV',
+            'here',
+            'ratio',
+            'corner error px OpenCV',
+            'here',
+            'ms OpenCV',
+            'here',
+            '95 %',
+            'pictures',
+        ],
+        rows,
+    )
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument('--quick', action='store_true', help='fewer pictures, under 50 s')
+    parser.add_argument('--picture', type=Path, help='draw recall over distance and angle')
+    options = parser.parse_args(argv)
+    cv2.setNumThreads(1)
+    detectors = {'OpenCV': opencv_defaults(), 'here': this_project()}
+    samples, degraded_samples, empty = (2, 1, 90) if options.quick else (12, 5, 1008)
+    print(f'OpenCV {cv2.__version__}, {samples} pictures a cell\n')
+
+    cells = grid(detectors, samples)
+    for name in detectors:
+        rows = [
+            [f'{distance} m', *(f'{cells[distance, a][name].recall:.2f}' for a in ANGLES)]
+            for distance in DISTANCES
+        ]
+        print_table([f'recall, {name}', *(f'{angle} deg' for angle in ANGLES)], rows)
+
+    def part(chosen: Callable[[int, int], bool]) -> Tallies:
+        keys = [key for key in cells if chosen(*key)]
+        return {name: summed([cells[key][name] for key in keys]) for name in detectors}
+
+    print_recall(
+        'distance and angle',
+        {
+            'whole grid': part(lambda _distance, _angle: True),
+            'far: 5-9 m, to 45 deg': part(lambda distance, angle: distance >= 5 and angle <= 45),
+            'oblique: from 70 deg, to 3 m': part(
+                lambda distance, angle: distance <= 3 and angle >= 70
+            ),
+        },
+    )
+    conditions = degraded(detectors, degraded_samples)
+    whole = {name: summed([each[name] for each in conditions.values()]) for name in detectors}
+    print_recall('2-5 m, to 60 deg', {**conditions, 'all degraded': whole})
+
+    kinds: defaultdict[str, Tallies] = defaultdict(lambda: {name: Tally() for name in detectors})
+    for kind, picture in without_markers(empty):
+        for name, detect in detectors.items():
+            kinds[kind][name].look(detect, picture, [])
+    total = {name: summed([each[name] for each in kinds.values()]) for name in detectors}
+    print_table(
+        [
+            'no marker in the picture',
+            'pictures',
+            'known ids OpenCV',
+            'here',
+            'other ids OpenCV',
+            'here',
+            'ms OpenCV',
+            'here',
+        ],
+        [
+            [
+                kind,
+                str(tallies['here'].pictures),
+                str(tallies['OpenCV'].wrong_known),
+                str(tallies['here'].wrong_known),
+                str(tallies['OpenCV'].wrong_other),
+                str(tallies['here'].wrong_other),
+                f'{1e3 * np.mean(tallies["OpenCV"].seconds):.1f}',
+                f'{1e3 * np.mean(tallies["here"].seconds):.1f}',
+            ]
+            for kind, tallies in {**kinds, 'all': total}.items()
+        ],
+    )
+    if options.picture is not None:
+        draw(cells, options.picture)
+        print(f'recall is drawn in {options.picture}')
+    return 0
+
+
+def draw(cells: dict[tuple[int, int], Tallies], path: Path) -> None:
+    """Two maps of recall, side by side."""
+    side, left, top = 56, 70, 70
+    width = left + side * len(ANGLES) + 30
+    height = top + side * len(DISTANCES) + 60
+    sheets = []
+    for name in ('OpenCV', 'here'):
+        sheet = np.full((height, width, 3), 255, np.uint8)
+        title = "OpenCV's defaults" if name == 'OpenCV' else 'this project'
+        tallies = summed([each[name] for each in cells.values()])
+        label = f'{title}: recall {tallies.recall:.2f}'
+        cv2.putText(sheet, label, (left, 34), 0, 0.7, (30, 30, 30), 2, cv2.LINE_AA)
+        for row, distance in enumerate(DISTANCES):
+            y = top + row * side
+            text = f'{distance} m'
+            cv2.putText(sheet, text, (16, y + 34), 0, 0.5, (60, 60, 60), 1, cv2.LINE_AA)
+            for column, angle in enumerate(ANGLES):
+                x = left + column * side
+                recall = cells[distance, angle][name].recall
+                grey = np.array([[round(recall * 255)]], np.uint8)
+                color = cv2.applyColorMap(grey, cv2.COLORMAP_VIRIDIS)[0, 0].tolist()
+                cv2.rectangle(sheet, (x, y), (x + side - 3, y + side - 3), color, -1)
+                ink = (255, 255, 255) if recall < 0.7 else (20, 20, 20)
+                text = f'{recall:.2f}'
+                cv2.putText(sheet, text, (x + 9, y + 32), 0, 0.48, ink, 1, cv2.LINE_AA)
+        for column, angle in enumerate(ANGLES):
+            position = (left + column * side + 12, top + side * len(DISTANCES) + 20)
+            cv2.putText(sheet, f'{angle}', position, 0, 0.5, (60, 60, 60), 1, cv2.LINE_AA)
+        position = (left, top + side * len(DISTANCES) + 45)
+        text = 'degrees between line of sight and the normal of the panel'
+        cv2.putText(sheet, text, position, 0, 0.5, (60, 60, 60), 1, cv2.LINE_AA)
+        sheets.append(sheet)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(cv2.imencode('.png', np.hstack(sheets))[1].tobytes())
+
+
+if __name__ == '__main__':
+    sys.exit(main())
