@@ -188,6 +188,8 @@ class Concurrence(ActiveContainer):
                 log.loginfo(f"'{self._fsm_path}' starts {sorted(self._states)} together")
             if history is None:
                 self.call_start_cbs()
+            if frame.trace is not None:
+                frame.trace((self._fsm_path, '', '', '', frame.now(), {}, 'start'))
             outcome = self._run_children(frame)
             if outcome is not SUSPENDED:
                 self.call_termination_cbs(list(self._states), outcome)
@@ -335,19 +337,8 @@ class Concurrence(ActiveContainer):
                 state._fsm_progress = None
             self._child_outcomes[label] = outcome
         if frame.trace is not None:
-            now = frame.now()
-            frame.trace(
-                (
-                    frame.path,
-                    label,
-                    outcome,
-                    '',
-                    now,
-                    now - frame.since,
-                    self.userdata._data.copy(),
-                    'ended',
-                )
-            )
+            data = self.userdata._data.copy()
+            frame.trace((frame.path, label, outcome, '', frame.now(), data, 'ended'))
         if log.chatty():
             log.loginfo(f"'{frame.path}': '{label}' ended with '{outcome}'")
         self.call_transition_cbs()

@@ -39,9 +39,10 @@ class Control:
 
         Args:
             trace: Takes one tuple per transition: path of the container, label of the state left,
-                outcome, label or outcome reached, time and duration of the state in seconds, a
-                shallow copy of the container's userdata, and the kind (``transition``, ``exit``,
-                ``interrupt``, ``resume``, ``forced``).
+                outcome, label or outcome reached, time in seconds, a shallow copy of the
+                container's userdata, and the kind: ``transition``, ``exit``, ``interrupt``,
+                ``resume``, ``forced``, ``ended`` (a child of a concurrence), or ``start``, when a
+                container is entered.
         """
         with self.condition:
             self._trace = trace

@@ -186,6 +186,7 @@ class DrivenContainer(ActiveContainer):
 
     def _drive(self, frame: Frame, target: Node | Exit) -> Exit:
         data = self.userdata._data
+        path, now, trace = frame.path, frame.now, frame.trace
         while not target.is_exit:
             node: Node = target  # type: ignore[assignment]
             try:
@@ -201,21 +202,9 @@ class DrivenContainer(ActiveContainer):
             frame.current = target
             if frame.attention or shutdown.check is not None:
                 target = self._attend(frame, node, outcome, target)
-            elif frame.trace is not None:
-                now = frame.now()
-                frame.trace(
-                    (
-                        frame.path,
-                        node.label,
-                        outcome,
-                        target.label,
-                        now,
-                        now - frame.since,
-                        data.copy(),
-                        'exit' if target.is_exit else 'transition',
-                    )
-                )
-                frame.since = now
+                trace = frame.trace
+            elif trace is not None:
+                trace((path, node.label, outcome, target.label, now(), data.copy(), target.kind))
         return target  # type: ignore[return-value]
 
     def _target(self, node: Node, outcome: Any) -> Node | Exit:
@@ -291,8 +280,12 @@ class DrivenContainer(ActiveContainer):
                     left = ended = target
             frame.attention = self._wants_attention(frame, target)
             frame.trace = run.trace
-        if left is not None and target is not _SHUTDOWN:
+        if target is _SHUTDOWN:
+            pass
+        elif left is not None:
             self._tell(frame, left, outcome, target, kind)
+        elif frame.trace is not None:
+            frame.trace((frame.path, '', '', target.label, frame.now(), {}, 'start'))
         return target
 
     def _sort_requests(
@@ -366,23 +359,9 @@ class DrivenContainer(ActiveContainer):
 
     def _tell(self, frame: Frame, left: Node, outcome: Any, target: Node | Exit, kind: str) -> None:
         if frame.trace is not None:
-            now = frame.now()
-            if target.is_exit:
-                kind = 'exit'
+            kind = target.kind if target.is_exit else kind
             data = self.userdata._data.copy()
-            frame.trace(
-                (
-                    frame.path,
-                    left.label,
-                    str(outcome),
-                    target.label,
-                    now,
-                    now - frame.since,
-                    data,
-                    kind,
-                )
-            )
-            frame.since = now
+            frame.trace((frame.path, left.label, outcome, target.label, frame.now(), data, kind))
         if log.chatty():
             verb = 'ends' if target.is_exit else 'goes on'
             log.loginfo(f"'{frame.path}' {verb}: '{left.label}' : '{outcome}' --> '{target.label}'")

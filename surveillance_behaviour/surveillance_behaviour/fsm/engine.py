@@ -34,6 +34,7 @@ class Exit:
 
     is_exit = True
     priority = LOWEST
+    kind = 'exit'
 
     def __init__(self, label: str) -> None:
         self.label = label
@@ -73,6 +74,7 @@ class Node:
     )
 
     is_exit = False
+    kind = 'transition'
 
     def __init__(
         self, label: str, state: State, make_view: Callable[[], Any], priority: float = LOWEST
@@ -94,7 +96,7 @@ class Node:
 
 
 Trace = Callable[[tuple[Any, ...]], object]
-"""Takes (path, from, outcome, to, time, duration, userdata, kind) of one transition."""
+"""Takes (path, from, outcome, to, time, userdata, kind) of one transition; see `Control`."""
 
 
 class Frame:
@@ -120,7 +122,6 @@ class Frame:
         parent_ud: The parent's userdata.
         trace: Where transitions are reported.
         now: The trace's clock.
-        since: When the current state was entered, on the trace's clock.
         items: An iterator's items that are left.
         repeat: The current state is executed again where it was cut short.
         index: How many items an iterator has begun.
@@ -140,7 +141,6 @@ class Frame:
         'preempted',
         'repeat',
         'saved',
-        'since',
         'stale',
         'strand',
         'suspending',
@@ -164,7 +164,6 @@ class Frame:
         self.forced: str | None = None
         self.trace: Trace | None = strand.run.trace
         self.now = strand.run.now
-        self.since = self.now() if self.trace is not None else 0.0
         self.items: Any = None
         self.index = 0
         self.repeat = False
@@ -177,7 +176,6 @@ class Frame:
             'cut',
             'suspending',
             'forced',
-            'since',
             'items',
             'index',
             'repeat',

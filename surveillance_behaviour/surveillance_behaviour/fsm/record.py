@@ -93,6 +93,9 @@ class TransitionFeed:
         self._show_userdata = show_userdata
         self._queue: deque[tuple[int, tuple[Any, ...]]] = deque(maxlen=QUEUE_LENGTH)
         self._visits: dict[tuple[str, str], int] = {}
+        self._entered: dict[str, float] = {}
+        self._expected = 1
+        self._sequence = 0
         self._wakeup = threading.Event()
         self._drained = threading.Condition()
         self._asleep = False
@@ -128,8 +131,11 @@ class TransitionFeed:
         while True:
             while queue:
                 sequence, raw = queue.popleft()
+                transition = self._transition(sequence, raw)
+                if transition is None:
+                    continue
                 try:
-                    self._consume(self._transition(sequence, raw))
+                    self._consume(transition)
                 except Exception as error:
                     logerr(f'Reporting a transition raised {type(error).__name__}: {error}')
             if self._closing:
@@ -143,13 +149,31 @@ class TransitionFeed:
                 self._wakeup.wait()
             self._asleep = False
 
-    def _transition(self, sequence: int, raw: tuple[Any, ...]) -> Transition:
-        path, left, outcome, target, time, duration, userdata, kind = raw
+    def _transition(self, number: int, raw: tuple[Any, ...]) -> Transition | None:
+        path, left, outcome, target, time, userdata, kind = raw
+        # What was lost leaves a gap.
+        self._sequence += number - self._expected
+        self._expected = number + 1
         place = (path, target)
         visits = self._visits[place] = self._visits.get(place, 0) + 1
+        since = self._entered.get(path, time)
+        if kind != 'ended':
+            self._entered[path] = time
+        if kind == 'start':
+            return None
+        self._sequence += 1
         data = shown(userdata) if self._show_userdata else {}
         return Transition(
-            sequence, time, path, left, str(outcome), target, kind, duration, visits, data
+            self._sequence,
+            time,
+            path,
+            left,
+            str(outcome),
+            target,
+            kind,
+            time - since,
+            visits,
+            data,
         )
 
 

@@ -149,8 +149,9 @@ class Watched:
         self.transitions: list[tuple[str, str, str, str]] = []
 
     def _saw(self, raw: tuple[Any, ...]) -> None:
-        path, left, outcome, target, *_ = raw
-        self.transitions.append((path, left, str(outcome), target))
+        path, left, outcome, target, _, _, kind = raw
+        if kind != 'start':
+            self.transitions.append((path, left, str(outcome), target))
 
     def path(self, container: str | None = None) -> list[str]:
         """Labels of the states that were executed in a container, in order; default: the root."""
