@@ -2,11 +2,12 @@
 
     python benchmarks/ontology.py [--quick] [--places 7 57 ...]
 
-A generated map is a chain of corridors, each joined to the next by a door, with seven rooms on each. A visit
-replaces `isIn`, `now` and the place's `visitedAt`, reasons, and asks what a decision asks: what the robot can
-reach, which places are URGENT, which are CORRIDORs, where the robot is. Each size runs in a process of its
-own. Peers in the same run: the same reasoner recomputing everything, and the Java reasoners that owlready2
-brings, resident in a JVM. `benchmarks/armor_calls.py` adds the directives inside the server and over ROS.
+A generated map is a chain of corridors, each joined to the next by a door, with seven rooms on
+each. A visit replaces `isIn`, `now` and the place's `visitedAt`, reasons, and asks what a decision
+asks: what the robot can reach, which places are URGENT, which are CORRIDORs, where the robot is.
+Each size runs in a process of its own. Peers in the same run: the same reasoner recomputing
+everything, and the Java reasoners that owlready2 brings, resident in a JVM.
+`benchmarks/armor_calls.py` adds the directives inside the server and over ROS.
 """
 
 from __future__ import annotations
@@ -123,7 +124,9 @@ class Patrol:
         return DataPropertyAssertion(named('now'), self.robot, seconds(self.now))
 
     def step(self) -> tuple[list[Axiom], list[Axiom], tuple[str, ...]]:
-        """Goes to a neighbour: assertions that go, those that come, and the words of a Java `visit`."""
+        """Goes to a neighbour: assertions that go, those that come, and the words of a Java
+        `visit`.
+        """
         self._steps += 1
         neighbours = self.beyond[self.place]
         target = neighbours[self._steps % len(neighbours)]

@@ -1,4 +1,6 @@
-"""Axioms in words, for explanations and reports: class expressions in Manchester syntax, facts as sentences."""
+"""Axioms in words, for explanations and reports: class expressions in Manchester syntax, facts as
+sentences.
+"""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
 """OWL 2 axioms, class expressions and SWRL rules as frozen, hashable records.
 
-The names follow the OWL 2 Structural Specification (https://www.w3.org/TR/owl2-syntax/) and the SWRL
-submission (https://www.w3.org/Submission/SWRL/). An entity is its full IRI as a plain `str`; a named class is
-therefore a `str` wherever a class expression is expected, a datatype is a `str` wherever a data range is.
-Anonymous individuals are strings that begin with `_:`.
+The names follow the OWL 2 Structural Specification (https://www.w3.org/TR/owl2-syntax/) and the
+SWRL submission (https://www.w3.org/Submission/SWRL/). An entity is its full IRI as a plain `str`; a
+named class is therefore a `str` wherever a class expression is expected, a datatype is a `str`
+wherever a data range is. Anonymous individuals are strings that begin with `_:`.
 """
 
 from __future__ import annotations

@@ -15,7 +15,8 @@ class Explanation:
         kind: 'asserted', 'rule' (a SWRL rule) or 'axiom' (a class or property axiom).
         because: The rule or axiom in words, '' for an asserted fact.
         premises: What the fact follows from by that rule or axiom; empty for an asserted fact.
-        reason: A calculation that replaces the listing of premises in the sentence, '' where none is needed.
+        reason: A calculation that replaces the listing of premises in the sentence, '' where none
+            is needed.
     """
 
     fact_text: str

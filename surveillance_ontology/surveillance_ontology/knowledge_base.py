@@ -1,8 +1,9 @@
 """An ontology in memory: what is asserted, what follows from it, and why.
 
-The asserted axioms change at once with `add` and `remove`; what follows is brought up to date by `reason`,
-which touches only what depends on the changes. Asserted and derived facts are kept apart: a derived fact never
-becomes an assertion. Nothing here is thread-safe; a caller that shares a `KnowledgeBase` locks it.
+The asserted axioms change at once with `add` and `remove`; what follows is brought up to date by
+`reason`, which touches only what depends on the changes. Asserted and derived facts are kept apart:
+a derived fact never becomes an assertion. Nothing here is thread-safe; a caller that shares a
+`KnowledgeBase` locks it.
 
     kb = KnowledgeBase(iri, read_ontology(path, iri).axioms)
     kb.reason()
@@ -64,9 +65,10 @@ class Changes:
 class KnowledgeBase:
     """Asserted axioms of one ontology and the facts derived from them.
 
-    Queries answer from what is asserted now together with what was derived by the last `reason`; a value whose
-    assertion was retracted is never returned. When the last `reason` found a contradiction, queries answer
-    from the assertions alone. Individuals, classes and properties are full IRIs.
+    Queries answer from what is asserted now together with what was derived by the last `reason`; a
+    value whose assertion was retracted is never returned. When the last `reason` found a
+    contradiction, queries answer from the assertions alone. Individuals, classes and properties are
+    full IRIs.
 
     Args:
         iri: The ontology's IRI.
@@ -112,7 +114,9 @@ class KnowledgeBase:
         return True
 
     def change(self, added: Iterable[Axiom] = (), removed: Iterable[Axiom] = ()) -> int:
-        """Retracts `removed`, then asserts `added`, as one batch; the number of axioms that changed."""
+        """Retracts `removed`, then asserts `added`, as one batch; the number of axioms that
+        changed.
+        """
         gone = [(axiom, False) for axiom in removed if self._retract(axiom)]
         come = [(axiom, False) for axiom in added if self._assert(axiom)]
         if self._subscribers and (gone or come):
@@ -194,7 +198,8 @@ class KnowledgeBase:
         return len(affected)
 
     def remove_entity(self, kind: str, iri: str) -> int:
-        """Retracts every axiom that mentions the entity; a set of (different, same) individuals shrinks instead.
+        """Retracts every axiom that mentions the entity; a set of (different, same) individuals
+        shrinks instead.
 
         Returns:
             The number of axioms removed or shrunk.
@@ -291,7 +296,9 @@ class KnowledgeBase:
             yield from FactView(self._engine).derived()
 
     def _show(self) -> set[Axiom]:
-        """The derived facts now; kept where the next change cannot be told from the engine's log alone."""
+        """The derived facts now; kept where the next change cannot be told from the engine's log
+        alone.
+        """
         visible = set(self._visible())
         engine = self._engine
         special = engine is not None and (not self._consistent or bool(engine.equality.members))
@@ -312,7 +319,9 @@ class KnowledgeBase:
             self._publish(added, removed)
 
     def recompute(self) -> bool:
-        """Forgets what is derived and derives it again from nothing; whether the ontology is consistent."""
+        """Forgets what is derived and derives it again from nothing; whether the ontology is
+        consistent.
+        """
         self._schema_changed = True
         return self.reason()
 
@@ -328,7 +337,9 @@ class KnowledgeBase:
 
     @property
     def unsupported(self) -> tuple[str, ...]:
-        """One sentence for each asserted axiom (or part) that the reasoner does not use, as of `reason`."""
+        """One sentence for each asserted axiom (or part) that the reasoner does not use, as of
+        `reason`.
+        """
         return () if self._schema is None else tuple(self._schema.program.unsupported)
 
     # --- queries ---
@@ -441,7 +452,9 @@ class KnowledgeBase:
         return found
 
     def data_values(self, prop: str, individual: str) -> set[Literal]:
-        """Values of a data property: asserted ones as written, derived ones in one form for each value."""
+        """Values of a data property: asserted ones as written, derived ones in one form for each
+        value.
+        """
         engine = self._usable
         if engine is None:
             return set(self._literals.get((prop, individual), ()))
@@ -507,8 +520,8 @@ class KnowledgeBase:
     def explain(self, fact: Axiom) -> Explanation | None:
         """Why a fact holds; None when it is neither asserted nor derived.
 
-        A fact is a class, property, same- or different-individuals assertion, or a subclass axiom between
-        named classes.
+        A fact is a class, property, same- or different-individuals assertion, or a subclass axiom
+        between named classes.
         """
         if fact in self._axioms:
             return Explanation(axiom_text(fact), 'asserted')

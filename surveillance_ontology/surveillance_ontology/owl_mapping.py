@@ -1,7 +1,8 @@
 """RDF triples to OWL axioms and SWRL rules.
 
-Follows OWL 2 Mapping to RDF Graphs (https://www.w3.org/TR/owl2-mapping-to-rdf/), section 3, and the SWRL
-submission's RDF syntax. What is not understood is reported with its line, never dropped in silence.
+Follows OWL 2 Mapping to RDF Graphs (https://www.w3.org/TR/owl2-mapping-to-rdf/), section 3, and the
+SWRL submission's RDF syntax. What is not understood is reported with its line, never dropped in
+silence.
 """
 
 from __future__ import annotations
@@ -81,7 +82,9 @@ class Mapping:
             self._subject(subject, properties)
 
     def _guess_kinds(self) -> None:
-        """Undeclared properties with a datatype as range, or a literal as value, are data properties."""
+        """Undeclared properties with a datatype as range, or a literal as value, are data
+        properties.
+        """
         guessed: set[str] = set()
         for subject, properties in self._nodes.items():
             for predicate, values in properties.items():

@@ -17,7 +17,9 @@ DEFAULT_SIZE_LIMIT = 256 * 1024 * 1024
 
 
 class OntologyFileError(ValueError):
-    """A document that cannot be read. `str()` is one line: path, line, column and what was expected."""
+    """A document that cannot be read. `str()` is one line: path, line, column and what was
+    expected.
+    """
 
     def __init__(self, path: str, line: int, column: int, message: str) -> None:
         place = f':{line}:{column}' if line else ''

@@ -303,8 +303,8 @@ class _Mapping:
 def triples_of(axioms: Iterable[Axiom], iri: str) -> Iterator[Triple]:
     """The triples of an ontology, its header first.
 
-    Classes, properties and datatypes that are used but not declared are declared: without, a reader could not
-    tell an object property from a data property.
+    Classes, properties and datatypes that are used but not declared are declared: without, a reader
+    could not tell an object property from a data property.
     """
     mapping = _Mapping(iri)
     mapping.add(iri, _TYPE, OWL + 'Ontology')

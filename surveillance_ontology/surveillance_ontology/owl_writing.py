@@ -30,7 +30,8 @@ def write_ontology(
     format: str = 'rdfxml',
     prefixes: Mapping[str, str] | None = None,
 ) -> None:
-    """Writes a document through a temporary file beside it, so that the old one stays until the new is whole.
+    """Writes a document through a temporary file beside it, so that the old one stays until the new
+    is whole.
 
     Args:
         axioms: What the document states, in this order.
@@ -40,8 +41,8 @@ def write_ontology(
         prefixes: Further namespace prefixes for RDF/XML.
 
     Raises:
-        OntologyWriteError: The directory is not writable, the format is unknown, or RDF/XML cannot hold a
-            property IRI or a character.
+        OntologyWriteError: The directory is not writable, the format is unknown, or RDF/XML cannot
+            hold a property IRI or a character.
     """
     data = ontology_bytes(axioms, iri, format, prefixes)
     target = Path(path)

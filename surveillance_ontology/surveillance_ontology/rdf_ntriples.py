@@ -36,7 +36,8 @@ def parse_ntriples(data: bytes) -> Graph:
     """Parses a document.
 
     Raises:
-        RdfSyntaxError: With line and column, for a line that is no triple or bytes that are not UTF-8.
+        RdfSyntaxError: With line and column, for a line that is no triple or bytes that are not
+            UTF-8.
     """
     try:
         text = data.decode('utf-8-sig')

@@ -1,8 +1,9 @@
 """RDF/XML to triples, with exact datatypes and the place of every error.
 
-Follows RDF 1.1 XML Syntax (https://www.w3.org/TR/rdf-syntax-grammar/) on top of expat. Document type
-declarations may define short plain-text entities (Protégé writes namespaces that way); entities inside
-entities, external ones and parameter entities are refused, so a document cannot expand itself.
+Follows RDF 1.1 XML Syntax (https://www.w3.org/TR/rdf-syntax-grammar/) on top of expat. Document
+type declarations may define short plain-text entities (Protégé writes namespaces that way);
+entities inside entities, external ones and parameter entities are refused, so a document cannot
+expand itself.
 """
 
 from __future__ import annotations
@@ -65,7 +66,9 @@ class _Frame:
 
 
 def resolve(base: str, reference: str) -> str:
-    """An IRI reference against a base IRI (RFC 3986); raises RdfSyntaxError for a forbidden character."""
+    """An IRI reference against a base IRI (RFC 3986); raises RdfSyntaxError for a forbidden
+    character.
+    """
     found = _FORBIDDEN.search(reference)
     if found:
         raise RdfSyntaxError(f'IRI {reference!r} contains {found.group()!r}')
@@ -298,7 +301,8 @@ def parse_rdf_xml(data: bytes, base: str) -> Graph:
     """Parses a document.
 
     Raises:
-        RdfSyntaxError: With line and column, for anything that is not RDF/XML or would expand entities.
+        RdfSyntaxError: With line and column, for anything that is not RDF/XML or would expand
+            entities.
     """
     reader = _Reader(base)
     try:

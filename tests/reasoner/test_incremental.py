@@ -1,4 +1,6 @@
-"""What is derived step by step equals what is derived from nothing, on random ontologies and changes."""
+"""What is derived step by step equals what is derived from nothing, on random ontologies and
+changes.
+"""
 
 from __future__ import annotations
 
@@ -40,7 +42,9 @@ from tests.reasoner.random_ontologies import RandomOntology
 
 
 def by_value(axiom: Axiom) -> object:
-    """An axiom, with a literal replaced by its value: derived values may be written in several ways."""
+    """An axiom, with a literal replaced by its value: derived values may be written in several
+    ways.
+    """
     if isinstance(axiom, DataPropertyAssertion):
         return axiom.prop, axiom.subject, axiom.literal.value()
     return axiom

@@ -1,4 +1,6 @@
-"""Assertions, queries between two reasonings, renaming and removal of entities, the feed of changes."""
+"""Assertions, queries between two reasonings, renaming and removal of entities, the feed of
+changes.
+"""
 
 from __future__ import annotations
 

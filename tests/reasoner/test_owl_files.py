@@ -1,4 +1,6 @@
-"""Reading and writing documents: exact datatypes, located errors, bounded expansion, nothing half-written."""
+"""Reading and writing documents: exact datatypes, located errors, bounded expansion, nothing
+half-written.
+"""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
 """What axioms become: predicates that hold facts, and Horn clauses over them.
 
-A fact is a tuple that begins with its predicate: `(C, x)`, `(R, x, y)`, `(D, x, value)`. Individuals are IRIs
-(`str`), each standing for all individuals known to be the same; values are those of `datatypes`.
+A fact is a tuple that begins with its predicate: `(C, x)`, `(R, x, y)`, `(D, x, value)`.
+Individuals are IRIs (`str`), each standing for all individuals known to be the same; values are
+those of `datatypes`.
 """
 
 from __future__ import annotations
@@ -30,7 +31,8 @@ class Predicate:
         on_insert, on_delete: Called with a fact's arguments after it came, before it goes.
         supports: Pairs of a generator of premise tuples for given arguments and the origin to name.
         disjoint: Predicates that share no member with this one (kind 'class').
-        touching: Positions (1, 2) whose individuals may become different from others by a fact of this predicate.
+        touching: Positions (1, 2) whose individuals may become different from others by a fact of
+            this predicate.
     """
 
     __slots__ = (
@@ -156,7 +158,9 @@ class RangeAtom:
 
 @dataclass(frozen=True, slots=True)
 class ComputedAtom:
-    """A built-in: `builtin` is its local name, the first term may be unbound where `solve` is given."""
+    """A built-in: `builtin` is its local name, the first term may be unbound where `solve` is
+    given.
+    """
 
     builtin: str
     holds: Callable[..., bool]
@@ -194,7 +198,9 @@ class AtLeast:
 
 @dataclass(frozen=True, slots=True)
 class AtMost:
-    """What `label` holds of (None: everything) has at most `n` related individuals (values) in the filler."""
+    """What `label` holds of (None: everything) has at most `n` related individuals (values) in the
+    filler.
+    """
 
     label: Predicate | None
     n: int
@@ -215,7 +221,9 @@ class Key:
 
 @dataclass(frozen=True, slots=True)
 class Existential:
-    """What `label` holds of has at least `n` related individuals (or a value) in the filler, known or not."""
+    """What `label` holds of has at least `n` related individuals (or a value) in the filler, known
+    or not.
+    """
 
     label: Predicate
     n: int
@@ -230,8 +238,10 @@ class Program:
 
     Attributes:
         classes, objects, datas: Predicates by IRI.
-        labels: Predicates of complex class expressions that individuals may be asserted to belong to.
-        thing, nothing, different, same: The predicates with fixed meaning; `same` only ever names a premise.
+        labels: Predicates of complex class expressions that individuals may be asserted to belong
+            to.
+        thing, nothing, different, same: The predicates with fixed meaning; `same` only ever names a
+            premise.
         uses_thing: Whether the extension of owl:Thing must be kept.
     """
 

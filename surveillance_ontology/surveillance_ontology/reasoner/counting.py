@@ -1,7 +1,7 @@
 """Cardinalities: counting what is known, with difference decided by `Difference`.
 
-`AtLeastCounter` derives membership in `min n`; `AtMostCounter` finds contradictions with `max n` and
-functional properties, and the individuals that must be the same because only one is allowed.
+`AtLeastCounter` derives membership in `min n`; `AtMostCounter` finds contradictions with `max n`
+and functional properties, and the individuals that must be the same because only one is allowed.
 """
 
 from __future__ import annotations

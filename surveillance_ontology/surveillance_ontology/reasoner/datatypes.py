@@ -1,8 +1,10 @@
-"""Literals by value: value spaces, lexical forms, ranges and facets (XML Schema 1.1 part 2, OWL 2 section 4).
+"""Literals by value: value spaces, lexical forms, ranges and facets (XML Schema 1.1 part 2, OWL 2
+section 4).
 
-A value is a hashable Python object that is equal to another exactly where the value spaces say so: whole
-numbers of the decimal space are `int`, other decimals `Fraction`, plain strings `str`; any other value is a
-tuple that begins with the name of its space. Values of xsd:float and xsd:double are never equal to decimals.
+A value is a hashable Python object that is equal to another exactly where the value spaces say so:
+whole numbers of the decimal space are `int`, other decimals `Fraction`, plain strings `str`; any
+other value is a tuple that begins with the name of its space. Values of xsd:float and xsd:double
+are never equal to decimals.
 """
 
 from __future__ import annotations
@@ -185,7 +187,9 @@ def parse_value(literal: Literal) -> Value:
 
 
 def value_of(literal: Literal) -> Value:
-    """The value a literal denotes; an ill-formed literal denotes a value of its own, in no datatype."""
+    """The value a literal denotes; an ill-formed literal denotes a value of its own, in no
+    datatype.
+    """
     try:
         return parse_value(literal)
     except (IllFormedLiteral, ValueError, ZeroDivisionError):
@@ -304,7 +308,9 @@ def _datatype_test(datatype: str) -> Test | None:
 
 
 def comparable(value: Value) -> tuple[str, Any]:
-    """A value as (kind, key): keys of one kind compare by order; numbers of all spaces are one kind."""
+    """A value as (kind, key): keys of one kind compare by order; numbers of all spaces are one
+    kind.
+    """
     if isinstance(value, (int, Fraction)):
         return 'number', value
     if isinstance(value, str):

@@ -1,9 +1,9 @@
 """Which individuals are known to be different, decided for a pair when it is asked for.
 
-Pairs are never listed: a set of all-different individuals is a number that its members carry, and difference
-that follows from other facts (disjoint classes, functional properties with different values, ...) is looked up
-in the facts of the two individuals. Where such a fact comes or goes, its individual is *touched*, and whatever
-asks for differences of that individual is asked again.
+Pairs are never listed: a set of all-different individuals is a number that its members carry, and
+difference that follows from other facts (disjoint classes, functional properties with different
+values, ...) is looked up in the facts of the two individuals. Where such a fact comes or goes, its
+individual is *touched*, and whatever asks for differences of that individual is asked again.
 """
 
 from __future__ import annotations
@@ -183,7 +183,8 @@ class AsymmetricEvidence:
 class DisjointPropertyEvidence:
     """Two individuals that stand in disjoint properties to the same third differ.
 
-    `turned` says that the second property is read backwards. A negated assertion is such a property too.
+    `turned` says that the second property is read backwards. A negated assertion is such a property
+    too.
     """
 
     def __init__(self, first: Predicate, second: Predicate, turned: bool) -> None:
@@ -222,7 +223,9 @@ def _among(predicate: Predicate, x: str, y: str) -> Fact | None:
 def clique(
     items: list[str], size: int, different: Callable[[str, str], bool], budget: int = 20_000
 ) -> list[str] | None:
-    """`size` of the items that are pairwise different; None where there are none (or after `budget` tries)."""
+    """`size` of the items that are pairwise different; None where there are none (or after `budget`
+    tries).
+    """
     if size <= 0:
         return []
     chosen: list[str] = []

@@ -1,9 +1,11 @@
-"""The incremental engine: facts come in, what follows is added; facts go, what no longer follows is taken away.
+"""The incremental engine: facts come in, what follows is added; facts go, what no longer follows is
+taken away.
 
-Additions run semi-naively: every new fact is joined with what is there. Removals run backwards and forwards:
-what a vanished fact supported is a candidate; a candidate with another proof from the assertions stays; the
-rest goes, and what can be derived again from what is left comes back. So a fact derived in several ways
-survives the loss of one, and a change is followed no further than it reaches.
+Additions run semi-naively: every new fact is joined with what is there. Removals run backwards and
+forwards: what a vanished fact supported is a candidate; a candidate with another proof from the
+assertions stays; the rest goes, and what can be derived again from what is left comes back. So a
+fact derived in several ways survives the loss of one, and a change is followed no further than it
+reaches.
 """
 
 from __future__ import annotations
@@ -253,7 +255,9 @@ class Engine:
         return list(expressions), list(negated)
 
     def understands(self, axiom: Axiom) -> bool:
-        """Whether the program was made for a complex class or negated property that an assertion uses."""
+        """Whether the program was made for a complex class or negated property that an assertion
+        uses.
+        """
         if isinstance(axiom, ClassAssertion):
             return isinstance(axiom.cls, str) or axiom.cls in self.program.labels
         if isinstance(axiom, NegativeObjectPropertyAssertion):
@@ -325,7 +329,8 @@ class Engine:
         difference, equality = self.difference, self.equality
         touched: dict[str, None] = {}
         for axiom in gone:
-            # A set that comes back a little larger or smaller changes only for those who joined or left.
+            # A set that comes back a little larger or smaller changes only for those who joined
+            # or left.
             heirs = [other.individuals for other in come]
             best = max(heirs, key=lambda heir: len(heir & axiom.individuals), default=frozenset())
             for individual in sorted(axiom.individuals - best):
@@ -494,7 +499,9 @@ class Engine:
                         yield predicate, x, individual
 
     def _split(self, representative: str, fresh: list[Fact]) -> None:
-        """Takes away everything about a class of individuals, and states its members' assertions again."""
+        """Takes away everything about a class of individuals, and states its members' assertions
+        again.
+        """
         if representative not in self.equality.members:
             return
         self.renamed = self._split_happened = True

@@ -79,7 +79,9 @@ class Equality:
         return members
 
     def dependents(self, fact: Fact) -> set[str]:
-        """Representatives of the classes whose justification uses a fact, or that the fact mentions."""
+        """Representatives of the classes whose justification uses a fact, or that the fact
+        mentions.
+        """
         found: set[str] = set()
         for argument in fact[1:2] if fact[0].kind == 'data' else fact[1:]:
             if argument in self.members:

@@ -1,8 +1,9 @@
 """Joins compiled to Python: the atoms of a body in the order of what is bound, as nested loops.
 
-For each clause and each of its atoms there is a function that takes a new (or vanishing) fact's arguments and
-yields what follows; for each clause there is a generator that takes the head's arguments and yields the
-premises it follows from. The source depends only on the shape of a clause, so compiled code is shared.
+For each clause and each of its atoms there is a function that takes a new (or vanishing) fact's
+arguments and yields what follows; for each clause there is a generator that takes the head's
+arguments and yields the premises it follows from. The source depends only on the shape of a clause,
+so compiled code is shared.
 """
 
 from __future__ import annotations
@@ -167,7 +168,9 @@ class _Writer:
             self.bound.update((x, y))  # type: ignore[arg-type]
 
     def join(self, atoms: Sequence[BodyAtom], early: Callable[[], bool] | None = None) -> None:
-        """Writes all atoms, cheapest first; `early` may write more once it finds its variables bound."""
+        """Writes all atoms, cheapest first; `early` may write more once it finds its variables
+        bound.
+        """
         waiting = list(atoms)
         pending = early
         while True:
@@ -284,7 +287,8 @@ def compile_support(
     terms: Sequence[Term],
     outputs: Sequence[Term] = (),
 ) -> Callable[..., Iterator[Any]]:
-    """A generator of the premises of each instance of the body in which `terms` have the given values.
+    """A generator of the premises of each instance of the body in which `terms` have the given
+    values.
 
     With `outputs` it yields pairs (values of the outputs, premises).
     """

@@ -1,4 +1,6 @@
-"""From a program to what runs: compiled joins and counters attached to the predicates that trigger them."""
+"""From a program to what runs: compiled joins and counters attached to the predicates that trigger
+them.
+"""
 
 from __future__ import annotations
 
@@ -41,8 +43,10 @@ class Network:
 
     Attributes:
         initial: Clauses without a condition on facts; run them once at the start.
-        naming: Clauses that name an individual; run them when it comes to stand for another, or ceases to.
-        touch_insert, touch_delete: Called with an individual whose difference from others may have changed.
+        naming: Clauses that name an individual; run them when it comes to stand for another, or
+            ceases to.
+        touch_insert, touch_delete: Called with an individual whose difference from others may have
+            changed.
         touch_related: Like these, for individuals that differ because their values do.
         thresholds: The rules run by a sorted index.
         counters: The watchers of upper bounds.

@@ -1,8 +1,9 @@
 """Axioms to Horn clauses and counting conditions.
 
-A class expression that cannot be spelt out in a clause's body (a cardinality, `only`, a complement) becomes a
-label: a predicate that holds of what is known to belong to the expression. What no Horn clause can express is
-reported, with the axiom, in `Program.unsupported`.
+A class expression that cannot be spelt out in a clause's body (a cardinality, `only`, a complement)
+becomes a
+label: a predicate that holds of what is known to belong to the expression. What no Horn clause can
+express is reported, with the axiom, in `Program.unsupported`.
 """
 
 from __future__ import annotations
@@ -119,7 +120,9 @@ class Normaliser:
         self._contradict(body, _X)
 
     def label_asserted(self, expression: ClassExpression) -> Predicate:
-        """The label of an expression that individuals are asserted to belong to, with what it implies."""
+        """The label of an expression that individuals are asserted to belong to, with what it
+        implies.
+        """
         label = self._label(expression)
         self._imply((PredicateAtom(label, (_X,)),), expression, _X)
         return label
@@ -204,7 +207,9 @@ class Normaliser:
         return data_range
 
     def _complement_labels(self) -> None:
-        """What is disjoint from a class belongs to its complement, where the complement is asked for."""
+        """What is disjoint from a class belongs to its complement, where the complement is asked
+        for.
+        """
         for iri, label in self._complements.items():
             for other in self.program.cls(iri).disjoint:
                 if other is not label:

@@ -1,7 +1,7 @@
 """Backward search: from a fact to the assertions it follows from.
 
-A proof is a finite tree whose leaves are asserted, so a fact with a proof holds whatever else is being taken
-away. The search deepens step by step, so the first proof found is a shallowest one.
+A proof is a finite tree whose leaves are asserted, so a fact with a proof holds whatever else is
+being taken away. The search deepens step by step, so the first proof found is a shallowest one.
 """
 
 from __future__ import annotations
@@ -14,7 +14,9 @@ from surveillance_ontology.reasoner.clauses import Fact
 
 @dataclass(frozen=True)
 class Proof:
-    """A fact and the proofs of its premises; `origin` is the axiom or rule applied, None for an assertion."""
+    """A fact and the proofs of its premises; `origin` is the axiom or rule applied, None for an
+    assertion.
+    """
 
     fact: Fact
     origin: object = None

@@ -1,10 +1,11 @@
-"""The part of an ontology that is not about individuals: its program, completed, and its class hierarchy.
+"""The part of an ontology that is not about individuals: its program, completed, and its class
+hierarchy.
 
-What follows from a class alone is found by trying: a prototype individual is asserted to be a member, what it
-must be related to is made up as further individuals down to a bounded depth, and the engine shows what else
-the prototype is. Rules take no part, since they speak of named individuals only. What a class implies only
-through such made-up individuals is added to the program as clauses, so that the engine over real individuals
-needs none.
+What follows from a class alone is found by trying: a prototype individual is asserted to be a
+member, what it must be related to is made up as further individuals down to a bounded depth, and
+the engine shows what else the prototype is. Rules take no part, since they speak of named
+individuals only. What a class implies only through such made-up individuals is added to the program
+as clauses, so that the engine over real individuals needs none.
 """
 
 from __future__ import annotations
@@ -37,7 +38,8 @@ _MAX_COUNT = 12
 _MAX_PROPERTIES = 24
 
 
-# What a prototype turned out to be: a member of a class, or related to a named individual or a value, as
+# What a prototype turned out to be: a member of a class, or related to a named individual or a
+# value, as
 # (predicate, whether it is the second argument, the other argument).
 Finding = Predicate | tuple[Predicate, bool, Value]
 
@@ -150,7 +152,9 @@ class Schema:
         self.program.clauses += [clause for clause in extra if clause.head not in clause.body]
 
     def _exclusions(self, prototypes: _Prototypes) -> None:
-        """Finds the properties that can relate nothing to itself, or never the same two individuals."""
+        """Finds the properties that can relate nothing to itself, or never the same two
+        individuals.
+        """
         program = self.program
         if not (program.irreflexive or program.asymmetric or program.disjoint_properties):
             return
@@ -265,7 +269,9 @@ class _Prototypes:
         return found
 
     def excludes(self, *props: tuple[str, bool], loop: bool = True) -> bool:
-        """Whether the properties (IRI, turned) cannot all relate one individual to itself, or to another."""
+        """Whether the properties (IRI, turned) cannot all relate one individual to itself, or to
+        another.
+        """
         target = _ROOT if loop else _ROOT + '2'
         facts: list[Fact] = []
         for name, turned in props:

@@ -1,8 +1,9 @@
 """Makes a program smaller without changing what it derives.
 
-Three steps: a label that exactly one class stands for is replaced by the class; clauses whose labels nothing
-can reach, or whose results nothing can see, go; and an atom of a body that the other atoms imply goes, so that
-`LOCATION(?l), visitedAt(?l, ?v)` becomes `visitedAt(?l, ?v)` where LOCATION is the domain of visitedAt.
+Three steps: a label that exactly one class stands for is replaced by the class; clauses whose
+labels nothing can reach, or whose results nothing can see, go; and an atom of a body that the other
+atoms imply goes, so that `LOCATION(?l), visitedAt(?l, ?v)` becomes `visitedAt(?l, ?v)` where
+LOCATION is the domain of visitedAt.
 """
 
 from __future__ import annotations

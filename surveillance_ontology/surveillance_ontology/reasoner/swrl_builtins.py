@@ -1,10 +1,12 @@
-"""SWRL built-ins over values (https://www.w3.org/Submission/SWRL/, section 8): comparisons, arithmetic,
-booleans and strings. Those on dates, URIs and lists are not supported and reported as such.
+"""SWRL built-ins over values (https://www.w3.org/Submission/SWRL/, section 8): comparisons,
+arithmetic, booleans and strings. Those on dates, URIs and lists are not supported and reported as
+such.
 
-Each built-in is known by two functions of the values of its arguments: whether they satisfy it, and, for
-those that compute, the values its first argument can take given the others. Arguments outside the built-in's
-domain satisfy nothing. Numbers of the decimal space are exact; with an xsd:double or xsd:float beside them
-both sides become floating-point, as XPath's numeric promotion has it.
+Each built-in is known by two functions of the values of its arguments: whether they satisfy it,
+and, for those that compute, the values its first argument can take given the others. Arguments
+outside the built-in's domain satisfy nothing. Numbers of the decimal space are exact; with an
+xsd:double or xsd:float beside them both sides become floating-point, as XPath's numeric promotion
+has it.
 """
 
 from __future__ import annotations
@@ -23,7 +25,9 @@ _Solve = Callable[..., Iterable[Value]]
 
 
 def _numbers(values: Iterable[Value]) -> tuple[str, list[_Number]] | None:
-    """The common space ('exact', 'float', 'double') and the numbers promoted to it; None for a non-number."""
+    """The common space ('exact', 'float', 'double') and the numbers promoted to it; None for a
+    non-number.
+    """
     space = 'exact'
     numbers: list[_Number] = []
     for value in values:

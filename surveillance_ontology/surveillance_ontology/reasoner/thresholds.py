@@ -2,12 +2,13 @@
 
 A rule such as
 
-    now(?r, ?t), urgencyThreshold(?r, ?h), visitedAt(?l, ?v), subtract(?d, ?t, ?v), greaterThan(?d, ?h) -> URGENT(?l)
+    now(?r, ?t), urgencyThreshold(?r, ?h), visitedAt(?l, ?v), subtract(?d, ?t, ?v), greaterThan(?d,
+    ?h) -> URGENT(?l)
 
-falls into two halves that share no variable, linked by one linear comparison: here v < t - h. The half with
-the head's variables is kept sorted by its side of the comparison, its *key* (v); of the other half only the
-greatest side, its *reach* (t - h), matters. Heads of keys below the reach hold. When the reach moves, the keys
-between its old and its new place are all that is looked at.
+falls into two halves that share no variable, linked by one linear comparison: here v < t - h. The
+half with the head's variables is kept sorted by its side of the comparison, its *key* (v); of the
+other half only the greatest side, its *reach* (t - h), matters. Heads of keys below the reach hold.
+When the reach moves, the keys between its old and its new place are all that is looked at.
 """
 
 from __future__ import annotations
