@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import PublisherEventCallbacks
 
 from surveillance_interfaces.msg import ArmorDirectiveRes, FactChanges
@@ -26,6 +27,8 @@ from surveillance_ontology.conversions import changes_to_ros, fill_response, req
 from surveillance_runtime.node import PatrolNode, StartError, run_node
 from surveillance_runtime.qos import STATE_QOS
 
+PUBLISH_DELAY = 0.005
+"""Seconds by which changes are told later, so that this delays no client's next directive."""
 WORKERS = 4
 """Threads for directives that may take long."""
 CHOICES = {
@@ -49,6 +52,10 @@ class ArmorServer(PatrolNode):
             STATE_QOS,
             event_callbacks=PublisherEventCallbacks(matched=lambda _status: self._publish()),
         )
+        # Steady time: a simulated clock may stand still.
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._pause = self.create_timer(PUBLISH_DELAY, self._publish, clock=steady)
+        self._pause.cancel()
         self._work = AwaitedWork(self, WORKERS)
         group = ReentrantCallbackGroup()
         for kind, name, callback in (
@@ -116,9 +123,10 @@ class ArmorServer(PatrolNode):
 
     def _soon(self) -> None:
         if self.executor is not None:
-            self.executor.create_task(self._publish)
+            self.executor.create_task(self._pause.reset)
 
     def _publish(self) -> None:
+        self._pause.cancel()
         if self._publisher.get_subscription_count() == 0:
             return
         for change in self._feed.take():

@@ -89,6 +89,8 @@ def test_doubles_are_narrowed_when_asked_for() -> None:
         ('LONG', '', 'not a whole number'),
         ('FLOAT', '1,5', 'not a number'),
         ('DOUBLE', '0x10', 'not a number'),
+        ('STRING', 'a\x01', 'which XML cannot hold'),
+        ('STRING', '\ud800', 'which XML cannot hold'),
     ],
 )
 def test_wrong_values_are_named(type_word: str, text: str, words: str) -> None:

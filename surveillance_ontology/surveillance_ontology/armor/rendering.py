@@ -18,6 +18,7 @@ from surveillance_ontology.axioms import OWL, RDF, RDFS, XSD, Literal
 MAX_NAME = 2048
 PREFIXES = {'owl': OWL, 'xsd': XSD, 'rdf': RDF, 'rdfs': RDFS}
 _FORBIDDEN_IN_IRI = re.compile(r'[\x00-\x20<>"{}|\\^`\x7f-\x9f\ud800-\udfff]')
+_FORBIDDEN_IN_TEXT = re.compile(r'[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]')
 _ABSOLUTE_IRI = re.compile(r'[A-Za-z][A-Za-z0-9+.-]*:[^\s]+\Z')
 _RENDERED = re.compile(
     r'"(?P<text>(?:[^"\\]|\\.)*)"'
@@ -114,6 +115,10 @@ def parse_literal(type_word: str, text: str, *, narrow_doubles: bool = False) ->
     Raises:
         ValueError: The text is not a value of the type.
     """
+    if found := _FORBIDDEN_IN_TEXT.search(text):
+        raise ValueError(
+            f'{shown(text)} has the character {found.group()!r}, which XML cannot hold'
+        )
     wanted = TYPES[type_word]
     if wanted == 'double' and narrow_doubles:
         wanted = 'float'

@@ -119,7 +119,8 @@ class ArmorService:
             directive = look_up(request)
         except DirectiveError:
             return self.execute(request)
-        if directive.slow or directive.schema or len(request.args) > LONG_ARGUMENTS:
+        writes = self._store is not None and directive.kind.may_reason
+        if writes or directive.slow or directive.schema or len(request.args) > LONG_ARGUMENTS:
             return None
         ref = self._references.get(request.reference_name)
         if ref is None:
