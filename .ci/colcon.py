@@ -69,13 +69,9 @@ def make_environment(venv: Path) -> Path:
 
 def build(folder: Path, python: Path) -> None:
     """Builds every package of the checkout into `folder`/install."""
-    venv = python.parent.parent
-    environ = {
-        **clean_environ(),
-        'PATH': f'{python.parent}{os.pathsep}{os.environ["PATH"]}',
-        'CMAKE_PREFIX_PATH': str(venv),
-        'AMENT_PREFIX_PATH': str(venv),
-    }
+    # Neither CMAKE_PREFIX_PATH nor AMENT_PREFIX_PATH: the interfaces ask the interpreter for both.
+    environ = clean_environ()
+    environ['PATH'] = f'{python.parent}{os.pathsep}{environ["PATH"]}'
     words = ['colcon', 'build', '--base-paths']
     words += [str(CHECKOUT / package) for package in (INTERFACES, *PACKAGES)]
     # The interpreter that a find_package finds first is not always the environment's.

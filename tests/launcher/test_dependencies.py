@@ -59,7 +59,7 @@ def installed() -> set[str]:
 def test_every_import_is_installed_by_the_set_up(folder):
     known = installed()
     for name, path in imports(ROOT / folder).items():
-        own = name in (*PACKAGES, 'surveillance_interfaces', 'launcher', 'tests')
+        own = name in (*PACKAGES, 'surveillance_interfaces', 'launcher', 'tests', 'benchmarks')
         if own or name in sys.stdlib_module_names or name in OPTIONAL or ROS.match(name):
             continue
         distribution = DISTRIBUTIONS.get(name, name).lower().replace('_', '-')

@@ -78,6 +78,7 @@ def test_ctrl_c_ends_a_mission_with_its_summary_and_leaves_nothing_behind(launch
     assert {'mission.jsonl', 'launch.log', 'launch.yaml'} <= {p.name for p in folder.iterdir()}
 
 
+@pytest.mark.timeout(300)  # six deaths, each with two arrivals after it
 def test_the_mission_goes_on_when_each_node_is_killed_once(launch, clock):
     mission = launch('--mode', 'RANDOM')
     mission.until(r'robot_behavior +\| arrived in', timeout=60)
