@@ -13,8 +13,10 @@ step for as long as a straight one, so that its paths are longer and ignore the 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import cv2
 import numpy as np
@@ -64,7 +66,6 @@ class PlanningParameters:
 class _Costs:
     clearance: NDArray[np.float32]
     cost: NDArray[np.float32]
-    price: NDArray[np.float32]
     regions: NDArray[np.int32]
 
 
@@ -169,7 +170,7 @@ class GridPlanner:
         price = 1 + np.float32(p.aversion) * crowded * crowded
         cost = np.where(free, price, np.float32(-1))
         _, regions = cv2.connectedComponents(free.astype(np.uint8), connectivity=8)
-        self._costs = _Costs(clearance, cost, price, regions)
+        self._costs = _Costs(clearance, cost, regions)
 
     def _cell(self, what: str, point: Points) -> tuple[int, int]:
         cell = self.grid.cells_of(point)
@@ -279,9 +280,9 @@ class GridPlanner:
 
     def _shortened(self, path: Points) -> Points:
         """Replaces steps of the grid by straight lines that are free and no dearer."""
-        steps = np.hypot(*np.diff(path, axis=0).T)
-        costs = self.grid.interpolated(self._costs.price, path)
-        dear = np.concatenate(([0.0], np.cumsum(steps * (costs[1:] + costs[:-1]) / 2)))
+        path = path[_corners(path)]
+        dear = np.array([self._price(first, last) for first, last in pairwise(path)])
+        dear = np.concatenate(([0.0], np.cumsum(dear)))
         kept = [0]
         while kept[-1] < len(path) - 1:
             at = kept[-1]
@@ -291,8 +292,6 @@ class GridPlanner:
                 good = at + reach
                 reach *= 2
             bad = min(at + reach, len(path))
-            if bad == len(path) and self._is_line(path, at, len(path) - 1, dear):
-                good = len(path) - 1
             while bad - good > 1:
                 middle = (good + bad) // 2
                 if self._is_line(path, at, middle, dear):
@@ -303,13 +302,24 @@ class GridPlanner:
         return np.asarray(path[kept])
 
     def _is_line(self, path: Points, first: int, last: int, dear: Points) -> bool:
-        line = _samples(path[[first, last]], self.grid.resolution / 2)
-        needed = self.parameters.radius + self.parameters.margin / 2
-        if (self.clearance(line) < needed).any():
-            return False
-        length = float(np.hypot(*(path[last] - path[first])))
-        cost = float(self.grid.interpolated(self._costs.price, line).mean()) * length
-        return bool(cost <= (dear[last] - dear[first]) * 1.02 + 1e-6)
+        price = self._price(path[first], path[last])
+        return price <= float(dear[last] - dear[first]) * 1.02 + 1e-6
+
+    def _price(self, begin: Points, end: Points) -> float:
+        """What the straight line between two points costs; infinite where it is not free."""
+        (x, y), (dx, dy) = begin, end - begin
+        length = math.hypot(dx, dy)
+        count = math.ceil(2 * length / self.grid.resolution) + 1
+        share = np.linspace(0.0, 1.0, count)
+        scale = 1.0 / self.grid.resolution
+        west, south = self.grid.origin
+        columns = (((x - west) + share * dx) * scale).astype(np.intp)
+        rows = (((y - south) + share * dy) * scale).astype(np.intp)
+        costs = self._costs.cost[rows, columns]
+        # The ends are the start's and the goal's own, which may be nearer to something.
+        if count > 2 and costs[1:-1].min() < 0:
+            return math.inf
+        return float(np.abs(costs).mean()) * length
 
     def _rounded(self, path: Points) -> Points:
         """Rounds each corner by a quadratic Bezier curve, as far as that is free."""
@@ -322,17 +332,28 @@ class GridPlanner:
         return np.vstack(result)
 
     def _round(self, before: Points, corner: Points, after: Points, arms: list[float]) -> Points:
-        share = np.linspace(0.0, 1.0, 7)[:, None]
         for _ in range(3):
-            entry = corner + (before - corner) * (arms[0] / np.hypot(*(before - corner)))
-            leave = corner + (after - corner) * (arms[1] / np.hypot(*(after - corner)))
+            entry = corner + (before - corner) * (arms[0] / math.dist(before, corner))
+            leave = corner + (after - corner) * (arms[1] / math.dist(after, corner))
+            # The curve is shorter than its two arms: samples are at most half a cell apart.
+            count = 2 * math.ceil(sum(arms) / self.grid.resolution) + 1
+            share = np.linspace(0.0, 1.0, count)[:, None]
             curve = (1 - share) ** 2 * entry + 2 * share * (1 - share) * corner + share**2 * leave
-            needed = self.parameters.radius + self.parameters.margin / 2
-            samples = _samples(curve, self.grid.resolution / 2)
-            if (self.clearance(samples) >= needed).all():
-                return np.asarray(curve)
+            cells = ((curve - self.grid.origin) / self.grid.resolution).astype(np.intp)
+            if self._costs.cost[cells[:, 1], cells[:, 0]].min() > 0:
+                step = max(1, count // 6)
+                return np.vstack([curve[:-1:step], curve[-1:]])
             arms = [arm / 2 for arm in arms]
         return corner[None, :]
+
+
+def _corners(path: Points) -> NDArray[np.intp]:
+    """Where a path of cells changes its direction, and its two ends."""
+    if len(path) < 3:
+        return np.arange(len(path))
+    steps = np.diff(path, axis=0)
+    turns = np.flatnonzero(np.abs(np.diff(steps, axis=0)).max(axis=1) > 1e-9) + 1
+    return np.concatenate(([0], turns, [len(path) - 1]))
 
 
 def _ends(line: tuple[float, float, float, float]) -> Points:
