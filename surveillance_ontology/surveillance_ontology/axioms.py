@@ -1,4 +1,4 @@
-"""OWL 2 axioms, class expressions and SWRL rules as frozen, hashable records.
+"""OWL 2 axioms and SWRL rules as frozen, hashable records.
 
 The names follow the OWL 2 Structural Specification (https://www.w3.org/TR/owl2-syntax/) and the
 SWRL submission (https://www.w3.org/Submission/SWRL/). An entity is its full IRI as a plain `str`; a
@@ -11,21 +11,148 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field, fields
 from functools import cache
-from typing import TYPE_CHECKING, TypeAlias
 
-if TYPE_CHECKING:
-    from surveillance_ontology.reasoner.datatypes import Value
-
-OWL = 'http://www.w3.org/2002/07/owl#'
-RDF = 'http://www.w3.org/1999/02/22-rdf-syntax-ns#'
-RDFS = 'http://www.w3.org/2000/01/rdf-schema#'
-XSD = 'http://www.w3.org/2001/XMLSchema#'
-SWRL = 'http://www.w3.org/2003/11/swrl#'
-SWRLB = 'http://www.w3.org/2003/11/swrlb#'
-
-THING = OWL + 'Thing'
-NOTHING = OWL + 'Nothing'
-TOP_LITERAL = RDFS + 'Literal'
+from surveillance_ontology.expressions import (
+    NOTHING as NOTHING,
+)
+from surveillance_ontology.expressions import (
+    OWL as OWL,
+)
+from surveillance_ontology.expressions import (
+    RDF as RDF,
+)
+from surveillance_ontology.expressions import (
+    RDFS as RDFS,
+)
+from surveillance_ontology.expressions import (
+    SWRL as SWRL,
+)
+from surveillance_ontology.expressions import (
+    SWRLB as SWRLB,
+)
+from surveillance_ontology.expressions import (
+    THING as THING,
+)
+from surveillance_ontology.expressions import (
+    TOP_LITERAL as TOP_LITERAL,
+)
+from surveillance_ontology.expressions import (
+    XSD as XSD,
+)
+from surveillance_ontology.expressions import (
+    Atom as Atom,
+)
+from surveillance_ontology.expressions import (
+    BuiltinAtom as BuiltinAtom,
+)
+from surveillance_ontology.expressions import (
+    ClassAtom as ClassAtom,
+)
+from surveillance_ontology.expressions import (
+    ClassExpression as ClassExpression,
+)
+from surveillance_ontology.expressions import (
+    DataAllValuesFrom as DataAllValuesFrom,
+)
+from surveillance_ontology.expressions import (
+    DataArgument as DataArgument,
+)
+from surveillance_ontology.expressions import (
+    DataComplementOf as DataComplementOf,
+)
+from surveillance_ontology.expressions import (
+    DataExactCardinality as DataExactCardinality,
+)
+from surveillance_ontology.expressions import (
+    DataHasValue as DataHasValue,
+)
+from surveillance_ontology.expressions import (
+    DataIntersectionOf as DataIntersectionOf,
+)
+from surveillance_ontology.expressions import (
+    DataMaxCardinality as DataMaxCardinality,
+)
+from surveillance_ontology.expressions import (
+    DataMinCardinality as DataMinCardinality,
+)
+from surveillance_ontology.expressions import (
+    DataOneOf as DataOneOf,
+)
+from surveillance_ontology.expressions import (
+    DataPropertyAtom as DataPropertyAtom,
+)
+from surveillance_ontology.expressions import (
+    DataRange as DataRange,
+)
+from surveillance_ontology.expressions import (
+    DataRangeAtom as DataRangeAtom,
+)
+from surveillance_ontology.expressions import (
+    DataSomeValuesFrom as DataSomeValuesFrom,
+)
+from surveillance_ontology.expressions import (
+    DatatypeRestriction as DatatypeRestriction,
+)
+from surveillance_ontology.expressions import (
+    DataUnionOf as DataUnionOf,
+)
+from surveillance_ontology.expressions import (
+    DifferentIndividualsAtom as DifferentIndividualsAtom,
+)
+from surveillance_ontology.expressions import (
+    IndividualArgument as IndividualArgument,
+)
+from surveillance_ontology.expressions import (
+    Literal as Literal,
+)
+from surveillance_ontology.expressions import (
+    ObjectAllValuesFrom as ObjectAllValuesFrom,
+)
+from surveillance_ontology.expressions import (
+    ObjectComplementOf as ObjectComplementOf,
+)
+from surveillance_ontology.expressions import (
+    ObjectExactCardinality as ObjectExactCardinality,
+)
+from surveillance_ontology.expressions import (
+    ObjectHasSelf as ObjectHasSelf,
+)
+from surveillance_ontology.expressions import (
+    ObjectHasValue as ObjectHasValue,
+)
+from surveillance_ontology.expressions import (
+    ObjectIntersectionOf as ObjectIntersectionOf,
+)
+from surveillance_ontology.expressions import (
+    ObjectInverseOf as ObjectInverseOf,
+)
+from surveillance_ontology.expressions import (
+    ObjectMaxCardinality as ObjectMaxCardinality,
+)
+from surveillance_ontology.expressions import (
+    ObjectMinCardinality as ObjectMinCardinality,
+)
+from surveillance_ontology.expressions import (
+    ObjectOneOf as ObjectOneOf,
+)
+from surveillance_ontology.expressions import (
+    ObjectPropertyAtom as ObjectPropertyAtom,
+)
+from surveillance_ontology.expressions import (
+    ObjectSomeValuesFrom as ObjectSomeValuesFrom,
+)
+from surveillance_ontology.expressions import (
+    ObjectUnionOf as ObjectUnionOf,
+)
+from surveillance_ontology.expressions import (
+    PropertyExpression as PropertyExpression,
+)
+from surveillance_ontology.expressions import (
+    SameIndividualAtom as SameIndividualAtom,
+)
+from surveillance_ontology.expressions import (
+    Variable as Variable,
+)
 
 KINDS = (
     'class',
@@ -35,209 +162,6 @@ KINDS = (
     'annotation_property',
     'datatype',
 )
-
-
-@dataclass(frozen=True, slots=True)
-class Literal:
-    """A literal as written: equal only to one with the same lexical form, datatype and language.
-
-    Two literals that denote one value (`"5"^^xsd:int`, `"5.0"^^xsd:decimal`) have equal `value()`.
-    """
-
-    lexical: str
-    datatype: str = XSD + 'string'
-    language: str = ''
-
-    def value(self) -> Value:
-        """The value denoted, comparable by value space; an ill-formed literal denotes itself."""
-        from surveillance_ontology.reasoner.datatypes import value_of
-
-        return value_of(self)
-
-
-@dataclass(frozen=True, slots=True)
-class Variable:
-    """A SWRL variable, local to its rule."""
-
-    name: str
-
-
-# --- property expressions ---
-
-
-@dataclass(frozen=True, slots=True)
-class ObjectInverseOf:
-    prop: str
-
-
-PropertyExpression: TypeAlias = str | ObjectInverseOf
-
-
-# --- data ranges ---
-
-
-@dataclass(frozen=True, slots=True)
-class DatatypeRestriction:
-    """A datatype narrowed by facets, each the pair (facet IRI, bound)."""
-
-    datatype: str
-    facets: tuple[tuple[str, Literal], ...]
-
-
-@dataclass(frozen=True, slots=True)
-class DataOneOf:
-    literals: tuple[Literal, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class DataIntersectionOf:
-    operands: tuple[DataRange, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class DataUnionOf:
-    operands: tuple[DataRange, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class DataComplementOf:
-    operand: DataRange
-
-
-DataRange: TypeAlias = (
-    str | DatatypeRestriction | DataOneOf | DataIntersectionOf | DataUnionOf | DataComplementOf
-)
-
-
-# --- class expressions ---
-
-
-@dataclass(frozen=True, slots=True)
-class ObjectIntersectionOf:
-    operands: tuple[ClassExpression, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class ObjectUnionOf:
-    operands: tuple[ClassExpression, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class ObjectComplementOf:
-    operand: ClassExpression
-
-
-@dataclass(frozen=True, slots=True)
-class ObjectOneOf:
-    individuals: tuple[str, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class ObjectSomeValuesFrom:
-    prop: PropertyExpression
-    filler: ClassExpression
-
-
-@dataclass(frozen=True, slots=True)
-class ObjectAllValuesFrom:
-    prop: PropertyExpression
-    filler: ClassExpression
-
-
-@dataclass(frozen=True, slots=True)
-class ObjectHasValue:
-    prop: PropertyExpression
-    individual: str
-
-
-@dataclass(frozen=True, slots=True)
-class ObjectHasSelf:
-    prop: PropertyExpression
-
-
-@dataclass(frozen=True, slots=True)
-class ObjectMinCardinality:
-    n: int
-    prop: PropertyExpression
-    filler: ClassExpression = THING
-
-
-@dataclass(frozen=True, slots=True)
-class ObjectMaxCardinality:
-    n: int
-    prop: PropertyExpression
-    filler: ClassExpression = THING
-
-
-@dataclass(frozen=True, slots=True)
-class ObjectExactCardinality:
-    n: int
-    prop: PropertyExpression
-    filler: ClassExpression = THING
-
-
-@dataclass(frozen=True, slots=True)
-class DataSomeValuesFrom:
-    prop: str
-    range: DataRange
-
-
-@dataclass(frozen=True, slots=True)
-class DataAllValuesFrom:
-    prop: str
-    range: DataRange
-
-
-@dataclass(frozen=True, slots=True)
-class DataHasValue:
-    prop: str
-    literal: Literal
-
-
-@dataclass(frozen=True, slots=True)
-class DataMinCardinality:
-    n: int
-    prop: str
-    range: DataRange = TOP_LITERAL
-
-
-@dataclass(frozen=True, slots=True)
-class DataMaxCardinality:
-    n: int
-    prop: str
-    range: DataRange = TOP_LITERAL
-
-
-@dataclass(frozen=True, slots=True)
-class DataExactCardinality:
-    n: int
-    prop: str
-    range: DataRange = TOP_LITERAL
-
-
-ClassExpression: TypeAlias = (
-    str
-    | ObjectIntersectionOf
-    | ObjectUnionOf
-    | ObjectComplementOf
-    | ObjectOneOf
-    | ObjectSomeValuesFrom
-    | ObjectAllValuesFrom
-    | ObjectHasValue
-    | ObjectHasSelf
-    | ObjectMinCardinality
-    | ObjectMaxCardinality
-    | ObjectExactCardinality
-    | DataSomeValuesFrom
-    | DataAllValuesFrom
-    | DataHasValue
-    | DataMinCardinality
-    | DataMaxCardinality
-    | DataExactCardinality
-)
-
-
-# --- axioms ---
 
 
 class Axiom:
@@ -463,69 +387,6 @@ class HasKey(Axiom):
     data_props: tuple[str, ...]
 
 
-# --- SWRL ---
-
-IndividualArgument: TypeAlias = str | Variable
-DataArgument: TypeAlias = Literal | Variable
-
-
-@dataclass(frozen=True, slots=True)
-class ClassAtom:
-    cls: ClassExpression
-    argument: IndividualArgument
-
-
-@dataclass(frozen=True, slots=True)
-class DataRangeAtom:
-    range: DataRange
-    argument: DataArgument
-
-
-@dataclass(frozen=True, slots=True)
-class ObjectPropertyAtom:
-    prop: PropertyExpression
-    first: IndividualArgument
-    second: IndividualArgument
-
-
-@dataclass(frozen=True, slots=True)
-class DataPropertyAtom:
-    prop: str
-    first: IndividualArgument
-    second: DataArgument
-
-
-@dataclass(frozen=True, slots=True)
-class SameIndividualAtom:
-    first: IndividualArgument
-    second: IndividualArgument
-
-
-@dataclass(frozen=True, slots=True)
-class DifferentIndividualsAtom:
-    first: IndividualArgument
-    second: IndividualArgument
-
-
-@dataclass(frozen=True, slots=True)
-class BuiltinAtom:
-    """`builtin` is the built-in's full IRI (swrlb)."""
-
-    builtin: str
-    arguments: tuple[DataArgument, ...]
-
-
-Atom: TypeAlias = (
-    ClassAtom
-    | DataRangeAtom
-    | ObjectPropertyAtom
-    | DataPropertyAtom
-    | SameIndividualAtom
-    | DifferentIndividualsAtom
-    | BuiltinAtom
-)
-
-
 @dataclass(frozen=True, slots=True)
 class Rule(Axiom):
     """A SWRL rule. `annotations` (pairs of property and value) play no part in equality."""
@@ -568,7 +429,7 @@ _OBJECT, _DATA = 'object_property', 'data_property'
 
 @cache
 def roles_of(record: type) -> tuple[tuple[str, str], ...]:
-    """For each field of a record type, the entity kind a bare `str` in it stands for ('' for none)."""
+    """For each field of a record type, the entity kind a bare `str` in it stands for, or ''."""
     name = record.__name__
     data = name.startswith('Data') or 'Data' in name
     pairs = []
@@ -589,9 +450,7 @@ def roles_of(record: type) -> tuple[tuple[str, str], ...]:
             role = 'class' if name == 'ObjectPropertyRange' else 'datatype'
         elif data and entry.name in ('operand', 'operands'):
             role = 'datatype'
-        elif entry.name == 'subject' and name == 'AnnotationAssertion':
-            role = 'annotated'
-        elif entry.name == 'value':
+        elif (entry.name == 'subject' and name == 'AnnotationAssertion') or entry.name == 'value':
             role = 'annotated'
         pairs.append((entry.name, role))
     return tuple(pairs)

@@ -32,7 +32,8 @@ from surveillance_ontology.reasoner.joins import (
     compile_support,
     compile_trigger,
 )
-from surveillance_ontology.reasoner.thresholds import ThresholdIndex, split_rule
+from surveillance_ontology.reasoner.rule_halves import split_rule
+from surveillance_ontology.reasoner.thresholds import ThresholdIndex
 
 Emit = Callable[[Fact], None]
 MergeRequest = Callable[[str, str, Axiom | None, Premises], None]
