@@ -10,36 +10,19 @@ reaches.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 
 from surveillance_ontology.axioms import (
-    NOTHING,
-    THING,
-    Assertion,
     Axiom,
-    ClassAssertion,
-    ClassExpression,
-    DataPropertyAssertion,
-    Declaration,
     DifferentIndividuals,
-    Literal,
-    NegativeDataPropertyAssertion,
-    NegativeObjectPropertyAssertion,
-    ObjectPropertyAssertion,
     SameIndividual,
-    entities_of,
 )
-from surveillance_ontology.reasoner.clauses import Fact, Predicate, Premises, Program
-from surveillance_ontology.reasoner.datatypes import Value, value_of
-from surveillance_ontology.reasoner.difference import Difference
-from surveillance_ontology.reasoner.equality import Equality, Merge
-from surveillance_ontology.reasoner.network import Network
-from surveillance_ontology.reasoner.proofs import ProofSearch
-
-Conflict = tuple[str, str]
+from surveillance_ontology.reasoner.clauses import Fact, Program
+from surveillance_ontology.reasoner.identification import Identification
+from surveillance_ontology.reasoner.translation import individuals_of
 
 
-class Engine:
+class Engine(Identification):
     """Keeps the consequences of a program and a changing set of assertions.
 
     Args:
@@ -48,45 +31,8 @@ class Engine:
     """
 
     def __init__(self, program: Program, about: Callable[[str], Iterable[Axiom]]) -> None:
-        self.program = program
-        self.about = about
-        self.equality = Equality()
-        self.difference = Difference(program)
-        self.asserted: dict[Fact, int] = {}
-        self._queue: list[Fact] = []
-        self._doomed: list[Fact] = []
-        self._requests: dict[Merge, None] = {}
-        self.conflicts: dict[Conflict, Merge] = {}
-        self._touched: dict[str, None] = {}
-        self._removed: dict[Fact, None] = {}
-        self._split_happened = False
-        self._values: dict[Literal, Value] = {}
-        self.spelling: dict[Value, Literal] = {}
-        self.proofs = ProofSearch(self.asserted)
-        self.changed: dict[Fact, bool] | None = None
-        self.renamed = False
-        self._network = Network(
-            program,
-            self.equality.representative,
-            self.difference,
-            self._queue.append,
-            self._doomed.append,
-            self._request,
-        )
-        self._nothing = program.nothing
-        self._nothing.supports.append((self._conflict_supports, 'one individual, yet different'))
-        program.same.supports.append((self._same_supports, None))
-        for index in self._network.thresholds:
-            index.proves = self.proofs.proves
-        self._flushes = [index.flush for index in self._network.thresholds]
-        for predicate in dict.fromkeys(program.predicates()):
-            self._attach_touching(predicate)
+        super().__init__(program, about)
         self._start()
-
-    @property
-    def consistent(self) -> bool:
-        """Whether no contradiction is derived."""
-        return not self._nothing.members
 
     def _start(self) -> None:
         for fire in self._network.initial:
@@ -109,167 +55,10 @@ class Engine:
         """Takes more facts for asserted."""
         self.proofs.reset()
         for fact in facts:
-            fact = self._current(fact)
+            fact = self.current(fact)
             self.asserted[fact] = self.asserted.get(fact, 0) + 1
             self._queue.append(fact)
         self._propagate()
-
-    # --- touching ---
-
-    def _attach_touching(self, predicate: Predicate) -> None:
-        if not predicate.touching:
-            return
-        touch = self._touched.setdefault
-        forget = self._touch_before_removal
-        if predicate.kind == 'class':
-            predicate.on_insert.append(lambda x: touch(x))
-            predicate.on_delete.append(forget)
-            return
-        if 1 in predicate.touching:
-            predicate.on_insert.append(lambda x, y: touch(x))
-            predicate.on_delete.append(lambda x, y: forget(x))
-        if 2 in predicate.touching:
-            predicate.on_insert.append(lambda x, y: touch(y))
-            predicate.on_delete.append(lambda x, y: forget(y))
-
-    def _related_by_difference(self, individual: str) -> list[str]:
-        """The individual and those whose difference from others may rest on its own."""
-        found = [individual]
-        if self._network.touch_related:
-            for one in found:
-                for related in self._network.touch_related:
-                    found += [other for other in related(one) if other not in found]
-        return found
-
-    def _touch_before_removal(self, individual: str) -> None:
-        for one in self._related_by_difference(individual):
-            for touch in self._network.touch_delete:
-                touch(one)
-            if self.conflicts:
-                for pair in [pair for pair in self.conflicts if one in pair]:
-                    self._withdraw_conflict(pair)
-
-    def _run_touched(self) -> None:
-        pending = tuple(self._touched)
-        self._touched.clear()
-        done: set[str] = set()
-        touch_insert = self._network.touch_insert
-        for individual in pending:
-            for one in self._related_by_difference(individual):
-                if one not in done:
-                    done.add(one)
-                    for touch in touch_insert:
-                        touch(one)
-
-    # --- assertions to facts ---
-
-    def value(self, literal: Literal) -> Value:
-        """The literal's value, remembered."""
-        values = self._values
-        value = values.get(literal)
-        if value is None:
-            if len(values) > 200_000:
-                values.clear()
-                self.spelling.clear()
-            value = values[literal] = value_of(literal)
-            self.spelling.setdefault(value, literal)
-        return value
-
-    def fact_of(self, axiom: Axiom) -> Fact | None:
-        """The fact an assertion states, in representatives; None for assertions of another kind."""
-        names = self.equality.representative
-        kind = type(axiom)
-        if kind is DataPropertyAssertion:
-            subject = axiom.subject  # type: ignore[attr-defined]
-            value = self.value(axiom.literal)  # type: ignore[attr-defined]
-            return self.program.data(axiom.prop), names.get(subject, subject), value  # type: ignore[attr-defined]
-        if kind is ObjectPropertyAssertion:
-            subject, target = axiom.subject, axiom.object  # type: ignore[attr-defined]
-            prop = self.program.object(axiom.prop)  # type: ignore[attr-defined]
-            return prop, names.get(subject, subject), names.get(target, target)
-        if isinstance(axiom, ClassAssertion):
-            individual = names.get(axiom.individual, axiom.individual)
-            if axiom.cls == THING:
-                return None
-            if axiom.cls == NOTHING:
-                return self._nothing, individual
-            if isinstance(axiom.cls, str):
-                return self.program.cls(axiom.cls), individual
-            label = self.program.labels.get(axiom.cls)
-            return None if label is None else (label, individual)
-        if isinstance(axiom, NegativeObjectPropertyAssertion):
-            negative = self.program.negatives[self.program.object(axiom.prop)]
-            pair = names.get(axiom.subject, axiom.subject), names.get(axiom.object, axiom.object)
-            return (negative, *pair)
-        if isinstance(axiom, NegativeDataPropertyAssertion):
-            negative = self.program.negatives[self.program.data(axiom.prop)]
-            return negative, names.get(axiom.subject, axiom.subject), self.value(axiom.literal)
-        return None
-
-    def _individuals(self, axiom: Axiom) -> set[str]:
-        return {name for kind, name in entities_of(axiom) if kind == 'individual'}
-
-    def _assert(self, fact: Fact, fresh: list[Fact]) -> None:
-        asserted = self.asserted
-        count = asserted.get(fact)
-        if count is not None:
-            asserted[fact] = count + 1
-            return
-        asserted[fact] = 1
-        if self.changed is not None:
-            self.changed.setdefault(fact, fact[0].holds(fact))
-        if not fact[0].holds(fact):
-            fact[0].insert(fact)
-            fresh.append(fact)
-
-    def _unassert(self, fact: Fact) -> None:
-        count = self.asserted.get(fact, 0)
-        if count > 1:
-            self.asserted[fact] = count - 1
-        elif count:
-            del self.asserted[fact]
-            if self.changed is not None:
-                self.changed.setdefault(fact, False)
-            self._doomed.append(fact)
-
-    def states(self, axiom: Axiom) -> bool:
-        """Whether an assertion is among those that were made."""
-        individuals = axiom.individuals if isinstance(axiom, SameIndividual) else None
-        name = next(iter(individuals)) if individuals else next(iter(self._individuals(axiom)))
-        return axiom in self.about(name)
-
-    @staticmethod
-    def needs_of(
-        axioms: Iterable[Axiom],
-    ) -> tuple[list[ClassExpression], list[tuple[str, str]]]:
-        """The complex classes and the negated properties (kind, IRI) that assertions use."""
-        expressions: dict[ClassExpression, None] = {}
-        negated: dict[tuple[str, str], None] = {}
-        for axiom in axioms:
-            if isinstance(axiom, ClassAssertion) and not isinstance(axiom.cls, str):
-                expressions[axiom.cls] = None
-            elif isinstance(axiom, NegativeObjectPropertyAssertion):
-                negated['object', axiom.prop] = None
-            elif isinstance(axiom, NegativeDataPropertyAssertion):
-                negated['data', axiom.prop] = None
-        return list(expressions), list(negated)
-
-    def understands(self, axiom: Axiom) -> bool:
-        """Whether the program was made for a complex class or negated property that an assertion
-        uses.
-        """
-        if isinstance(axiom, ClassAssertion):
-            return isinstance(axiom.cls, str) or axiom.cls in self.program.labels
-        if isinstance(axiom, NegativeObjectPropertyAssertion):
-            return self.program.object(axiom.prop) in self.program.negatives
-        if isinstance(axiom, NegativeDataPropertyAssertion):
-            return self.program.data(axiom.prop) in self.program.negatives
-        return True
-
-    def take_spelling(self, other: Engine) -> None:
-        """Writes derived values as another engine did."""
-        self._values.update(other._values)
-        self.spelling.update(other.spelling)
 
     # --- updates ---
 
@@ -291,7 +80,7 @@ class Engine:
             if fact is not None:
                 self._unassert(fact)
             if uses_thing:
-                for individual in self._individuals(axiom):
+                for individual in individuals_of(axiom):
                     self._unassert((self.program.thing, equality.find(individual)))
         for axiom in added:
             if type(axiom) is SameIndividual:
@@ -300,7 +89,7 @@ class Engine:
             if fact is not None:
                 self._assert(fact, fresh)
             if uses_thing:
-                for individual in self._individuals(axiom):
+                for individual in individuals_of(axiom):
                     self._assert((self.program.thing, equality.find(individual)), fresh)
         for representative in splitting:
             self._split(representative, fresh)
@@ -316,7 +105,7 @@ class Engine:
         self._propagate()
 
     def _classes_of(self, axiom: Axiom) -> set[str]:
-        found = {self.equality.find(name) for name in self._individuals(axiom)}
+        found = {self.equality.find(name) for name in individuals_of(axiom)}
         return {name for name in found if name in self.equality.members}
 
     def _restate_differences(
@@ -370,25 +159,13 @@ class Engine:
                     self._split(representative, fresh)
         self._settle()
 
-    def _take(self, fact: Fact) -> None:
-        predicate, arguments = fact[0], fact[1:]
-        for fire in predicate.on_delete:
-            fire(*arguments)
-        predicate.discard(fact)
-        self._removed[fact] = None
-        if self.changed is not None:
-            self.changed.setdefault(fact, True)
-        if self.conflicts:
-            for pair in [p for p, merge in self.conflicts.items() if fact in merge.premises]:
-                self._withdraw_conflict(pair)
-
     def _settle(self) -> None:
         """Brings back what still follows, and lets the counters look again."""
         for index in self._network.thresholds:
             index.settle()
         queue, names = self._queue, self.equality.representative
         for fact in self._removed:
-            if names and self._current(fact) != fact:
+            if names and self.current(fact) != fact:
                 continue
             if self._follows(fact):
                 queue.append(fact)
@@ -402,160 +179,6 @@ class Engine:
             counter.recheck.clear()
             for individual in recheck:
                 counter.gain(self.equality.find(individual))
-
-    def _follows(self, fact: Fact) -> bool:
-        """Whether one step derives a fact from what holds."""
-        for support, _ in fact[0].supports:
-            for premises in support(*fact[1:]):
-                if all(self._holds(premise) for premise in premises):
-                    return True
-        return False
-
-    def _holds(self, fact: Fact) -> bool:
-        if fact[0] is self.program.different:
-            return self.difference.different(fact[1], fact[2])
-        if fact[0] is self.program.same:
-            return (fact[1], fact[2]) in self.conflicts
-        holds: bool = fact[0].holds(fact)
-        return holds
-
-    # --- equality ---
-
-    def _state_same(self, axiom: SameIndividual) -> None:
-        first, *others = sorted(axiom.individuals)
-        for other in others:
-            self._requests[Merge(first, other, axiom, ())] = None
-
-    def _request(self, x: str, y: str, origin: Axiom | None, premises: Premises) -> None:
-        self._requests[Merge(x, y, origin, premises)] = None
-
-    def _run_requests(self) -> None:
-        pending = tuple(self._requests)
-        self._requests.clear()
-        equality = self.equality
-        for merge in pending:
-            origin = merge.origin
-            if isinstance(origin, SameIndividual) and origin not in self.about(merge.first):
-                continue
-            x, y = equality.find(merge.first), equality.find(merge.second)
-            if x == y or not all(self._holds(self._current(fact)) for fact in merge.premises):
-                continue
-            if self.difference.different(x, y):
-                self.conflicts[merge.first, merge.second] = merge
-                self._queue.append((self._nothing, x))
-                continue
-            self._merge(merge)
-
-    def _current(self, fact: Fact) -> Fact:
-        names = self.equality.representative
-        if not names:
-            return fact
-        if len(fact) == 2:
-            return fact[0], names.get(fact[1], fact[1])
-        predicate, x, y = fact
-        return predicate, names.get(x, x), y if predicate.kind == 'data' else names.get(y, y)
-
-    def _merge(self, merge: Merge) -> None:
-        self.renamed = True
-        kept, gone = self.equality.join(merge)
-        self.difference.merge(kept, self.equality.members[kept])
-        moved = list(self._facts_about(gone))
-        for fact in moved:
-            for fire in fact[0].on_delete:
-                fire(*fact[1:])
-            fact[0].discard(fact)
-            if self.changed is not None:
-                self.changed.setdefault(fact, fact not in self.asserted)
-            self._queue.append(fact)
-        # Nothing ceased to hold: what the removal hooks named holds of the representative.
-        self._doomed.clear()
-        for place, fact in enumerate(self._queue):
-            current = self._current(fact)
-            if current != fact:
-                self._queue[place] = current
-                count = self.asserted.pop(fact, 0)
-                if count:
-                    known = self.asserted.get(current, 0)
-                    if self.changed is not None and not known:
-                        self.changed.setdefault(current, current[0].holds(current))
-                    self.asserted[current] = known + count
-        for index in self._network.thresholds:
-            index.settle()
-        for run in self._network.naming:
-            run()
-        self._touched[kept] = None
-
-    def _facts_about(self, individual: str) -> Iterator[Fact]:
-        for predicate in dict.fromkeys(self.program.predicates()):
-            if predicate.kind == 'class':
-                if individual in predicate.members:
-                    yield predicate, individual
-                continue
-            for y in predicate.succ.get(individual, ()):
-                yield predicate, individual, y
-            if predicate.kind != 'data':
-                for x in predicate.pred.get(individual, ()):
-                    if x != individual:
-                        yield predicate, x, individual
-
-    def _split(self, representative: str, fresh: list[Fact]) -> None:
-        """Takes away everything about a class of individuals, and states its members' assertions
-        again.
-        """
-        if representative not in self.equality.members:
-            return
-        self.renamed = self._split_happened = True
-        facts = list(self._facts_about(representative))
-        for fact in facts:
-            if self.asserted.pop(fact, None) and self.changed is not None:
-                self.changed.setdefault(fact, False)
-        others: dict[str, None] = {}
-        for fact in facts:
-            others.update(dict.fromkeys(self.equality.dependents(fact)))
-            self._take(fact)
-        members = self.equality.split(representative)
-        self.difference.split(representative)
-        for pair in [pair for pair in self.conflicts if not members.isdisjoint(pair)]:
-            self._doomed.append((self._nothing, representative))
-            self._withdraw_conflict(pair)
-        self.proofs.reset()
-        axioms: dict[Axiom, None] = {}
-        for member in sorted(members):
-            self._touched[member] = None
-            for axiom in self.about(member):
-                if _is_assertion(axiom):
-                    axioms[axiom] = None
-        for axiom in axioms:
-            if isinstance(axiom, SameIndividual):
-                self._state_same(axiom)
-            fact = self.fact_of(axiom)
-            if fact is not None and not members.isdisjoint(_individuals_of(fact)):
-                self._assert(fact, fresh)
-            if self.program.uses_thing:
-                for individual in self._individuals(axiom) & members:
-                    self._assert((self.program.thing, individual), fresh)
-        for other in others:
-            self._split(other, fresh)
-
-    # --- conflicts: individuals that must be the same and are different ---
-
-    def _withdraw_conflict(self, pair: Conflict, again: bool = True) -> None:
-        merge = self.conflicts.pop(pair)
-        self._doomed.append((self._nothing, self.equality.find(pair[0])))
-        if again:
-            self._requests[merge] = None
-
-    def _conflict_supports(self, x: str) -> Iterator[Premises]:
-        find = self.equality.find
-        for (first, second), merge in self.conflicts.items():
-            if find(first) == x:
-                different = (self.program.different, x, find(second))
-                yield ((self.program.same, first, second), different)
-
-    def _same_supports(self, first: str, second: str) -> Iterator[Premises]:
-        merge = self.conflicts.get((first, second))
-        if merge is not None:
-            yield tuple(map(self._current, merge.premises))
 
     # --- addition ---
 
@@ -605,12 +228,14 @@ class Engine:
                 if not queue:
                     return
 
-
-def _individuals_of(fact: Fact) -> tuple[str, ...]:
-    return fact[1:2] if fact[0].kind == 'data' else fact[1:]
-
-
-def _is_assertion(axiom: Axiom) -> bool:
-    return isinstance(axiom, Assertion) or (
-        isinstance(axiom, Declaration) and axiom.kind == 'individual'
-    )
+    def _run_touched(self) -> None:
+        pending = tuple(self._touched)
+        self._touched.clear()
+        done: set[str] = set()
+        touch_insert = self._network.touch_insert
+        for individual in pending:
+            for one in self._related_by_difference(individual):
+                if one not in done:
+                    done.add(one)
+                    for touch in touch_insert:
+                        touch(one)
