@@ -13,6 +13,7 @@ from sensor_msgs.msg import CameraInfo, Image
 from surveillance_runtime.node import PatrolNode
 from surveillance_simulation import conversions, simulator_parameters
 from surveillance_simulation.camera import Conditions
+from surveillance_simulation.mujoco_rendering import MujocoRenderer
 from surveillance_simulation.rendering import Renderer
 from surveillance_simulation.robot import Robot
 from surveillance_simulation.sensor_feed import SENSOR_DEPTH
@@ -46,11 +47,14 @@ class CameraFeed:
 
         Raises:
             TextureError: A marker's dictionary or id does not exist.
+            MujocoMissing: MuJoCo is to render and is not installed.
         """
         self.conditions = simulator_parameters.conditions(node, self._take_conditions)
         self._robot = robot
         self._camera = simulator_parameters.camera(node)
-        self._renderer = Renderer(robot.world, self._camera)
+        kind = simulator_parameters.renderer(node)
+        take = MujocoRenderer if kind == 'mujoco' else Renderer
+        self._renderer: Renderer | MujocoRenderer = take(robot.world, self._camera)
         self._period = 1.0 / simulator_parameters.camera_rate(node)
         self._next = 0.0
         self._rng = np.random.default_rng(seed)
@@ -87,6 +91,7 @@ class CameraFeed:
             while self._wanted.acquire(blocking=False):
                 pass
             if self._stopping.is_set():
+                self._renderer.close()
                 return
             with self._changing:
                 self._renderer.refresh()

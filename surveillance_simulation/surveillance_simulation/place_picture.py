@@ -23,7 +23,7 @@ _PAPER, _INK, _SOFT = '#fbfaf7', '#2f3742', '#7d8794'
 _ROOM, _CORRIDOR, _HOME = '#f6ecd9', '#e3ebf3', '#dff0dc'
 _WALL, _LEAF, _CLOSED = '#3a4350', '#b08a57', '#c0392b'
 _GRAPH, _SIGN, _SIGN_HOME = '#7fa3c7', '#2c5d8f', '#2f8a4c'
-_DRIVEN, _CALM, _LATE = '#d4570f', '#f7f1e3', '#e8743b'
+_DRIVEN, _CALM, _LATE = '#14717f', '#fdf9f0', '#f2b287'
 _LONGEST_SIDE = 1180.0
 _PANEL = 250
 

@@ -69,6 +69,9 @@ class Renderer:
             self._version = self._world.version
             self._shrunk.clear()
 
+    def close(self) -> None:
+        """Free what the pictures needed: nothing but memory."""
+
     def ideal(self, camera_pose: Array) -> npt.NDArray[np.float32]:
         """Return the picture (rows, columns, 3) before light, noise and blur."""
         width, height = self._size

@@ -17,7 +17,7 @@ from surveillance_simulation.world import Obstacle, Panel, World
 
 DOOR_HEIGHT = 2.05
 OBSTACLE_HEIGHT = 0.8
-_STATION_SIDE = 0.6
+STATION_SIDE = 0.6
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ def faces_of(world: World) -> list[Face]:
     for panel in world.panels.values():
         faces.append(_panel(panel, plan.marker_dictionary))
     x, y, yaw = plan.station
-    faces.append(_lying(x, y, 0.004, yaw, _STATION_SIDE, textures.station()))
+    faces.append(_lying(x, y, 0.004, yaw, STATION_SIDE, textures.station()))
     return faces
 
 

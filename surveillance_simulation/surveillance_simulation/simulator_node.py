@@ -20,6 +20,7 @@ from surveillance_simulation.arm_motion import TrajectoryError
 from surveillance_simulation.camera_feed import CameraFeed
 from surveillance_simulation.fault_services import FaultServices
 from surveillance_simulation.floor_plan import WorldError
+from surveillance_simulation.mujoco_rendering import MujocoMissing
 from surveillance_simulation.pace import Pace
 from surveillance_simulation.robot import Robot
 from surveillance_simulation.sensor_feed import SensorFeed
@@ -54,7 +55,7 @@ class Simulator(PatrolNode):
         self._sensors = SensorFeed(self, self.robot, drives_clock=self._drives_clock)
         try:
             self._camera = CameraFeed(self, self.robot, seed, self._changing, self._stamp)
-        except TextureError as error:
+        except (TextureError, MujocoMissing) as error:
             raise StartError(f'simulator: {error}') from None
         FaultServices(self, self.robot, self._changing, self._sensors.tell_doors)
         self.create_subscription(Twist, 'cmd_vel', self._on_command, 1)

@@ -204,6 +204,18 @@ def camera(node: PatrolNode) -> Camera:
     )
 
 
+def renderer(node: PatrolNode) -> str:
+    """Declare what draws the camera's pictures."""
+    kind: str = node.parameter(
+        'camera.renderer',
+        'opencv',
+        'What draws the pictures; mujoco adds shadows and needs the package mujoco.',
+        choices=('opencv', 'mujoco'),
+        read_only=True,
+    )
+    return kind
+
+
 def camera_rate(node: PatrolNode) -> float:
     """Declare how often a picture is taken."""
     rate: float = node.parameter(
