@@ -222,10 +222,11 @@ class FactSubscription:
         try:
             while True:
                 self._ask_again = False
-                facts = await self._armor.query.facts.call_async(str(self._set.pattern))
+                pattern = str(self._set.pattern)
+                facts = await self._armor.query.facts_by_origin.call_async(pattern)
                 if not self._ask_again:
                     break
-            self._tell(self._set.replace(facts))
+            self._tell(self._set.replace(*facts))
         except ArmorServiceCallError as error:
             self._node.get_logger().debug(f'facts {self._set.pattern}: {error}')
             if self._subscription.get_publisher_count() > 0:
@@ -233,7 +234,7 @@ class FactSubscription:
                 self._retry.reset()
         except ArmorServiceInternalError:
             # There is no such reference: no facts either. Its loading is announced.
-            self._tell(self._set.replace([]))
+            self._tell(self._set.replace([], []))
         finally:
             self._asking = False
 

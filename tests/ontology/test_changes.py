@@ -66,14 +66,16 @@ def test_a_fact_set_follows_messages_and_asks_when_it_cannot() -> None:
     one, two = parse_fact('URGENT(R1)'), parse_fact('URGENT(R2)')
     other = parse_fact('ROOM(R1)')
     assert facts.follow(5, [(one, True, True)]) is None, 'it does not know what was before'
-    assert facts.replace([one]) == [(one, True)]
+    assert facts.replace([one], []) == [(one, True)]
     assert facts.follow(6, [(two, True, True), (other, True, True)]) == [(two, True)]
     assert facts.follow(7, [(two, True, False)]) == [], 'asserted as well now'
-    assert facts.follow(8, [(two, False, True)]) is None, 'it may still be asserted'
-    assert facts.replace([one, two]) == []
-    assert facts.follow(10, []) is None, 'one was missed'
-    assert facts.replace([two]) == [(one, False)]
-    assert facts.facts == {two}
+    assert facts.follow(8, [(two, False, True)]) == [], 'asserted still'
+    assert facts.follow(9, [(two, False, False), (two, True, True)]) == [], 'derived instead'
+    assert facts.follow(10, [(two, False, True)]) == [(two, False)]
+    assert facts.follow(12, []) is None, 'one was missed'
+    assert facts.replace([two], [two]) == [(one, False), (two, True)]
+    assert facts.follow(13, [(two, False, False)]) == [(two, False)]
+    assert facts.facts == set()
 
 
 def test_messages_round_trip(service: ArmorService, client: ArmorClient) -> None:

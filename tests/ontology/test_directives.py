@@ -293,6 +293,12 @@ def test_facts_by_pattern(ask: Ask) -> None:
     ]
     assert ask('QUERY FACT', 'ROBOT(Robot1)').queried_objects == ['ROBOT(Robot1)']
     assert ask('QUERY FACT', 'URGENT(R4)').queried_objects == []
+    assert ask('QUERY FACT', 'URGENT(?)', 'true').queried_objects == []
+    assert ask('QUERY FACT', '?(Robot1, ?)', 'true').queried_objects == [
+        'isIn(Robot1, R3)',
+        'now(Robot1, "1665579740"^^xsd:long)',
+        'urgencyThreshold(Robot1, "7"^^xsd:long)',
+    ]
 
 
 # --- buffering and consistency ---

@@ -6,7 +6,7 @@ import re
 
 from surveillance_ontology.armor.facts import ShortFact, parse_fact
 from surveillance_ontology.armor.operations import ClientPart, Steps, checked, operation
-from surveillance_ontology.armor.protocol import DirectiveResponse, ExitCode
+from surveillance_ontology.armor.protocol import DirectiveResponse, ExitCode, ListResponse
 from surveillance_ontology.armor.rendering import parse_rendered
 from surveillance_ontology.axioms import local_name
 
@@ -128,6 +128,21 @@ class Query(ClientPart):
         parse_fact(pattern)
         objects = yield from self._objects('QUERY FACT', pattern)
         return [parse_fact(text) for text in objects]
+
+    @operation
+    def facts_by_origin(self, pattern: str) -> Steps[tuple[list[ShortFact], list[ShortFact]]]:
+        """Facts that match a pattern: all of them, and those of them that are asserted."""
+        parse_fact(pattern)
+        rows = [
+            self.request('QUERY FACT', pattern),
+            self.request('QUERY FACT', pattern, 'true'),
+        ]
+        answer: ListResponse = yield rows
+        every, asserted = (
+            [parse_fact(text) for text in checked(response).queried_objects]
+            for response in answer.responses
+        )
+        return every, asserted
 
     @operation
     def explain(self, fact: str) -> Steps[tuple[str, str] | None]:

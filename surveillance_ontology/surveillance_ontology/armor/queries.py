@@ -17,6 +17,7 @@ from surveillance_ontology.armor.restrictions import describe
 from surveillance_ontology.armor.table import CLS, DAT, IND, OBJ, flag, query, text
 from surveillance_ontology.axioms import (
     NOTHING,
+    Axiom,
     ClassAssertion,
     DataPropertyAssertion,
     ObjectPropertyAssertion,
@@ -167,17 +168,28 @@ def _unsupported(ref: Reference) -> DirectiveResponse:
 @query(
     'QUERY FACT',
     text('pattern'),
+    flag('asserted', 'false'),
     native=False,
-    summary='Asserted and derived facts that match a pattern: `URGENT(?)`, `canReach(Robot1, ?)`, '
-    '`visitedAt(?, ?)`.',
+    summary='Facts that match a pattern, `URGENT(?)`, `canReach(Robot1, ?)`, `visitedAt(?, ?)`: '
+    'asserted and derived ones, or with the second argument the asserted ones only.',
 )
-def _facts(ref: Reference, pattern: str) -> DirectiveResponse:
+def _facts(ref: Reference, pattern: str, asserted: bool) -> DirectiveResponse:
     try:
         wanted = parse_fact(pattern)
     except ValueError as error:
         raise DirectiveError(f'QUERY FACT: argument pattern {error}') from None
-    found = {str(fact) for fact in _candidates(ref, wanted) if wanted.matches(fact)}
+    candidates = _asserted(ref, wanted) if asserted else _candidates(ref, wanted)
+    found = {str(fact) for fact in candidates if wanted.matches(fact)}
     return DirectiveResponse(queried_objects=sorted(found))
+
+
+def _asserted(ref: Reference, wanted: ShortFact) -> Iterable[ShortFact]:
+    """Asserted facts among which those that match a pattern are."""
+    kb = ref.kb
+    axioms: Iterable[Axiom] = kb.facts(derived=False)
+    if wanted.predicate not in (ANY, SAME_AS):
+        axioms = kb.axioms_about(parse_entity(wanted.predicate, kb.iri))
+    return (short for axiom in axioms for short in short_facts(axiom))
 
 
 def _candidates(ref: Reference, wanted: ShortFact) -> Iterable[ShortFact]:
