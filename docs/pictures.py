@@ -80,13 +80,16 @@ class Photographer:
             threading.Event().wait(0.05)
         self._arm.publish(JointTrajectory(joint_names=ARM.names, points=[point]))
         with self._arrived:
-            self._arrived.wait_for(lambda: np.allclose(self._joints, wanted, atol=1e-3), 30.0)
+            self._arrived.wait_for(lambda: self._is_at(wanted), 30.0)
             for _ in range(2):
                 self._picture = None
                 self._arrived.wait_for(lambda: self._picture is not None, 30.0)
             message = self._picture
         pixels = np.frombuffer(bytes(message.data), np.uint8)
         return Picture.fromarray(pixels.reshape(message.height, message.width, 3))
+
+    def _is_at(self, wanted: tuple[float, ...]) -> bool:
+        return bool(self._joints) and np.allclose(self._joints, wanted, atol=1e-3)
 
     def _on_joints(self, message: JointState) -> None:
         with self._arrived:
