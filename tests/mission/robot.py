@@ -9,10 +9,10 @@ from typing import Any
 
 import pytest
 import yaml
+from rclpy.parameter import Parameter
 from std_srvs.srv import Empty
 
-from surveillance_behaviour.fsm.testing import Watched, watching
-from surveillance_behaviour.mission_record import Summary, read, summarize
+from surveillance_behaviour.mission_record import Event, Summary, read, summarize
 from surveillance_behaviour.reasoner_node import Reasoner
 from surveillance_behaviour.robot_behavior_node import RobotBehavior
 from surveillance_controllers.battery_controller_node import BatteryController
@@ -21,7 +21,7 @@ from surveillance_controllers.planner_controller_node import PlannerController
 from surveillance_ontology.armor_server_node import ArmorServer
 from surveillance_ontology.ontology_map_builder_node import OntologyMapBuilder
 
-from .simulated_time import SimulatedTime, simulated_time
+from .simulated_time import START, SimulatedTime, simulated_time
 
 CONFIG = Path(__file__).parents[2] / 'config'
 NODES: dict[str, Callable[..., Any]] = {
@@ -66,13 +66,13 @@ class Robot:
     Attributes:
         time: The clock they live by.
         nodes: By name; what is not there is away.
-        watched: The transitions of the machine.
     """
 
     def __init__(self, graph: Any, time: SimulatedTime, behaviour: str, record: Path) -> None:
         self._graph = graph
         self.time = time
         self.record = record
+        self._running = False
         self.nodes: dict[str, Any] = {}
         self._parameters: dict[str, dict[str, Any]] = {
             'armor_server': {},
@@ -83,15 +83,23 @@ class Robot:
                 'random_battery_time': [200.0, 300.0],
                 'recharge_seconds': 20.0,
             },
-            'planner_controller': {'execution_mode': 'RANDOM', 'random_seed': 1},
-            'motion_controller': {'execution_mode': 'RANDOM', 'random_seed': 2},
+            'planner_controller': {
+                'execution_mode': 'RANDOM',
+                'random_seed': 1,
+                'peer_timeout': 0.5,
+            },
+            'motion_controller': {
+                'execution_mode': 'RANDOM',
+                'random_seed': 2,
+                'peer_timeout': 0.5,
+            },
             'reasoner': {'urgency_threshold': 60},
             'robot_behavior': {**BEHAVIOUR, 'behaviour': behaviour, 'record': str(record)},
         }
         if behaviour == 'surveillance':
             del self._parameters['reasoner']
         else:
-            # `start` takes the map from the configuration here: there is nothing to look around for.
+            # `start` takes the map from the configuration: there are no markers here.
             graph.node.create_service(Empty, 'start', lambda _request, response: response)
 
     def configure(self, name: str, **parameters: Any) -> None:
@@ -103,24 +111,41 @@ class Robot:
         for name in self._parameters:
             if name not in without:
                 self.arrive(name)
+        self._running = True
         self.time.start()
 
     def arrive(self, name: str) -> None:
         """Starts one node."""
         parameters = {**self._parameters[name], 'use_sim_time': True}
         self.nodes[name] = self._graph.add(NODES[name], parameters)
+        self.time.unattended = 'robot_behavior' not in self.nodes
+        if self._running:
+            self.time.tell()
 
     def leave(self, name: str) -> None:
         """Ends one node, as when its process dies."""
-        self._graph.remove(self.nodes.pop(name))
+        node = self.nodes.pop(name)
+        self.time.unattended = 'robot_behavior' not in self.nodes
+        self._graph.remove(node)
 
     def until(self, seconds: float, timeout: float = 60.0) -> None:
         """Runs the mission until ``seconds`` after its start."""
-        self._graph.until(lambda: self.time.now >= 1000.0 + seconds, timeout)
+        end = START + seconds
+        self._graph.until(lambda: self.time.error or self.time.now >= end, timeout)
+        assert self.time.error is None, repr(self.time.error)
 
     def summary(self) -> Summary:
         """What the record says."""
         return summarize(read(self.record))
+
+    def events(self) -> list[Event]:
+        """The record."""
+        return read(self.record)
+
+    def set_parameter(self, node: Any, name: str, value: Any) -> str:
+        """Sets a parameter at run time; why that was refused, empty: it was not."""
+        (result,) = node.set_parameters([Parameter(name, value=value)])
+        return '' if result.successful else str(result.reason)
 
     def decisions(self) -> list[tuple[str, str]]:
         """The places that were chosen, with the rule."""
@@ -135,7 +160,7 @@ class Robot:
         return {
             event.text('place')
             for event in read(self.record)
-            if event.name == 'visit' and event.time >= 1000.0 + since
+            if event.name == 'visit' and event.time >= START + since
         }
 
 
@@ -146,11 +171,3 @@ def mission(graph: Any, patch: pytest.MonkeyPatch, behaviour: str, record: Path)
         robot = Robot(graph, time, behaviour, record)
         time.follow(lambda: list(robot.nodes.values()))
         yield robot
-
-
-def watch(robot: Robot) -> Any:
-    """Notes the transitions of the robot's machine."""
-    return watching(robot.nodes['robot_behavior'].machine)
-
-
-__all__ = ['Robot', 'Watched', 'mission', 'watch']

@@ -23,9 +23,18 @@ from surveillance_runtime.waiting import ClockWait
 CARRIES_ON = ('surveillance', 'patrol', ' goal', '_recharge')
 """Ends of the names of threads whose sleep means that nothing else is under way."""
 
+START = 1.0
+"""The first moment, seconds; at 0 nothing has a time yet."""
+
 
 class SimulatedTime:
-    """Drives ``/clock`` for the nodes of a graph."""
+    """Drives ``/clock`` for the nodes of a graph.
+
+    Attributes:
+        now: The present moment, seconds.
+        error: What an action raised; time has ended then.
+        unattended: Nobody carries a mission on at present; time passes all the same.
+    """
 
     def __init__(self, graph: Any) -> None:
         self._nodes: Callable[[], list[Any]] = list
@@ -33,7 +42,9 @@ class SimulatedTime:
         self._condition = threading.Condition()
         self._sleepers: dict[int, tuple[float, str]] = {}
         self._ended = False
-        self.now = 1000.0
+        self.unattended = False
+        self.error: BaseException | None = None
+        self.now = START
         self.alarms: list[tuple[float, Any]] = []
         self._thread = threading.Thread(target=self._run, name='simulated time')
 
@@ -46,6 +57,10 @@ class SimulatedTime:
         self._publish()
         self._thread.start()
 
+    def tell(self) -> None:
+        """Tells a node that has just come what time it is."""
+        self._publish()
+
     def stop(self) -> None:
         """Ends time; sleepers stay asleep."""
         with self._condition:
@@ -56,7 +71,7 @@ class SimulatedTime:
     def at(self, seconds: float, action: Any) -> None:
         """Does something ``seconds`` after the start, while everybody sleeps."""
         with self._condition:
-            self.alarms.append((1000.0 + seconds, action))
+            self.alarms.append((START + seconds, action))
             self.alarms.sort(key=lambda alarm: alarm[0])
 
     def fell_asleep(self, deadline: float) -> None:
@@ -84,11 +99,17 @@ class SimulatedTime:
             self.now = max(self.now, due)
             self._publish()
             if action is not None:
-                action()
+                try:
+                    action()
+                except BaseException as error:
+                    self.error = error
+                    raise
             with self._condition:
                 self._condition.wait_for(lambda: self._ended or not self._overdue(), timeout=5.0)
 
     def _all_wait(self) -> bool:
+        if self.unattended:
+            return bool(self._sleepers)
         return any(name.endswith(CARRIES_ON) for _, name in self._sleepers.values())
 
     def _overdue(self) -> bool:
@@ -98,11 +119,16 @@ class SimulatedTime:
         message = Clock()
         message.clock.sec = int(self.now)
         message.clock.nanosec = round((self.now - int(self.now)) * 1e9) % 10**9
-        self._topic.publish(message)
         nanoseconds = message.clock.sec * 10**9 + message.clock.nanosec
         late = time.monotonic() + 5.0
+        self._topic.publish(message)
+        told = time.monotonic()
         while any(node.get_clock().now().nanoseconds < nanoseconds for node in self._nodes()):
             assert time.monotonic() < late, 'a node does not follow the clock'
+            if time.monotonic() > told + 0.02:
+                # A node that has just come had not met this topic yet.
+                self._topic.publish(message)
+                told = time.monotonic()
             threading.Event().wait(0.0002)
 
 

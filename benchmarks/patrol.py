@@ -1,0 +1,323 @@
+"""How long places go unvisited under each policy, beside the bound that no robot can beat.
+
+Every policy patrols every map for 24 simulated hours with fixed seeds. The robot drives 1 m/s and
+spends 2 s in each place it enters; all places count as just visited at the start.
+
+- longest: the longest time any place went unvisited, from visit to visit
+- ratio:   longest / bound, where the bound is the shortest closed tour: exact up to 12 places and
+           wherever blocks of the map are that small or the lower bound meets the tour, else the
+           Held-Karp lower bound (marked >=)
+- mean:    the time a place went unvisited, averaged over places and time
+- late:    longest - threshold
+
+    python benchmarks/patrol.py                       all maps, a few minutes
+    python benchmarks/patrol.py --quick               small maps, 4 hours
+    python benchmarks/patrol.py --graph FILE ...      maps of patrolling_sim
+    python benchmarks/patrol.py --plot docs/patrol.png
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import random
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import yaml
+
+ROOT = Path(__file__).resolve().parents[1]
+for package in ('surveillance_behaviour', 'surveillance_ontology', 'surveillance_runtime'):
+    sys.path.insert(0, str(ROOT / package))
+
+from surveillance_behaviour.policy.graph import (  # noqa: E402
+    GraphError,
+    PatrolGraph,
+    graph_of_places,
+)
+from surveillance_behaviour.policy.graph_files import read_patrolling_sim  # noqa: E402
+from surveillance_behaviour.policy.policies import DEFAULT_POLICY, make_policy  # noqa: E402
+from surveillance_behaviour.policy.rules import Rules  # noqa: E402
+from surveillance_behaviour.policy.simulation import Battery, Patrol, PatrolRun  # noqa: E402
+from surveillance_ontology.place import read_place  # noqa: E402
+
+DAY = 86400.0
+SPEED, DWELL = 1.0, 2.0
+SEED = 1
+URGENCY = 7.0
+"""Threshold of the seeds' ontology, seconds."""
+RULED = ('tour', 'lookahead', 'oldest', 'seed')
+"""Policies run within the seeds' rules; the literature's run without any."""
+FREE = ('random', 'CR', 'HCR', 'HPCC', 'cycle')
+
+
+@dataclass(frozen=True)
+class Map:
+    """A map with its name and where the robot starts."""
+
+    name: str
+    graph: PatrolGraph
+    start: str
+
+
+def place_map(name: str, path: Path) -> Map:
+    """A place of config/."""
+    place = read_place(path)
+    neighbours = {room: list(place.neighbours(room)) for room in place.rooms}
+    return Map(name, graph_of_places(neighbours, place.positions, SPEED, DWELL), place.start)
+
+
+def grid(width: int, height: int) -> Map:
+    """A grid of places 5 m apart."""
+    positions = {f'P{x}_{y}': (5.0 * x, 5.0 * y) for x in range(width) for y in range(height)}
+    neighbours = {
+        f'P{x}_{y}': [
+            name
+            for name in (f'P{x + 1}_{y}', f'P{x - 1}_{y}', f'P{x}_{y + 1}', f'P{x}_{y - 1}')
+            if name in positions
+        ]
+        for x in range(width)
+        for y in range(height)
+    }
+    graph = graph_of_places(neighbours, positions, SPEED, DWELL)
+    return Map(f'grid {width}x{height}', graph, 'P0_0')
+
+
+def _joined(pairs: Sequence[tuple[int, int]], draw: random.Random) -> PatrolGraph:
+    legs: dict[str, dict[str, float]] = {}
+    for first, second in pairs:
+        metres = draw.uniform(2.0, 10.0)
+        legs.setdefault(f'P{first}', {})[f'P{second}'] = metres / SPEED
+        legs.setdefault(f'P{second}', {})[f'P{first}'] = metres / SPEED
+    return PatrolGraph(legs, DWELL)
+
+
+def tree(count: int) -> Map:
+    """A random tree of places 2 to 10 m apart."""
+    draw = random.Random(SEED)
+    pairs = [(child, draw.randrange(max(0, child - 10), child)) for child in range(1, count)]
+    return Map(f'tree {count}', _joined(pairs, draw), 'P0')
+
+
+def ring(count: int) -> Map:
+    """A ring of places 2 to 10 m apart."""
+    draw = random.Random(SEED)
+    pairs = [(number, (number + 1) % count) for number in range(count)]
+    return Map(f'ring {count}', _joined(pairs, draw), 'P0')
+
+
+def maps(quick: bool) -> Iterator[Map]:
+    """The maps of the benchmark."""
+    yield place_map('seven rooms', ROOT / 'config' / 'seven_rooms.yaml')
+    yield place_map('office, 40 rooms', ROOT / 'config' / 'office.yaml')
+    yield grid(5, 5)
+    yield grid(10, 10)
+    yield tree(100)
+    yield ring(100)
+    if not quick:
+        yield grid(32, 31)
+        yield tree(1000)
+        yield ring(1000)
+
+
+def patrol(
+    place: Map,
+    policy: str,
+    hours: float,
+    threshold: float = URGENCY,
+    battery: Battery | None = None,
+) -> PatrolRun:
+    """One patrol."""
+    rules = Rules() if policy in RULED else Rules(())
+    run = Patrol(
+        place.graph,
+        rules,
+        make_policy(policy, random.Random(SEED)),
+        policy,
+        threshold,
+        place.start,
+        battery,
+    )
+    for _ in run.until(hours * 3600.0):
+        pass
+    return run.run
+
+
+def table(rows: Sequence[Sequence[str]]) -> str:
+    """Aligned columns, the first to the left and the rest to the right."""
+    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
+    return '\n'.join(
+        '  '.join(
+            cell.ljust(width) if column == 0 else cell.rjust(width)
+            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
+        )
+        for row in rows
+    )
+
+
+def compare(place: Map, hours: float) -> dict[str, PatrolRun]:
+    """All policies on one map, printed."""
+    began = time.perf_counter()
+    tour = place.graph.tour
+    planning = time.perf_counter() - began
+    sign = '' if tour.exact else '>= '
+    print(
+        f'\n{place.name}: {len(place.graph.places)} places, bound {sign}{tour.bound:.1f} s, '
+        f'tour {tour.length:.1f} s (found in {planning:.2f} s), {hours:g} h'
+    )
+    rows = [['policy', 'rules', 'longest s', 'ratio', 'mean s', 'late s', 'moves', 'ms/choice']]
+    runs = {}
+    for policy in (*RULED, *FREE):
+        began = time.perf_counter()
+        run = runs[policy] = patrol(place, policy, hours)
+        spent = time.perf_counter() - began
+        rows.append(
+            [
+                policy + (' (default)' if policy == DEFAULT_POLICY else ''),
+                'yes' if policy in RULED else 'no',
+                f'{run.longest:.1f}',
+                f'{run.longest / tour.bound:.3f}',
+                f'{run.mean:.1f}',
+                f'{max(0.0, run.longest - URGENCY):.1f}',
+                f'{run.moves}',
+                f'{1000.0 * spent / run.moves:.2f}',
+            ]
+        )
+    print(table(rows), flush=True)
+    return runs
+
+
+def thresholds(place: Map, hours: float) -> None:
+    """How late the ruled policies are when the threshold is near the tour, once it has settled."""
+    length = place.graph.tour.length
+    print(
+        f'\n{place.name}: longest time from visit to visit beyond max(threshold, tour), s, '
+        'by threshold / tour'
+    )
+    factors = (0.25, 0.5, 0.75, 0.9, 1.0, 1.25, 1.5, 2.0)
+    rows = [['policy', *(f'{factor:g}' for factor in factors)]]
+    for policy in RULED:
+        late = []
+        for factor in factors:
+            run = patrol(place, policy, hours, factor * length)
+            late.append(f'{run.settled - max(1.0, factor) * length:.1f}')
+        rows.append([policy, *late])
+    print(table(rows), flush=True)
+
+
+def strandings(place: Map, hours: float) -> None:
+    """The battery: fixed level against a reserve for the worst leg and the way home."""
+    graph = place.graph
+    far = max(graph.seconds(place.start, other) for other in graph.places)
+    print(f'\n{place.name}: battery, farthest place {far:.0f} s from the station, {hours:g} h')
+    rows = [['range of a full battery', 'level', 'strandings', 'recharges', 'longest s']]
+    for factor in (3.0, 4.0, 6.0, 10.0):
+        draw = 100.0 / (factor * far)
+        for keeps in (False, True):
+            run = patrol(
+                place, DEFAULT_POLICY, hours, battery=Battery(draw=draw, keeps_reserve=keeps)
+            )
+            rows.append(
+                [
+                    f'{factor:g} times as far ({factor * far:.0f} s)',
+                    'reserve' if keeps else 'fixed 20 %',
+                    f'{run.strandings}',
+                    f'{run.recharges}',
+                    f'{run.longest:.0f}',
+                ]
+            )
+    print(table(rows), flush=True)
+
+
+COLOURS = {
+    'tour': (40, 120, 30),
+    'lookahead': (200, 140, 30),
+    'oldest': (180, 90, 150),
+    'seed': (60, 60, 220),
+    'random': (150, 150, 230),
+    'CR': (210, 170, 210),
+    'HCR': (200, 200, 120),
+    'HPCC': (120, 200, 200),
+    'cycle': (120, 120, 120),
+}
+
+
+def plot(path: Path, results: dict[str, tuple[float, dict[str, PatrolRun]]]) -> None:
+    """Draws the ratios to the bound on a logarithmic scale, a group of bars for each map."""
+    import cv2
+    import numpy as np
+
+    left, top, height, bar, gap = 70, 50, 320, 12, 26
+    group = bar * len(COLOURS) + gap
+    image = np.full((top + height + 90, left + group * len(results) + 20, 3), 255, np.uint8)
+    greatest = max(run.longest / bound for bound, runs in results.values() for run in runs.values())
+    decades = math.log10(max(greatest * 1.2, 10.0))
+
+    def row(ratio: float) -> int:
+        return top + height - round(height * max(0.0, math.log10(ratio)) / decades)
+
+    def write(text: str, x: int, y: int, scale: float = 0.42) -> None:
+        font = cv2.FONT_HERSHEY_SIMPLEX
+        cv2.putText(image, text, (x, y), font, scale, (40, 40, 40), 1, cv2.LINE_AA)
+
+    write('longest time unvisited / bound (24 h; 1 = the shortest closed tour)', left, 24, 0.5)
+    for mark in (1.0, 1.1, 1.5, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0):
+        if mark <= 10**decades:
+            cv2.line(image, (left, row(mark)), (image.shape[1] - 20, row(mark)), (225, 225, 225), 1)
+            write(f'{mark:g}', left - 42, row(mark) + 4)
+    for number, (name, (bound, runs)) in enumerate(results.items()):
+        x = left + number * group + gap // 2
+        for policy, colour in COLOURS.items():
+            upper = min(row(runs[policy].longest / bound), row(1.0) - 2)
+            cv2.rectangle(image, (x, upper), (x + bar - 3, row(1.0)), colour, -1)
+            x += bar
+        write(name, left + number * group + gap // 2, top + height + 22, 0.38)
+    x = left
+    for policy, colour in COLOURS.items():
+        cv2.rectangle(image, (x, top + height + 48), (x + 12, top + height + 60), colour, -1)
+        write(policy, x + 17, top + height + 59)
+        x += 45 + 9 * len(policy)
+    cv2.imwrite(str(path), image)
+    print(f'\nplot written to {path}')
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs the benchmark; returns the exit code."""
+    parser = argparse.ArgumentParser(
+        description=(__doc__ or '').partition('\n')[0],
+        epilog=(__doc__ or '').partition('\n')[2],
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument('--quick', action='store_true', help='small maps, 4 simulated hours')
+    parser.add_argument('--hours', type=float, help='simulated hours (default 24, or 4)')
+    parser.add_argument(
+        '--graph', nargs='+', metavar='FILE', help="maps in patrolling_sim's format"
+    )
+    parser.add_argument('--plot', type=Path, metavar='FILE.png', help='draw the ratios')
+    options = parser.parse_args(arguments)
+    hours = options.hours or (4.0 if options.quick else 24.0)
+    try:
+        if options.graph:
+            chosen = []
+            for file in options.graph:
+                graph = read_patrolling_sim(file, SPEED, DWELL)
+                chosen.append(Map(Path(file).stem, graph, graph.places[0]))
+        else:
+            chosen = list(maps(options.quick))
+    except (GraphError, OSError, ValueError, yaml.YAMLError) as error:
+        print(error, file=sys.stderr)
+        return 1
+    results = {place.name: (place.graph.tour.bound, compare(place, hours)) for place in chosen}
+    for place in chosen[:2]:
+        thresholds(place, min(hours, 6.0))
+        strandings(place, min(hours, 24.0))
+    if options.plot:
+        plot(options.plot, results)
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())
