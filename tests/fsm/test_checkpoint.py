@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 
 import pytest
 
@@ -138,13 +139,17 @@ def test_a_concurrence_goes_on_with_the_children_that_had_not_ended():
         return concurrence, quick, slow, clock
 
     first, quick, slow, clock = build()
-    ended = []
-    first.register_transition_cb(lambda ud, active: ended.append(through_json(first)))
+    ended, quick_ended = [], threading.Event()
+
+    def saw(ud, active):
+        ended.append(through_json(first))
+        if active == ['SLOW']:
+            quick_ended.set()
+
+    first.register_transition_cb(saw)
     run = Background(first)
     began(slow)
-    clock.until_sleeping(1)
-    while first.get_active_states() != ['SLOW'] or len(ended) < 2:
-        pass
+    assert quick_ended.wait(5.0)
     first.request_preempt()
     run.result()
     second, quick, slow, clock = build()

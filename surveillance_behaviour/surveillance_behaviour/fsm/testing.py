@@ -38,7 +38,7 @@ class FakeClock:
         self._now = 0.0
         self._leaps = leaps
         self._changed = threading.Condition()
-        self._deadlines: list[float] = []
+        self._sleepers: list[tuple[float, Interrupt]] = []
 
     def now(self) -> float:
         """The time in seconds."""
@@ -53,13 +53,14 @@ class FakeClock:
             if self._leaps:
                 self._now = deadline
                 return True
-            self._deadlines.append(deadline)
+            sleeper = (deadline, interrupt)
+            self._sleepers.append(sleeper)
             self._changed.notify_all()
         remove = interrupt.subscribe(self._wake)
         try:
             with self._changed:
                 self._changed.wait_for(lambda: interrupt.is_set() or self._now >= deadline)
-                self._deadlines.remove(deadline)
+                self._sleepers.remove(sleeper)
                 return not interrupt.is_set()
         finally:
             remove()
@@ -82,8 +83,11 @@ class FakeClock:
         """
 
         def asleep() -> int:
-            # One whose time is over has only not woken yet.
-            return sum(deadline > self._now for deadline in self._deadlines)
+            # One whose time is over, or that was interrupted, has only not woken yet.
+            return sum(
+                deadline > self._now and not interrupt.is_set()
+                for deadline, interrupt in self._sleepers
+            )
 
         with self._changed:
             enough = self._changed.wait_for(lambda: asleep() >= sleepers, timeout)
