@@ -48,6 +48,7 @@ class DetectorSettings:
         bridges: Gaps in pixels that are closed for markers seen at a flat angle.
         contrast: Grey levels by which a border must be darker than its neighbourhood.
         min_length: Longer side in pixels of the smallest marker.
+        max_outlines: Dark outlines after which no further neighbourhood or bridge is tried.
         max_candidates: How many quadrilaterals of a picture are read, the likeliest first.
         blur: Standard deviation in pixels of the lens's blur.
         least_correlation: Correlation with the picture that a reading needs, 0 to 1.
@@ -63,6 +64,7 @@ class DetectorSettings:
     bridges: tuple[int, ...] = (5, 7)
     contrast: float = 7.0
     min_length: float = 8.0
+    max_outlines: int = 400
     max_candidates: int = 16
     blur: float = 0.8
     least_correlation: float = 0.85
@@ -133,11 +135,8 @@ class MarkerDetector:
     def _candidates(self, prepared: PreparedPicture, pyramid: PicturePyramid) -> Quads:
         settings = self.settings
         contrast = max(settings.contrast, 2.5 * prepared.noise)
-        masks = []
-        for index, window in enumerate(settings.windows):
-            bridges = settings.bridges if index == 0 else ()
-            masks += dark_masks(prepared.smooth, window, contrast, bridges)
-        quads = quads_around(masks, min_length=settings.min_length)
+        masks = dark_masks(prepared.smooth, settings.windows, contrast, settings.bridges)
+        quads = quads_around(masks, min_length=settings.min_length, limit=settings.max_outlines)
         if not len(quads):
             return quads
         correlation = self._ring.correlation(pyramid, homographies_of(quads), contrast)

@@ -35,6 +35,13 @@ _NUMBERS: tuple[tuple[str, float, str, float, float], ...] = (
     ('unknown_lead', _DEFAULT.unknown_lead, 'Lead over the second best code, other ids.', 1, 100),
 )
 _COUNTS: tuple[tuple[str, int, str, int, int], ...] = (
+    (
+        'max_outlines',
+        _DEFAULT.max_outlines,
+        'Dark outlines after which no further neighbourhood or bridge is tried.',
+        1,
+        100000,
+    ),
     ('max_candidates', _DEFAULT.max_candidates, 'Outlines of a picture that are read.', 1, 500),
     ('confirmation_frames', _WATCH.known_frames, 'Pictures that confirm a known id.', 1, 100),
     (
@@ -117,6 +124,7 @@ class DetectorParameters:
             known_ids=frozenset(values['known_ids']) or None,
             windows=tuple(values['windows']),
             bridges=tuple(values['bridges']),
+            max_outlines=values['max_outlines'],
             max_candidates=values['max_candidates'],
             **{name: values[name] for name, *_ in _NUMBERS},
         )

@@ -9,7 +9,7 @@ few tenths of a pixel wrong, which `template_fit` repairs, but they are there.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import cv2
 import numpy as np
@@ -18,30 +18,34 @@ import numpy.typing as npt
 Quads = npt.NDArray[np.float64]
 Grey = npt.NDArray[np.uint8]
 
-_MAX_HULL_CORNERS = 14
+_MAX_HULL_CORNERS = 8
 _MIN_SOLIDITY = 0.5
 _MAX_GROWTH = 1.6
 
 
-def dark_masks(picture: Grey, window: int, contrast: float, bridges: tuple[int, ...]) -> list[Grey]:
-    """Masks (height, width) of what is darker than its neighbourhood.
+def dark_masks(
+    picture: Grey, windows: Sequence[int], contrast: float, bridges: Sequence[int]
+) -> Iterator[Grey]:
+    """Masks (height, width) of what is darker than its neighbourhood, the most telling first.
 
     Args:
         picture: (height, width) grey levels.
-        window: Side in pixels of the neighbourhood, odd.
+        windows: Sides in pixels of the neighbourhoods, odd; one mask for each.
         contrast: How many grey levels darker.
-        bridges: Lengths in pixels of gaps to close along columns, and along rows, each in a mask
-            of its own: a marker seen at a flat angle has a border thinner than a pixel, which
-            breaks at white rows of its code.
+        bridges: Lengths in pixels of gaps to close in the first mask, along columns and along
+            rows, each in a mask of its own: a marker seen at a flat angle has a border thinner
+            than a pixel, which breaks at white rows of its code.
     """
-    dark = cv2.adaptiveThreshold(
-        picture, 255, cv2.ADAPTIVE_THRESH_MEAN_C, cv2.THRESH_BINARY_INV, window, contrast
-    )
-    masks = [dark]
+    first: Grey | None = None
+    for window in windows:
+        dark = cv2.adaptiveThreshold(
+            picture, 255, cv2.ADAPTIVE_THRESH_MEAN_C, cv2.THRESH_BINARY_INV, window, contrast
+        )
+        first = dark if first is None else first
+        yield dark
     for length in bridges:
         for shape in ((length, 1), (1, length)):
-            masks.append(cv2.morphologyEx(dark, cv2.MORPH_CLOSE, np.ones(shape, np.uint8)))
-    return masks
+            yield cv2.morphologyEx(first, cv2.MORPH_CLOSE, np.ones(shape, np.uint8))
 
 
 def quads_around(
@@ -50,6 +54,7 @@ def quads_around(
     min_length: float = 8.0,
     min_width: float = 2.0,
     min_area: float = 12.0,
+    limit: int = 10**9,
 ) -> Quads:
     """Quadrilaterals around the blobs of masks that do not touch the edge.
 
@@ -59,6 +64,7 @@ def quads_around(
         min_length: Longer side in pixels of the smallest blob's upright box.
         min_width: Shorter side of it.
         min_area: Area in pixels of the smallest blob's hull.
+        limit: Once so many blobs were looked at, no further mask is.
 
     Returns:
         (n, 4, 2) corners in pixels, clockwise as seen.
@@ -66,6 +72,8 @@ def quads_around(
     found = []
     seen: set[tuple[float, ...]] = set()
     for mask in masks:
+        if len(seen) > limit:
+            break
         contours, _ = cv2.findContours(mask, cv2.RETR_LIST, cv2.CHAIN_APPROX_SIMPLE)
         height, width = mask.shape
         for contour in contours:
@@ -126,7 +134,7 @@ def _area(corners: Sequence[tuple[float, float]]) -> float:
 
 # OpenCV's approxPolyN does the same from 4.11 on; this has to run with 4.10 too
 def _smallest_quad(hull: npt.NDArray[np.int32]) -> list[tuple[float, float]] | None:
-    tolerance = max(0.7, 0.01 * cv2.arcLength(hull, True))
+    tolerance = max(0.7, 0.02 * cv2.arcLength(hull, True))
     reduced = cv2.approxPolyDP(hull, tolerance, True)
     if len(reduced) < 4:
         reduced = hull
