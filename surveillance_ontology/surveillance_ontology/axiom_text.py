@@ -125,11 +125,13 @@ def axiom_text(axiom: ax.Axiom) -> str:
         word = 'EquivalentTo' if isinstance(axiom, ax.EquivalentClasses) else 'DisjointWith'
         return f' {word} '.join(map(expression_text, axiom.classes))
     if isinstance(axiom, ax.DisjointUnion):
-        return f'{local_name(axiom.cls)} DisjointUnionOf {", ".join(map(expression_text, axiom.classes))}'
+        parts = ', '.join(map(expression_text, axiom.classes))
+        return f'{local_name(axiom.cls)} DisjointUnionOf {parts}'
     if isinstance(axiom, (ax.SubObjectPropertyOf, ax.SubDataPropertyOf)):
         return f'{expression_text(axiom.sub)} SubPropertyOf {expression_text(axiom.sup)}'
     if isinstance(axiom, ax.SubPropertyChainOf):
-        return f'{" o ".join(map(expression_text, axiom.chain))} SubPropertyOf {expression_text(axiom.sup)}'
+        chain = ' o '.join(map(expression_text, axiom.chain))
+        return f'{chain} SubPropertyOf {expression_text(axiom.sup)}'
     if isinstance(axiom, ax.InverseObjectProperties):
         return f'{expression_text(axiom.first)} InverseOf {expression_text(axiom.second)}'
     if isinstance(axiom, (ax.ObjectPropertyDomain, ax.DataPropertyDomain)):

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, fields
-from functools import cache
+from typing import Any
 
 from surveillance_ontology.expressions import (
     NOTHING as NOTHING,
@@ -427,9 +427,18 @@ _ROLE_OF_FIELD = {
 _OBJECT, _DATA = 'object_property', 'data_property'
 
 
-@cache
+_ROLES: dict[type, tuple[tuple[str, str], ...]] = {}
+
+
 def roles_of(record: type) -> tuple[tuple[str, str], ...]:
     """For each field of a record type, the entity kind a bare `str` in it stands for, or ''."""
+    roles = _ROLES.get(record)
+    if roles is None:
+        roles = _ROLES[record] = _roles_of(record)
+    return roles
+
+
+def _roles_of(record: type[Any]) -> tuple[tuple[str, str], ...]:
     name = record.__name__
     data = name.startswith('Data') or 'Data' in name
     pairs = []

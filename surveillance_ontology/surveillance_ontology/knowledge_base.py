@@ -320,9 +320,12 @@ class KnowledgeBase:
         else:
             found.update(known.succ.get(individual, ()))
         for axiom in self._told.removed:
-            if type(axiom) is ObjectPropertyAssertion and axiom.prop == prop:
-                if axiom.subject == individual:
-                    found.discard(axiom.object)
+            if (
+                type(axiom) is ObjectPropertyAssertion
+                and axiom.prop == prop
+                and axiom.subject == individual
+            ):
+                found.discard(axiom.object)
         return found
 
     def data_values(self, prop: str, individual: str) -> set[Literal]:
@@ -411,7 +414,7 @@ class KnowledgeBase:
         return Reasons(engine).of_fact(fact)
 
     def explain_inconsistency(self) -> Explanation | None:
-        """Why the ontology contradicts itself; None when the last `reason` found no contradiction."""
+        """Why the ontology contradicts itself; None where the last `reason` found it does not."""
         if self._engine is None or self._consistent:
             return None
         return Reasons(self._engine).of_inconsistency()
@@ -427,5 +430,5 @@ class KnowledgeBase:
         return self._feed.subscribe(callback, self._engine)
 
     def copy(self) -> KnowledgeBase:
-        """Another knowledge base with the same assertions, nothing derived yet and no subscribers."""
+        """Another knowledge base with the same assertions, nothing derived and no subscribers."""
         return KnowledgeBase(self.iri, self._told.axioms)

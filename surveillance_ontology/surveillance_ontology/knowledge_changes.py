@@ -1,4 +1,7 @@
-"""What changes in a knowledge base, told to subscribers: assertions at once, derived facts per `reason`."""
+"""What changes in a knowledge base, told to whoever subscribed.
+
+Assertions are told at once, derived facts once per `reason`.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""OWL axioms and SWRL rules to RDF triples (https://www.w3.org/TR/owl2-mapping-to-rdf/, section 2)."""
+"""OWL axioms and SWRL rules to RDF triples (https://www.w3.org/TR/owl2-mapping-to-rdf/)."""
 
 from __future__ import annotations
 

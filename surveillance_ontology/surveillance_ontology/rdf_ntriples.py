@@ -45,15 +45,15 @@ def parse_ntriples(data: bytes) -> Graph:
         line = data.count(b'\n', 0, error.start) + 1
         raise RdfSyntaxError(f'not UTF-8: {error.reason}', line, 1) from None
     graph = Graph()
-    for number, line in enumerate(text.split('\n'), 1):
-        if not line.strip() or line.lstrip().startswith('#'):
+    for number, statement in enumerate(text.split('\n'), 1):
+        if not statement.strip() or statement.lstrip().startswith('#'):
             continue
-        found = _STATEMENT.match(line.rstrip('\r'))
+        found = _STATEMENT.match(statement.rstrip('\r'))
         if found is None:
-            column = len(line) - len(line.lstrip()) + 1
+            column = len(statement) - len(statement.lstrip()) + 1
             raise RdfSyntaxError(
                 'expected an RDF/XML document or an N-Triples statement'
-                f' `<subject> <predicate> object .`, got {line.strip()[:60]!r}',
+                f' `<subject> <predicate> object .`, got {statement.strip()[:60]!r}',
                 number,
                 column,
             )

@@ -31,7 +31,7 @@ _SYNTAX = {
 
 
 class RdfSyntaxError(ValueError):
-    """A document that is not what it should be; `line` and `column` count from 1, 0 when not known."""
+    """A document that is not what it should be; `line` and `column` from 1, 0 when not known."""
 
     def __init__(self, message: str, line: int = 0, column: int = 0) -> None:
         super().__init__(message)
@@ -111,9 +111,8 @@ class _Reader:
         if is_parameter or value is None:
             raise self.fail(f'entity {name!r} is refused: only plain text may stand in an entity')
         if '&' in value or '<' in value or len(value) > _MAX_ENTITY:
-            raise self.fail(
-                f'entity {name!r} is refused: expected plain text of at most {_MAX_ENTITY} characters'
-            )
+            expected = f'plain text of at most {_MAX_ENTITY} characters'
+            raise self.fail(f'entity {name!r} is refused: expected {expected}')
 
     def namespace(self, prefix: str | None, uri: str | None) -> None:
         self.graph.prefixes.setdefault(prefix or '', uri or '')

@@ -1,4 +1,4 @@
-"""The facts that hold, why each may be there, and single steps of putting one in or taking one out."""
+"""The facts that hold, and the single steps of putting one in or taking one out."""
 
 from __future__ import annotations
 
@@ -25,9 +25,10 @@ class FactState(Translation):
         difference: Who is known to be different.
         conflicts: Pairs that must be the same, and are different.
         proofs: Searches why a fact holds.
-        changed: Where a log of one update is wanted: facts that came, went or changed their standing,
-            with whether they were derived (and not asserted) before.
-        renamed: Whether an individual came to stand for another, or ceased to, since this was reset.
+        changed: Where a log of one update is wanted: facts that came, went or changed their
+            standing, with whether they were derived (and not asserted) before.
+        renamed: Whether an individual came to stand for another, or ceased to, since this was
+            reset.
     """
 
     def __init__(self, program: Program, about: Callable[[str], Iterable[Axiom]]) -> None:
@@ -180,7 +181,7 @@ class FactState(Translation):
 
     def _conflict_supports(self, x: str) -> Iterator[Premises]:
         find = self.equality.find
-        for (first, second), merge in self.conflicts.items():
+        for first, second in self.conflicts:
             if find(first) == x:
                 different = (self.program.different, x, find(second))
                 yield ((self.program.same, first, second), different)

@@ -1,4 +1,4 @@
-"""Individuals that come to be known as the same, or cease to be: facts follow to and from one name."""
+"""Individuals that come to be known as the same, or cease to be: facts follow to one name."""
 
 from __future__ import annotations
 
@@ -101,9 +101,9 @@ class Identification(FactState):
         for axiom in axioms:
             if isinstance(axiom, SameIndividual):
                 self._state_same(axiom)
-            fact = self.fact_of(axiom)
-            if fact is not None and not members.isdisjoint(_individuals_in(fact)):
-                self._assert(fact, fresh)
+            stated = self.fact_of(axiom)
+            if stated is not None and not members.isdisjoint(_individuals_in(stated)):
+                self._assert(stated, fresh)
             if self.program.uses_thing:
                 for individual in individuals_of(axiom) & members:
                     self._assert((self.program.thing, individual), fresh)

@@ -113,8 +113,8 @@ class _Writer:
             else:
                 self._property_step(atom)
         elif isinstance(atom, DifferentAtom):
-            first, second = map(self.text, atom.terms)
-            self.open(f'if {self.use(self.context.different)}({first}, {second}):')
+            pair = ', '.join(map(self.text, atom.terms))
+            self.open(f'if {self.use(self.context.different)}({pair}):')
         elif isinstance(atom, SameAtom):
             first, second = atom.terms
             if not self.is_bound(first):
@@ -131,10 +131,10 @@ class _Writer:
                 self.open(f'if {self.use(atom.holds)}({arguments}):')
             else:
                 rest = ', '.join(map(self.text, atom.terms[1:]))
-                first = atom.terms[0]
-                assert isinstance(first, int)
-                self.open(f'for v{first} in {self.use(atom.solve)}({rest}):')
-                self.bound.add(first)
+                result = atom.terms[0]
+                assert isinstance(result, int)
+                self.open(f'for v{result} in {self.use(atom.solve)}({rest}):')
+                self.bound.add(result)
 
     def _class_step(self, atom: PredicateAtom) -> None:
         (term,) = atom.terms

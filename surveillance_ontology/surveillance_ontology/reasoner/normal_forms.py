@@ -80,7 +80,7 @@ def normal(expression: ClassExpression) -> ClassExpression:
 
 
 def is_positive(expression: ClassExpression) -> bool:
-    """Whether membership can be concluded from facts that hold, so that a clause body can state it."""
+    """Whether facts that hold can show membership, so that a clause body can state it."""
     if isinstance(expression, str):
         return True
     if isinstance(expression, (ax.ObjectIntersectionOf, ax.ObjectUnionOf)):

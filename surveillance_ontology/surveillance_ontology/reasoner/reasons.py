@@ -116,9 +116,9 @@ class Reasons:
     def _premise(self, proof: Proof) -> list[Explanation]:
         """A premise; an unnamed class in between gives way to its own premises."""
         expression = proof.fact[0].expression
-        if not proof.asserted and proof.premises and expression is not None:
-            if not isinstance(expression, str):
-                return [part for premise in proof.premises for part in self._premise(premise)]
+        unnamed = expression is not None and not isinstance(expression, str)
+        if unnamed and proof.premises and not proof.asserted:
+            return [part for premise in proof.premises for part in self._premise(premise)]
         return [self._explained(proof)]
 
     def _assertion(self, fact: Fact, text: str) -> Explanation:
@@ -204,12 +204,12 @@ class Reasons:
         texts: dict[object, str] = {}
         sources = [atom for atom in rule.body if isinstance(atom, ax.DataPropertyAtom)]
         facts = [premise.fact for premise in proof.premises]
-        for atom in sources:
+        for source in sources:
             for fact in facts:
-                if fact[0].expression == atom.prop and atom.second not in values:
-                    values[atom.second] = fact[2]
+                if fact[0].expression == source.prop and source.second not in values:
+                    values[source.second] = fact[2]
                     shown = literal_text(self._view.literal(fact[2]))
-                    texts[atom.second] = f'{local_name(atom.prop)} {shown}'
+                    texts[source.second] = f'{local_name(source.prop)} {shown}'
         parts: list[str] = []
         pending = list(computed)
         while pending:

@@ -111,8 +111,8 @@ def split_rule(clause: Clause) -> Halves | None:
     }
     if not outputs or not outputs <= own or outputs & values - set(difference):
         return None
-    key = {term: -factor for term, factor in difference.items() if term in own}
-    reach = {term: factor for term, factor in difference.items() if term not in own}
+    key: Linear = {term: -factor for term, factor in difference.items() if term in own}
+    reach: Linear = {term: factor for term, factor in difference.items() if term not in own}
     return Halves(tuple(keyed), tuple(reaching), key, reach, strict, computed)
 
 

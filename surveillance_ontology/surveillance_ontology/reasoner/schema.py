@@ -168,9 +168,10 @@ class Schema:
             for other in props[place:]:
                 for turned in (False, True):
                     pair = (program.objects[name], False, program.objects[other], turned)
-                    if (name != other or turned) and pair not in pairs:
-                        if prototypes.excludes((name, False), (other, turned), loop=False):
-                            program.disjoint_properties.append(pair)
+                    if pair in pairs or (name == other and not turned):
+                        continue
+                    if prototypes.excludes((name, False), (other, turned), loop=False):
+                        program.disjoint_properties.append(pair)
 
     def _own(self, predicate: Predicate) -> Predicate:
         """The predicate of this program that stands for the same expression."""

@@ -37,6 +37,15 @@ def _is_label(predicate: Predicate) -> bool:
     return predicate.kind == 'class' and not isinstance(predicate.expression, str | None)
 
 
+def _source(clause: Clause) -> PredicateAtom | None:
+    """The body of a clause that only passes members of a class on; None for any other clause."""
+    if len(clause.body) != 1:
+        return None
+    (atom,) = clause.body
+    passes = isinstance(atom, PredicateAtom) and atom.predicate.kind == 'class'
+    return atom if passes and atom.terms == clause.head.terms else None  # type: ignore[return-value]
+
+
 def _replace_aliases(program: Program, kept: set[Predicate]) -> None:
     while True:
         producers: dict[Predicate, list[Clause]] = {}
@@ -49,16 +58,11 @@ def _replace_aliases(program: Program, kept: set[Predicate]) -> None:
             if len(clauses) != 1 or label in kept or label in counted or label.disjoint:
                 continue
             (clause,) = clauses
-            if len(clause.body) == 1 and isinstance(clause.body[0], PredicateAtom):
-                (atom,) = clause.body
-                source = atom.predicate
-                if (
-                    source.kind == 'class'
-                    and atom.terms == clause.head.terms
-                    and source is not label
-                ):
-                    if source not in alias and label not in alias.values():
-                        alias[label] = source
+            atom = _source(clause)
+            if atom is None or atom.predicate is label or atom.predicate in alias:
+                continue
+            if label not in alias.values():
+                alias[label] = atom.predicate
         if not alias:
             return
         _substitute(program, alias)
@@ -78,14 +82,14 @@ def _substitute(program: Program, alias: dict[Predicate, Predicate]) -> None:
             clauses[Clause(body, head, clause.origin)] = None  # type: ignore[arg-type]
     program.clauses = list(clauses)
     program.at_least = [
-        replace(condition, filler=alias.get(condition.filler, condition.filler))  # type: ignore[arg-type, call-overload]
+        replace(condition, filler=alias.get(condition.filler, condition.filler))  # type: ignore[arg-type]
         for condition in program.at_least
     ]
     program.at_most = [
         replace(
             condition,
             label=alias.get(condition.label, condition.label),  # type: ignore[arg-type]
-            filler=alias.get(condition.filler, condition.filler),  # type: ignore[arg-type, call-overload]
+            filler=alias.get(condition.filler, condition.filler),  # type: ignore[arg-type]
         )
         for condition in program.at_most
     ]
@@ -147,9 +151,9 @@ def _prune(program: Program, kept: set[Predicate]) -> None:
 def _drop_implied_atoms(program: Program) -> None:
     simple: dict[Predicate, list[Clause]] = {}
     for clause in program.clauses:
-        if len(clause.body) == 1 and isinstance(clause.body[0], PredicateAtom):
-            if isinstance(clause.head, PredicateAtom):
-                simple.setdefault(clause.body[0].predicate, []).append(clause)
+        facts = [atom for atom in clause.body if isinstance(atom, PredicateAtom)]
+        if len(facts) == len(clause.body) == 1 and isinstance(clause.head, PredicateAtom):
+            simple.setdefault(facts[0].predicate, []).append(clause)
 
     def implied(atoms: list[PredicateAtom]) -> set[PredicateAtom]:
         found = set(atoms)

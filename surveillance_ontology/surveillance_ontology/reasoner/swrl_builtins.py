@@ -102,7 +102,7 @@ def _modulo(first: _Number, second: _Number) -> _Number:
 
 def _power(base: _Number, exponent: _Number) -> _Number:
     if isinstance(base, float) or isinstance(exponent, float):
-        return float(base) ** float(exponent)
+        return math.pow(base, exponent)
     if not isinstance(exponent, int) or abs(exponent) > 1024:
         raise ValueError
     return Fraction(base) ** exponent

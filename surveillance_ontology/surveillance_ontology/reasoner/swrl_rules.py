@@ -57,7 +57,7 @@ class _Terms:
 
 
 def _unsupported(text: str) -> None:
-    from surveillance_ontology.reasoner.normalisation import Unsupported
+    from surveillance_ontology.reasoner.left_sides import Unsupported
 
     raise Unsupported(text)
 
@@ -66,8 +66,9 @@ def _computed(atom: ax.BuiltinAtom, terms: _Terms) -> ComputedAtom:
     name = atom.builtin.removeprefix(SWRLB)
     known = builtin(name, len(atom.arguments)) if atom.builtin.startswith(SWRLB) else None
     if known is None:
+        count = len(atom.arguments)
         _unsupported(
-            f'the built-in {local_name(atom.builtin)} with {len(atom.arguments)} arguments is not supported'
+            f'the built-in {local_name(atom.builtin)} with {count} arguments is not supported'
         )
         raise AssertionError
     holds, solve = known

@@ -224,7 +224,7 @@ class ThresholdIndex:
                 self._doom_head(keyed)
 
     def _proven_reach(self) -> Any:
-        """The greatest remaining reach whose facts have a proof and so cannot go by what is going."""
+        """The greatest remaining reach whose facts have a proof, and so stay whatever goes."""
         for reach, row in reversed(self._reaches):
             for premises in self._reach_exists(*row):
                 if all(map(self.proves, premises)):

@@ -73,7 +73,7 @@ class Translation:
             if axiom.cls == THING:
                 return None
             if axiom.cls == NOTHING:
-                return self._nothing, individual
+                return self.program.nothing, individual
             if isinstance(axiom.cls, str):
                 return self.program.cls(axiom.cls), individual
             label = self.program.labels.get(axiom.cls)

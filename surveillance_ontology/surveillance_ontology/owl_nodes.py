@@ -1,0 +1,259 @@
+"""The nodes of an RDF graph as what they stand for: lists, class expressions, data ranges."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from surveillance_ontology import axioms as ax
+from surveillance_ontology.axioms import OWL, RDF, RDFS, SWRL, XSD, Axiom, Literal, local_name
+from surveillance_ontology.rdf_xml import Graph, Node, RdfSyntaxError
+
+_TYPE = RDF + 'type'
+DECLARATIONS = {
+    OWL + 'Class': 'class',
+    RDFS + 'Class': 'class',
+    OWL + 'ObjectProperty': 'object_property',
+    OWL + 'DatatypeProperty': 'data_property',
+    OWL + 'AnnotationProperty': 'annotation_property',
+    OWL + 'OntologyProperty': 'annotation_property',
+    OWL + 'NamedIndividual': 'individual',
+    RDFS + 'Datatype': 'datatype',
+    OWL + 'DataRange': 'datatype',
+}
+CHARACTERISTICS: dict[str, Callable[[ax.PropertyExpression], Axiom]] = {
+    OWL + 'InverseFunctionalProperty': ax.InverseFunctionalObjectProperty,
+    OWL + 'ReflexiveProperty': ax.ReflexiveObjectProperty,
+    OWL + 'IrreflexiveProperty': ax.IrreflexiveObjectProperty,
+    OWL + 'SymmetricProperty': ax.SymmetricObjectProperty,
+    OWL + 'AsymmetricProperty': ax.AsymmetricObjectProperty,
+    OWL + 'TransitiveProperty': ax.TransitiveObjectProperty,
+}
+ANNOTATIONS = {
+    *(RDFS + name for name in ('label', 'comment', 'seeAlso', 'isDefinedBy')),
+    *(OWL + name for name in ('versionInfo', 'versionIRI', 'deprecated', 'priorVersion')),
+    *(OWL + name for name in ('backwardCompatibleWith', 'incompatibleWith')),
+}
+_CARDINALITIES = (
+    ('minCardinality', 'minQualifiedCardinality', ax.ObjectMinCardinality, ax.DataMinCardinality),
+    ('maxCardinality', 'maxQualifiedCardinality', ax.ObjectMaxCardinality, ax.DataMaxCardinality),
+    ('cardinality', 'qualifiedCardinality', ax.ObjectExactCardinality, ax.DataExactCardinality),
+)
+BUILT_IN = (OWL, RDF, RDFS, XSD, SWRL)
+
+
+class NodeReader:
+    """Indexes a graph by subject; reads lists, property and class expressions, data ranges."""
+
+    def __init__(self, graph: Graph) -> None:
+        self.unsupported: list[str] = []
+        self.iri = ''
+        self._places = graph.places
+        self._subject_read = ''
+        self._nodes: dict[str, dict[str, list[Node]]] = {}
+        self._kinds: dict[str, set[str]] = {}
+        self._expressions: dict[str, ax.ClassExpression] = {}
+        self._open: set[str] = set()
+        self._variables: set[str] = set()
+        for subject, predicate, value in graph.triples:
+            self._nodes.setdefault(subject, {}).setdefault(predicate, []).append(value)
+            if predicate == _TYPE and isinstance(value, str):
+                kind = DECLARATIONS.get(value)
+                if kind is not None:
+                    self._kinds.setdefault(subject, set()).add(kind)
+                elif value == OWL + 'Ontology' and not self.iri:
+                    self.iri = subject
+                elif value in CHARACTERISTICS:
+                    self._kinds.setdefault(subject, set()).add('object_property')
+                elif value == SWRL + 'Variable':
+                    self._variables.add(subject)
+        self._guess_kinds()
+
+    def _guess_kinds(self) -> None:
+        """Undeclared properties with a datatype as range, or a literal as value, are data
+        properties.
+        """
+        guessed: set[str] = set()
+        for subject, properties in self._nodes.items():
+            for predicate, values in properties.items():
+                if predicate == RDFS + 'range':
+                    if any(isinstance(v, str) and self._is_data_range(v) for v in values):
+                        guessed.add(subject)
+                elif any(isinstance(value, Literal) for value in values):
+                    guessed.add(predicate)
+        for name in guessed - ANNOTATIONS:
+            if not name.startswith(BUILT_IN):
+                self._kinds.setdefault(name, {'data_property'})
+
+    # --- reporting ---
+
+    def _where(self, node: str) -> str:
+        place = self._places.get(node)
+        return f'line {place[0]}: ' if place else ''
+
+    def _report(self, node: str, what: str) -> None:
+        self.unsupported.append(self._where(node) + what)
+
+    def _fail(self, node: str, message: str) -> RdfSyntaxError:
+        place = self._places.get(node) or self._places.get(self._subject_read, (0, 0))
+        return RdfSyntaxError(message, *place)
+
+    # --- reading parts ---
+
+    def _one(self, node: str, predicate: str) -> Node | None:
+        values = self._nodes.get(node, {}).get(predicate)
+        return values[0] if values else None
+
+    def _resource(self, node: str, predicate: str) -> str:
+        value = self._one(node, predicate)
+        if not isinstance(value, str):
+            raise self._fail(node, f'expected a resource as {local_name(predicate)}, got {value!r}')
+        return value
+
+    def _list(self, head: Node) -> list[Node]:
+        items: list[Node] = []
+        seen: set[str] = set()
+        node = head
+        while node != RDF + 'nil':
+            if not isinstance(node, str) or node in seen:
+                raise self._fail(str(head), 'expected a list that ends in rdf:nil')
+            seen.add(node)
+            first = self._one(node, RDF + 'first')
+            rest = self._one(node, RDF + 'rest')
+            if first is None or rest is None:
+                raise self._fail(node, 'expected rdf:first and rdf:rest in a list')
+            items.append(first)
+            node = rest
+        return items
+
+    def _resources(self, head: Node) -> list[str]:
+        items = self._list(head)
+        for item in items:
+            if not isinstance(item, str):
+                raise self._fail(
+                    str(head), f'expected resources in a list, got the literal {item.lexical!r}'
+                )
+        return items  # type: ignore[return-value]
+
+    def _property(self, node: str) -> ax.PropertyExpression:
+        inverse = self._one(node, OWL + 'inverseOf')
+        if node.startswith('_:') and isinstance(inverse, str):
+            return ax.ObjectInverseOf(inverse)
+        return node
+
+    def _is_data(self, prop: str, range_node: Node | None = None) -> bool:
+        kinds = self._kinds.get(prop, ())
+        if 'object_property' in kinds:
+            return False
+        if 'data_property' in kinds:
+            return True
+        return isinstance(range_node, str) and self._is_data_range(range_node)
+
+    def _is_data_range(self, node: str) -> bool:
+        if 'datatype' in self._kinds.get(node, ()) or node == RDFS + 'Literal':
+            return True
+        return node.startswith(XSD)
+
+    def _number(self, node: str, predicate: str) -> int | None:
+        value = self._one(node, predicate)
+        if value is None:
+            return None
+        try:
+            number = int(value.lexical) if isinstance(value, Literal) else -1
+        except ValueError:
+            number = -1
+        if number < 0:
+            shown = value.lexical if isinstance(value, Literal) else value
+            raise self._fail(
+                node, f'expected a whole number as {local_name(predicate)}, got {shown!r}'
+            )
+        return number
+
+    def data_range(self, node: Node) -> ax.DataRange:
+        """The data range a node stands for."""
+        if not isinstance(node, str):
+            raise RdfSyntaxError(f'expected a data range, got the literal {node.lexical!r}')
+        if not node.startswith('_:'):
+            return node
+        properties = self._nodes.get(node, {})
+        if OWL + 'oneOf' in properties:
+            items = self._list(properties[OWL + 'oneOf'][0])
+            return ax.DataOneOf(tuple(item for item in items if isinstance(item, Literal)))
+        for predicate, record in (
+            (OWL + 'intersectionOf', ax.DataIntersectionOf),
+            (OWL + 'unionOf', ax.DataUnionOf),
+        ):
+            if predicate in properties:
+                return record(tuple(map(self.data_range, self._list(properties[predicate][0]))))
+        if OWL + 'datatypeComplementOf' in properties:
+            return ax.DataComplementOf(self.data_range(properties[OWL + 'datatypeComplementOf'][0]))
+        if OWL + 'onDatatype' in properties:
+            facets = []
+            for facet in self._resources(self._one(node, OWL + 'withRestrictions') or RDF + 'nil'):
+                for name, values in self._nodes.get(facet, {}).items():
+                    facets += [(name, value) for value in values if isinstance(value, Literal)]
+            return ax.DatatypeRestriction(self._resource(node, OWL + 'onDatatype'), tuple(facets))
+        raise self._fail(node, 'expected a data range')
+
+    def expression(self, node: Node) -> ax.ClassExpression:
+        """The class expression a node stands for."""
+        if not isinstance(node, str):
+            raise RdfSyntaxError(f'expected a class, got the literal {node.lexical!r}')
+        if not node.startswith('_:'):
+            return node
+        known = self._expressions.get(node)
+        if known is not None:
+            return known
+        if node in self._open:
+            raise self._fail(node, 'a class expression contains itself')
+        self._open.add(node)
+        expression = self._expressions[node] = self._expression(node)
+        self._open.discard(node)
+        return expression
+
+    def _expression(self, node: str) -> ax.ClassExpression:
+        properties = self._nodes.get(node, {})
+        for predicate, record in (
+            (OWL + 'intersectionOf', ax.ObjectIntersectionOf),
+            (OWL + 'unionOf', ax.ObjectUnionOf),
+        ):
+            if predicate in properties:
+                return record(tuple(map(self.expression, self._list(properties[predicate][0]))))
+        if OWL + 'complementOf' in properties:
+            return ax.ObjectComplementOf(self.expression(properties[OWL + 'complementOf'][0]))
+        if OWL + 'oneOf' in properties:
+            return ax.ObjectOneOf(tuple(self._resources(properties[OWL + 'oneOf'][0])))
+        if OWL + 'onProperty' in properties:
+            return self._restriction(node, properties)
+        raise self._fail(node, 'expected a class expression')
+
+    def _restriction(self, node: str, properties: dict[str, list[Node]]) -> ax.ClassExpression:
+        on = self._resource(node, OWL + 'onProperty')
+        prop = self._property(on)
+        filler = self._one(node, OWL + 'someValuesFrom') or self._one(node, OWL + 'allValuesFrom')
+        if OWL + 'hasValue' in properties:
+            value = properties[OWL + 'hasValue'][0]
+            if isinstance(value, Literal):
+                return ax.DataHasValue(on, value)
+            return ax.ObjectHasValue(prop, value)
+        if OWL + 'hasSelf' in properties:
+            return ax.ObjectHasSelf(prop)
+        if filler is not None:
+            some = OWL + 'someValuesFrom' in properties
+            if self._is_data(on, filler):
+                data = ax.DataSomeValuesFrom if some else ax.DataAllValuesFrom
+                return data(on, self.data_range(filler))
+            quantified = ax.ObjectSomeValuesFrom if some else ax.ObjectAllValuesFrom
+            return quantified(prop, self.expression(filler))
+        on_class = self._one(node, OWL + 'onClass')
+        on_range = self._one(node, OWL + 'onDataRange')
+        counts_values = on_range is not None or (on_class is None and self._is_data(on))
+        for plain, qualified, of_objects, of_data in _CARDINALITIES:
+            number = self._number(node, OWL + plain)
+            if number is None:
+                number = self._number(node, OWL + qualified)
+            if number is None:
+                continue
+            if counts_values:
+                return of_data(number, on, self.data_range(on_range or RDFS + 'Literal'))
+            return of_objects(number, prop, self.expression(on_class or OWL + 'Thing'))
+        raise self._fail(node, f'restriction on {local_name(on)} states nothing that is understood')
