@@ -9,9 +9,11 @@ from __future__ import annotations
 
 import importlib.util
 import io
+import itertools
 import shutil
 import threading
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 from typing import Any
 
 from surveillance_ontology.axioms import (
@@ -28,6 +30,7 @@ from surveillance_ontology.axioms import (
 )
 from surveillance_ontology.explanation import Explanation
 from surveillance_ontology.knowledge_base import Fact, KnowledgeBase
+from surveillance_ontology.knowledge_changes import Changes
 from surveillance_ontology.owl_writing import ontology_bytes
 
 KINDS = ('hermit', 'pellet')
@@ -63,6 +66,7 @@ class JavaKnowledgeBase(KnowledgeBase):
         self._java: frozenset[Axiom] = frozenset()
         self._java_consistent = True
         self._reasoned = False
+        self._java_told: list[Callable[[Changes], None]] = []
 
     def reason(self) -> bool:
         """Bring what is derived up to date; whether the ontology is consistent.
@@ -82,8 +86,31 @@ class JavaKnowledgeBase(KnowledgeBase):
         come = tuple((axiom, True) for axiom in self._java - before)
         gone = tuple((axiom, True) for axiom in before - self._java)
         if come or gone:
-            self._publish(come, gone)
+            for tell in tuple(self._java_told):
+                tell(Changes(0, come, gone, self.consistent))
         return self.consistent
+
+    def subscribe(self, callback: Callable[[Changes], None]) -> Callable[[], None]:
+        """Call back once per batch of assertions and once per reasoner that changed derived facts.
+
+        Returns:
+            A function that ends the subscription.
+        """
+        numbers = itertools.count(1)
+
+        def tell(changes: Changes) -> None:
+            number = next(numbers)
+            callback(replace(changes, sequence=number, consistent=self.consistent))
+
+        unsubscribe = super().subscribe(tell)
+        self._java_told.append(tell)
+
+        def end() -> None:
+            unsubscribe()
+            if tell in self._java_told:
+                self._java_told.remove(tell)
+
+        return end
 
     def _further(self) -> frozenset[Axiom] | None:
         """What holds beyond the native derivations; None: there is a contradiction."""

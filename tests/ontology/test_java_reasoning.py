@@ -7,9 +7,11 @@ from pathlib import Path
 import pytest
 
 from surveillance_ontology import java_reasoning
+from surveillance_ontology.armor.change_feed import ChangeFeed
 from surveillance_ontology.armor.service import ArmorService
 from surveillance_ontology.armor.settings import DATA, Settings
 from surveillance_ontology.armor.store import Store
+from surveillance_ontology.axioms import ClassAssertion
 
 from .seven_rooms import FIXTURES, IRI, ONTOLOGY, asker, names
 
@@ -67,6 +69,7 @@ def test_hermit_derives_what_the_native_reasoner_does_not(tmp_path: Path) -> Non
         return ArmorService(limits, store=Store(tmp_path / 'store'))
 
     service = start()
+    feed = ChangeFeed(service, lambda: None)
     ask = asker(service)
     for name, reasoner in (('map', 'hermit'), ('native', 'native')):
         ask('LOAD FILE', 'u.owl', IRI, 'false', reasoner, 'true', reference=name)
@@ -75,6 +78,8 @@ def test_hermit_derives_what_the_native_reasoner_does_not(tmp_path: Path) -> Non
         ask('ADD OBJECTPROP IND', 'beside', 'x', 'y', reference=name)
         ask('REASON', reference=name)
     assert names(ask('QUERY IND', 'x', reference='native')) == ['A', 'E']
+    came = [axiom for change in feed.take() for axiom, derived in change.added if derived]
+    assert ClassAssertion(f'{IRI}#C', f'{IRI}#x') in came
     assert names(ask('QUERY IND', 'x')) == ['A', 'C', 'D', 'E']
     assert names(ask('QUERY IND CLASS', 'D')) == ['x']
     assert names(ask('QUERY OBJECTPROP IND', 'near', 'x')) == ['y']

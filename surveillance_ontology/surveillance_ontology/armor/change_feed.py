@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from surveillance_ontology.armor.service import ArmorService
 from surveillance_ontology.axioms import Axiom
-from surveillance_ontology.knowledge_base import Changes
+from surveillance_ontology.knowledge_changes import Changes
 
 LARGE = 2000
 """Facts in one change from which on it is only counted."""

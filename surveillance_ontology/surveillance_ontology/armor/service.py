@@ -40,7 +40,7 @@ from surveillance_ontology.armor.sparql import SparqlEngine
 from surveillance_ontology.armor.store import Store
 from surveillance_ontology.armor.table import Directive, Kind, look_up
 from surveillance_ontology.java_reasoning import JavaReasonerError
-from surveillance_ontology.knowledge_base import Changes
+from surveillance_ontology.knowledge_changes import Changes
 from surveillance_ontology.owl_writing import OntologyWriteError, write_ontology
 
 LONG_ARGUMENTS = 1000

@@ -1,0 +1,181 @@
+"""The ontology says of a place what the place says of itself, through every change of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from surveillance_ontology.armor.client import ArmorClient, ArmorServiceCallError
+from surveillance_ontology.armor.in_process import InProcessTransport
+from surveillance_ontology.armor.operations import Batch
+from surveillance_ontology.armor.protocol import (
+    DirectiveRequest,
+    DirectiveResponse,
+    ListResponse,
+)
+from surveillance_ontology.armor.service import ArmorService
+from surveillance_ontology.map_building import (
+    MapBuilding,
+    RoomNote,
+    closed_doors,
+    extended,
+    shown_doors,
+)
+from surveillance_ontology.map_keeper import MapKeeper, Reports
+from surveillance_ontology.place import Place, PlaceError, make_place
+
+from .seven_rooms import IRI, ONTOLOGY, SEVEN_ROOMS
+
+ROOMS = [*SEVEN_ROOMS, 'N1', 'N2']
+DOORS = [*sorted({door for doors in SEVEN_ROOMS.values() for door in doors}), 'X1', 'X2']
+
+
+def seven() -> Place:
+    positions = {room: [float(n), 0.0] for n, room in enumerate(SEVEN_ROOMS)}
+    return make_place(SEVEN_ROOMS, positions, 'E', ['E'])
+
+
+Edit = Callable[[Place], Place]
+EDITS = st.one_of(
+    st.builds(
+        lambda door, is_open: lambda place: place.with_door(door, is_open=is_open),
+        st.sampled_from(DOORS),
+        st.booleans(),
+    ),
+    st.builds(
+        lambda room, doors: lambda place: place.with_room(room, (0.0, 0.0, 0.0), doors),
+        st.sampled_from(ROOMS),
+        st.lists(st.sampled_from(DOORS), min_size=1, max_size=2, unique=True),
+    ),
+    st.builds(lambda room: lambda place: place.without_room(room), st.sampled_from(ROOMS)),
+)
+
+
+@settings(max_examples=25, deadline=None, derandomize=True)
+@given(st.lists(EDITS, max_size=8))
+def test_connections_are_those_of_the_place_after_any_edits(edits: list[Edit]) -> None:
+    service = ArmorService(warn=lambda _: None)
+    client = ArmorClient('test', 'map', InProcessTransport(service))
+    building = MapBuilding(client, ONTOLOGY, IRI)
+    place = building.build(seven(), 100, 'E')
+    for edit in edits:
+        try:
+            after = edit(place)
+        except PlaceError:
+            continue
+        building.change(place, after, 200)
+        place = after
+    assert client.query.ind_b2_class('LOCATION') == sorted(place.rooms)
+    for room in place.rooms:
+        neighbours = sorted(set(place.neighbours(room)))
+        assert client.query.objectprop_b2_ind('connectedTo', room) == neighbours
+    assert client.utils.sync_buffered_reasoner(), 'consistent'
+    assert building.build(place, 300, 'E').closed == {
+        door for door in place.closed if len(place.doors[door]) > 1
+    }
+    service.close()
+
+
+@given(st.sets(st.sampled_from(sorted(seven().doors))))
+@settings(max_examples=60, deadline=None, derandomize=True)
+def test_closed_doors_are_recognised_again(closed: set[str]) -> None:
+    place = seven()
+    for door in closed:
+        place = place.with_door(door, is_open=False)
+    shown = shown_doors(place)
+    assert closed_doors(place, shown) == closed
+    hidden = sum(len(doors) for doors in SEVEN_ROOMS.values()) - sum(map(len, shown.values()))
+    assert hidden == len(closed), 'each closed door stays on one of its sides'
+
+
+def test_a_map_grows_by_messages() -> None:
+    first = extended(
+        None,
+        [
+            RoomNote('A', (0, 0, 0), (('B', 'D1'),)),
+            RoomNote('B', (1, 0, 0), (('A', 'D1'), ('C', 'D2'))),
+        ],
+        'A',
+    )
+    assert first.rooms == {'A': ('D1',), 'B': ('D1', 'D2')}
+    second = extended(first, [RoomNote('C', (2, 0, 0), (('A', 'D3'),))], '')
+    assert second.rooms['A'] == ('D1', 'D3'), 'the other side of a new door is entered as well'
+    assert second.start == 'A'
+    moved = extended(second, [RoomNote('C', (5, 0, 0), (('A', 'D3'),))], 'C')
+    assert (moved.positions['C'], moved.start) == ((5, 0, 0), 'C')
+    for notes, robot_room, words in (
+        ([], '', 'no rooms'),
+        ([RoomNote('A', (0, 0, 0), (('A', 'D1'),))], '', 'connected to itself'),
+        ([RoomNote('A', (0, 0, 0), ())], '', 'no doors'),
+        ([RoomNote('A', (0, 0, 0), (('B', 'D1'),))] * 2, '', 'described twice'),
+        ([RoomNote('A', (0, 0, 0), (('B', 'D1'),))], 'Z', "no room 'Z'"),
+    ):
+        with pytest.raises(PlaceError, match=words):
+            extended(None, notes, robot_room)
+
+
+class Flaky(InProcessTransport):
+    """A transport to a server that is away for the first calls."""
+
+    def __init__(self, service: ArmorService, away: int) -> None:
+        super().__init__(service)
+        self.away = away
+
+    def call(self, request: DirectiveRequest) -> DirectiveResponse:
+        self._reach()
+        return super().call(request)
+
+    def call_list(self, requests: Batch) -> ListResponse:
+        self._reach()
+        return super().call_list(requests)
+
+    def _reach(self) -> None:
+        if self.away > 0:
+            self.away -= 1
+            raise ArmorServiceCallError('no server')
+
+
+def test_the_keeper_goes_on_until_the_server_is_there(tmp_path: Path) -> None:
+    service = ArmorService(warn=lambda _: None)
+    transport = Flaky(service, away=3)
+    client = ArmorClient('test', 'map', transport)
+    said: dict[str, list[str]] = {'info': [], 'warn': [], 'refused': [], 'failed': []}
+    built: list[int] = []
+
+    def keeper(path: str) -> MapKeeper:
+        return MapKeeper(
+            MapBuilding(client, path, IRI),
+            seven(),
+            lambda: 100,
+            lambda: False,
+            Reports(**{kind: lines.append for kind, lines in said.items()}),
+            lambda: built.append(1),
+        )
+
+    kept = keeper(ONTOLOGY)
+    kept.ensure_built()
+    assert (kept.is_built, built, len(said['warn'])) == (True, [1], 1)
+    kept.ensure_built()
+    assert built == [1], 'it is there'
+    assert kept.edit(lambda place: place.with_door('D1', is_open=False)) == ''
+    kept.robot_room = 'C1'
+    client.utils.drop_ref()
+    kept.ensure_built()
+    assert client.query.objectprop_b2_ind('canReach', 'Robot1') == ['C2', 'E', 'R2']
+    transport.away = 100
+    assert kept.edit(lambda place: place.with_door('D1', is_open=True)).startswith(
+        'the ontology was not changed'
+    )
+    assert kept.place is not None
+    assert 'D1' in kept.place.closed, 'what the ontology does not have is not remembered either'
+    transport.away = 0
+    kept.extend([RoomNote('R9', (0, 0, 0), (('R9', 'D9'),))], '')
+    assert 'connected to itself' in said['refused'][0]
+    client.utils.drop_ref()
+    keeper(str(tmp_path / 'none.owl')).ensure_built()
+    assert said['failed'][0].startswith('cannot build the map: path ')
+    service.close()
