@@ -84,7 +84,7 @@ def _history(container: ActiveContainer) -> History | None:
     if frame is None:
         return container._fsm_history
     if isinstance(container, DrivenContainer):
-        return container._history_of(frame, frame.current)
+        return frame.history(frame.current)
     if isinstance(container, Concurrence):
         return History(outcomes=container._ended())
     return None

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Hashable, Iterable, Mapping
 from collections.abc import Sequence as LabelSequence
 from typing import Any
 
 from surveillance_behaviour.fsm import log
 from surveillance_behaviour.fsm.active import ActiveContainer, forget, stop_for_now
-from surveillance_behaviour.fsm.container import describe
 from surveillance_behaviour.fsm.engine import (
+    LOWEST,
     RESUME,
     SUSPENDED,
     Branch,
@@ -21,19 +21,21 @@ from surveillance_behaviour.fsm.engine import (
 from surveillance_behaviour.fsm.exceptions import (
     InvalidStateError,
     InvalidTransitionError,
-    InvalidUserCodeError,
     SmachError,
 )
 from surveillance_behaviour.fsm.interface import has_smach_interface
-from surveillance_behaviour.fsm.limits import Limits, limited, make_limits
-from surveillance_behaviour.fsm.run import LeftBehind, Strand, keep_out, supervise
+from surveillance_behaviour.fsm.limits import Limits, make_limits
+from surveillance_behaviour.fsm.nodes import make_node, user_fault, wrong_outcome
+from surveillance_behaviour.fsm.outcome_policy import (
+    ChildTerminationCallback,
+    OutcomeCallback,
+    OutcomePolicy,
+    Outcomes,
+)
+from surveillance_behaviour.fsm.run import LeftBehind, Strand, supervise
 from surveillance_behaviour.fsm.state import State
-from surveillance_behaviour.fsm.user_data import Remapper, UserData, undeclared_write
-from surveillance_behaviour.fsm.waiting import Interrupt
-
-Outcomes = dict[str, str | None]
-ChildTerminationCallback = Callable[[Outcomes], bool | Iterable[str] | None]
-OutcomeCallback = Callable[[Outcomes], str | None]
+from surveillance_behaviour.fsm.user_data import UserData
+from surveillance_behaviour.fsm.waiting import Clock, Interrupt
 
 _TOGETHER = Exit('')
 
@@ -76,29 +78,18 @@ class Concurrence(ActiveContainer):
         self._states: dict[str, State] = {}
         self._remappings: dict[str, dict[str, str]] = {}
         self._limits: dict[str, Limits] = {}
-        self._default_outcome = default_outcome
-        self._outcome_map = {key: dict(value) for key, value in (outcome_map or {}).items()}
-        self._outcome_cb = outcome_cb
-        self._child_termination_cb = child_termination_cb
+        self._policy = OutcomePolicy(
+            frozenset(self._outcomes),
+            default_outcome,
+            outcome_map,
+            outcome_cb,
+            child_termination_cb,
+        )
         self._child_outcomes: Outcomes = {}
         self._wakeup = Interrupt()
         self._strands: dict[str, Strand] = {}
         self._nodes: dict[str, Node] = {}
         self._making_way: set[str] = set()
-        faults = []
-        for outcome in (default_outcome, *self._outcome_map):
-            if outcome not in self._outcomes:
-                faults.append(f'{outcome!r} is not one of its outcomes {sorted(self._outcomes)}')
-        for name, callback in (
-            ('outcome_cb', outcome_cb),
-            ('child_termination_cb', child_termination_cb),
-        ):
-            if callback is not None and not callable(callback):
-                faults.append(f'{name} {callback!r} cannot be called')
-        if faults:
-            raise InvalidStateError(
-                f'The outcome policy of a Concurrence is wrong: {"; ".join(faults)}'
-            )
 
     @staticmethod
     def add(
@@ -142,16 +133,7 @@ class Concurrence(ActiveContainer):
     def check_consistency(self) -> None:
         """Raise `InvalidTransitionError` when the outcome map does not fit the states."""
         faults = [] if self._states else ['it has no states']
-        for outcome, wanted in self._outcome_map.items():
-            for label, child_outcome in wanted.items():
-                state = self._states.get(label)
-                if state is None:
-                    faults.append(f"outcome '{outcome}' asks for state '{label}', which it lacks")
-                elif child_outcome not in state.get_registered_outcomes():
-                    faults.append(
-                        f"outcome '{outcome}' asks for '{child_outcome}' of state '{label}', whose "
-                        f'outcomes are {sorted(state.get_registered_outcomes())}'
-                    )
+        faults += self._policy.faults(self._states)
         faults += self._branch_faults()
         if faults:
             raise InvalidTransitionError(
@@ -223,7 +205,7 @@ class Concurrence(ActiveContainer):
             if outcome is not None:
                 return outcome
         self._service_children()
-        return self._decide()
+        return self._policy.decide(self._fsm_path, self._child_outcomes)
 
     def _ended(self) -> dict[str, str]:
         return {label: end for label, end in self._child_outcomes.items() if end is not None}
@@ -250,32 +232,20 @@ class Concurrence(ActiveContainer):
             elif frame.suspending or self._urgent(frame):
                 self._cut(frame)
 
-    def _node(self, label: str, state: State, clock: Any) -> Node:
-        path = self._path_of(label)
-        remapping = self._remappings.get(label, {})
-
-        def make_view() -> Remapper:
-            return Remapper(
-                self.userdata,
-                state.get_registered_input_keys(),
-                state.get_registered_output_keys(),
-                remapping,
-                None,
-                path,
-            )
-
-        node = Node(label, state, make_view)
+    def _node(self, label: str, state: State, clock: Clock, priority: float = LOWEST) -> Node:
+        node = make_node(
+            self._path_of(label),
+            state,
+            self.userdata,
+            clock,
+            remapping=self._remappings.get(label),
+            limits=self._limits.get(label),
+            priority=priority,
+        )
         for outcome in state.get_registered_outcomes():
             node.targets[outcome] = _TOGETHER
-        if isinstance(state, State):
-            state._fsm_clock = clock
-        left = getattr(state, '_fsm_left', None)
-        if left is not None and not left.is_set():
-            keep_out(node, left)
-        node.limits = self._limits.get(label)
-        if node.limits is not None:
+        if node.limits is not None and node.limits.late_outcome:
             node.targets.setdefault(node.limits.late_outcome, _TOGETHER)
-            node.execute = limited(path, node, node.limits)
         return node
 
     def _execute(self, node: Node) -> Any:
@@ -285,16 +255,9 @@ class Concurrence(ActiveContainer):
         except SmachError:
             raise
         except Exception as error:
-            undeclared = undeclared_write(node.view, error)
-            raise undeclared or InvalidUserCodeError(
-                f"State '{path}' of type {type(node.state).__name__} raised {describe(error)}"
-            ) from error
-        if outcome not in node.targets:
-            returned = 'None instead of an outcome' if outcome is None else f'outcome {outcome!r}'
-            raise InvalidTransitionError(
-                f"State '{path}' of type {type(node.state).__name__} returned {returned}: its "
-                f'outcomes are {sorted(node.state.get_registered_outcomes())}'
-            )
+            raise user_fault(path, node, error) from error
+        if not isinstance(outcome, Hashable) or outcome not in node.targets:
+            raise wrong_outcome(path, node, outcome)
         return outcome
 
     def _await_children(self, frame: Frame) -> BaseException | None:
@@ -315,10 +278,12 @@ class Concurrence(ActiveContainer):
                 self._note_end(frame, label, strand.outcome)
                 if first_error is None:
                     try:
-                        self._child_ended(running)
+                        stop = self._policy.to_stop(self._fsm_path, self._child_outcomes)
                     except SmachError as error:
-                        first_error = error
-                        self._stop(running, _preempt)
+                        first_error, stop = error, frozenset(running)
+                    self._stop(
+                        {other: running[other] for other in stop if other in running}, _preempt
+                    )
         with run.condition:
             self._strands = {}
         return first_error
@@ -343,24 +308,6 @@ class Concurrence(ActiveContainer):
             log.loginfo(f"'{frame.path}': '{label}' ended with '{outcome}'")
         self.call_transition_cbs()
 
-    def _child_ended(self, running: dict[str, Strand]) -> None:
-        if self._child_termination_cb is None:
-            return
-        try:
-            stop = self._child_termination_cb(dict(self._child_outcomes))
-        except Exception as error:
-            raise InvalidUserCodeError(
-                f"The child_termination_cb of '{self._fsm_path}' raised {describe(error)}"
-            ) from error
-        if stop is True:
-            self._stop(running, _preempt)
-        elif stop:
-            labels = [stop] if isinstance(stop, str) else list(stop)
-            self._stop(
-                {label: strand for label, strand in running.items() if label in labels},
-                _preempt,
-            )
-
     def _stop(self, strands: Mapping[str, Strand], ask: Callable[[State], object]) -> None:
         for label, strand in strands.items():
             if not strand.done:
@@ -383,28 +330,6 @@ class Concurrence(ActiveContainer):
                 log.logwarn(f"'{self._fsm_path}': {ignored} did not acknowledge the preempt")
             else:
                 self.service_preempt()
-
-    def _decide(self) -> str:
-        ends = dict(self._child_outcomes)
-        outcome, most = self._default_outcome, 0
-        for name, wanted in self._outcome_map.items():
-            if len(wanted) >= most and all(ends[label] == end for label, end in wanted.items()):
-                outcome, most = name, len(wanted)
-        if self._outcome_cb is not None:
-            try:
-                chosen = self._outcome_cb(ends)
-            except Exception as error:
-                raise InvalidUserCodeError(
-                    f"The outcome_cb of '{self._fsm_path}' raised {describe(error)}"
-                ) from error
-            if chosen:
-                if chosen not in self._outcomes:
-                    raise InvalidTransitionError(
-                        f"The outcome_cb of '{self._fsm_path}' returned {chosen!r}: the outcomes "
-                        f'are {sorted(self._outcomes)}'
-                    )
-                outcome = chosen
-        return outcome
 
     # Preempts and interrupts.
 
@@ -462,8 +387,7 @@ class Concurrence(ActiveContainer):
         """Run an interrupt's state; None to go on with the children."""
         run = frame.strand.run
         self._remappings[branch.label] = branch.remapping
-        node = self._node(branch.label, branch.state, run.clock)
-        node.priority = branch.priority
+        node = self._node(branch.label, branch.state, run.clock, branch.priority)
         with run.condition:
             frame.cut = None
             frame.current = node
@@ -530,6 +454,6 @@ class Concurrence(ActiveContainer):
         """The outcome map as (child outcome, label, outcome)."""
         return [
             (child_outcome, label, outcome)
-            for outcome, wanted in self._outcome_map.items()
+            for outcome, wanted in self._policy.outcome_map.items()
             for label, child_outcome in wanted.items()
         ]

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import threading
 from abc import abstractmethod
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from typing import Any
 
 from surveillance_behaviour.fsm import log, shutdown
 from surveillance_behaviour.fsm.active import ActiveContainer, forget, stop_for_now
-from surveillance_behaviour.fsm.container import Container, describe
+from surveillance_behaviour.fsm.container import Container
 from surveillance_behaviour.fsm.engine import (
     LOWEST,
     RESUME,
@@ -22,19 +22,16 @@ from surveillance_behaviour.fsm.engine import (
     SUSPENDED,
     Exit,
     Frame,
-    History,
     Node,
 )
 from surveillance_behaviour.fsm.exceptions import (
     InvalidStateError,
-    InvalidTransitionError,
-    InvalidUserCodeError,
     SmachError,
 )
 from surveillance_behaviour.fsm.limits import settle
-from surveillance_behaviour.fsm.run import LeftBehind, Strand, keep_out
+from surveillance_behaviour.fsm.nodes import make_node, user_fault, wrong_outcome
+from surveillance_behaviour.fsm.run import LeftBehind, Strand
 from surveillance_behaviour.fsm.state import State
-from surveillance_behaviour.fsm.user_data import Remapper, undeclared_write
 from surveillance_behaviour.fsm.waiting import Clock
 
 _start_lock = threading.Lock()
@@ -82,44 +79,21 @@ class DrivenContainer(ActiveContainer):
             self._fsm_clock = clock
             self._table = self._make_table()
             self._add_branches()
-            for node in self._table.values():
-                if isinstance(node.state, State):
-                    node.state._fsm_clock = clock
-                left = getattr(node.state, '_fsm_left', None)
-                if left is not None and not left.is_set():
-                    keep_out(node, left)
             self._table_made_for = made_for
         return self._table
 
-    def _node(
-        self,
-        label: str,
-        state: State,
-        remapping: Mapping[str, str],
-        constants: Mapping[str, Any] | None = None,
-        priority: float = LOWEST,
-    ) -> Node:
-        path = self._path_of(label)
-        userdata = self.userdata
-
-        def make_view() -> Remapper:
-            return Remapper(
-                userdata,
-                state.get_registered_input_keys(),
-                state.get_registered_output_keys(),
-                remapping,
-                constants,
-                path,
-            )
-
-        return Node(label, state, make_view, priority)
+    def _node(self, label: str, state: State, **options: Any) -> Node:
+        return make_node(self._path_of(label), state, self.userdata, self._fsm_clock, **options)
 
     def _add_branches(self) -> None:
         exits = {outcome: Exit(outcome) for outcome in self.get_registered_outcomes()}
         ordinary = dict(self._table)
         for branch in self._branches.values():
             node = self._node(
-                branch.label, branch.state, branch.remapping, priority=branch.priority
+                branch.label,
+                branch.state,
+                remapping=branch.remapping,
+                priority=branch.priority,
             )
             for outcome in branch.state.get_registered_outcomes():
                 name = branch.transitions.get(outcome, RESUME)
@@ -153,7 +127,7 @@ class DrivenContainer(ActiveContainer):
                 self._copy_input_keys(parent_ud, self.userdata)
                 self._begun(frame)
             else:
-                self._restore(frame, history)
+                frame.go_on_from(history, self._table)
             target = frame.current
             if log.chatty():
                 verb = 'starts in' if history is None else 'goes on in'
@@ -194,11 +168,11 @@ class DrivenContainer(ActiveContainer):
             except SmachError:
                 raise
             except Exception as error:
-                raise self._fault(node, error) from error
+                raise user_fault(self._path_of(node.label), node, error) from error
             try:
                 target = node.targets[outcome]
             except (KeyError, TypeError):
-                raise self._undeclared_outcome(node, outcome) from None
+                raise wrong_outcome(self._path_of(node.label), node, outcome) from None
             frame.current = target
             if frame.attention or shutdown.check is not None:
                 target = self._attend(frame, node, outcome, target)
@@ -211,7 +185,7 @@ class DrivenContainer(ActiveContainer):
         try:
             return node.targets[outcome]
         except (KeyError, TypeError):
-            raise self._undeclared_outcome(node, outcome) from None
+            raise wrong_outcome(self._path_of(node.label), node, outcome) from None
 
     def _finish(self, frame: Frame, target: Exit) -> Any:
         if target is _ASIDE:
@@ -264,7 +238,7 @@ class DrivenContainer(ActiveContainer):
                 if self._preempt_requested and isinstance(target, Node):
                     self._preempt_next(frame, target)
                 elif frame.suspending and isinstance(target, Node):
-                    self._fsm_history = self._history_of(frame, target)
+                    self._fsm_history = frame.history(target)
                     return _ASIDE
                 elif self._fsm_raised and not self._preempt_requested:
                     target, kind = self._branch_off(frame, target, kind)
@@ -435,49 +409,6 @@ class DrivenContainer(ActiveContainer):
             return
         frame.suspending = frame.attention = True
         self._cut(frame)
-
-    def _history_of(self, frame: Frame, target: Node | Exit) -> History:
-        return History(
-            target.label,
-            target.is_exit,
-            [(node.label, node.is_exit) for node in frame.saved],
-            frame.index,
-            items=frame.items,
-        )
-
-    def _restore(self, frame: Frame, history: History) -> None:
-        def place(label: str, leaving: bool) -> Node | Exit:
-            if leaving:
-                return Exit(label)
-            if label not in self._table:
-                raise InvalidStateError(
-                    f"'{self._fsm_path}' cannot resume in '{label}': its states are "
-                    f'{sorted(self._table)}'
-                )
-            return self._table[label]
-
-        frame.saved = [place(*saved) for saved in history.saved]
-        frame.current = place(history.current, history.leaving)
-        frame.index, frame.items = history.index, history.items
-        frame.repeat = True
-
-    # Errors.
-
-    def _fault(self, node: Node, error: Exception) -> SmachError:
-        undeclared = undeclared_write(node.view, error)
-        if undeclared is not None:
-            return undeclared
-        return InvalidUserCodeError(
-            f"State '{self._path_of(node.label)}' of type {type(node.state).__name__} raised "
-            f'{describe(error)}'
-        )
-
-    def _undeclared_outcome(self, node: Node, outcome: object) -> InvalidTransitionError:
-        returned = 'None instead of an outcome' if outcome is None else f'outcome {outcome!r}'
-        return InvalidTransitionError(
-            f"State '{self._path_of(node.label)}' of type {type(node.state).__name__} returned "
-            f'{returned}: its outcomes are {sorted(node.state.get_registered_outcomes())}'
-        )
 
     # The container's interface.
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from surveillance_behaviour.fsm.exceptions import InvalidStateError
 from surveillance_behaviour.fsm.state import State
 
 if TYPE_CHECKING:
@@ -99,6 +100,27 @@ Trace = Callable[[tuple[Any, ...]], object]
 """Takes (path, from, outcome, to, time, userdata, kind) of one transition; see `Control`."""
 
 
+@dataclass
+class History:
+    """Where a container that was put aside goes on.
+
+    Attributes:
+        current: Label of the state, or of the outcome when `leaving`.
+        leaving: `current` is an outcome of the container.
+        saved: Of the interrupts under way, where each goes on: (label, leaving).
+        index: How many items an iterator had begun, the current one included.
+        outcomes: Of a concurrence's children that had ended.
+    """
+
+    current: str = ''
+    leaving: bool = False
+    saved: list[tuple[str, bool]] = field(default_factory=list)
+    index: int = 0
+    outcomes: dict[str, str] = field(default_factory=dict)
+    # An iterator suspended in this process goes on with its own generator.
+    items: Any = None
+
+
 class Frame:
     """One execution of a container.
 
@@ -184,6 +206,37 @@ class Frame:
         frame.saved = list(self.saved)
         return frame
 
+    def history(self, target: Node | Exit) -> History:
+        """Where to go on when the container is put aside before `target`."""
+        return History(
+            target.label,
+            target.is_exit,
+            [(node.label, node.is_exit) for node in self.saved],
+            self.index,
+            items=self.items,
+        )
+
+    def go_on_from(self, history: History, table: Mapping[str, Node]) -> None:
+        """Begin where the container was put aside.
+
+        Raises:
+            InvalidStateError: It has no such state any more.
+        """
+
+        def place(label: str, leaving: bool) -> Node | Exit:
+            if leaving:
+                return Exit(label)
+            if label not in table:
+                raise InvalidStateError(
+                    f"'{self.path}' cannot go on in '{label}': its states are {sorted(table)}"
+                )
+            return table[label]
+
+        self.saved = [place(*saved) for saved in history.saved]
+        self.current = place(history.current, history.leaving)
+        self.index, self.items = history.index, history.items
+        self.repeat = True
+
     @property
     def wanted(self) -> bool:
         """Whether somebody wants the current state to end."""
@@ -193,27 +246,6 @@ class Frame:
             or self.suspending
             or self.forced is not None
         )
-
-
-@dataclass
-class History:
-    """Where a container that was put aside goes on.
-
-    Attributes:
-        current: Label of the state, or of the outcome when `leaving`.
-        leaving: `current` is an outcome of the container.
-        saved: Of the interrupts under way, where each goes on: (label, leaving).
-        index: How many items an iterator had begun, the current one included.
-        outcomes: Of a concurrence's children that had ended.
-    """
-
-    current: str = ''
-    leaving: bool = False
-    saved: list[tuple[str, bool]] = field(default_factory=list)
-    index: int = 0
-    outcomes: dict[str, str] = field(default_factory=dict)
-    # An iterator suspended in this process goes on with its own generator.
-    items: Any = None
 
 
 @dataclass

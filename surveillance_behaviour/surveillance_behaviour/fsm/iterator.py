@@ -14,7 +14,7 @@ from surveillance_behaviour.fsm.exceptions import (
     InvalidTransitionError,
     InvalidUserCodeError,
 )
-from surveillance_behaviour.fsm.limits import TIMEOUT, Limits, limited, make_limits
+from surveillance_behaviour.fsm.limits import TIMEOUT, Limits, make_limits
 from surveillance_behaviour.fsm.log import logwarn
 from surveillance_behaviour.fsm.state import State
 from surveillance_behaviour.fsm.user_data import UserData
@@ -144,16 +144,13 @@ class Iterator(DrivenContainer):
 
     def _make_table(self) -> dict[str, Node]:
         assert self._state is not None
-        node = self._node(self._state_label, self._state, {})
+        node = self._node(self._state_label, self._state, limits=self._limits)
         for outcome in self._loop_outcomes:
             node.targets[outcome] = node
         for outcome in self._break_outcomes:
             node.targets[outcome] = self._ending(outcome)
         node.targets[_EXHAUSTED] = self._ending(self._exhausted_outcome)
-        node.limits = self._limits
-        execute = node.enter
-        if self._limits is not None:
-            execute = limited(self._path_of(self._state_label), node, self._limits)
+        within_limits = node.execute if node.limits is not None else None
 
         def execute_for_item(view: Any) -> Any:
             frame = self._frame
@@ -162,7 +159,7 @@ class Iterator(DrivenContainer):
                 frame.repeat = False
             elif not self._draw(frame):
                 return _EXHAUSTED
-            return execute(view)
+            return within_limits(view) if within_limits is not None else node.enter(view)
 
         node.execute = execute_for_item
         return {self._state_label: node}

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 from surveillance_behaviour.fsm.engine import Frame, Node, Trace
 from surveillance_behaviour.fsm.exceptions import PreemptIgnoredError
 from surveillance_behaviour.fsm.log import logerr, logwarn
+from surveillance_behaviour.fsm.takeover import STOPPED, go_on, keep_out, stopped_outcome
 from surveillance_behaviour.fsm.this_thread import this_thread
 from surveillance_behaviour.fsm.waiting import WALL_CLOCK, Clock, Interrupt
 
@@ -323,7 +324,7 @@ class Strand:
             return
         root = self.stack[0].container if self.stack else None
         outcomes = root.get_registered_outcomes() if root is not None else ()
-        for ending in _STOPPED:
+        for ending in STOPPED:
             if ending in outcomes:
                 self._take_over(-1, None, ending, reason, culprit)
                 return
@@ -384,54 +385,7 @@ class Strand:
             else:
                 self._end(None, outcome)
             return
-        self.start(lambda: _go_on(self, frames, outcome))
-
-
-_STOPPED = ('preempted', 'aborted')
-
-
-def keep_out(node: Node, ended: threading.Event) -> None:
-    """Let nobody into a state before the thread that was left behind in it has ended."""
-    enter = node.state.execute
-    unlimited = node.execute is node.enter
-
-    def wait_and_enter(view: Any) -> Any:
-        strand = this_thread.strand
-        bound = strand.run.preempt_timeout if strand is not None else None
-        if not ended.wait(bound):
-            logerr(f"State '{node.label}' is still running from an earlier execution")
-            return stopped_outcome(node)
-        node.enter = enter
-        if unlimited:
-            node.execute = enter
-        node.state.recall_preempt()
-        return enter(view)
-
-    node.state._fsm_left = ended
-    node.enter = wait_and_enter
-    if unlimited:
-        node.execute = wait_and_enter
-
-
-def stopped_outcome(node: Node) -> str | None:
-    for outcome in _STOPPED:
-        if outcome in node.targets:
-            return outcome
-    return None
-
-
-def _go_on(strand: Strand, frames: list[Frame], outcome: Any) -> Any:
-    """Finish nested containers from inside out, the innermost one's state having ended."""
-    frame = frames[-1]
-    try:
-        for frame in reversed(frames):
-            outcome = frame.container._proceed(frame, outcome)
-    finally:
-        with strand.run.condition:
-            for rest in frames[: frames.index(frame) + 1]:
-                if rest.container._frame is rest:
-                    rest.container._frame = None
-    return outcome
+        self.start(lambda: go_on(self, frames, outcome))
 
 
 def supervise(run: Run, strands: Sequence[Strand], wakeup: Interrupt) -> None:

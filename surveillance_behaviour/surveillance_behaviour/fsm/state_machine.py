@@ -9,7 +9,7 @@ from surveillance_behaviour.fsm.driven import DrivenContainer
 from surveillance_behaviour.fsm.engine import Exit, Node
 from surveillance_behaviour.fsm.exceptions import InvalidStateError, InvalidTransitionError
 from surveillance_behaviour.fsm.interface import has_smach_interface
-from surveillance_behaviour.fsm.limits import TIMEOUT, Limits, limited, make_limits
+from surveillance_behaviour.fsm.limits import TIMEOUT, Limits, make_limits
 from surveillance_behaviour.fsm.state import State
 from surveillance_behaviour.fsm.user_data import UserData
 
@@ -204,7 +204,13 @@ class StateMachine(DrivenContainer):
 
     def _make_table(self) -> dict[str, Node]:
         table = {
-            label: self._node(label, state, self._remappings[label], self._constants[label])
+            label: self._node(
+                label,
+                state,
+                remapping=self._remappings[label],
+                constants=self._constants[label],
+                limits=self._limits.get(label),
+            )
             for label, state in self._states.items()
         }
         exits = {outcome: Exit(outcome) for outcome in self.get_registered_outcomes()}
@@ -213,9 +219,6 @@ class StateMachine(DrivenContainer):
             for outcome, target in transitions.items():
                 name = target or outcome
                 node.targets[outcome] = table.get(name) or exits[name]
-            node.limits = self._limits.get(label)
-            if node.limits is not None:
-                node.execute = limited(self._path_of(label), node, node.limits)
         return table
 
     # The container's interface.
