@@ -1,4 +1,4 @@
-"""Resident Java reasoners (the copies that owlready2 brings) as subprocesses, for comparison only."""
+"""Resident Java reasoners (the copies that owlready2 brings), for comparison only."""
 
 from __future__ import annotations
 
@@ -28,7 +28,8 @@ def absent() -> str:
 
 def _classpath() -> str:
     found = importlib.util.find_spec('owlready2')
-    assert found is not None and found.origin is not None
+    assert found is not None
+    assert found.origin is not None
     folder = Path(found.origin).parent
     jars = sorted((folder / 'pellet').glob('*.jar'))
     return os.pathsep.join([*map(str, jars), str(folder / 'hermit' / 'HermiT.jar')])
@@ -60,7 +61,8 @@ class JavaReasoner:
     def ask(self, *words: str) -> str:
         """Sends a command; its answer."""
         process = self._process
-        assert process.stdin is not None and process.stdout is not None
+        assert process.stdin is not None
+        assert process.stdout is not None
         try:
             process.stdin.write('\t'.join(words) + '\n')
             process.stdin.flush()

@@ -24,6 +24,7 @@ import tempfile
 import time
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
+from itertools import pairwise
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -83,7 +84,7 @@ class Patrol:
         self.doors: dict[str, list[str]] = {name: [] for name in names}
         self.beyond: dict[str, list[str]] = {name: [] for name in names}
         self._door_number = 0
-        for one, other in zip(names, names[1:], strict=False):
+        for one, other in pairwise(names):
             self._join(one, other)
         for number in range(places - corridors):
             room = named(f'R{number + 1}')
@@ -295,8 +296,17 @@ def main() -> int:
     figures = [measure_apart(places, visits) for places in options.places]
     base = figures[0].visit
     rows = [
-        ['places', 'LOAD', 'first REASON', 'visit in all', 'x smallest', 'its REASON', 'its QUERYs']
-        + ['full recompute', 'memory']
+        [
+            'places',
+            'LOAD',
+            'first REASON',
+            'visit in all',
+            'x smallest',
+            'its REASON',
+            'its QUERYs',
+            'full recompute',
+            'memory',
+        ]
     ]
     for entry in figures:
         rows.append(

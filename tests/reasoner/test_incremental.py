@@ -70,7 +70,7 @@ def changeable(kb: KnowledgeBase) -> list[Axiom]:
 
 
 def walk(seed: int) -> None:
-    """A random ontology, random changes, all compared after each `reason`; the feed of changes too."""
+    """A random ontology and random changes, compared after each `reason`; the feed too."""
     drawn = RandomOntology(seed)
     rng = drawn.random
     kb = KnowledgeBase('http://example.org/random', drawn.ontology(rng.randrange(1, 10), 12))

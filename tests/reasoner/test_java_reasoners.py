@@ -54,6 +54,14 @@ def questions() -> Iterator[tuple[Axiom, tuple[str, ...]]]:
                 yield SubClassOf(sub, sup), ('subclass', sub, sup)
 
 
+def settled(axioms: list[Axiom], words: tuple[str, ...], path: Path) -> bool:
+    """Whether HermiT finds that a fact follows, where Pellet says it does not."""
+    write_ontology(axioms, 'http://example.org/random', path)
+    with JavaReasoner('hermit') as judge:
+        judge.ask('load', str(path))
+        return judge.ask(*words) == 'true'
+
+
 def needs_cases(axioms: list[Axiom]) -> bool:
     """Whether completeness would take reasoning by cases: whether two individuals are the same or
     not.
@@ -99,8 +107,10 @@ def test_random_ontologies(kind: str, tmp_path: Path) -> None:
                     continue  # HermiT fails on some questions (ConcurrentModificationException).
                 asked += 1
                 if ours != answer:
-                    assert not ours, f'seed {seed}: {axiom} does not follow'
-                    missed += 1
+                    other = tmp_path / 'settling.owl'
+                    right = ours and kind == 'pellet' and settled(axioms, words, other)
+                    assert right or not ours, f'seed {seed}: {axiom} does not follow'
+                    missed += not ours
     assert compared > ONTOLOGIES / 2
     assert missed <= asked / 1000, f'{missed} of {asked} facts missed'
 
