@@ -76,6 +76,12 @@ def _shared_options() -> argparse.ArgumentParser:
     )
     parser.add_argument('--namespace', metavar='NAME', help='of all nodes, for a second robot')
     parser.add_argument('--domain', type=int, metavar='N', help='ROS domain, 0 to 101')
+    parser.add_argument(
+        '--mode',
+        choices=graph.MODES,
+        type=str.upper,
+        help=f'how the controllers work (default {graph.DEFAULT_MODE})',
+    )
     parser.add_argument('--behaviour', choices=graph.BEHAVIOURS, default='surveillance')
     return parser
 
@@ -91,12 +97,6 @@ def make_parser() -> argparse.ArgumentParser:
         epilog=_EXAMPLES + package_lines,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         parents=[_shared_options()],
-    )
-    parser.add_argument(
-        '--mode',
-        choices=graph.MODES,
-        type=str.upper,
-        help=f'how the controllers work (default {graph.DEFAULT_MODE})',
     )
     parser.add_argument('--for', dest='seconds', type=_seconds, metavar='SECONDS')
     parser.add_argument('--composed', action='store_true', help='all nodes in one process')
@@ -184,7 +184,10 @@ def _node(argv: list[str]) -> int:
 
     run = wanted_run(options)
     run.check()
-    arguments = [*ros_arguments(parameter_files(CONFIG, run), run), '--', *options.rest]
+    arguments = ros_arguments(parameter_files(CONFIG, run), run)
+    if node.console:
+        arguments += ['-p', f'execution_mode:={run.mode or graph.DEFAULT_MODE}']
+    arguments += ['--', *options.rest]
     words = command([node], arguments, 0)
     os.execve(words[0], words, node_environ(run))
 
