@@ -16,7 +16,7 @@ from rclpy.event_handler import PublisherEventCallbacks
 
 from surveillance_interfaces.msg import ArmorDirectiveRes, FactChanges
 from surveillance_interfaces.srv import ArmorDirective, ArmorDirectiveList
-from surveillance_ontology.armor.change_feed import ChangeFeed
+from surveillance_ontology.armor.change_feed import ChangeFeed, NumberedChange
 from surveillance_ontology.armor.journal import JournalError
 from surveillance_ontology.armor.service import ArmorService
 from surveillance_ontology.armor.settings import Settings
@@ -46,15 +46,17 @@ class ArmorServer(PatrolNode):
         super().__init__('armor_server', **node_options)
         self._service = self._described_service()
         self._feed = ChangeFeed(self._service, self._soon)
+        self._subscribers = 0
+        self._untold: list[NumberedChange] = []
         self._publisher = self.create_publisher(
             FactChanges,
             CHANGES_TOPIC,
             STATE_QOS,
-            event_callbacks=PublisherEventCallbacks(matched=lambda _status: self._publish()),
+            event_callbacks=PublisherEventCallbacks(matched=self._on_matched),
         )
         # Steady time: a simulated clock may stand still.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._pause = self.create_timer(PUBLISH_DELAY, self._publish, clock=steady)
+        self._pause = self.create_timer(PUBLISH_DELAY, self._on_pause, clock=steady)
         self._pause.cancel()
         self._work = AwaitedWork(self, WORKERS)
         group = ReentrantCallbackGroup()
@@ -125,11 +127,22 @@ class ArmorServer(PatrolNode):
         if self.executor is not None:
             self.executor.create_task(self._pause.reset)
 
-    def _publish(self) -> None:
+    def _on_pause(self) -> None:
+        # Cancelled nowhere else: rclpy fails on a timer that was due when it was cancelled.
         self._pause.cancel()
-        if self._publisher.get_subscription_count() == 0:
+        self._publish()
+
+    def _on_matched(self, status: Any) -> None:
+        self._subscribers = status.current_count
+        self._publish()
+
+    def _publish(self) -> None:
+        changes = [*self._untold, *self._feed.take()]
+        if not self._subscribers:
+            self._untold = changes[-1:]
             return
-        for change in self._feed.take():
+        self._untold = []
+        for change in changes:
             msg = changes_to_ros(*change)
             msg.stamp = self.get_clock().now().to_msg()
             self._publisher.publish(msg)
