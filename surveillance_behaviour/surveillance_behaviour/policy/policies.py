@@ -171,10 +171,10 @@ def heuristic_cognitive(situation: Situation, allowed: Sequence[str]) -> Scores:
         worth[here] = -np.inf
         goal = int(np.argmax(worth))
     target = graph.places[goal]
-    costs = _idle_ways(graph, idle, goal)
+    first, rest = _idle_ways(graph, idle, here, goal)
     return {
         place: Score(
-            -float(costs[here, graph.index[place]] + costs[graph.index[place], goal]),
+            -float(first[graph.index[place]] + rest[graph.index[place]]),
             target,
             f'{_leads_to(place, target)} went unvisited for {idle[goal]:.1f} s '
             f'and is {far[goal]:.1f} s away',
@@ -183,23 +183,25 @@ def heuristic_cognitive(situation: Situation, allowed: Sequence[str]) -> Scores:
     }
 
 
-def _idle_ways(graph: PatrolGraph, idle: NDArray[np.float64], goal: int) -> NDArray[np.float64]:
-    """Costs of ways from each place to each: half the time, half the freshness of what is entered.
+def _idle_ways(
+    graph: PatrolGraph, idle: NDArray[np.float64], here: int, goal: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Costs of the legs from ``here`` and of the ways to ``goal``, each of shape (n,).
 
-    Only the row of each place to its neighbours and the column of ``goal`` are filled in.
+    A leg costs its time over the longest, plus the freshness of the place it enters.
     """
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import dijkstra
 
-    direct = graph.adjacency
-    coo = direct.tocoo()
-    longest, idlest = max(float(coo.data.max()), 1e-9), max(float(idle.max()), 1e-9)
-    weights = coo.data / longest + (1.0 - np.clip(idle[coo.col] / idlest, 0.0, 1.0)) + 1e-6
-    towards = csr_array((weights, (coo.col, coo.row)), shape=direct.shape)
-    costs: NDArray[np.float64] = np.full(direct.shape, np.inf)
-    costs[coo.row, coo.col] = weights
-    costs[:, goal] = dijkstra(towards, indices=goal)
-    return costs
+    legs = graph.adjacency.tocoo()
+    idlest = max(float(idle.max()), 1e-9)
+    fresh = 1.0 - np.clip(idle[legs.col] / idlest, 0.0, 1.0)
+    weights = legs.data / float(legs.data.max()) + fresh + 1e-6
+    first = np.full(len(idle), np.inf)
+    leaving = legs.row == here
+    first[legs.col[leaving]] = weights[leaving]
+    backwards = csr_array((weights, (legs.col, legs.row)), shape=legs.shape)
+    return first, dijkstra(backwards, indices=goal)
 
 
 def cycle(situation: Situation, allowed: Sequence[str]) -> Scores:
