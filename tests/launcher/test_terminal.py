@@ -1,0 +1,83 @@
+"""The one console on a real terminal."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import pty
+import re
+import select
+import struct
+import subprocess
+import sys
+import termios
+import time
+from pathlib import Path
+
+import pytest
+
+from tests.launcher.conftest import ROOT
+
+PROCESS = str(Path(__file__).with_name('mission_process.py'))
+ESCAPES = re.compile(rb'\x1b\[[0-9;?]*[a-zA-Z]')
+WHERE_IS_THE_CURSOR, AT_THE_BOTTOM = b'\x1b[6n', b'\x1b[40;1R'
+
+
+class Terminal:
+    """A terminal with somebody at it."""
+
+    def __init__(self, command: list[str]) -> None:
+        self.ours, theirs = pty.openpty()
+        fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack('HHHH', 40, 160, 0, 0))
+        self.settings = termios.tcgetattr(theirs)
+        self.theirs = theirs
+        environ = {**os.environ, 'TERM': 'xterm', 'PYTHONPATH': str(ROOT)}
+        self.process = subprocess.Popen(
+            command, stdin=theirs, stdout=theirs, stderr=theirs, env=environ, start_new_session=True
+        )
+        self.seen = b''
+
+    def until(self, pattern: bytes, timeout: float = 40.0) -> None:
+        deadline = time.monotonic() + timeout
+        while not re.search(pattern, ESCAPES.sub(b'', self.seen)):
+            readable, _, _ = select.select([self.ours], [], [], deadline - time.monotonic())
+            assert readable, f'no {pattern!r} in {self.seen!r}'
+            self.seen += os.read(self.ours, 65536)
+            if WHERE_IS_THE_CURSOR in self.seen:
+                self.seen = self.seen.replace(WHERE_IS_THE_CURSOR, b'')
+                os.write(self.ours, AT_THE_BOTTOM)
+
+    def type(self, keys: str) -> None:
+        self.seen = b''
+        os.write(self.ours, keys.encode())
+
+    def close(self) -> None:
+        if self.process.poll() is None:
+            self.process.kill()
+            self.process.wait()
+        os.close(self.ours)
+        os.close(self.theirs)
+
+
+@pytest.fixture
+def terminal(tmp_path, ros_domain):
+    nodes = 'battery_controller,planner_controller,motion_controller'
+    options = ['--mode', 'MANUAL', '--only', nodes, '--domain', str(ros_domain)]
+    terminal = Terminal([sys.executable, PROCESS, str(tmp_path), *options])
+    yield terminal
+    terminal.close()
+
+
+def test_commands_are_completed_and_ctrl_c_gives_the_terminal_back(terminal):
+    terminal.until(rb'patrol>')
+    terminal.until(rb'battery_controller.*MANUAL mode')
+    terminal.type('bat\t')
+    terminal.until(rb'tery')
+    terminal.type(' set 15\r')
+    terminal.until(rb'The battery is at 15 %')
+    terminal.type('exit planner_controller\r')
+    terminal.until(rb'planner_controller has ended by itself')
+    terminal.type('\x03')
+    terminal.until(rb'every process has ended')
+    assert terminal.process.wait(10) == 0
+    assert termios.tcgetattr(terminal.theirs) == terminal.settings
