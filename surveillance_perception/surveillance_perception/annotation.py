@@ -13,7 +13,7 @@ from surveillance_perception.detection import Detection
 _CONFIRMED = (60, 220, 60)
 _SEEN = (0, 165, 255)
 _CORNER = (255, 80, 40)
-_OUTLINE = (20, 20, 20)
+_GROUND = (20, 20, 20)
 
 
 def annotated(
@@ -43,6 +43,8 @@ def annotated(
         x = int(detection.corners[:, 0].min())
         y = int(detection.corners[:, 1].min()) - 5
         origin = (max(0, x), y if y > 12 else int(detection.corners[:, 1].max()) + 14)
-        for color_, width in ((_OUTLINE, 3 * thickness), (color, thickness)):
-            cv2.putText(drawn, text, origin, 0, scale, color_, width, cv2.LINE_AA)
+        (width, height), _ = cv2.getTextSize(text, 0, scale, thickness)
+        top_left = (origin[0] - 2, origin[1] - height - 2)
+        cv2.rectangle(drawn, top_left, (origin[0] + width + 2, origin[1] + 3), _GROUND, -1)
+        cv2.putText(drawn, text, origin, 0, scale, color, thickness, cv2.LINE_AA)
     return drawn

@@ -66,15 +66,15 @@ class DetectorParameters:
     """
 
     def __init__(self, node: PatrolNode, changed: Callable[[], None]) -> None:
-        self._values: dict[str, Any] = {'dictionary': _DEFAULT.dictionary, 'known_ids': []}
+        self._values: dict[str, Any] = {'marker_dictionary': _DEFAULT.dictionary, 'known_ids': []}
         self._node = node
         self._changed = changed
         self._add(
-            'dictionary',
+            'marker_dictionary',
             _DEFAULT.dictionary,
             "One of OpenCV's marker dictionaries.",
             choices=DICTIONARY_NAMES,
-            check=lambda value: self._check(dictionary=value),
+            check=lambda value: self._check(marker_dictionary=value),
         )
         self._add(
             'known_ids',
@@ -120,7 +120,7 @@ class DetectorParameters:
         """The settings that the present values make."""
         values = self._values
         detector = DetectorSettings(
-            dictionary=values['dictionary'],
+            dictionary=values['marker_dictionary'],
             known_ids=frozenset(values['known_ids']) or None,
             windows=tuple(values['windows']),
             bridges=tuple(values['bridges']),
@@ -149,7 +149,7 @@ class DetectorParameters:
         values = {**self._values, **changed}
         known = frozenset(values['known_ids']) or None
         try:
-            MarkerDetector(DetectorSettings(values['dictionary'], known))
+            MarkerDetector(DetectorSettings(values['marker_dictionary'], known))
         except ValueError as error:
             return str(error)
         return None

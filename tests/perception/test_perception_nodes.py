@@ -162,11 +162,11 @@ def test_settings_change_while_it_runs(graph: Any) -> None:
         return setter.call(request, 5.0).results[0]
 
     assert change('known_ids', [7]).successful
-    assert change('dictionary', 'DICT_4X4_50').successful
+    assert change('marker_dictionary', 'DICT_4X4_50').successful
     assert change('marker_sizes', ['7:0.4']).successful
     shown = camera.show(other).detections
     assert [(each.id, each.known, each.size) for each in shown] == [(7, True, 0.4)]
-    refused = change('dictionary', 'DICT_77')
+    refused = change('marker_dictionary', 'DICT_77')
     assert not refused.successful
     assert 'DICT_77' in refused.reason
     refused = change('known_ids', [70])
@@ -195,7 +195,7 @@ def test_pictures_taken_while_the_arm_moves_are_not_read(graph: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    'wrong', [{'dictionary': 'DICT_0'}, {'known_ids': [500]}, {'blur': -1.0}, {'marker_size': 0.0}]
+    'wrong', [{'marker_dictionary': 'DICT_0'}, {'known_ids': [500]}, {'blur': -1.0}, {'marker_size': 0.0}]
 )
 def test_wrong_parameters_are_refused_at_the_start(graph: Any, wrong: dict[str, Any]) -> None:
     with pytest.raises(ParameterError, match=next(iter(wrong))):
