@@ -13,7 +13,10 @@ from surveillance_runtime.node import PatrolNode, StartError, run_node
 
 UNKNOWN = 'no room associated with this marker id'
 
-_OF_THE_PROJECT = Path(__file__).resolve().parents[2] / 'config' / 'markers.yaml'
+_HERE = Path(__file__).resolve()
+_IN_CHECKOUT = _HERE.parents[2] / 'config' / 'markers.yaml'
+# From PREFIX/lib/python3.x/site-packages/surveillance_perception, where colcon puts this module.
+_INSTALLED = _HERE.parents[4] / 'share' / 'surveillance_perception' / 'config' / 'markers.yaml'
 
 
 class MarkerServer(PatrolNode):
@@ -49,7 +52,9 @@ class MarkerServer(PatrolNode):
 
 
 def _file(path: str) -> Path:
-    return Path(path) if path else _OF_THE_PROJECT
+    if path:
+        return Path(path)
+    return _INSTALLED if _INSTALLED.exists() else _IN_CHECKOUT
 
 
 def _problem_in(path: str) -> str | None:
