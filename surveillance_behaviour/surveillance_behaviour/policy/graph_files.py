@@ -1,9 +1,9 @@
 """Reads patrolling graphs in the format of ``patrolling_sim``.
 
 Numbers separated by white space: the number of vertices; width and height of the map in pixels;
-its resolution in metres per pixel; the x and y of its origin in metres; and then for each vertex
-its id, x and y in pixels, its number of neighbours, and for each neighbour the neighbour's id, the
-direction (N, NE, E, ...) and the cost of the edge in pixels.
+its resolution in metres per pixel; the x and y of its origin in metres (older files have none);
+and then for each vertex its id, x and y in pixels, its number of neighbours, and for each
+neighbour the neighbour's id, the direction (N, NE, E, ...) and the cost of the edge in pixels.
 """
 
 from __future__ import annotations
@@ -30,20 +30,34 @@ def read_patrolling_sim(path: str | Path, speed: float = 1.0, dwell: float = 0.0
         words = Path(path).read_text(encoding='utf-8').split()
     except (OSError, UnicodeDecodeError) as error:
         raise GraphError(f'{path}: cannot be read: {error}') from None
-    numbers = _Words(path, words)
+    try:
+        legs = _legs(_Words(path, words), speed, origin=True)
+    except GraphError as error:
+        try:
+            legs = _legs(_Words(path, words), speed, origin=False)
+        except GraphError:
+            raise error from None
+    try:
+        return PatrolGraph(legs, dwell)
+    except GraphError as error:
+        raise GraphError(f'{path}: {error}') from None
+
+
+def _legs(numbers: _Words, speed: float, *, origin: bool) -> dict[str, dict[str, float]]:
     count = numbers.whole('the number of vertices', least=1)
     numbers.number('the width')
     numbers.number('the height')
     resolution = numbers.number('the resolution')
     if not resolution > 0.0:
-        raise GraphError(f'{path}: the resolution is {resolution:g}, expected more than 0')
-    numbers.number("the origin's x")
-    numbers.number("the origin's y")
+        raise numbers.error(f'the resolution is {resolution:g}, expected more than 0')
+    if origin:
+        numbers.number("the origin's x")
+        numbers.number("the origin's y")
     legs: dict[str, dict[str, float]] = {}
     for _ in range(count):
         place = str(numbers.whole('the id of a vertex'))
         if place in legs:
-            raise GraphError(f'{path}: vertex {place} stands twice')
+            raise numbers.error(f'vertex {place} stands twice')
         numbers.number(f'the x of vertex {place}')
         numbers.number(f'the y of vertex {place}')
         legs[place] = {}
@@ -53,11 +67,8 @@ def read_patrolling_sim(path: str | Path, speed: float = 1.0, dwell: float = 0.0
             cost = numbers.number(f'the cost from vertex {place} to {other}')
             legs[place][other] = cost * resolution / speed
     if left := list(numbers):
-        raise GraphError(f'{path}: {len(left)} words after the last vertex, expected none')
-    try:
-        return PatrolGraph(legs, dwell)
-    except GraphError as error:
-        raise GraphError(f'{path}: {error}') from None
+        raise numbers.error(f'{len(left)} words after the last vertex, expected none')
+    return legs
 
 
 class _Words:
@@ -70,10 +81,13 @@ class _Words:
     def __iter__(self) -> Iterator[str]:
         return self._words
 
+    def error(self, problem: str) -> GraphError:
+        return GraphError(f'{self._path}: {problem}')
+
     def word(self, what: str) -> str:
         word = next(self._words, None)
         if word is None:
-            raise GraphError(f'{self._path}: ends before {what}')
+            raise self.error(f'ends before {what}')
         return word
 
     def number(self, what: str) -> float:
@@ -81,9 +95,7 @@ class _Words:
         try:
             return float(word)
         except ValueError:
-            raise GraphError(
-                f'{self._path}: expected {what}, a number, got {word[:40]!r}'
-            ) from None
+            raise self.error(f'expected {what}, a number, got {word[:40]!r}') from None
 
     def whole(self, what: str, least: int = 0) -> int:
         number = self.number(what)
