@@ -1,0 +1,75 @@
+"""The battery in a robot: way, turn and arm drain it; it charges at the station only."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from surveillance_controllers.battery_model import Battery, BatteryParameters
+from surveillance_controllers.battery_use import BatteryInUse, MotionMeter
+
+PARAMETERS = BatteryParameters(
+    capacity=1.0,
+    rest_power=0.0,
+    joules_per_metre=36.0,
+    joules_per_radian=18.0,
+    equipment_power=36.0,
+    charging_power=36.0,
+)
+
+
+def in_use(level: float = 50.0) -> tuple[Battery, BatteryInUse]:
+    battery = Battery(PARAMETERS, level)
+    return battery, BatteryInUse(battery, (1.0, 0.0, 0.0), 0.5, now=0.0)
+
+
+def test_way_and_turn_are_paid_for() -> None:
+    battery, use = in_use()
+    for step in range(11):
+        use.see_pose((3.0 + 0.1 * step, 0.0, 0.1 * step), now=0.2 * step)
+    use.advance(2.0)
+    assert battery.energy == pytest.approx(0.5 - (36 * 1.0 + 18 * 1.0) / 3600)
+
+
+def test_a_correction_of_the_estimate_is_no_way_driven() -> None:
+    meter = MotionMeter(top_speed=1.0, top_turn=1.0)
+    meter.see((0.0, 0.0, 0.0), 0.0)
+    meter.see((5.0, 0.0, math.pi), 0.1)
+    assert meter.take() == pytest.approx((0.1, 0.1))
+    assert meter.take() == (0.0, 0.0)
+
+
+def test_the_arm_is_paid_for_while_it_moves() -> None:
+    battery, use = in_use()
+    use.see_joints([0.0, 0.0])
+    use.advance(1.0)
+    assert battery.energy == 0.5
+    use.see_joints([0.0, 0.1])
+    use.advance(2.0)
+    assert battery.energy == pytest.approx(0.49)
+    use.advance(3.0)
+    assert battery.energy == pytest.approx(0.49)
+
+
+def test_it_charges_at_the_station_only_and_says_why_not_elsewhere() -> None:
+    battery, use = in_use()
+    assert use.why_not_charging() == ('where the robot is is not known (nothing came on amcl_pose)')
+    use.see_pose((3.0, 0.0, 0.0), now=0.0)
+    use.advance(10.0)
+    assert battery.level == 50
+    assert use.why_not_charging() == 'the robot is at (3.00, 0.00), not at the station (1.00, 0.00)'
+    _, docked = in_use()
+    docked.see_pose((1.3, 0.3, 2.0), now=0.0)
+    assert docked.why_not_charging() is None
+    docked.advance(10.0)
+    assert docked.docked
+
+
+def test_a_clock_that_goes_back_takes_nothing() -> None:
+    battery, use = in_use()
+    use.see_pose((1.0, 0.0, 0.0), now=5.0)
+    use.advance(5.0)
+    before = battery.energy
+    use.advance(2.0)
+    assert battery.energy == before

@@ -1,0 +1,114 @@
+"""Messages and core types: what goes out comes back the same, and unsound messages are refused."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from nav_msgs.msg import OccupancyGrid
+from sensor_msgs.msg import BatteryState, LaserScan, PointCloud2
+
+from surveillance_controllers import conversions
+from surveillance_controllers.battery_model import Battery, BatteryParameters
+from surveillance_controllers.path_following import Velocity
+
+NUMBER = st.floats(-1e4, 1e4)
+YAW = st.floats(-3.1, 3.1)
+
+
+@given(st.lists(st.tuples(NUMBER, NUMBER, NUMBER), max_size=6))
+@settings(max_examples=40, deadline=None)
+def test_points_come_back(points: list[tuple[float, float, float]]) -> None:
+    messages = conversions.points_from_array(np.array(points).reshape(-1, 3))
+    assert conversions.array_from_points(messages).tolist() == [list(p) for p in points]
+
+
+def test_a_point_in_the_plane_has_no_height() -> None:
+    point = conversions.point_from((1, 2))
+    assert (point.x, point.y, point.z) == (1.0, 2.0, 0.0)
+
+
+@given(NUMBER, NUMBER, YAW)
+@settings(max_examples=40, deadline=None)
+def test_poses_come_back(x: float, y: float, yaw: float) -> None:
+    pose = conversions.pose_from(conversions.pose_message((x, y, yaw)))
+    assert pose == pytest.approx((x, y, yaw))
+    estimate = conversions.pose_estimate((x, y, yaw), 0.5, 0.1)
+    assert conversions.pose_from(estimate.pose.pose) == pytest.approx((x, y, yaw))
+    assert estimate.pose.covariance[0] == 0.25
+    assert estimate.pose.covariance[35] == pytest.approx(0.01)
+
+
+@given(st.lists(st.tuples(st.floats(-99, 99), st.floats(-99, 99)), max_size=6))
+@settings(max_examples=40, deadline=None)
+def test_clouds_come_back(points: list[tuple[float, float]]) -> None:
+    array = np.array(points).reshape(-1, 2)
+    cloud = conversions.cloud_from_points(array)
+    assert cloud.width == len(points)
+    assert conversions.points_from_cloud(cloud) == pytest.approx(array, abs=1e-4)
+
+
+def test_a_cloud_without_coordinates_is_refused() -> None:
+    with pytest.raises(ValueError, match='a cloud without x and y'):
+        conversions.points_from_cloud(PointCloud2(width=1, height=1, point_step=4))
+
+
+def grid_message(width: int, height: int, cells: int) -> OccupancyGrid:
+    message = OccupancyGrid()
+    message.info.width, message.info.height = width, height
+    message.info.resolution = 0.5
+    message.info.origin.position.x, message.info.origin.position.y = -1.0, 2.0
+    message.info.origin.orientation.w = 1.0
+    message.data = [100 if index == 1 else 0 for index in range(cells)]
+    return message
+
+
+def test_a_map_is_read_row_by_row_from_its_south_west_corner() -> None:
+    grid = conversions.grid_from(grid_message(3, 2, 6))
+    assert grid.cells.tolist() == [[0, 100, 0], [0, 0, 0]]
+    assert grid.resolution == 0.5
+    assert grid.cells_of((-0.3, 2.1)).tolist() == [[0, 1]]
+
+
+def test_unsound_maps_are_refused() -> None:
+    with pytest.raises(ValueError, match='a map of 5 cells: expected 3 x 2 of them'):
+        conversions.grid_from(grid_message(3, 2, 5))
+    turned = grid_message(3, 2, 6)
+    turned.info.origin.orientation.z, turned.info.origin.orientation.w = 1.0, 0.0
+    with pytest.raises(ValueError, match=r'a map turned by 3\.142 rad'):
+        conversions.grid_from(turned)
+
+
+def test_a_scan_keeps_what_was_met_and_makes_the_rest_infinite() -> None:
+    message = LaserScan(angle_min=-1.0, angle_increment=0.5, range_min=0.1, range_max=8.0)
+    message.ranges = [0.5, math.inf, math.nan, 8.5, 0.0]
+    scan = conversions.scan_from(message)
+    assert scan.angles == pytest.approx([-1, -0.5, 0, 0.5, 1])
+    assert scan.ranges[0] == 0.5
+    assert np.isinf(scan.ranges[1:]).all()
+    assert scan.points == pytest.approx(np.array([[0.5 * math.cos(-1), 0.5 * math.sin(-1)]]))
+
+
+def test_a_velocity_is_a_twist() -> None:
+    twist = conversions.twist_from(Velocity(0.5, -1.0))
+    assert (twist.linear.x, twist.angular.z, twist.linear.y) == (0.5, -1.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ('level', 'charging', 'status'),
+    [
+        (50, False, BatteryState.POWER_SUPPLY_STATUS_DISCHARGING),
+        (50, True, BatteryState.POWER_SUPPLY_STATUS_CHARGING),
+        (100, True, BatteryState.POWER_SUPPLY_STATUS_FULL),
+    ],
+)
+def test_a_battery_s_state_is_told(level: float, charging: bool, status: int) -> None:
+    battery = Battery(BatteryParameters(), level)
+    state = conversions.battery_state(battery, charging=charging)
+    assert state.percentage == pytest.approx(level / 100)
+    assert state.power_supply_status == status
+    assert state.charge == pytest.approx(state.capacity * level / 100)
+    assert math.isnan(state.current) == (status != BatteryState.POWER_SUPPLY_STATUS_CHARGING)
