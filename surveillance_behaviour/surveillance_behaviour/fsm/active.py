@@ -42,6 +42,8 @@ class ActiveContainer(Container):
         self._fsm_control = Control(self)
         self._fsm_history: History | None = None
         self._fsm_raised: list[Branch] = []
+        # Asked to be put aside in the moment before it began.
+        self._fsm_aside = False
         self._branches: dict[str, Branch] = {}
         self._table_version = 0
 
@@ -230,6 +232,12 @@ class ActiveContainer(Container):
     def _suspend(self) -> None:
         """Have the container put aside with its history; under the run's condition."""
 
+    def _heed_suspension(self, frame: Frame) -> None:
+        """Have a run that has just begun put aside, if that was asked before it began."""
+        with frame.strand.run.condition:
+            frame.suspending = frame.suspending or self._fsm_aside
+            self._fsm_aside = False
+
     def _branch_faults(self) -> list[str]:
         names = {*self.get_children(), *self.get_registered_outcomes(), RESUME}
         return [
@@ -243,10 +251,18 @@ class ActiveContainer(Container):
 
 def stop_for_now(state: State) -> None:
     """Ask a state to make way: a container keeps its history, any other state is preempted."""
-    if isinstance(state, ActiveContainer) and state._frame is not None:
+    if isinstance(state, ActiveContainer):
         state._suspend()
     else:
         state.request_preempt()
+
+
+def let_go(state: State) -> None:
+    """Take `stop_for_now` back from a state that had not begun."""
+    if isinstance(state, ActiveContainer):
+        state._fsm_aside = False
+    else:
+        state.recall_preempt()
 
 
 def forget(state: State) -> None:

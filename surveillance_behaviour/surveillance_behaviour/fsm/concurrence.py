@@ -90,6 +90,7 @@ class Concurrence(ActiveContainer):
         self._strands: dict[str, Strand] = {}
         self._nodes: dict[str, Node] = {}
         self._making_way: set[str] = set()
+        self._preempted: set[str] = set()
 
     @staticmethod
     def add(
@@ -160,6 +161,7 @@ class Concurrence(ActiveContainer):
         strand.push(frame)
         history, self._fsm_history = self._fsm_history, None
         try:
+            self._heed_suspension(frame)
             if history is None:
                 self._copy_input_keys(parent_ud, self.userdata)
             with run.condition:
@@ -215,6 +217,7 @@ class Concurrence(ActiveContainer):
         strands = {}
         with run.condition:
             self._making_way.clear()
+            self._preempted.clear()
             for label, state in self._states.items():
                 if self._child_outcomes[label] is None:
                     node = self._nodes[label] = self._node(label, state, run.clock)
@@ -228,7 +231,7 @@ class Concurrence(ActiveContainer):
         with run.condition:
             # What was asked before there was anybody to ask.
             if self._preempt_requested:
-                self._stop(strands, _preempt)
+                self._preempt_children()
             elif frame.suspending or self._urgent(frame):
                 self._cut(frame)
 
@@ -293,7 +296,7 @@ class Concurrence(ActiveContainer):
         with frame.strand.run.condition:
             if outcome is SUSPENDED:
                 return
-            if label in self._making_way and not self._preempt_requested:
+            if label in self._making_way:
                 made_way = not state.preempt_requested() or outcome == 'preempted'
                 state.recall_preempt()
                 if made_way:
@@ -320,15 +323,25 @@ class Concurrence(ActiveContainer):
             strand.disown()
         raise LeftBehind
 
+    def _preempt_children(self) -> None:
+        # Each is asked once: a second request could come after it has served the first.
+        asked = {
+            label: strand
+            for label, strand in self._strands.items()
+            if not strand.done and label not in self._preempted
+        }
+        self._preempted.update(asked)
+        self._stop(asked, _preempt)
+
     def _service_children(self) -> None:
-        """Acknowledge the preempt if all children did; recall what they left pending."""
+        """Acknowledge the preempt if one of those asked did; recall what the rest left pending."""
         ignored = [label for label, state in self._states.items() if state.preempt_requested()]
         for label in ignored:
             self._states[label].recall_preempt()
         if self._preempt_requested:
             if ignored:
                 log.logwarn(f"'{self._fsm_path}': {ignored} did not acknowledge the preempt")
-            else:
+            if self._preempted.difference(ignored):
                 self.service_preempt()
 
     # Preempts and interrupts.
@@ -347,7 +360,7 @@ class Concurrence(ActiveContainer):
             if isinstance(current, Node):
                 frame.strand.asked()
                 current.state.request_preempt()
-            self._stop(self._strands, _preempt)
+            self._preempt_children()
             frame.strand.run.condition.notify_all()
 
     def _urgent(self, frame: Frame) -> bool:
@@ -360,9 +373,11 @@ class Concurrence(ActiveContainer):
 
     def _suspend(self) -> None:
         frame = self._frame
-        if frame is not None:
-            frame.suspending = True
-            self._cut(frame)
+        if frame is None:
+            self._fsm_aside = True
+            return
+        frame.suspending = True
+        self._cut(frame)
 
     def _cut(self, frame: Frame) -> None:
         current = frame.current

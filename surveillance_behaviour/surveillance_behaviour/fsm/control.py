@@ -117,7 +117,7 @@ class Control:
                     f"State '{path}' cannot be forced to '{outcome}': its outcomes are "
                     f'{sorted(node.state.get_registered_outcomes())}'
                 )
-            frame.forced = outcome
+            frame.forced = (node, outcome)
             frame.attention = True
             frame.strand.asked()
             node.state.request_preempt()

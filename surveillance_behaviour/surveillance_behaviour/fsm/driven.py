@@ -13,7 +13,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from surveillance_behaviour.fsm import log, shutdown
-from surveillance_behaviour.fsm.active import ActiveContainer, forget, stop_for_now
+from surveillance_behaviour.fsm.active import ActiveContainer, forget, let_go, stop_for_now
 from surveillance_behaviour.fsm.container import Container
 from surveillance_behaviour.fsm.engine import (
     LOWEST,
@@ -123,6 +123,7 @@ class DrivenContainer(ActiveContainer):
             self._frame = frame
         strand.push(frame)
         try:
+            self._heed_suspension(frame)
             if history is None:
                 self._copy_input_keys(parent_ud, self.userdata)
                 self._begun(frame)
@@ -226,10 +227,14 @@ class DrivenContainer(ActiveContainer):
             frame.attention = False
             kind = 'start' if left is None else 'transition'
             while True:
-                if frame.forced is not None and ended is not None:
-                    outcome, kind = frame.forced, 'forced'
-                    target = self._target(ended, outcome)
-                    self._drop_requests(frame, ended)
+                if frame.cut is not None and frame.cut is not ended:
+                    # It was asked to make way before it began.
+                    let_go(frame.cut.state)
+                    frame.cut = None
+                if frame.forced is not None and frame.forced[0] is ended:
+                    outcome, kind = frame.forced[1], 'forced'
+                    target = self._target(frame.forced[0], outcome)
+                    self._drop_requests(frame, frame.forced[0])
                 elif ended is not None:
                     target = self._sort_requests(frame, ended, outcome, target)
                 if ended is not None and ended.priority > LOWEST and target is not ended:
@@ -250,8 +255,8 @@ class DrivenContainer(ActiveContainer):
                 run.condition.wait()
                 if frame.stale:
                     raise LeftBehind
-                if frame.forced is not None and isinstance(target, Node):
-                    left = ended = target
+                if frame.forced is not None and frame.forced[0] is target:
+                    left = ended = frame.forced[0]
             frame.attention = self._wants_attention(frame, target)
             frame.trace = run.trace
         if target is _SHUTDOWN:
@@ -266,22 +271,23 @@ class DrivenContainer(ActiveContainer):
         self, frame: Frame, left: Node, outcome: Any, target: Node | Exit
     ) -> Node | Exit:
         """Settle what was asked of the state that ended: a preempt, or to make way."""
-        state = left.state
-        asked, cut = frame.preempted, frame.cut
-        frame.preempted = frame.cut = None
-        made_way = False
-        if self._preempt_requested:
-            if asked is left and not state.preempt_requested():
-                self.service_preempt()
-            else:
-                state.recall_preempt()
-        elif cut is left and outcome is not SUSPENDED:
-            made_way = not state.preempt_requested() or outcome == 'preempted'
+        state, cut, made_way = left.state, frame.cut, False
+        asked = frame.preempted is left
+        pending = state.preempt_requested()
+        frame.cut = None
+        if asked:
+            frame.preempted = None
+        if cut is left and outcome is not SUSPENDED and (pending or not asked):
+            # With both asked and one still pending, what it served was to make way.
+            made_way = not pending or outcome == 'preempted'
             state.recall_preempt()
-            if made_way:
-                target = left
-                frame.repeat = True
-        elif outcome is SUSPENDED:
+        elif asked and pending:
+            state.recall_preempt()
+        elif asked and self._preempt_requested:
+            self.service_preempt()
+        if made_way:
+            target = left
+        if made_way or outcome is SUSPENDED:
             frame.repeat = True
         if not made_way and getattr(state, '_fsm_progress', None) is not None:
             state._fsm_progress = None
@@ -295,6 +301,8 @@ class DrivenContainer(ActiveContainer):
     def _preempt_next(self, frame: Frame, target: Any) -> None:
         """Ask the next state to stop, because the last one did not acknowledge the preempt."""
         if frame.preempted is not target:
+            if frame.preempted is not None:
+                frame.preempted.state.recall_preempt()
             frame.preempted = target
             frame.strand.asked()
             target.state.request_preempt()
@@ -406,6 +414,7 @@ class DrivenContainer(ActiveContainer):
         """Have the container put aside with its history; under the run's condition."""
         frame = self._frame
         if frame is None:
+            self._fsm_aside = True
             return
         frame.suspending = frame.attention = True
         self._cut(frame)

@@ -140,7 +140,7 @@ class Frame:
         cut: The node whose state was asked to stop because of an interrupt.
         suspending: The parent wants the container put aside.
         saved: Where to go on after each of the interrupts under way.
-        forced: An outcome to take in place of the one the current state returns.
+        forced: A node, and the outcome to take in place of the one that its state returns.
         parent_ud: The parent's userdata.
         trace: Where transitions are reported.
         now: The trace's clock.
@@ -183,7 +183,7 @@ class Frame:
         self.cut: Node | None = None
         self.suspending = False
         self.saved: list[Node | Exit] = []
-        self.forced: str | None = None
+        self.forced: tuple[Node, str] | None = None
         self.trace: Trace | None = strand.run.trace
         self.now = strand.run.now
         self.items: Any = None

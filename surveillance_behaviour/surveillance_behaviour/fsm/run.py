@@ -313,7 +313,7 @@ class Strand:
             if not isinstance(node, Node):
                 return  # It is ending by itself.
             forced = self.stack[depth].forced
-            outcome = forced or stopped_outcome(node)
+            outcome = forced[1] if forced is not None else stopped_outcome(node)
             if outcome is not None:
                 self._take_over(depth, node, outcome, reason, culprit)
                 return
