@@ -7,6 +7,7 @@ and functional properties, and the individuals that must be the same because onl
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from itertools import combinations, islice
 from typing import Any
 
 from surveillance_ontology.axioms import Axiom
@@ -18,10 +19,11 @@ from surveillance_ontology.reasoner.clauses import (
     Predicate,
     Premises,
 )
-from surveillance_ontology.reasoner.difference import Difference, clique
+from surveillance_ontology.reasoner.difference import Difference, clique, cliques
 
 Emit = Callable[[Fact], None]
 MergeRequest = Callable[[str, str, Axiom | None, Premises], None]
+_MAX_CHOICES = 50
 
 
 class _Counter:
@@ -59,8 +61,20 @@ class _Counter:
             facts += [(filler, y) for y in values]
         return tuple(facts)
 
+    def choices(self, values: list[Any], size: int) -> Iterator[list[Any]]:
+        """Ways to choose `size` different ones, some dozens at most."""
+        if len(values) < size:
+            return
+        if self.is_data:
+            found: Iterator[list[Any]] = map(list, combinations(sorted(values, key=repr), size))
+        else:
+            found = cliques(sorted(values), size, self.difference.different)
+        yield from islice(found, _MAX_CHOICES)
+
     def differences(self, values: list[str]) -> Premises:
-        """The facts by which the values are pairwise different."""
+        """The facts by which the values are pairwise different; values of data just are."""
+        if self.is_data:
+            return ()
         predicate = self.difference._predicate
         return tuple(
             (predicate, one, other)
@@ -117,13 +131,7 @@ class AtLeastCounter(_Counter):
 
     def supports(self, z: str) -> Iterator[Premises]:
         """Facts by which `z` has enough."""
-        values = self.related(z)
-        if self.is_data:
-            if len(values) >= self.n:
-                yield self.facts(z, sorted(values, key=repr)[: self.n])
-            return
-        chosen = clique(sorted(values), self.n, self.difference.different)
-        if chosen is not None:
+        for chosen in self.choices(self.related(z), self.n):
             yield self.facts(z, chosen) + self.differences(chosen)
 
 
@@ -207,16 +215,8 @@ class AtMostCounter(_Counter):
             return
         if self.label is not None and z not in self.label.members:
             return
-        related = self.related(z)
-        if len(related) <= self.n:
-            return
-        if self.is_data:
-            chosen = sorted(related, key=repr)[: self.n + 1]
-            yield self._label_fact(z) + self.facts(z, chosen)
-            return
-        found = clique(sorted(related), self.n + 1, self.difference.different)
-        if found is not None:
-            yield self._label_fact(z) + self.facts(z, found) + self.differences(found)
+        for chosen in self.choices(self.related(z), self.n + 1):
+            yield self._label_fact(z) + self.facts(z, chosen) + self.differences(chosen)
 
     # --- as evidence that two individuals differ: together they would have too many ---
 
@@ -235,12 +235,12 @@ class AtMostCounter(_Counter):
             union = set(ours) | set(theirs)
             if len(union) <= self.n:
                 return
-            chosen = sorted(union, key=repr)[: self.n + 1]
-            mine = [value for value in chosen if value in first]
-            rest = [value for value in chosen if value not in first]
-            facts = self.facts(x, mine) + self.facts(y, rest)
-            for mark in marks:
-                yield mark + facts
+            for chosen in self.choices(list(union), self.n + 1):
+                mine = [value for value in chosen if value in first]
+                rest = [value for value in chosen if value not in first]
+                facts = self.facts(x, mine) + self.facts(y, rest)
+                for mark in marks:
+                    yield mark + facts
             return
         if self.n != 1:
             return

@@ -193,9 +193,9 @@ class DisjointPropertyEvidence:
     def premises(self, x: str, y: str) -> Iterator[Premises]:
         first, second = self._first, self._second
         if first.kind == 'object':
-            ours, theirs = _among(first, x, y), _among(second, x, y)
-            if ours is not None and theirs is not None:
-                yield (ours, theirs)
+            for ours in _among(first, x, y):
+                for theirs in _among(second, x, y):
+                    yield (ours, theirs)
         if self._turned:
             of_subject, of_value = second.pred, second.succ
         else:
@@ -210,39 +210,41 @@ class DisjointPropertyEvidence:
                     yield ((first, subject, one), fact)
 
 
-def _among(predicate: Predicate, x: str, y: str) -> Fact | None:
-    """A fact that relates the two, or one of them to itself: a loop, were they one."""
+def _among(predicate: Predicate, x: str, y: str) -> Iterator[Fact]:
+    """Facts that relate the two, or one of them to itself: loops, were they one."""
     for subject in (x, y):
         values = predicate.succ.get(subject, ())
         for value in (x, y):
             if value in values:
-                return (predicate, subject, value)
-    return None
+                yield (predicate, subject, value)
 
 
-def clique(
+def cliques(
     items: list[str], size: int, different: Callable[[str, str], bool], budget: int = 20_000
-) -> list[str] | None:
-    """`size` of the items that are pairwise different; None where there are none (or after `budget`
-    tries).
-    """
-    if size <= 0:
-        return []
+) -> Iterator[list[str]]:
+    """Each choice of `size` items that are pairwise different, until `budget` items were tried."""
     chosen: list[str] = []
-    left = budget
-
-    def extend(start: int) -> bool:
-        nonlocal left
-        for position in range(start, len(items) - (size - len(chosen)) + 1):
-            left -= 1
-            if left < 0:
-                return False
-            item = items[position]
-            if all(different(item, other) for other in chosen):
-                chosen.append(item)
-                if len(chosen) == size or extend(position + 1):
-                    return True
+    places = [0]
+    while places and budget > 0:
+        place = places[-1]
+        if place > len(items) - (size - len(chosen)):
+            places.pop()
+            if chosen:
                 chosen.pop()
-        return False
+                places[-1] += 1
+            continue
+        budget -= 1
+        item = items[place]
+        if all(different(item, other) for other in chosen):
+            chosen.append(item)
+            if len(chosen) < size:
+                places.append(place + 1)
+                continue
+            yield list(chosen)
+            chosen.pop()
+        places[-1] += 1
 
-    return chosen if extend(0) else None
+
+def clique(items: list[str], size: int, different: Callable[[str, str], bool]) -> list[str] | None:
+    """The first of `cliques`; None where there is none."""
+    return next(cliques(items, size, different), None)
