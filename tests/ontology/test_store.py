@@ -111,6 +111,15 @@ def test_a_batch_is_there_as_a_whole_or_not_at_all(
         patch.setattr(os, 'fdatasync', full)
         failed = server.service.execute_list(batch)
         single = server.ask('ADD IND CLASS', 'D', 'DOOR')
+        load = (ONTOLOGY, IRI, 'false', '', 'false')
+        lifecycle = server.service.execute_list(
+            [
+                DirectiveRequest('c', 'map', 'DROP'),
+                DirectiveRequest('c', 'other', 'LOAD', 'FILE', '', load),
+            ]
+        )
+    assert not lifecycle.success
+    assert server.ask('GET ALL REFS').queried_objects == ['map']
     assert not failed.success
     assert 'No space left' in failed.responses[0].error_description
     assert (single.success, single.exit_code) == (False, 205)

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import contextlib
 import threading
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 from surveillance_ontology.armor import (  # noqa: F401 - the modules fill the table
@@ -34,6 +34,7 @@ from surveillance_ontology.armor.protocol import (
     ListResponse,
 )
 from surveillance_ontology.armor.reference import NOBODY, Reference
+from surveillance_ontology.armor.registry import Registry
 from surveillance_ontology.armor.rendering import shown
 from surveillance_ontology.armor.settings import Settings
 from surveillance_ontology.armor.sparql import SparqlEngine
@@ -73,8 +74,7 @@ class ArmorService:
         self.log = DirectiveLog(screen)
         self.sparql = SparqlEngine()
         self._warn = warn
-        self._references: dict[str, Reference] = {}
-        self._registry = threading.Lock()
+        self.references = Registry()
         self._loading = threading.Lock()
         self._watchers: list[Watcher] = []
         self._store = store
@@ -101,7 +101,7 @@ class ArmorService:
             problem = ' '.join(problem.split())
             self._warn(problem)
             response = _refusal(problem)
-        ref = self._references.get(request.reference_name)
+        ref = self.references.get(request.reference_name)
         if ref is not None:
             response.is_consistent = ref.kb.consistent
         if self.log.enabled:
@@ -122,7 +122,7 @@ class ArmorService:
         writes = self._store is not None and directive.kind.may_reason
         if writes or directive.slow or directive.schema or len(request.args) > LONG_ARGUMENTS:
             return None
-        ref = self._references.get(request.reference_name)
+        ref = self.references.get(request.reference_name)
         if ref is None:
             return self.execute(request)
         if not ref.lock.acquire(blocking=False):
@@ -143,12 +143,12 @@ class ArmorService:
             problem = f'{len(requests)} directives in a list, at most {self.settings.max_batch}'
             return ListResponse(False, False, [_refusal(problem)])
         names = {request.reference_name for request in requests}
-        with self._held(names) as held:
+        with self.references.held(names):
             try:
                 with self._store.batch() if self._store else contextlib.nullcontext():
                     responses = [self.execute(request) for request in requests]
             except JournalError as error:
-                self._undo(held)
+                self._undo(names)
                 return ListResponse(False, False, [_refusal(f'nothing was done: {error}')])
         return ListResponse(
             success=all(response.success for response in responses),
@@ -163,23 +163,20 @@ class ArmorService:
             self._store.close()
         self.log.close()
 
-    @contextlib.contextmanager
-    def _held(self, names: Iterable[str]) -> Iterator[list[Reference]]:
-        with contextlib.ExitStack() as locks:
-            found = [ref for name in sorted(names) if (ref := self._references.get(name))]
-            for ref in found:
-                locks.enter_context(ref.lock)
-            yield found
-
-    def _undo(self, held: Iterable[Reference]) -> None:
+    def _undo(self, names: Iterable[str]) -> None:
         """Bring references back to what the store has of them."""
         assert self._store is not None
         durable = {ref.name: ref for ref in self._store.recover()}
-        for ref in held:
-            if kept := durable.get(ref.name):
+        for name in names:
+            kept, ref = durable.get(name), self.references.get(name)
+            if kept is not None and ref is not None:
                 ref.restore(kept)
                 self._follow(ref)
-                self._tell(ref.name, None)
+            elif kept is not None:
+                self._register(kept)
+            elif ref is not None:
+                self.references.remove(ref)
+            self._tell(name, None)
 
     def watch(self, watcher: Watcher) -> Callable[[], None]:
         """Tell a watcher of every change of asserted and derived facts.
@@ -191,36 +188,6 @@ class ArmorService:
         """
         self._watchers.append(watcher)
         return lambda: self._watchers.remove(watcher)
-
-    def names(self) -> list[str]:
-        """The names of all references."""
-        return sorted(self._references)
-
-    def reference(self, name: str) -> Reference:
-        """Find a reference.
-
-        Raises:
-            DirectiveError: 205, naming those there are.
-        """
-        ref = self._references.get(name)
-        if ref is None:
-            loaded = ', '.join(map(shown, self.names()[:10])) or 'none'
-            raise DirectiveError(f'unknown reference {shown(name)}; loaded: {loaded}')
-        return ref
-
-    @contextlib.contextmanager
-    def locked(self, name: str) -> Iterator[Reference]:
-        """Hold a reference's lock.
-
-        Raises:
-            DirectiveError: 205, there is no such reference.
-        """
-        while True:
-            ref = self.reference(name)
-            with ref.lock:
-                if not ref.dropped:
-                    yield ref
-                    return
 
     def load(
         self,
@@ -239,7 +206,7 @@ class ArmorService:
         if self._rebuffer(name, buffered):
             return again
         with self._loading:
-            if name not in self._references:
+            if name not in self.references:
                 ref, notes = load_document(
                     name, source, iri, reasoner, self.paths, self.settings, web=web
                 )
@@ -254,9 +221,9 @@ class ArmorService:
         return again
 
     def _rebuffer(self, name: str, buffered: bool) -> bool:
-        if name not in self._references:
+        if name not in self.references:
             return False
-        with contextlib.suppress(DirectiveError), self.locked(name) as ref:
+        with contextlib.suppress(DirectiveError), self.references.locked(name) as ref:
             if self._store and ref.buffered_manipulation != buffered:
                 self._store.buffered(name, buffered)
             ref.buffer(buffered)
@@ -265,8 +232,7 @@ class ArmorService:
 
     def _register(self, ref: Reference) -> None:
         self._follow(ref)
-        with self._registry:
-            self._references[ref.name] = ref
+        self.references.add(ref)
         self._tell(ref.name, None)
 
     def _follow(self, ref: Reference) -> None:
@@ -278,12 +244,10 @@ class ArmorService:
 
     def drop(self, name: str) -> None:
         """Do DROP."""
-        with contextlib.suppress(DirectiveError), self.locked(name) as ref:
+        with contextlib.suppress(DirectiveError), self.references.locked(name) as ref:
             if self._store:
                 self._store.dropped(name)
-            ref.dropped = True
-            with self._registry:
-                del self._references[name]
+            self.references.remove(ref)
             self._tell(name, None)
 
     def mount(self, request: DirectiveRequest) -> DirectiveResponse:
@@ -293,11 +257,11 @@ class ArmorService:
             DirectiveError: 203, the reference is unknown or another client is mounted.
         """
         client, name = request.client_name, request.reference_name
-        if name not in self._references:
+        if name not in self.references:
             raise DirectiveError(
                 f'{client} cannot be mounted on {name}. Unknown reference.', ExitCode.MOUNT_REFUSED
             )
-        with self.locked(name) as ref:
+        with self.references.locked(name) as ref:
             if not ref.is_free_for(client):
                 raise DirectiveError(
                     f'{client} cannot be mounted on {name}. '
@@ -316,7 +280,7 @@ class ArmorService:
         Raises:
             DirectiveError: 205, there is no such reference.
         """
-        with self.locked(request.reference_name) as ref:
+        with self.references.locked(request.reference_name) as ref:
             if ref.mounted != request.client_name:
                 note = f'{request.client_name} is not mounted on {ref.name}'
                 return DirectiveResponse(error_description=note)
@@ -331,7 +295,7 @@ class ArmorService:
         Raises:
             DirectiveError: 205, the path is not allowed or cannot be written.
         """
-        with self.locked(name) as ref:
+        with self.references.locked(name) as ref:
             target = path or str(ref.origin.file or '')
             if not target:
                 raise DirectiveError(
@@ -360,9 +324,9 @@ class ArmorService:
             values = directive.read(request.args, '')
             return _response(directive.run(self, request, *values))
         if directive.slow:
-            ref = self.reference(request.reference_name)
+            ref = self.references.find(request.reference_name)
             return _response(directive.run(self, ref, *self._values(directive, request, ref)))
-        ref = self.reference(request.reference_name)
+        ref = self.references.find(request.reference_name)
         with ref.lock:
             if ref.dropped:
                 return self._execute(request)
@@ -370,7 +334,9 @@ class ArmorService:
                 return _response(directive.run(ref, *self._values(directive, request, ref)))
             self._change(directive, request, ref)
         if self._store:
-            self._store.compact_if_large(lambda: self._held(self.names()), self._warn)
+            self._store.compact_if_large(
+                lambda: self.references.held(self.references.names()), self._warn
+            )
         return DirectiveResponse()
 
     def _change(self, directive: Directive, request: DirectiveRequest, ref: Reference) -> None:

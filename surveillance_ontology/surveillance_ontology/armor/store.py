@@ -51,11 +51,12 @@ class Store:
             JournalError: A record that this version does not know.
         """
         recovery = _Recovery()
-        for record in self._journal.records():
-            try:
-                recovery.take(record)
-            except (KeyError, IndexError, TypeError, ValueError) as error:
-                raise JournalError(f'record {record!r:.80} cannot be read: {error}') from None
+        with self._lock:
+            for record in self._journal.records():
+                try:
+                    recovery.take(record)
+                except (KeyError, IndexError, TypeError, ValueError) as error:
+                    raise JournalError(f'record {record!r:.80} cannot be read: {error}') from None
         for ref in recovery.references.values():
             with suppress(JavaReasonerError):
                 ref.kb.reason()

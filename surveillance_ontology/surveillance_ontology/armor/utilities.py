@@ -159,7 +159,7 @@ def _unmount(service: ArmorService, request: DirectiveRequest) -> DirectiveRespo
 
 @utility('GET ALL REFS', summary='The names of all references.')
 def _get_all(service: ArmorService, _: DirectiveRequest) -> DirectiveResponse:
-    return DirectiveResponse(queried_objects=service.names())
+    return DirectiveResponse(queried_objects=service.references.names())
 
 
 @utility(
@@ -169,7 +169,7 @@ def _get_all(service: ArmorService, _: DirectiveRequest) -> DirectiveResponse:
     differs='An unknown reference is answered with 205.',
 )
 def _get_client(service: ArmorService, _: DirectiveRequest, name: str) -> DirectiveResponse:
-    return DirectiveResponse(queried_objects=[service.reference(name).mounted])
+    return DirectiveResponse(queried_objects=[service.references.find(name).mounted])
 
 
 @utility('LOG FILE ON', text('path'), summary='Appends each directive with its answer to a file.')

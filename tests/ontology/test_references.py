@@ -1,0 +1,378 @@
+"""References, mounting, files, bounds and batches, and what other people's scripts do."""
+
+from __future__ import annotations
+
+import threading
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+
+import pytest
+
+from surveillance_ontology.armor.protocol import DirectiveRequest
+from surveillance_ontology.armor.service import ArmorService
+from surveillance_ontology.armor.settings import DATA, Settings
+
+from .seven_rooms import FIXTURES, IRI, ONTOLOGY, Ask, asker, names
+
+
+def iri(name: str) -> str:
+    return f'<{IRI}#{name}>'
+
+
+# --- references, mounting, files ---
+
+
+def test_loading_again_keeps_the_reference_but_takes_the_first_flag(ask: Ask) -> None:
+    ask('ADD IND CLASS', 'X', 'DOOR')
+    again = ask('LOAD FILE', ONTOLOGY, IRI, 'true', 'PELLET', 'false')
+    assert again.success
+    assert 'loaded already' in again.error_description
+    assert names(ask('QUERY IND CLASS', 'DOOR')) == ['X']
+    ask('ADD IND CLASS', 'Y', 'DOOR')
+    assert names(ask('QUERY IND CLASS', 'DOOR')) == ['X'], 'buffered now'
+    ask('LOAD FILE', ONTOLOGY, IRI, 'false', 'PELLET', 'false')
+    assert names(ask('QUERY IND CLASS', 'DOOR')) == ['X', 'Y']
+
+
+def test_several_references_do_not_mix(ask: Ask) -> None:
+    assert ask('LOAD FILE', ONTOLOGY, IRI, 'false', '', 'false', reference='other').success
+    ask('ADD IND CLASS', 'X', 'DOOR', reference='other')
+    assert names(ask('QUERY IND CLASS', 'DOOR')) == []
+    assert ask('GET ALL REFS').queried_objects == ['map', 'other']
+    assert ask('DROP', reference='other').success
+    assert ask('DROP', reference='other').success
+    assert ask('GET ALL REFS').queried_objects == ['map']
+
+
+def test_only_the_mounted_client_changes_anything(ask: Ask) -> None:
+    assert ask('MOUNT', client='a').success
+    assert ask('MOUNT', client='a').success
+    assert ask('GET REF CLIENT', 'map').queried_objects == ['a']
+    refused = ask('MOUNT', client='b')
+    assert (refused.success, refused.exit_code) == (False, 203)
+    assert refused.error_description == (
+        'b cannot be mounted on map. Another client is already mounted on it.'
+    )
+    for words, args in (('ADD IND', ('X',)), ('APPLY', ()), ('REASON', ())):
+        busy = ask(words, *args, client='b')
+        assert (busy.success, busy.exit_code) == (False, 102)
+        assert busy.error_description == (
+            'b cannot connect to map. Another client is already mounted on it.'
+        )
+    assert ask('QUERY IND CLASS', 'DOOR', client='b').success
+    assert ask('ADD IND CLASS', 'X', 'DOOR', client='a').success
+    assert ask('UNMOUNT', client='b').success
+    assert ask('GET REF CLIENT', 'map').queried_objects == ['a']
+    assert ask('UNMOUNT', client='a').success
+    assert ask('GET REF CLIENT', 'map').queried_objects == ['none']
+    assert ask('ADD IND', 'Y', client='b').success
+
+
+def test_mounting_what_is_not_there(ask: Ask) -> None:
+    assert ask('MOUNT', reference='other').exit_code == 203
+    assert ask('GET REF CLIENT', 'other').exit_code == 205
+
+
+def test_load_mounted(ask: Ask) -> None:
+    args = (ONTOLOGY, IRI, 'false', 'PELLET', 'false')
+    assert ask('LOAD FILE MOUNTED', *args, client='a', reference='other').success
+    assert ask('GET REF CLIENT', 'other').queried_objects == ['a']
+    refused = ask('LOAD FILE MOUNTED', *args, client='b', reference='other')
+    assert (refused.success, refused.exit_code) == (False, 203)
+
+
+def test_a_client_called_none_is_not_mounted(ask: Ask) -> None:
+    ask('MOUNT', client='none')
+    assert ask('ADD IND', 'X', client='b').success
+
+
+def test_mounting_can_be_left_unenforced(tmp_path: Path) -> None:
+    service = ArmorService(Settings(directories=(tmp_path,), enforce_mount=False))
+    ask = loaded(service, 'false', 'false')
+    ask('MOUNT', client='a')
+    assert ask('ADD IND CLASS', 'X', 'DOOR', client='b').success
+    service.close()
+
+
+@pytest.mark.parametrize(
+    ('reasoner', 'note'),
+    [('', ''), ('pellet', ''), ('NATIVE', ''), ('FACT', "'FACT'"), ('SNOROCKET', "'SNOROCKET'")],
+)
+def test_reasoner_names(service: ArmorService, reasoner: str, note: str) -> None:
+    answer = asker(service)('LOAD FILE', ONTOLOGY, IRI, 'false', reasoner, 'false')
+    assert answer.success
+    assert note in answer.error_description
+    assert bool(answer.error_description) == bool(note)
+
+
+def test_what_cannot_be_loaded_leaves_no_reference(service: ArmorService, tmp_path: Path) -> None:
+    ask = asker(service)
+    broken = tmp_path / 'broken.owl'
+    broken.write_text('<?xml version="1.0"?>\n<rdf:RDF>\n  <oops\n')
+    entities = tmp_path / 'entities.owl'
+    entities.write_text('<!DOCTYPE x [<!ENTITY a "aa"><!ENTITY b "&a;&a;">]>\n<x>&b;</x>')
+    for path, words in (
+        (str(broken), 'broken.owl:'),
+        (str(entities), 'entities.owl'),
+        (str(tmp_path / 'none.owl'), 'does not exist'),
+        (str(tmp_path), 'is not a file'),
+        ('/etc/passwd', 'may not be read'),
+        (f'{tmp_path}/../../../etc/passwd', 'may not be read'),
+        ('', 'path is empty'),
+        ('a\nb', 'is not a path'),
+    ):
+        answer = ask('LOAD FILE', path, IRI, 'false', 'PELLET', 'false')
+        assert (answer.success, answer.exit_code) == (False, 205), path
+        assert words in answer.error_description
+        assert '\n' not in answer.error_description
+        assert ask('GET ALL REFS').queried_objects == []
+    assert ask('LOAD FILE', ONTOLOGY, 'no iri', 'false', '', 'false').exit_code == 205
+    assert ask('LOAD FILE', ONTOLOGY, IRI, 'false', '', 'false').success, 'the name is not poisoned'
+
+
+def test_links_out_of_the_allowed_directories_are_seen_through(
+    service: ArmorService, tmp_path: Path
+) -> None:
+    (tmp_path / 'link.owl').symlink_to('/etc/passwd')
+    (tmp_path / 'out').symlink_to('/tmp')
+    ask = asker(service)
+    assert (
+        'may not be read'
+        in ask('LOAD FILE', str(tmp_path / 'link.owl'), IRI, 'false', '', 'false').error_description
+    )
+    ask('LOAD FILE', ONTOLOGY, IRI, 'false', '', 'false')
+    for path in (str(tmp_path / 'out' / 'x.owl'), str(tmp_path / 'link.owl'), '/tmp/x.owl'):
+        assert 'may not be written' in ask('SAVE', path).error_description
+
+
+def test_the_packaged_ontology_is_never_overwritten(ask: Ask) -> None:
+    before = Path(ONTOLOGY).read_bytes()
+    answer = ask('SAVE', '')
+    assert not answer.success
+    assert 'may not be written' in answer.error_description
+    assert Path(ONTOLOGY).read_bytes() == before
+
+
+def test_the_web_is_closed(ask: Ask) -> None:
+    answer = ask('LOAD WEB', 'http://example.org/x.owl', IRI, 'false', '', 'false', reference='web')
+    assert (answer.success, answer.exit_code) == (False, 205)
+    assert 'allow_web' in answer.error_description
+
+
+def test_saving_and_loading_again(ask: Ask, tmp_path: Path) -> None:
+    ask('ADD DATAPROP IND', 'visitedAt', 'R3', 'LONG', '1')
+    ask('ADD OBJECTPROP IND', 'hasDoor', 'R3', 'D1')
+    assert ask('SAVE', 'plain.owl').success
+    assert ask('SAVE INFERENCE', str(tmp_path / 'derived.owl')).success
+    assert '#URGENT' in (tmp_path / 'derived.owl').read_text()
+    ask('REPLACE DATAPROP IND', 'visitedAt', 'R3', 'LONG', '1665579740', '1')
+    assert names(ask('QUERY IND CLASS', 'URGENT')) == [], 'saving asserted nothing'
+    for name, urgent in (('plain', []), ('derived', ['R3'])):
+        path = str(tmp_path / f'{name}.owl')
+        assert ask('LOAD FILE', path, IRI, 'false', '', 'false', reference=name).success
+        assert names(ask('QUERY IND CLASS', 'ROOM', reference=name)) == ['R3']
+        ask('REMOVE DATAPROP IND', 'visitedAt', 'R3', 'LONG', '1', reference=name)
+        assert names(ask('QUERY IND CLASS', 'URGENT', reference=name)) == urgent
+        assert ask('SAVE', '', reference=name).success, 'an empty path is the file it came from'
+
+
+def test_logging_to_a_file_and_the_console(service: ArmorService, ask: Ask, tmp_path: Path) -> None:
+    assert ask('LOG FILE ON', 'armor.log').success
+    ask('QUERY IND CLASS', 'DOOR')
+    assert ask('LOG FILE OFF').success
+    ask('QUERY IND CLASS', 'ROOM')
+    text = (tmp_path / 'armor.log').read_text()
+    assert "'tester' on 'map': QUERY IND CLASS [DOOR] -> ok" in text
+    assert 'ROOM' not in text
+    assert ask('LOG FILE ON', '/etc/armor.log').exit_code == 205
+    shown: list[str] = []
+    noisy = ArmorService(Settings(), screen=shown.append)
+    asker(noisy)('LOG SCREEN ON')
+    asker(noisy)('QUERY IND', 'x')
+    asker(noisy)('LOG SCREEN OFF')
+    assert any('exit code 205' in line for line in shown)
+    noisy.close()
+
+
+# --- bounds ---
+
+
+def test_size_is_bounded(service: ArmorService) -> None:
+    small = Settings(max_arguments=10, max_characters=100, max_batch=3)
+    bounded = ArmorService(small)
+    ask = asker(bounded)
+    ask('LOAD FILE', ONTOLOGY, IRI, 'false', '', 'false')
+    assert '11 arguments, at most 10' in ask('DISJOINT IND', *'abcdefghijk').error_description
+    assert 'at most 100' in ask('ADD IND', 'x' * 101).error_description
+    answer = bounded.execute_list([DirectiveRequest('c', 'map', 'REASON')] * 4)
+    assert not answer.success
+    assert 'at most 3' in answer.responses[0].error_description
+    bounded.close()
+
+
+def test_names_of_references_are_bounded(ask: Ask) -> None:
+    for name in ('a\x00b', 'x' * 300, 'a\nb'):
+        answer = ask('LOAD FILE', ONTOLOGY, IRI, 'false', '', 'false', reference=name)
+        assert (answer.success, answer.exit_code) == (False, 205)
+
+
+# --- batches ---
+
+
+def request(words: str, *args: str, client: str = 'c', reference: str = 'map') -> DirectiveRequest:
+    command, primary, secondary, *_ = (*words.split(), '', '', '')
+    return DirectiveRequest(client, reference, command, primary, secondary, args)
+
+
+def test_a_batch_runs_in_order_with_one_answer_each(service: ArmorService, ask: Ask) -> None:
+    answer = service.execute_list(
+        [
+            request('ADD IND CLASS', 'X', 'DOOR'),
+            request('QUERY IND CLASS', 'DOOR'),
+            request('NO SUCH COMMAND'),
+            request('ADD IND CLASS', 'Y', 'DOOR'),
+            request('REASON'),
+        ]
+    )
+    assert [row.success for row in answer.responses] == [True, True, False, True, True]
+    assert answer.responses[1].queried_objects == [iri('X')]
+    assert not answer.success
+    assert answer.is_consistent
+    assert names(ask('QUERY IND CLASS', 'DOOR')) == ['X', 'Y']
+    assert service.execute_list([request('REASON')]).success
+    assert service.execute_list([]).success
+
+
+# --- acceptance: other people's scripts ---
+
+
+def test_the_python_clients_own_test_script(service: ArmorService) -> None:
+    base = 'http://example.org/four'
+    ask = asker(service)
+    path = str(FIXTURES / 'four_classes.owl')
+    assert ask('LOAD FILE', path, base, 'True', 'PELLET', 'True').success
+    ask('MOUNT')
+    for ind in '123':
+        ask('ADD IND CLASS', f'ind_{ind}', f'Class_{ind}')
+    ask('ADD OBJECTPROP IND', 'OProperty_1', 'ind_1', 'ind_3')
+    ask('ADD OBJECTPROP IND', 'OProperty_2', 'ind_1', 'ind_2')
+    ask('ADD DATAPROP IND', 'DProperty_1', 'ind_1', 'INTEGER', '1')
+    ask('REPLACE DATAPROP IND', 'DProperty_1', 'ind_1', 'INTEGER', '3', '1')
+    ask('APPLY')
+    ask('REASON')
+    types = {ind: ask('QUERY IND', ind).queried_objects for ind in ('ind_1', 'ind_2', 'ind_3')}
+    assert types == {
+        'ind_1': [f'<{base}#Class_1>', f'<{base}#Class_4>'],
+        'ind_2': [f'<{base}#Class_1>', f'<{base}#Class_2>'],
+        'ind_3': [f'<{base}#Class_3>'],
+    }
+    assert ask('QUERY DATAPROP IND', 'DProperty_1', 'ind_1').queried_objects == ['"3"^^xsd:integer']
+
+
+def test_the_tutorials_calls(ask: Ask) -> None:
+    assert ask('QUERY DATAPROP IND', 'now', 'Robot1').queried_objects == ['"1665579740"^^xsd:long']
+    ask('ADD OBJECTPROP IND', 'hasDoor', 'R1', 'D1')
+    ask('ADD OBJECTPROP IND', 'isIn', 'Robot1', 'R1')
+    ask('ADD DATAPROP IND', 'visitedAt', 'R1', 'LONG', '1665579710')
+    assert names(ask('QUERY IND CLASS', 'ROOM')) == ['R1']
+    assert names(ask('QUERY OBJECTPROP IND', 'isIn', 'Robot1')) == ['R1']
+    ask('REPLACE DATAPROP IND', 'now', 'Robot1', 'LONG', '1665579750', '1665579740')
+    assert names(ask('QUERY IND CLASS', 'URGENT')) == ['R1']
+
+
+def test_an_ontology_with_the_older_form_of_all_different(
+    service: ArmorService, tmp_path: Path
+) -> None:
+    vocabulary = Path(ONTOLOGY).read_text().rpartition('</rdf:RDF>')[0]
+    individuals = (FIXTURES / 'three_places.owl').read_text().partition('rdf-syntax-ns#">')[2]
+    (tmp_path / 'abox.owl').write_text(vocabulary + individuals)
+    ask = asker(service)
+    assert ask('LOAD FILE', 'abox.owl', IRI, 'false', 'PELLET', 'false').success
+    assert names(ask('QUERY IND', 'C1')) == ['CORRIDOR', 'LOCATION', 'ROOM']
+    assert 'URGENT' in names(ask('QUERY IND', 'R1'))
+    assert names(ask('QUERY OBJECTPROP IND', 'canReach', 'Robot1')) == ['R1', 'R2']
+
+
+def test_the_service_is_told_of_its_data() -> None:
+    assert (DATA / 'surveillance.owl').is_file()
+
+
+def test_disjointness_of_very_many_classes_is_refused(ask: Ask) -> None:
+    answer = ask('DISJOINT CLASS', *(f'K{number}' for number in range(501)))
+    assert (answer.success, answer.exit_code) == (False, 205)
+    assert answer.error_description == 'DISJOINT CLASS: 501 arguments, at most 500'
+
+
+def test_what_may_take_long_is_not_done_at_once(service: ArmorService, ask: Ask) -> None:
+    assert service.execute_at_once(request('QUERY IND CLASS', 'ROOM')) is not None
+    for slow in (
+        request('QUERY SPARQL', 'SELECT * { ?a ?b ?c }'),
+        request('LOAD FILE', ONTOLOGY, IRI, 'false', '', 'false', reference='other'),
+        request('ADD CLASS CLASS', 'A', 'B'),
+        request('DISJOINT IND', *(f'X{number}' for number in range(2000))),
+    ):
+        assert service.execute_at_once(slow) is None
+    assert ask('GET ALL REFS').queried_objects == ['map'], 'nothing was done'
+    ask('LOAD FILE', ONTOLOGY, IRI, 'true', '', 'true')
+    assert service.execute_at_once(request('REASON')) is not None
+    ask('ADD CLASS CLASS', 'A', 'B')
+    assert service.execute_at_once(request('REASON')) is None, 'classes changed'
+
+
+UNSUPPORTED = """<?xml version="1.0"?>
+<rdf:RDF xmlns="http://example.org/u#" xml:base="http://example.org/u"
+     xmlns:owl="http://www.w3.org/2002/07/owl#" xmlns:rdfs="http://www.w3.org/2000/01/rdf-schema#"
+     xmlns:rdf="http://www.w3.org/1999/02/22-rdf-syntax-ns#">
+  <owl:Class rdf:about="#A">
+    <rdfs:subClassOf>
+      <owl:Class>
+        <owl:unionOf rdf:parseType="Collection">
+          <owl:Class rdf:about="#B"/>
+          <owl:Class rdf:about="#C"/>
+        </owl:unionOf>
+      </owl:Class>
+    </rdfs:subClassOf>
+  </owl:Class>
+</rdf:RDF>
+"""
+
+
+def test_what_the_reasoner_does_not_support_is_reported_at_load(
+    service: ArmorService, tmp_path: Path
+) -> None:
+    (tmp_path / 'u.owl').write_text(UNSUPPORTED)
+    ask = asker(service)
+    answer = ask('LOAD FILE', 'u.owl', 'http://example.org/u', 'false', '', 'false')
+    assert answer.success
+    assert 'not supported by the reasoner' in answer.error_description
+    listed = ask('QUERY UNSUPPORTED').queried_objects
+    assert listed
+    assert listed[0] in answer.error_description
+
+
+def test_the_web_when_it_is_allowed(tmp_path: Path) -> None:
+    class Quiet(SimpleHTTPRequestHandler):
+        def log_message(self, *_: object) -> None:
+            pass
+
+    handler = partial(Quiet, directory=str(DATA))
+    with ThreadingHTTPServer(('127.0.0.1', 0), handler) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        base = f'http://127.0.0.1:{server.server_address[1]}'
+        service = ArmorService(Settings(directories=(tmp_path,), allow_web=True))
+        ask = asker(service)
+        good = ask('LOAD WEB MOUNTED', f'{base}/surveillance.owl', IRI, 'false', '', 'false')
+        assert good.success
+        assert ask('GET REF CLIENT', 'map').queried_objects == ['tester']
+        assert 'expected a path' in ask('SAVE', '').error_description
+        for url, words in (
+            (f'{base}/none.owl', 'not found'),
+            ('file:///etc/passwd', 'not an http address'),
+            ('http://127.0.0.1:1/x', 'refused'),
+        ):
+            bad = ask('LOAD WEB', url, IRI, 'false', '', 'false', reference='bad')
+            assert (bad.success, bad.exit_code) == (False, 205)
+            assert words in bad.error_description
+        server.shutdown()
+        service.close()
