@@ -89,7 +89,8 @@ def test_a_client_called_none_is_not_mounted(ask: Ask) -> None:
 
 def test_mounting_can_be_left_unenforced(tmp_path: Path) -> None:
     service = ArmorService(Settings(directories=(tmp_path,), enforce_mount=False))
-    ask = loaded(service, 'false', 'false')
+    ask = asker(service)
+    ask('LOAD FILE', ONTOLOGY, IRI, 'false', '', 'false')
     ask('MOUNT', client='a')
     assert ask('ADD IND CLASS', 'X', 'DOOR', client='b').success
     service.close()
