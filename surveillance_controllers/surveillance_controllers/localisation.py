@@ -72,7 +72,7 @@ class LocalisationParameters:
         far_better: A pose far away must explain this much more, and win in several searches: that
             somebody carried the robot there is unlikely, and rooms look alike.
         far_wins: In so many, one after the other.
-        doubts: Doubtful scans in a row before it looks.
+        doubts: Doubtful scans in a row before it looks; one is enough when it would be lost.
         lost_pause: Scans between two looks while it is lost.
         top_step: Odometry that jumps further than this between two readings is not believed, m.
         top_turn: Likewise, rad.
@@ -86,7 +86,7 @@ class LocalisationParameters:
     cast_rays: int = 45
     update_distance: float = 0.15
     update_turn: float = 0.15
-    update_period: float = 0.5
+    update_period: float = 0.3
     hit: float = 0.15
     spread: float = 0.2
     doubt_below: float = 0.85
@@ -213,7 +213,12 @@ class Localiser:
             return
         self.agreement = agreement
         self._doubts += 1
-        if self._doubts < (p.lost_pause if self.lost else p.doubts):
+        if self.lost:
+            patience = p.lost_pause
+        else:
+            # Next to nothing fits: that is no passer-by.
+            patience = p.doubts if agreement >= p.lost_below else 1
+        if self._doubts < patience:
             return
         self._doubts = 0
         found = self.search(thin)
