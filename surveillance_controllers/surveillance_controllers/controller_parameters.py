@@ -71,6 +71,31 @@ def _pose(values: Sequence[float]) -> str | None:
     return None if len(values) == 3 else 'three numbers: x, y, yaw'
 
 
+def station_pose(node: PatrolNode) -> Pose:
+    """Declares `station`."""
+    x, y, yaw = node.parameter(
+        'station',
+        [0.0, 0.0, 0.0],
+        'Where the charging station is: x, y in metres, yaw in radians, world frame.',
+        check=_pose,
+        read_only=True,
+    )
+    return x, y, yaw
+
+
+def dock_reach(node: PatrolNode) -> float:
+    """Declares `dock_reach`."""
+    reach: float = node.parameter(
+        'dock_reach',
+        0.5,
+        'SIMULATED: the robot is at the station within this distance of it, m.',
+        minimum=0.0,
+        maximum=100.0,
+        read_only=True,
+    )
+    return reach
+
+
 @dataclass(frozen=True)
 class BatterySettings:
     """What `battery_controller` is told by its parameters; units as declared."""
@@ -121,13 +146,6 @@ def battery_settings(
         check=_interval,
         read_only=True,
     )
-    station = node.parameter(
-        'station',
-        [0.0, 0.0, 0.0],
-        'Where the charging station is: x, y in metres, yaw in radians, world frame.',
-        check=_pose,
-        read_only=True,
-    )
     return BatterySettings(
         initial_value=node.parameter(
             'battery_initial_value',
@@ -156,15 +174,8 @@ def battery_settings(
             maximum=86_400.0,
             read_only=True,
         ),
-        station=(station[0], station[1], station[2]),
-        dock_reach=node.parameter(
-            'dock_reach',
-            0.5,
-            'SIMULATED: the robot charges within this distance of the station, m.',
-            minimum=0.0,
-            maximum=100.0,
-            read_only=True,
-        ),
+        station=station_pose(node),
+        dock_reach=dock_reach(node),
         update_period=node.parameter(
             'battery_update_period',
             1.0,
@@ -270,6 +281,10 @@ class MotionSettings:
     """What `motion_controller` is told by its parameters; units as declared."""
 
     navigator: str
+    docking: str
+    dock_type: str
+    station: Pose
+    dock_reach: float
     feedback_period: float
     place_reach: float
     random_seed: int
@@ -291,6 +306,18 @@ def motion_settings(node: PatrolNode) -> MotionSettings:
             choices=('own', 'nav2'),
             read_only=True,
         ),
+        docking=node.parameter(
+            'docking',
+            'none',
+            'SIMULATED: a docking server that docks the robot where a way ends at the station.',
+            choices=('none', 'opennav'),
+            read_only=True,
+        ),
+        dock_type=node.parameter(
+            'dock_type', '', "The dock's type, as the docking server knows it.", read_only=True
+        ),
+        station=station_pose(node),
+        dock_reach=dock_reach(node),
         feedback_period=node.parameter(
             'feedback_period',
             0.2,

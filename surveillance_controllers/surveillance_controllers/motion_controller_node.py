@@ -26,8 +26,7 @@ from surveillance_runtime.goals import GoalAborted, GoalRun, GoalServer
 from surveillance_runtime.node import PatrolNode, run_node
 
 if TYPE_CHECKING:
-    from surveillance_controllers.nav2_motion import Nav2Motion
-    from surveillance_controllers.simulated_motion import SimulatedMotion
+    from surveillance_controllers.docking import Motion
 
 
 class MotionController(PatrolNode):
@@ -45,7 +44,7 @@ class MotionController(PatrolNode):
         self._knowledge = MapKnowledge(self, self._settings.peer_timeout)
         self._desk: OperatorDesk[tuple[float, float]] = OperatorDesk(self._announce)
         self._console = OperatorConsole(self, MOTION, self._carry_out, lambda: self._desk.status)
-        self._robot: SimulatedMotion | Nav2Motion | None = None
+        self._robot: Motion | None = None
         if self._mode == 'SIMULATED':
             self._robot = self._make_robot()
         GoalServer(self, FollowPath, 'follow_path', self._follow_path)
@@ -54,16 +53,11 @@ class MotionController(PatrolNode):
         if self._mode == 'MANUAL' and self._settings.console:
             self._console.open(console_source)
 
-    def _make_robot(self) -> SimulatedMotion | Nav2Motion:
-        # Imported only here, for the libraries behind them take their time.
-        if self._settings.navigator == 'nav2':
-            from surveillance_controllers.nav2_motion import Nav2Motion
+    def _make_robot(self) -> Motion:
+        # Only here, for the libraries behind it take their time to import.
+        from surveillance_controllers.robot_motion import make_motion
 
-            return Nav2Motion(self, self._knowledge, self._settings)
-        from surveillance_controllers.robot_parameters import robot_settings
-        from surveillance_controllers.simulated_motion import SimulatedMotion
-
-        return SimulatedMotion(self, robot_settings(self, self._settings), self._knowledge)
+        return make_motion(self, self._settings, self._knowledge)
 
     def _announce(self, text: str) -> None:
         self._console.announce(text)

@@ -1,0 +1,149 @@
+"""Moving by Nav2 and docking by a docking server, with both servers scripted.
+
+Their message packages come with them and are no wheels, so plain classes stand in for the types
+here; what is asked of the servers, and what is made of their answers, is what is looked at.
+"""
+
+from __future__ import annotations
+
+import sys
+from types import ModuleType, SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from surveillance_controllers import docking, nav2_motion
+from surveillance_controllers.arrival import MotionFailed
+from surveillance_runtime.calls import GoalEnd, Unavailable
+from surveillance_runtime.node import StartError
+from surveillance_runtime.waiting import Interrupt
+
+PATH = np.array([[0.0, 0, 0], [3, 0, 0], [3, 4, 0]])
+
+
+class Servers:
+    """Action servers that answer as told and keep what they were asked."""
+
+    def __init__(self) -> None:
+        self.asked: list[tuple[str, Any]] = []
+        self.ends: dict[str, GoalEnd | Exception] = {}
+        self.feedback: list[Any] = []
+
+    def caller(self, _node: Any, _type: Any, name: str) -> Any:
+        def run(goal: Any, *, on_feedback: Any = None, **_deadlines: Any) -> GoalEnd:
+            self.asked.append((name, goal))
+            for message in self.feedback if on_feedback else ():
+                on_feedback(message)
+            end = self.ends.get(name, GoalEnd('succeeded', SimpleNamespace(success=True)))
+            if isinstance(end, Exception):
+                raise end
+            return end
+
+        return SimpleNamespace(run=run)
+
+
+@pytest.fixture
+def servers(monkeypatch: pytest.MonkeyPatch) -> Servers:
+    servers = Servers()
+    for package, names in (
+        ('nav2_msgs', ['NavigateToPose']),
+        ('opennav_docking_msgs', ['DockRobot', 'UndockRobot']),
+    ):
+        module = ModuleType(f'{package}.action')
+        for name in names:
+            setattr(module, name, SimpleNamespace(Goal=SimpleNamespace))
+        monkeypatch.setitem(sys.modules, package, ModuleType(package))
+        monkeypatch.setitem(sys.modules, f'{package}.action', module)
+    monkeypatch.setattr(nav2_motion, 'GoalCaller', servers.caller)
+    monkeypatch.setattr(docking, 'GoalCaller', servers.caller)
+    return servers
+
+
+@pytest.fixture
+def run() -> Any:
+    return SimpleNamespace(interrupt=Interrupt())
+
+
+def nav2(graph: Any) -> nav2_motion.Nav2Motion:
+    settings: Any = SimpleNamespace(place_reach=2.0, peer_timeout=1.0)
+    knowledge: Any = None
+    return nav2_motion.Nav2Motion(graph.node, knowledge, settings)
+
+
+def at(x: float, y: float) -> Any:
+    position = SimpleNamespace(x=x, y=y, z=0.0)
+    return SimpleNamespace(current_pose=SimpleNamespace(pose=SimpleNamespace(position=position)))
+
+
+def test_nav2_is_sent_to_the_path_s_end_facing_along_it(
+    graph: Any, servers: Servers, run: Any
+) -> None:
+    servers.feedback = [at(1, 0), at(2.9, 3.9)]
+    seen: list[Any] = []
+    end = nav2(graph).follow(PATH, run, seen.append)
+    ((name, goal),) = servers.asked
+    assert name == 'navigate_to_pose'
+    assert goal.pose.header.frame_id == 'map'
+    pose = goal.pose.pose
+    assert (pose.position.x, pose.position.y) == (3, 4)
+    assert pose.orientation.z == pytest.approx(np.sin(np.pi / 4))
+    assert [tuple(p) for p in seen] == [(1, 0, 0), (2.9, 3.9, 0)]
+    assert tuple(end) == (2.9, 3.9, 0)
+
+
+@pytest.mark.parametrize(
+    ('end', 'text'),
+    [
+        (GoalEnd('aborted', None), 'Nav2 aborted the goal'),
+        (Unavailable('action navigate_to_pose: no server'), 'navigate_to_pose: no server'),
+    ],
+)
+def test_what_nav2_cannot_do_fails_with_the_reason(
+    graph: Any, servers: Servers, run: Any, end: Any, text: str
+) -> None:
+    servers.ends['navigate_to_pose'] = end
+    with pytest.raises(MotionFailed, match=text):
+        nav2(graph).follow(PATH, run, lambda _: None)
+
+
+def docked(graph: Any, station: tuple[float, float, float]) -> docking.DockingMotion:
+    return docking.DockingMotion(graph.node, nav2(graph), station, 0.5, 'charger', 1.0)
+
+
+def test_a_way_to_the_station_ends_in_the_dock_and_the_next_one_begins_by_undocking(
+    graph: Any, servers: Servers, run: Any
+) -> None:
+    motion = docked(graph, (3.2, 4.0, 1.0))
+    motion.follow(PATH, run, lambda _: None)
+    motion.look_around(run)
+    assert [name for name, _ in servers.asked] == ['navigate_to_pose', 'dock_robot']
+    goal = servers.asked[-1][1]
+    assert (goal.dock_type, goal.use_dock_id) == ('charger', False)
+    assert goal.dock_pose.pose.position.x == 3.2
+    motion.follow(PATH[::-1], run, lambda _: None)
+    assert [name for name, _ in servers.asked[2:]] == ['undock_robot', 'navigate_to_pose']
+
+
+def test_a_way_to_elsewhere_does_not_dock(graph: Any, servers: Servers, run: Any) -> None:
+    docked(graph, (9.0, 9.0, 0.0)).follow(PATH, run, lambda _: None)
+    assert [name for name, _ in servers.asked] == ['navigate_to_pose']
+
+
+def test_a_dock_that_is_not_found_fails_the_way(graph: Any, servers: Servers, run: Any) -> None:
+    refused = SimpleNamespace(success=False, error_code=903)
+    servers.ends['dock_robot'] = GoalEnd('aborted', refused)
+    with pytest.raises(MotionFailed, match=r'docking: .* aborted the goal \(error code 903\)'):
+        docked(graph, (3.0, 4.0, 0.0)).follow(PATH, run, lambda _: None)
+
+
+def test_without_their_messages_both_say_what_to_install(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    for package in ('nav2_msgs', 'opennav_docking_msgs'):
+        monkeypatch.setitem(sys.modules, package, None)
+        monkeypatch.setitem(sys.modules, f'{package}.action', None)
+    with pytest.raises(StartError, match='install ros-jazzy-nav2-msgs'):
+        nav2_motion.navigate_to_pose()
+    with pytest.raises(StartError, match='install ros-jazzy-opennav-docking-msgs'):
+        docking.docking_actions()
