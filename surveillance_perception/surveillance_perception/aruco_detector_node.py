@@ -28,6 +28,7 @@ from surveillance_perception.detection_watch import DetectionWatch, Sighting
 from surveillance_perception.detector_parameters import DetectorParameters
 from surveillance_perception.latest import Latest
 from surveillance_perception.picture_files import Picture
+from surveillance_perception.picture_subscription import PICTURES_QOS, PictureSubscription
 from surveillance_runtime.node import PatrolNode, run_node
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 
@@ -74,13 +75,11 @@ class ArucoDetector(PatrolNode):
             MarkerDetectionArray, 'aruco_detector/detections', 10
         )
         self._poses = self.create_publisher(PoseArray, 'aruco_detector/poses', 10)
-        self._annotated = self.create_publisher(Image, 'aruco_detector/annotated', SENSOR_QOS)
+        self._annotated = self.create_publisher(Image, 'aruco_detector/annotated', PICTURES_QOS)
         self._diagnostics = self.create_publisher(DiagnosticArray, 'diagnostics', 10)
         topic = 'camera/rgb/image_raw'
-        self.create_subscription(Image, topic, self._pictures.put, SENSOR_QOS)
-        self.create_subscription(
-            CompressedImage, topic + '/compressed', self._pictures.put, SENSOR_QOS
-        )
+        PictureSubscription(self, Image, topic, self._pictures.put)
+        PictureSubscription(self, CompressedImage, topic + '/compressed', self._pictures.put)
         self.create_subscription(
             CameraInfo, 'camera/rgb/camera_info', self._on_camera_info, SENSOR_QOS
         )

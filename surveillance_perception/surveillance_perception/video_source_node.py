@@ -12,9 +12,9 @@ from std_msgs.msg import Header
 from surveillance_perception.camera_model import CameraModel
 from surveillance_perception.conversions import camera_to_ros, picture_to_ros
 from surveillance_perception.picture_files import Picture, PictureError
+from surveillance_perception.picture_subscription import PICTURES_QOS
 from surveillance_perception.video_frames import FrameSource, open_source
 from surveillance_runtime.node import PatrolNode, StartError, run_node
-from surveillance_runtime.qos import SENSOR_QOS
 from surveillance_runtime.waiting import ClockWait
 
 
@@ -55,8 +55,8 @@ class VideoSource(PatrolNode):
             on_change=lambda value: setattr(self, '_field_of_view', value),
         )
         self._is_camera = str(source).isdigit()
-        self._images = self.create_publisher(Image, 'camera/rgb/image_raw', SENSOR_QOS)
-        self._infos = self.create_publisher(CameraInfo, 'camera/rgb/camera_info', SENSOR_QOS)
+        self._images = self.create_publisher(Image, 'camera/rgb/image_raw', PICTURES_QOS)
+        self._infos = self.create_publisher(CameraInfo, 'camera/rgb/camera_info', PICTURES_QOS)
         self._wait = ClockWait(self)
         self._source = str(source)
         try:

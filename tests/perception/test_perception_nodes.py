@@ -51,11 +51,11 @@ ROOM = picture(Panel(12, 1.5, 0.3, offset=(-60.0, 0.0)), Panel(70, 1.5, offset=(
 class Camera:
     """Publishes pictures and listens to what the detector makes of them."""
 
-    def __init__(self, graph: Any) -> None:
+    def __init__(self, graph: Any, qos: Any = 5) -> None:
         self.graph = graph
-        self.images = graph.node.create_publisher(Image, 'camera/rgb/image_raw', SENSOR_QOS)
+        self.images = graph.node.create_publisher(Image, 'camera/rgb/image_raw', qos)
         self.compressed = graph.node.create_publisher(
-            CompressedImage, 'camera/rgb/image_raw/compressed', SENSOR_QOS
+            CompressedImage, 'camera/rgb/image_raw/compressed', qos
         )
         self.info = graph.node.create_publisher(CameraInfo, 'camera/rgb/camera_info', SENSOR_QOS)
         self.ids = graph.listen(Int32, 'aruco_detector/id', IDS_QOS)
@@ -77,8 +77,8 @@ class Camera:
         return self.detections[-1]
 
 
-def detector(graph: Any, **parameters: Any) -> tuple[Camera, ArucoDetector]:
-    camera = Camera(graph)
+def detector(graph: Any, qos: Any = 5, **parameters: Any) -> tuple[Camera, ArucoDetector]:
+    camera = Camera(graph, qos)
     node = graph.add(ArucoDetector, parameters={'known_ids': [11, 12, 13]} | parameters)
     camera.ready()
     return camera, node
@@ -92,6 +92,11 @@ def test_each_marker_is_announced_once_when_enough_pictures_agree(graph: Any) ->
     assert [message.data for message in camera.ids] == [12, 70]
     late = graph.listen(Int32, 'aruco_detector/id', IDS_QOS)
     graph.until(lambda: len(late) == 2)
+
+
+def test_camera_that_offers_best_effort_only_is_heard(graph: Any) -> None:
+    camera, _ = detector(graph, qos=SENSOR_QOS)
+    assert len(camera.show(ROOM).detections) == 2
 
 
 def test_detections_are_typed_posed_and_drawn(graph: Any) -> None:
@@ -195,7 +200,8 @@ def test_pictures_taken_while_the_arm_moves_are_not_read(graph: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    'wrong', [{'marker_dictionary': 'DICT_0'}, {'known_ids': [500]}, {'blur': -1.0}, {'marker_size': 0.0}]
+    'wrong',
+    [{'marker_dictionary': 'DICT_0'}, {'known_ids': [500]}, {'blur': -1.0}, {'marker_size': 0.0}],
 )
 def test_wrong_parameters_are_refused_at_the_start(graph: Any, wrong: dict[str, Any]) -> None:
     with pytest.raises(ParameterError, match=next(iter(wrong))):
