@@ -81,6 +81,15 @@ class OntologyMapBuilder(PatrolNode):
         self._work.stop()
 
     def _described_place(self) -> Place | None:
+        source = self.parameter(
+            'map_source',
+            'configuration',
+            'Where the map comes from: the parameters, or ontology_map/build_map alone.',
+            choices=('configuration', 'markers'),
+            read_only=True,
+        )
+        if source == 'markers':
+            return None
         rooms = self.parameters_under('map')
         positions = self.parameters_under('room_positions')
         robot_room = self.parameter('robot_room', '', 'Room in which the robot starts.')

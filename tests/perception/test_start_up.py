@@ -61,7 +61,8 @@ def started(graph: Any) -> Any:
 
 def test_start_from_pixels_to_ontology_with_one_marker_covered_until_later(graph: Any) -> None:
     graph.add(ArmorServer, parameters=SIMULATED)
-    graph.add(OntologyMapBuilder, parameters=SIMULATED | {'map_source': 'markers'})
+    # the place's file is for the simulator: the builder must not take its map from there
+    graph.add(OntologyMapBuilder, parameters=place() | SIMULATED | {'map_source': 'markers'})
     maps = graph.listen(OntologyMap, 'ontology_map/build_map', STATE_QOS)
     ids = robot(graph)
     marker = ServiceCaller(graph.node, SetMarker, 'simulation/set_marker')
