@@ -310,7 +310,11 @@ def processes(seconds: float) -> tuple[float, float, float]:
             for process in started:
                 process.send_signal(signal.SIGINT)
             for process in started:
-                process.wait(30)
+                try:
+                    process.wait(15)
+                except subprocess.TimeoutExpired:
+                    process.kill()
+                    process.wait()
             node.stop()
             spinner.stop()
             node.destroy_node()
