@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+import threading
 from pathlib import Path
 
 import pytest
@@ -120,3 +121,17 @@ def test_a_query_reaches_no_other_machine(service: ArmorService, built: ArmorCli
         listener.setblocking(False)
         with pytest.raises(BlockingIOError):
             listener.accept()
+
+
+def test_a_service_that_closes_stops_its_queries(service: ArmorService, built: ArmorClient) -> None:
+    answers: list[str] = []
+    thread = threading.Thread(
+        target=lambda: answers.append(asker(service)('QUERY SPARQL', ENDLESS).error_description)
+    )
+    thread.start()
+    while not service.sparql.is_busy():
+        thread.join(0.01)
+    service.sparql.close()
+    thread.join(10)
+    assert answers == ['QUERY SPARQL: the server stops']
+    assert not asker(service)('QUERY SPARQL', 'SELECT * { ?a ?b ?c }').success

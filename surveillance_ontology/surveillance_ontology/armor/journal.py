@@ -90,6 +90,8 @@ class Journal:
         Raises:
             JournalError: They could not be written; none of them is there.
         """
+        if self._file.closed:
+            raise JournalError(f'{self._directory}: closed')
         line = _line(list(records))
         end = self._file.tell()
         try:

@@ -61,6 +61,8 @@ class SparqlEngine:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._idle: list[_Worker] = []
+        self._busy: set[_Worker] = set()
+        self._closed = False
 
     def select(
         self, version: Version, graph: Callable[[], Graph], query: str, seconds: float, rows: int
@@ -84,34 +86,51 @@ class SparqlEngine:
         try:
             answer = worker.ask(version, graph, query, deadline, rows)
         except BaseException:
+            with self._lock:
+                self._busy.discard(worker)
             worker.kill()
+            if self._closed:
+                raise SparqlError('the server stops') from None
             raise
         with self._lock:
+            self._busy.discard(worker)
             self._idle.append(worker)
-            surplus = self._idle[:-IDLE]
-            self._idle = self._idle[-IDLE:]
+            kept = 0 if self._closed else IDLE
+            surplus = self._idle[: len(self._idle) - kept]
+            self._idle = self._idle[len(self._idle) - kept :]
         for other in surplus:
             other.kill()
         if 'error' in answer:
             raise SparqlError(' '.join(str(answer['error']).split()))
         return [[Binding(*bound) for bound in row] for row in answer['rows']]
 
+    def is_busy(self) -> bool:
+        """Tell whether a query runs."""
+        return bool(self._busy)
+
     def close(self) -> None:
-        """End the processes."""
+        """End the processes, also those that run a query."""
         with self._lock:
+            self._closed = True
             idle, self._idle = self._idle, []
+            busy = list(self._busy)
+        for worker in busy:
+            worker.interrupt()
         for worker in idle:
             worker.kill()
 
     def _take(self, version: Version) -> _Worker:
         with self._lock:
-            for worker in self._idle:
-                if worker.version == version:
-                    self._idle.remove(worker)
-                    return worker
-            if self._idle:
-                return self._idle.pop(0)
-        return _Worker()
+            if self._closed:
+                raise SparqlError('the server stops')
+            matching = (worker for worker in self._idle if worker.version == version)
+            worker = next(matching, None) or (self._idle[0] if self._idle else None)
+            if worker is None:
+                worker = _Worker()
+            else:
+                self._idle.remove(worker)
+            self._busy.add(worker)
+            return worker
 
 
 class _Worker:
@@ -151,6 +170,10 @@ class _Worker:
         answer = json.loads(self._receive(deadline))
         self.version = version
         return answer
+
+    def interrupt(self) -> None:
+        """End the process; whoever waits for it finds out."""
+        self._process.kill()
 
     def kill(self) -> None:
         """End the process at once."""
