@@ -25,6 +25,9 @@ from surveillance_ontology.place import Place, PlaceError, make_place
 from surveillance_runtime.node import PatrolNode, StartError, run_node
 from surveillance_runtime.qos import STATE_QOS
 
+SECONDS_PER_ROOM = 0.005
+"""By which the longest wait grows with the map."""
+
 
 class OntologyMapBuilder(PatrolNode):
     """Builds and keeps the map in the ontology."""
@@ -43,13 +46,16 @@ class OntologyMapBuilder(PatrolNode):
         timeout = self.parameter(
             'armor_timeout', 5.0, 'Longest wait for an answer of the server, seconds.', minimum=0.1
         )
+        place = self._described_place()
+        # The first reasoning over thousands of places takes its time.
+        timeout = max(timeout, SECONDS_PER_ROOM * len(place.rooms if place else ()))
         armor = ArmorClient(
             self, self.get_name(), self._reference, timeout=timeout, interrupt=self.stopping
         )
         log = self.get_logger()
         self._keeper = MapKeeper(
             MapBuilding(armor, path, uri),
-            self._described_place(),
+            place,
             lambda: int(self.get_clock().now().nanoseconds // 1_000_000_000),
             self.stopping.is_set,
             Reports(log.info, log.warn, log.error, self.fail),
