@@ -178,6 +178,17 @@ def test_saving_and_loading_again(ask: Ask, tmp_path: Path) -> None:
         assert ask('SAVE', '', reference=name).success, 'an empty path is the file it came from'
 
 
+def test_a_turtle_document_is_saved_as_one(service: ArmorService, tmp_path: Path) -> None:
+    ask = asker(service)
+    (tmp_path / 't.ttl').write_text(f'@prefix : <{IRI}#> .\n:R1 a :ROOM .\n')
+    args = (IRI, 'false', '', 'false')
+    assert ask('LOAD FILE', 't.ttl', *args).success
+    ask('ADD IND CLASS', 'R2', 'ROOM')
+    assert ask('SAVE', '').success
+    assert ask('LOAD FILE', 't.ttl', *args, reference='again').success
+    assert names(ask('QUERY IND CLASS', 'ROOM', reference='again')) == ['R1', 'R2']
+
+
 def test_logging_to_a_file_and_the_console(service: ArmorService, ask: Ask, tmp_path: Path) -> None:
     assert ask('LOG FILE ON', 'armor.log').success
     ask('QUERY IND CLASS', 'DOOR')

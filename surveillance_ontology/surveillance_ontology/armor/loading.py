@@ -20,6 +20,8 @@ NATIVE = ('', 'PELLET', 'NATIVE')
 """Names of the reasoner of this package; PELLET is what ARMOR's clients send."""
 JAVA = {'HERMIT': 'hermit', 'OPENLLET': 'pellet', 'PELLET_JAVA': 'pellet'}
 """Names of the Java reasoners, see `java_reasoning`."""
+WRITTEN = {'turtle': 'ntriples', 'owlxml': 'rdfxml'}
+"""What SAVE writes for formats that are only read: N-Triples is Turtle as well."""
 WEB_TIMEOUT = 20.0
 MAX_NAMED = 5
 """How many unsupported statements a description names."""
@@ -81,7 +83,8 @@ def load_document(
         named = '; '.join(unsupported[:MAX_NAMED])
         notes.append(f'{len(unsupported)} statements not supported by the reasoner: {named}{more}')
     used = reasoner if isinstance(kb, JavaKnowledgeBase) else ''
-    return Reference(name, kb, Origin(path, document.format, document.prefixes, used)), notes
+    form = WRITTEN.get(document.format, document.format)
+    return Reference(name, kb, Origin(path, form, document.prefixes, used)), notes
 
 
 def knowledge_base(base: str, axioms: Iterable[Axiom], reasoner: str) -> KnowledgeBase:

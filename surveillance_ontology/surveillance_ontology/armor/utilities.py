@@ -119,7 +119,8 @@ def _drop(service: ArmorService, request: DirectiveRequest) -> DirectiveResponse
     text('path', ''),
     summary='Writes the asserted axioms in the format that was loaded; an empty path stands for '
     'the file that was loaded.',
-    differs='Written beside the file and renamed, so that a crash leaves the old file whole.',
+    differs='Written beside the file and renamed, so that a crash leaves the old file whole. '
+    'Turtle is written as N-Triples, OWL/XML as RDF/XML.',
     slow=True,
 )
 def _save(service: ArmorService, request: DirectiveRequest, path: str) -> DirectiveResponse:
