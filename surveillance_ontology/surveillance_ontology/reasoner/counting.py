@@ -7,7 +7,7 @@ and functional properties, and the individuals that must be the same because onl
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from itertools import combinations, islice
+from itertools import combinations, islice, product
 from typing import Any
 
 from surveillance_ontology.axioms import Axiom
@@ -75,7 +75,7 @@ class _Counter:
         """The facts by which the values are pairwise different; values of data just are."""
         if self.is_data:
             return ()
-        predicate = self.difference._predicate
+        predicate = self.difference.predicate
         return tuple(
             (predicate, one, other)
             for place, one in enumerate(values)
@@ -230,9 +230,8 @@ class AtMostCounter(_Counter):
             marks = [((label, z),) for z in (x, y) if z in label.members]
             if not marks:
                 return
-        ours, theirs = self.related(x), self.related(y)
         if self.is_data:
-            union = set(ours) | set(theirs)
+            union = {*self.related(x), *self.related(y)}
             if len(union) <= self.n:
                 return
             for chosen in self.choices(list(union), self.n + 1):
@@ -242,15 +241,20 @@ class AtMostCounter(_Counter):
                 for mark in marks:
                     yield mark + facts
             return
-        if self.n != 1:
-            return
         different = self.difference.different
-        for one in ours:
-            for other in theirs:
-                if different(one, other):
-                    facts = self.facts(x, [one]) + self.facts(y, [other])
-                    for mark in marks:
-                        yield mark + facts + ((self.difference._predicate, one, other),)
+        for one, other in self.pairs(x, y):
+            if different(one, other):
+                facts = self.facts(x, [one]) + self.facts(y, [other])
+                for mark in marks:
+                    yield mark + facts + ((self.difference.predicate, one, other),)
+
+    def pairs(self, x: str, y: str) -> Iterator[tuple[str, str]]:
+        """Where one is allowed: pairs of values that must be the same if `x` and `y` are."""
+        if x not in self.succ or y not in self.succ or self.n != 1:
+            return
+        members = None if self.label is None else self.label.members
+        if members is None or x in members or y in members:
+            yield from product(self.related(x), self.related(y))
 
 
 class KeyWatcher:

@@ -14,7 +14,7 @@ from typing import Protocol
 from surveillance_ontology.axioms import DifferentIndividuals
 from surveillance_ontology.reasoner.clauses import Fact, Predicate, Premises, Program
 
-_MAX_DEPTH = 6
+_MAX_PAIRS = 1000
 
 
 class Evidence(Protocol):
@@ -24,19 +24,31 @@ class Evidence(Protocol):
         """Each set of facts by which `x` and `y` differ."""
 
 
+class EvidenceOfValues(Evidence, Protocol):
+    """Two individuals differ because what they are related to does."""
+
+    def pairs(self, x: str, y: str) -> Iterator[tuple[str, str]]:
+        """Pairs of individuals each of which, if different, makes `x` and `y` different."""
+
+
 class Difference:
-    """Difference between representatives of individuals."""
+    """Difference between representatives of individuals.
+
+    Attributes:
+        evidence: By which facts two individuals differ.
+        through: By which differences of others they do.
+    """
 
     def __init__(self, program: Program) -> None:
-        self._predicate = program.different
+        self.predicate = program.different
         self._own: dict[str, set[int]] = {}
         self._merged: dict[str, set[int]] = {}
         self._numbers: dict[DifferentIndividuals, int] = {}
         self._axioms: dict[int, DifferentIndividuals] = {}
         self._next = 0
-        self._depth = 0
         self._stated = program.different.succ
         self.evidence: list[Evidence] = []
+        self.through: list[EvidenceOfValues] = []
 
     def clear(self) -> None:
         """Forgets every stated difference."""
@@ -116,18 +128,33 @@ class Difference:
                     return True
         elif self.stated(x, y):
             return True
-        if self._stated and (y in self._stated.get(x, ()) or x in self._stated.get(y, ())):
+        if self._stated and self._stated_by_rule(x, y):
             return True
-        if not self.evidence or self._depth >= _MAX_DEPTH:
-            return False
-        self._depth += 1
-        try:
+        return bool(self.evidence or self.through) and self._follows(x, y)
+
+    def _follows(self, x: str, y: str) -> bool:
+        """Whether facts show the difference, of these two or of pairs that it comes down to."""
+        seen = {(x, y)}
+        pending = [(x, y)]
+        for pair in pending:
             for evidence in self.evidence:
-                for _ in evidence.premises(x, y):
+                for _ in evidence.premises(*pair):
                     return True
-        finally:
-            self._depth -= 1
+            if len(seen) > _MAX_PAIRS:
+                continue
+            for counter in self.through:
+                for one, other in counter.pairs(*pair):
+                    if one == other or (one, other) in seen:
+                        continue
+                    if self.stated(one, other) or self._stated_by_rule(one, other):
+                        return True
+                    seen.add((one, other))
+                    pending.append((one, other))
         return False
+
+    def _stated_by_rule(self, x: str, y: str) -> bool:
+        stated = self._stated
+        return y in stated.get(x, ()) or x in stated.get(y, ())
 
     def premises(self, x: str, y: str) -> Iterator[Premises]:
         """Each set of facts by which two individuals differ; an empty set where it is stated."""
@@ -136,8 +163,8 @@ class Difference:
         if self.stated(x, y):
             yield ()
         if x in self._stated.get(y, ()):
-            yield ((self._predicate, y, x),)
-        for evidence in self.evidence:
+            yield ((self.predicate, y, x),)
+        for evidence in (*self.evidence, *self.through):
             yield from evidence.premises(x, y)
 
 

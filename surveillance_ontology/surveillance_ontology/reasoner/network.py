@@ -208,7 +208,7 @@ class Network:
                 if counter.label is not None:
                     counter.label.touching = (1,)
             elif counter.n == 1:
-                evidence.append(counter)
+                self._difference.through.append(counter)
                 _also_touches(counter.prop, 2 if counter.inverse else 1)
                 if counter.label is not None:
                     counter.label.touching = (1,)
