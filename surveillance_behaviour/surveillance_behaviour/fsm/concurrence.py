@@ -91,6 +91,7 @@ class Concurrence(ActiveContainer):
         self._nodes: dict[str, Node] = {}
         self._making_way: set[str] = set()
         self._preempted: set[str] = set()
+        self._gone: set[str] = set()
 
     @staticmethod
     def add(
@@ -218,6 +219,7 @@ class Concurrence(ActiveContainer):
         with run.condition:
             self._making_way.clear()
             self._preempted.clear()
+            self._gone.clear()
             for label, state in self._states.items():
                 if self._child_outcomes[label] is None:
                     node = self._nodes[label] = self._node(label, state, run.clock)
@@ -278,6 +280,8 @@ class Concurrence(ActiveContainer):
                     first_error = first_error or strand.error
                     self._stop(running, _preempt)
                     continue
+                if strand.without_leaf:
+                    self._gone.add(label)
                 self._note_end(frame, label, strand.outcome)
                 if first_error is None:
                     try:
@@ -298,7 +302,8 @@ class Concurrence(ActiveContainer):
                 return
             if label in self._making_way:
                 made_way = not state.preempt_requested() or outcome == 'preempted'
-                state.recall_preempt()
+                if label not in self._gone:
+                    state.recall_preempt()
                 if made_way:
                     return
             if getattr(state, '_fsm_progress', None) is not None:
@@ -335,7 +340,12 @@ class Concurrence(ActiveContainer):
 
     def _service_children(self) -> None:
         """Acknowledge the preempt if one of those asked did; recall what the rest left pending."""
-        ignored = [label for label, state in self._states.items() if state.preempt_requested()]
+        # A state that was left behind keeps the request, so that it ends some time.
+        ignored = [
+            label
+            for label, state in self._states.items()
+            if state.preempt_requested() and label not in self._gone
+        ]
         for label in ignored:
             self._states[label].recall_preempt()
         if self._preempt_requested:

@@ -273,14 +273,17 @@ class DrivenContainer(ActiveContainer):
         """Settle what was asked of the state that ended: a preempt, or to make way."""
         state, cut, made_way = left.state, frame.cut, False
         asked = frame.preempted is left
-        pending = state.preempt_requested()
-        frame.cut = None
+        gone = frame.gone is left
+        # A state that was left behind keeps the request, and has not ignored it any longer.
+        pending = state.preempt_requested() and not gone
+        frame.cut = frame.gone = None
         if asked:
             frame.preempted = None
         if cut is left and outcome is not SUSPENDED and (pending or not asked):
             # With both asked and one still pending, what it served was to make way.
             made_way = not pending or outcome == 'preempted'
-            state.recall_preempt()
+            if not gone:
+                state.recall_preempt()
         elif asked and pending:
             state.recall_preempt()
         elif asked and self._preempt_requested:

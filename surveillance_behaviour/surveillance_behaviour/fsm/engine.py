@@ -140,6 +140,7 @@ class Frame:
         cut: The node whose state was asked to stop because of an interrupt.
         suspending: The parent wants the container put aside.
         saved: Where to go on after each of the interrupts under way.
+        gone: The node whose state was left behind.
         forced: A node, and the outcome to take in place of the one that its state returns.
         parent_ud: The parent's userdata.
         trace: Where transitions are reported.
@@ -155,6 +156,7 @@ class Frame:
         'current',
         'cut',
         'forced',
+        'gone',
         'index',
         'items',
         'now',
@@ -184,6 +186,7 @@ class Frame:
         self.suspending = False
         self.saved: list[Node | Exit] = []
         self.forced: tuple[Node, str] | None = None
+        self.gone: Node | None = None
         self.trace: Trace | None = strand.run.trace
         self.now = strand.run.now
         self.items: Any = None

@@ -104,6 +104,7 @@ class Strand:
         path: Path of the state it was started for.
         stack: Frames of the containers it is in, outermost first.
         done: It has ended.
+        without_leaf: It ended because its own state, outside any container, was left behind.
         outcome: What it ended with.
         error: What it was ended by.
     """
@@ -113,6 +114,7 @@ class Strand:
         self.path = path
         self.stack: list[Frame] = []
         self.done = False
+        self.without_leaf = False
         self.outcome: Any = None
         self.error: BaseException | None = None
         self._wakeup = wakeup
@@ -257,6 +259,21 @@ class Strand:
                 self._asked_at = time.monotonic()
         self._wakeup.set()
 
+    def renew_request(self, node: Node) -> None:
+        """Take the request of an earlier execution back from a state, but not a present one."""
+        with self.run.condition:
+            node.state.recall_preempt()
+            if self._asked_at is not None:
+                node.state.request_preempt()
+
+    def still_gone(self, node: Node) -> None:
+        """Note that a state could not be entered: an earlier execution of it has not ended."""
+        with self.run.condition:
+            if self.stack:
+                self.stack[-1].gone, self.stack[-1].attention = node, True
+            else:
+                self.without_leaf = True
+
     def heeded(self) -> None:
         """Note that the state that was asked to stop has returned."""
         self._asked_at = None
@@ -362,9 +379,12 @@ class Strand:
         for frame in old:
             frame.stale = frame.attention = True
             frame.container._frame = None
+        for frame in old[depth + 1 :]:
             frame.container.recall_preempt()
         for frame in frames:
             frame.container._frame = frame
+        if frames:
+            frames[-1].gone = node
         if isinstance(leaf, Node):
             # The request stays with the state, so that the thread left behind ends some time.
             leaf.state.request_preempt()
@@ -380,6 +400,7 @@ class Strand:
             frame.container._fsm_woken()
         if not frames:
             self._token = object()
+            self.without_leaf = leaf is self._leaf
             if isinstance(outcome, str):
                 self._end(outcome, None)
             else:

@@ -26,11 +26,16 @@ def keep_out(node: Node, ended: threading.Event) -> None:
         bound = strand.run.preempt_timeout if strand is not None else None
         if not ended.wait(bound):
             logerr(f"State '{node.label}' is still running from an earlier execution")
+            if strand is not None:
+                strand.still_gone(node)
             return stopped_outcome(node)
         node.enter = enter
         if unlimited:
             node.execute = enter
-        node.state.recall_preempt()
+        if strand is None:
+            node.state.recall_preempt()
+        else:
+            strand.renew_request(node)
         return enter(view)
 
     node.state._fsm_left = ended
