@@ -7,7 +7,6 @@ first reasoning) goes to a worker thread, so that other clients are not kept wai
 from __future__ import annotations
 
 import sys
-from pathlib import Path
 from typing import Any
 
 from rclpy.callback_groups import ReentrantCallbackGroup
@@ -17,26 +16,17 @@ from rclpy.event_handler import PublisherEventCallbacks
 from surveillance_interfaces.msg import ArmorDirectiveRes, FactChanges
 from surveillance_interfaces.srv import ArmorDirective, ArmorDirectiveList
 from surveillance_ontology.armor.change_feed import ChangeFeed, NumberedChange
-from surveillance_ontology.armor.journal import JournalError
-from surveillance_ontology.armor.service import ArmorService
-from surveillance_ontology.armor.settings import Settings
-from surveillance_ontology.armor.store import Store
 from surveillance_ontology.armor_client import CHANGES_TOPIC
 from surveillance_ontology.awaited_work import AwaitedWork
 from surveillance_ontology.conversions import changes_to_ros, fill_response, request_from_ros
-from surveillance_runtime.node import PatrolNode, StartError, run_node
+from surveillance_ontology.described_parameters import described_service
+from surveillance_runtime.node import PatrolNode, run_node
 from surveillance_runtime.qos import STATE_QOS
 
 PUBLISH_DELAY = 0.005
 """Seconds by which changes are told later, so that this delays no client's next directive."""
 WORKERS = 4
-"""Threads for directives that may take long."""
-CHOICES = {
-    'enforce_mount': 'Refuse changes by others while a client is mounted; ARMOR 2.2 does not.',
-    'narrow_doubles': 'Store values of type DOUBLE as xsd:float, as ARMOR 2.2 does.',
-    'allow_web': 'Let LOAD WEB fetch documents from the web.',
-    'sparql_derived': 'Let SPARQL see derived facts; ARMOR 2.2 shows it the asserted ones only.',
-}
+"""Threads for directives that may take long, and as many for SPARQL queries."""
 
 
 class ArmorServer(PatrolNode):
@@ -44,7 +34,7 @@ class ArmorServer(PatrolNode):
 
     def __init__(self, **node_options: Any) -> None:
         super().__init__('armor_server', **node_options)
-        self._service = self._described_service()
+        self._service = described_service(self)
         self._feed = ChangeFeed(self._service, self._soon)
         self._subscribers = 0
         self._untold: list[NumberedChange] = []
@@ -59,6 +49,7 @@ class ArmorServer(PatrolNode):
         self._pause = self.create_timer(PUBLISH_DELAY, self._on_pause, clock=steady)
         self._pause.cancel()
         self._work = AwaitedWork(self, WORKERS)
+        self._queries = AwaitedWork(self, WORKERS)
         group = ReentrantCallbackGroup()
         for kind, name, callback in (
             (ArmorDirective, 'armor_interface_srv', self._on_directive),
@@ -69,48 +60,16 @@ class ArmorServer(PatrolNode):
     def on_stop(self) -> None:
         """End the workers and queries that run."""
         self._work.stop()
+        self._queries.stop()
         self._service.close()
-
-    def _described_service(self) -> ArmorService:
-        default = Settings()
-        directories = self.parameter(
-            'directories',
-            ['.'],
-            'Directories inside which LOAD, SAVE and LOG may read and write files.',
-            check=lambda value: None if value and all(value) else 'names of directories',
-        )
-        sparql_timeout = self.parameter(
-            'sparql_timeout',
-            default.sparql_timeout,
-            'Longest time a SPARQL query may take, seconds.',
-            minimum=0.01,
-            maximum=3600.0,
-        )
-        choices = {
-            name: self.parameter(name, getattr(default, name), text)
-            for name, text in CHOICES.items()
-        }
-        stored = self.parameter(
-            'store',
-            '',
-            'Directory in which references and their changes are kept over a restart; empty: none.',
-            read_only=True,
-        )
-        settings = Settings(
-            directories=tuple(directories), sparql_timeout=sparql_timeout, **choices
-        )
-        log = self.get_logger()
-        try:
-            store = Store(Path(stored).expanduser()) if stored else None
-            return ArmorService(settings, log.info, log.warn, store)
-        except JournalError as error:
-            raise StartError(f'{self.get_name()}: parameter store: {error}') from None
 
     async def _on_directive(self, request: Any, response: Any) -> Any:
         directive = request_from_ros(request.armor_request)
         answer = self._service.execute_at_once(directive)
         if answer is None:
-            answer = await self._work.run(lambda: self._service.execute(directive))
+            # Queries that take all their time must not keep other slow directives waiting.
+            work = self._queries if directive.primary.upper() == 'SPARQL' else self._work
+            answer = await work.run(lambda: self._service.execute(directive))
         fill_response(response.armor_response, answer)
         return response
 

@@ -19,10 +19,11 @@ from surveillance_ontology.armor.settings import DATA
 from surveillance_ontology.armor_client import ArmorClient, FactSubscription
 from surveillance_ontology.awaited_work import AwaitedWork
 from surveillance_ontology.conversions import point_to_ros, position_from_ros, room_note_from_ros
+from surveillance_ontology.described_parameters import described_place
 from surveillance_ontology.map_building import ROBOT, MapBuilding
 from surveillance_ontology.map_keeper import MapKeeper, Reports
-from surveillance_ontology.place import Place, PlaceError, make_place
-from surveillance_runtime.node import PatrolNode, StartError, run_node
+from surveillance_ontology.place import Place
+from surveillance_runtime.node import PatrolNode, run_node
 from surveillance_runtime.qos import STATE_QOS
 
 SECONDS_PER_ROOM = 0.005
@@ -46,7 +47,7 @@ class OntologyMapBuilder(PatrolNode):
         timeout = self.parameter(
             'armor_timeout', 5.0, 'Longest wait for an answer of the server, seconds.', minimum=0.1
         )
-        place = self._described_place()
+        place = described_place(self)
         # The first reasoning over thousands of places takes its time.
         timeout = max(timeout, SECONDS_PER_ROOM * len(place.rooms if place else ()))
         armor = ArmorClient(
@@ -85,29 +86,6 @@ class OntologyMapBuilder(PatrolNode):
     def on_stop(self) -> None:
         """End the worker."""
         self._work.stop()
-
-    def _described_place(self) -> Place | None:
-        source = self.parameter(
-            'map_source',
-            'configuration',
-            'Where the map comes from: the parameters, or ontology_map/build_map alone.',
-            choices=('configuration', 'markers'),
-            read_only=True,
-        )
-        if source == 'markers':
-            return None
-        rooms = self.parameters_under('map')
-        positions = self.parameters_under('room_positions')
-        robot_room = self.parameter('robot_room', '', 'Room in which the robot starts.')
-        stations = self.parameter(
-            'recharge_rooms', [], 'Rooms with a charging station; they are never removed.', of=str
-        )
-        if not rooms and not positions:
-            return None
-        try:
-            return make_place(rooms, positions, robot_room, stations)
-        except PlaceError as error:
-            raise StartError(f'{self.get_name()}: parameter {error}') from None
 
     def _look(self) -> None:
         self._work.put(self._keeper.ensure_built)

@@ -142,6 +142,7 @@ def test_a_long_query_keeps_nobody_waiting(graph: Any) -> None:
     for _ in range(20):
         armor.manipulation.add_ind_to_class('X', 'DOOR')
         assert armor.query.ind_b2_class('DOOR') == ['X']
+    assert armor.batch([armor.request('REASON')]).success
     assert not ended, 'the others were answered while the query ran'
     graph.until(lambda: ended)
     assert ended == ['stopped']
