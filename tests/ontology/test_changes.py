@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import threading
 
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
 from surveillance_interfaces.msg import ArmorDirectiveRes
 from surveillance_ontology.armor.change_feed import LARGE, ChangeFeed
 from surveillance_ontology.armor.changes import decode, encode
@@ -127,3 +130,55 @@ def test_clients_at_once_do_not_disturb_each_other(service: ArmorService) -> Non
     ]
     assert ask.facts('hasDoor(?, ?)') == []
     assert clients[0].utils.sync_buffered_reasoner()
+
+
+STEPS = st.one_of(
+    st.tuples(
+        st.sampled_from(['ADD DATAPROP IND', 'REMOVE DATAPROP IND']),
+        st.tuples(
+            st.just('visitedAt'),
+            st.sampled_from(['R1', 'E']),
+            st.just('LONG'),
+            st.sampled_from(['1665579740', '5']),
+        ),
+    ),
+    st.tuples(
+        st.sampled_from(['ADD IND CLASS', 'REMOVE IND CLASS']),
+        st.tuples(st.sampled_from(['R1', 'X']), st.sampled_from(['URGENT', 'ROOM'])),
+    ),
+    st.tuples(
+        st.sampled_from(['ADD OBJECTPROP IND', 'REMOVE OBJECTPROP IND']),
+        st.one_of(
+            st.tuples(st.just('hasDoor'), st.sampled_from(['R1', 'E']), st.sampled_from(['D1'])),
+            st.tuples(st.just('canReach'), st.just('Robot1'), st.sampled_from(['R1', 'C1'])),
+            st.tuples(st.just('isIn'), st.just('Robot1'), st.sampled_from(['E', 'R1'])),
+        ),
+    ),
+    st.just(('REASON', ())),
+    st.just(('REASON', ())),
+)
+PATTERNS = ('URGENT(?)', 'canReach(Robot1, ?)', 'visitedAt(?, ?)', 'ROOM(?)', 'owl:sameAs(?, ?)')
+
+
+@settings(max_examples=40, deadline=None, derandomize=True)
+@given(st.lists(STEPS, max_size=14))
+def test_followed_facts_are_those_that_the_server_has(
+    steps: list[tuple[str, tuple[str, ...]]],
+) -> None:
+    service = ArmorService(warn=lambda _: None)
+    client = ArmorClient('test', 'map', InProcessTransport(service))
+    build_seven_rooms(client, False, True)
+    feed = ChangeFeed(service, lambda: None)
+    sets = [FactSet(pattern) for pattern in PATTERNS]
+    for facts in sets:
+        facts.follow(0, [])
+        facts.replace(*client.query.facts_by_origin(str(facts.pattern)))
+    for words, args in steps:
+        service.execute(client.request(words, *args))
+        for change in feed.take():
+            told = changes_from_ros(changes_to_ros(*change))
+            for facts in sets:
+                assert facts.follow(change.sequence, told) is not None
+        for facts in sets:
+            assert facts.facts == set(client.query.facts(str(facts.pattern))), facts.pattern
+    service.close()
