@@ -16,12 +16,14 @@ from std_msgs.msg import UInt32
 from surveillance_controllers.motion_controller_node import MotionController
 from surveillance_controllers.planner_controller_node import PlannerController
 from surveillance_interfaces.action import ComputePath, Control, FollowPath, Plan
+from surveillance_interfaces.msg import OntologyMap, OntologyPlace, RoomConnection
 from surveillance_interfaces.srv import PlaceObstacle, PushRobot, SetDoor
 from surveillance_ontology.armor_client import ArmorClient
 from surveillance_ontology.armor_server_node import ArmorServer
 from surveillance_ontology.ontology_map_builder_node import OntologyMapBuilder
-from surveillance_runtime.calls import GoalCaller, ServiceCaller
+from surveillance_runtime.calls import GoalCaller, Interrupted, ServiceCaller
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
+from surveillance_runtime.waiting import Interrupt
 from surveillance_simulation.simulator_node import Simulator
 
 
@@ -161,3 +163,55 @@ def test_a_robot_pushed_off_its_way_finds_itself_and_arrives(world: World) -> No
     assert (reached.x, reached.y) == pytest.approx(world.position, abs=0.08)
     assert world.position == pytest.approx((10, 8), abs=0.15)
     world.ask_until(lambda: world.robot_place() == ['C1'])
+
+
+def test_a_drive_that_is_cancelled_leaves_the_robot_standing(world: World) -> None:
+    path = world.compute((10.0, 8.0)).result.path
+    cancel = Interrupt()
+    with pytest.raises(Interrupted):
+        world.follow(path, interrupt=cancel, on_feedback=lambda _: cancel.set())
+    seen = len(world.truth)
+    world.graph.until(lambda: len(world.truth) > seen + 5)
+    stands = world.position
+    seen = len(world.truth)
+    world.graph.until(lambda: len(world.truth) > seen + 5)
+    assert world.position == pytest.approx(stands, abs=1e-6)
+    assert math.dist(stands, (10, 8)) > 1
+
+
+def test_a_place_that_joins_is_planned_to_and_visited(world: World) -> None:
+    world.ask_until(lambda: world.can_reach('C1'))
+    alcove = OntologyPlace(
+        name='ALCOVE',
+        position=Point(x=12.5, y=8.0),
+        connections=[RoomConnection(connected_to='C1', through_door='D9')],
+    )
+    world.graph.node.create_publisher(OntologyMap, 'ontology_map/build_map', STATE_QOS).publish(
+        OntologyMap(places=[alcove])
+    )
+    world.ask_until(lambda: 'ALCOVE' in world.armor.query.ind_b2_class('LOCATION'))
+    end, _ = world.plan('ALCOVE')
+    assert end.status == 'succeeded'
+    assert world.control(end.result.via_points).status == 'succeeded'
+    assert world.robot_place() == ['ALCOVE']
+
+
+@pytest.mark.parametrize(
+    ('node', 'text'),
+    [
+        (PlannerController, 'no map came on the topic map within 0.2 s'),
+        (MotionController, 'nothing came on the topic map for 0.2 s'),
+    ],
+)
+def test_without_a_robot_the_reason_is_what_does_not_come(
+    graph: Any, capfd: Any, node: Any, text: str
+) -> None:
+    graph.add(node, {'execution_mode': 'SIMULATED', 'peer_timeout': 0.2, 'sensor_timeout': 0.2})
+    points = [Point(), Point(x=1.0)]
+    if node is PlannerController:
+        kind, name, goal = ComputePath, 'compute_path', ComputePath.Goal(goal=points[1])
+    else:
+        kind, name, goal = FollowPath, 'follow_path', FollowPath.Goal(path=points)
+    end = GoalCaller(graph.node, kind, name).run(goal, accept_timeout=10.0)
+    assert end.status == 'aborted'
+    assert text in capfd.readouterr().err
