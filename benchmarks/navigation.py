@@ -227,7 +227,7 @@ def control(*, quick: bool) -> None:
 
 def stack(*, quick: bool) -> None:
     """Simulated seconds per real second of the whole patrol."""
-    seconds = 8.0 if quick else 30.0
+    seconds = 5.0 if quick else 30.0
     rows = []
     for name, measure in (
         ('composed', lambda: composed(seconds)),

@@ -39,7 +39,11 @@ class PaceModel:
 
 
 class Pace:
-    """Decides how much simulated time passes at each tick."""
+    """Decides how much simulated time passes at each tick.
+
+    Attributes:
+        is_waiting: Whether time stands still until a command comes.
+    """
 
     def __init__(self, model: PaceModel, steady: float) -> None:
         """Start at the given reading of the steady clock, seconds."""
@@ -47,6 +51,7 @@ class Pace:
         self._last = steady
         self._owed = 0.0
         self._commanded: tuple[float, float] | None = None
+        self.is_waiting = False
 
     def command(self, moving: bool, simulated: float, steady: float) -> None:
         """Note a command: whether it moves the base, and when it came by both clocks."""
@@ -62,10 +67,12 @@ class Pace:
         """
         model = self._model
         elapsed, self._last = steady - self._last, steady
-        if self._waits(simulated, steady):
-            self._owed = 0.0
-            return 0.0
         step = model.step
+        self.is_waiting = self._waits(simulated, steady)
+        if self.is_waiting:
+            # Ready to go on at once when the command comes.
+            self._owed = min(self._owed + elapsed * model.ceiling, step)
+            return 0.0
         if model.speed == 0.0:
             if not moving:
                 step = model.idle_step

@@ -83,6 +83,8 @@ class Simulator(PatrolNode):
         with self._changing:
             self.robot.base.command(speed, turn_speed)
             self._pace.command(self.robot.base.is_moving, self.robot.time, time.monotonic())
+        if self._pace.is_waiting:
+            self._tick()
 
     def _on_trajectory(self, message: JointTrajectory) -> None:
         names, points = conversions.trajectory_from_ros(message)
