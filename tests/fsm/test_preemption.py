@@ -141,6 +141,7 @@ def test_a_state_that_ignores_a_preempt_is_left_behind_and_named(depth, caplog):
     culprit = 'ROOT/' + 'INNER/' * (depth - 1) + 'S0'
     assert f"State '{culprit}' ignored a preempt for 0.05 s" in caplog.text
     assert root.control.left_behind() == [culprit]
+    assert not root.preempt_requested()
     deaf.release.set()
     assert deaf.ended.wait(5.0)
     # It can be executed again, and the next run knows nothing of the old preempt.
@@ -344,7 +345,44 @@ def test_a_child_of_a_concurrence_that_ignores_a_preempt_is_left_behind(caplog):
     root.request_preempt()
     assert run.result() == 'preempted'
     assert "'ROOT/TOGETHER/S0' ignored a preempt" in caplog.text
+    assert not root.preempt_requested()
+    assert not concurrence.preempt_requested()
     deaf.release.set()
+
+
+def test_a_request_to_a_state_that_an_earlier_run_left_behind_is_kept():
+    deaf = Deaf()
+    root = fsm.StateMachine(['done', 'preempted'])
+    root.preempt_timeout = 0.05
+    with root:
+        fsm.StateMachine.add('DEAF', deaf)
+    run = Background(root)
+    began(deaf)
+    root.request_preempt()
+    assert run.result() == 'preempted'
+    # It is still running: nobody may enter it, and the machine is told so in time.
+    assert root.execute() == 'preempted'
+    assert not root.preempt_requested()
+    deaf.release.set()
+    assert deaf.ended.wait(5.0)
+    assert root.execute() == 'done'
+
+
+def test_an_interrupt_that_meets_a_state_as_it_begins_leaves_no_request_on_it():
+    first, stop = Answer('done'), Answer('done')
+    second = Waiter(0.0)
+    root = fsm.StateMachine(['done', 'preempted'])
+    with root:
+        fsm.StateMachine.add('FIRST', first, {'done': 'SECOND'})
+        fsm.StateMachine.add('SECOND', second)
+    root.add_interrupt('STOP', stop)
+    # Raised when SECOND is current but has not begun.
+    root.register_transition_cb(
+        lambda ud, active: active == ['SECOND'] and not stop.runs and root.raise_interrupt('STOP')
+    )
+    assert root.execute() == 'done'
+    assert stop.runs == 1
+    assert not second.preempt_requested()
 
 
 def test_a_deaf_state_deep_inside_a_child_of_a_concurrence_is_left_behind():

@@ -12,6 +12,7 @@ from std_srvs.srv import Trigger
 
 from surveillance_behaviour import fsm
 from surveillance_behaviour.fsm.active import ActiveContainer
+from surveillance_behaviour.fsm.export import to_ascii
 from surveillance_behaviour.fsm.record import Transition, TransitionFeed
 from surveillance_behaviour.fsm.structure import state_at
 from surveillance_behaviour.fsm_ros.conversions import (
@@ -77,7 +78,8 @@ class IntrospectionServer:
         node.create_service(SetInitialState, f'{prefix}/set_initial_state', self._set_initial_state)
 
     def start(self) -> None:
-        """Begin to publish."""
+        """Draw the machine in the log and begin to publish."""
+        self._node.get_logger().info(f'state machine:\n{to_ascii(self._root)}')
         self._structure.publish(structure_to_ros(self._root, self._stamp()))
         self._feed = TransitionFeed(self._root, self._publish)
         self._root.register_start_cb(self._changed)
