@@ -38,8 +38,11 @@ def test_time_waits_for_the_next_command_of_a_controller_at_work() -> None:
     pace.command(True, 0.0, 0.0)
     passed = [pace.due(0.1 * count, 0.01 * count, moving=True) for count in range(1, 6)]
     assert passed == pytest.approx([0.1, 0.0, 0.0, 0.0, 0.0])
-    pace.command(True, 0.2, 0.06)
-    assert pace.due(0.2, 0.08, moving=True) == pytest.approx(0.1)
+    assert pace.is_waiting
+    pace.command(True, 0.2, 0.05)
+    # At once: what was owed while it waited is not lost.
+    assert pace.due(0.2, 0.05, moving=True) == pytest.approx(0.1)
+    assert not pace.is_waiting
 
 
 def test_a_silent_controller_is_given_up() -> None:
