@@ -32,6 +32,7 @@ class Pilot:
     Args:
         doors: All doors by name, as segments; they divide the map into places.
         localisation: How the pose is estimated.
+        guesses: Where the robot may be at first, beside where its odometry says.
 
     Attributes:
         task: What is carried out at the moment.
@@ -43,10 +44,12 @@ class Pilot:
         self,
         doors: Mapping[str, Segment] | None = None,
         localisation: LocalisationParameters | None = None,
+        guesses: Iterable[Pose] = (),
     ) -> None:
         self._doors = dict(doors or {})
         self._closed: frozenset[str] = frozenset()
         self._localisation = localisation
+        self._guesses = tuple(guesses)
         self._positions: dict[str, Points] = {}
         self._grid: GridMap | None = None
         self._localiser: Localiser | None = None
@@ -136,10 +139,7 @@ class Pilot:
         if self._grid is None or self._odometry is None:
             return None
         if self._localiser is None:
-            # Odometry begins where the robot begins, unless somebody says where that is.
-            first = self._believed or self._odometry
-            self._localiser = Localiser(self._seen_map, first, self._localisation)
-            self._localiser.move(self._odometry)
+            self._localiser = self._first_localiser(scan, self._odometry)
         if self._localiser.see(scan, now) and self._localiser.certain:
             self._remember(scan, now)
         if self._localiser.certain:
@@ -150,6 +150,18 @@ class Pilot:
         if isinstance(self.task, Spin):
             return self.task.step(pose[2])
         return None
+
+    def _first_localiser(self, scan: Scan, odometry: Pose) -> Localiser:
+        """Begins where the robot is said to be, or else where its first scan fits best."""
+        localiser = Localiser(self._seen_map, odometry, self._localisation)
+        if self._believed is not None:
+            localiser.believe(self._believed)
+        else:
+            # The first of equals: the odometry.
+            fits = [localiser.explained(pose, scan) for pose in (odometry, *self._guesses)]
+            localiser.believe((odometry, *self._guesses)[fits.index(max(fits))])
+        localiser.move(odometry)
+        return localiser
 
     def _remember(self, scan: Scan, now: float) -> None:
         assert self._localiser is not None

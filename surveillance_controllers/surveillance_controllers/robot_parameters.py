@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from surveillance_controllers.battery_use import Pose
 from surveillance_controllers.controller_parameters import MotionSettings
 from surveillance_controllers.grid_planning import PlanningParameters
 from surveillance_controllers.path_following import DriveParameters
@@ -79,6 +80,7 @@ class RobotSettings:
     """What `motion_controller` is told about the robot and its place in SIMULATED mode."""
 
     drive: DriveParameters
+    station: Pose
     doors: dict[str, Segment]
     positions: dict[str, Points]
     feedback_period: float
@@ -117,6 +119,7 @@ def robot_settings(node: PatrolNode, motion: MotionSettings) -> RobotSettings:
     )
     return RobotSettings(
         drive=drive,
+        station=motion.station,
         doors=door_segments(node),
         positions=place_positions(node),
         feedback_period=motion.feedback_period,

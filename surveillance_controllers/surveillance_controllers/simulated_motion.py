@@ -37,7 +37,7 @@ class SimulatedMotion:
         self._settings = settings
         self._wait_for_peer = settings.peer_timeout
         self._planner = GoalCaller(node, ComputePath, 'compute_path')
-        pilot = Pilot(settings.doors)
+        pilot = Pilot(settings.doors, guesses=[settings.station])
         self._base = RobotBase(node, pilot, settings.sensor_timeout, self._on_place)
         self._base.set_positions(settings.positions)
         self._tracking = PlaceTracking(node, self._base, knowledge, settings)

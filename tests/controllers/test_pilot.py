@@ -66,6 +66,15 @@ def test_a_pose_that_is_told_is_taken(flat: Any, pilot: Pilot) -> None:
     assert pilot.place == 'B'
 
 
+def test_a_robot_whose_odometry_begins_at_zero_is_taken_to_be_at_the_station(flat: Any) -> None:
+    station = (5.5, 2.0, 2.0)
+    pilot = Pilot(guesses=[station])
+    pilot.set_map(flat.grid)
+    pilot.move((0.0, 0.0, 0.0))
+    pilot.see(flat.scan((5.45, 2.05, 1.9)), 0.0)
+    assert pilot.pose == pytest.approx((5.45, 2.05, 1.9), abs=0.05)
+
+
 def test_an_obstacle_on_the_path_makes_the_drive_ask(flat: Any, pilot: Pilot) -> None:
     true = (1.0, 1.5, 0.0)
     pilot.move(true)
