@@ -65,6 +65,15 @@ def described_place(node: PatrolNode) -> Place | None:
         ParameterError: A parameter is of the wrong type.
         StartError: What is described is not a place.
     """
+    source = node.parameter(
+        'map_source',
+        'configuration',
+        'Where the map comes from: the parameters, or ontology_map/build_map alone.',
+        choices=('configuration', 'markers'),
+        read_only=True,
+    )
+    if source == 'markers':
+        return None
     rooms = node.parameters_under('map')
     positions = node.parameters_under('room_positions')
     robot_room = node.parameter('robot_room', '', 'Room in which the robot starts.')
