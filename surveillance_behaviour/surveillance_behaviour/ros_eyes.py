@@ -13,7 +13,6 @@ from surveillance_runtime.rested_pictures import RestedPictures
 from surveillance_runtime.waiting import ClockWait, Interrupt
 
 _ARM_SECONDS = 30.0
-_HORIZON = 0.5
 
 
 class RosEyes:
@@ -43,10 +42,9 @@ class RosEyes:
         """Fold the arm for driving."""
         self._moved(MarkerRoutine.Request.HOME)
 
-    def scan(self, overlap: float, dwell: float, done: Callable[[], bool]) -> None:
+    def scan(self, overlap: float, reach: float, dwell: float, done: Callable[[], bool]) -> None:
         """Look all around the horizon; `done` is asked after each view and ends the scan."""
-        goal = ScanSurroundings.Goal(overlap=overlap, lowest=-_HORIZON, highest=_HORIZON)
-        goal.dwell = dwell
+        goal = ScanSurroundings.Goal(overlap=overlap, lowest=-reach, highest=reach, dwell=dwell)
         view_changed, ended = Interrupt(), Interrupt()
         self._node.stopping.subscribe(ended.set)
 

@@ -1,8 +1,8 @@
 """Looking around until the map is whole, or until a deadline.
 
-First the arm's poses, as long as they bring something new; then whole scans around the horizon,
-each with more overlap and a longer rest than the one before, so that a marker missed at the edge of
-a picture, at a flat angle or in poor light has another chance from a slightly different view.
+First the arm's poses; then whole scans around the horizon, each with more overlap, a further reach
+up and down and a longer rest than the one before, so that a marker missed at the edge of a picture,
+at a flat angle or in poor light has another chance from a slightly different view.
 """
 
 from __future__ import annotations
@@ -14,14 +14,21 @@ from typing import Protocol
 from surveillance_behaviour.survey import SurveyReport
 
 
+_OVERLAP = 0.12
+_REACH = 0.3
+
+
 class Eyes(Protocol):
     """What turns the camera. Each blocks until the camera has rested and its pictures were seen."""
 
     def pose(self, number: int) -> None:
         """Take one of the arm's poses and look."""
 
-    def scan(self, overlap: float, dwell: float, done: Callable[[], bool]) -> None:
-        """Look all around; `done` is asked after each view and ends the scan."""
+    def scan(self, overlap: float, reach: float, dwell: float, done: Callable[[], bool]) -> None:
+        """Look all around, `reach` rad above and below the horizon.
+
+        `done` is asked after each view and ends the scan.
+        """
 
     def home(self) -> None:
         """Fold the arm for driving."""
@@ -71,12 +78,14 @@ class LookingAround:
             eyes.pose(number)
             if enough():
                 break
-        overlap, dwell, told = 0.2, self.dwell, False
+        overlap, reach, dwell, told = _OVERLAP, _REACH, self.dwell, False
         while not enough():
             for sentence in judge().sentences():
                 say(f'looking on: {sentence}')
-            eyes.scan(overlap, dwell, enough)
-            overlap, dwell = min(overlap + 0.15, 0.5), min(dwell * 2.0, 4.0 * self.dwell)
+            eyes.scan(overlap, reach, dwell, enough)
+            overlap = min(overlap + _OVERLAP, 0.5)
+            reach = min(reach * 1.5, 1.2)
+            dwell = min(dwell * 2.0, 4.0 * self.dwell)
             if late() and not judge().places and not told:
                 told = True
                 say('nothing to patrol was found yet; looking on')

@@ -69,7 +69,7 @@ class DetectorSettings:
     blur: float = 0.8
     least_correlation: float = 0.85
     least_inner_correlation: float = 0.8
-    known_lead: float = 1.8
+    known_lead: float = 2.2
     unknown_lead: float = 3.0
 
     def __post_init__(self) -> None:

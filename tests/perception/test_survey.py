@@ -137,8 +137,8 @@ class Eyes:
         self.did.append(number)
         self._show(self.by_pose.get(number, ()))
 
-    def scan(self, overlap, dwell, done):
-        self.did.append(('scan', round(overlap, 2), dwell))
+    def scan(self, overlap, reach, dwell, done):
+        self.did.append(('scan', round(overlap, 2), round(reach, 2), dwell))
         self._show(self.by_scan.pop(0) if self.by_scan else ())
 
     def home(self):
@@ -164,7 +164,7 @@ def test_looking_goes_on_closer_for_what_is_missing():
     eyes = Eyes(Survey('E'), {1: range(11, 17)}, by_scan=[(), (17,)])
     report, said = look(eyes)
     assert report.complete
-    assert eyes.did == [1, 2, 3, 4, ('scan', 0.2, 0.5), ('scan', 0.35, 1.0), 'home']
+    assert eyes.did == [1, 2, 3, 4, ('scan', 0.12, 0.3, 0.5), ('scan', 0.24, 0.45, 1.0), 'home']
     assert said[0] == 'looking on: no marker tells of R4, to which D4 leads'
 
 
