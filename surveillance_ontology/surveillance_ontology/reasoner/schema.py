@@ -36,6 +36,14 @@ _MAX_MADE_UP = 200
 _MAX_PAIRS = 400
 _MAX_COUNT = 12
 _MAX_PROPERTIES = 24
+_EXISTENTIALS = (ax.ObjectSomeValuesFrom, ax.ObjectMinCardinality)
+_RESTRICTIONS = (
+    *_EXISTENTIALS,
+    ax.ObjectAllValuesFrom,
+    ax.ObjectMaxCardinality,
+    ax.DataAllValuesFrom,
+    ax.DataMaxCardinality,
+)
 
 
 # What a prototype turned out to be: a member of a class, or related to a named individual or a
@@ -133,22 +141,23 @@ class Schema:
             else:
                 for finding in found - plain:
                     extra[self._clause((label,), finding)] = None
-        pairs = 0
-        for label in existentials:
-            for other in prototypes.interacting(label):
-                pairs += 1
-                if pairs > _MAX_PAIRS:
-                    self.program.unsupported.append(
-                        'the class hierarchy: too many pairs of restrictions to combine'
-                    )
-                    break
-                both = prototypes.consequences((label, other))
-                known = prototypes.consequences((label, other), make_up=False) or set()
-                if both is None:
-                    extra[self._clause((label, other), None)] = None
-                    continue
-                for finding in both - known - alone[label] - alone.get(other, set()):
-                    extra[self._clause((label, other), finding)] = None
+        pairs = [
+            (label, other) for label in existentials for other in prototypes.interacting(label)
+        ]
+        if len(pairs) > _MAX_PAIRS:
+            del pairs[_MAX_PAIRS:]
+            self.program.unsupported.append(
+                f'the class hierarchy: of the pairs of restrictions on one property, {_MAX_PAIRS}'
+                ' are looked at together, the others each alone'
+            )
+        for label, other in pairs:
+            both = prototypes.consequences((label, other))
+            known = prototypes.consequences((label, other), make_up=False) or set()
+            if both is None:
+                extra[self._clause((label, other), None)] = None
+                continue
+            for finding in both - known - alone[label] - alone.get(other, set()):
+                extra[self._clause((label, other), finding)] = None
         self.program.clauses += [clause for clause in extra if clause.head not in clause.body]
 
     def _exclusions(self, prototypes: _Prototypes) -> None:
@@ -203,7 +212,7 @@ class _Prototypes:
 
     def __init__(self, normaliser: Normaliser) -> None:
         self.program: Program = normaliser.program
-        self._filler: dict[int, Predicate | None] = {}
+        self._hierarchy = normaliser.hierarchy
         fillers = [
             existential.filler
             for existential in self.program.existentials
@@ -226,20 +235,19 @@ class _Prototypes:
 
     def interacting(self, label: Predicate) -> list[Predicate]:
         """Labels that say something more about what an existential's individuals are related to."""
-        kinds = (
-            ax.ObjectAllValuesFrom,
-            ax.ObjectMaxCardinality,
-            ax.ObjectSomeValuesFrom,
-            ax.ObjectMinCardinality,
-            ax.DataMaxCardinality,
-            ax.DataAllValuesFrom,
-            ax.ObjectComplementOf,
-        )
-        return [
-            other
-            for other in self.program.labels.values()
-            if other is not label and isinstance(other.expression, kinds)
-        ]
+        above = self._hierarchy.above(label.expression.prop)
+        found = []
+        for other in self.program.labels.values():
+            expression = other.expression
+            if other is label or not isinstance(expression, _RESTRICTIONS):
+                continue
+            shared = above & self._hierarchy.above(expression.prop)
+            # Two existentials meet only in what both must be the one value of.
+            if isinstance(expression, _EXISTENTIALS):
+                shared = {prop for prop in shared if self._hierarchy.is_functional_as(prop)}
+            if shared:
+                found.append(other)
+        return found
 
     def consequences(
         self, labels: tuple[Predicate, ...], make_up: bool = True
