@@ -139,7 +139,7 @@ def test_a_long_query_keeps_nobody_waiting(graph: Any) -> None:
         ended.append('stopped' if response.timeout else 'done')
 
     graph.node.executor.create_task(endless)
-    for _ in range(20):
+    for _ in range(10):
         armor.manipulation.add_ind_to_class('X', 'DOOR')
         assert armor.query.ind_b2_class('DOOR') == ['X']
     assert armor.batch([armor.request('REASON')]).success
