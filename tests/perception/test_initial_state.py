@@ -1,0 +1,133 @@
+"""The node `initial_state` with a scripted arm and a scripted detector."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from nav_msgs.msg import Odometry
+from std_msgs.msg import Int32
+from std_srvs.srv import Empty
+
+from surveillance_behaviour.initial_state_node import InitialState
+from surveillance_interfaces.msg import OntologyMap
+from surveillance_interfaces.srv import MarkerRoutine, ReferenceName
+from surveillance_perception.marker_server_node import MarkerServer
+from surveillance_runtime.node import StartError
+from surveillance_runtime.qos import STATE_QOS
+
+CONFIGURED = {
+    'map_source': 'configuration',
+    'map.A': ['D'],
+    'map.B': ['D'],
+    'room_positions.A': [1.0, 2.0],
+    'room_positions.B': [3.0, 4.0],
+    'robot_room': 'A',
+}
+
+
+class Robot:
+    """An arm that is wherever it is told to be, and a detector that sees given ids at each pose."""
+
+    def __init__(self, graph: Any, by_pose: dict[int, list[int]]) -> None:
+        self.graph = graph
+        self.by_pose = by_pose
+        self.poses: list[int] = []
+        self.maps = graph.listen(OntologyMap, 'ontology_map/build_map', STATE_QOS)
+        self.ids = graph.node.create_publisher(Int32, 'aruco_detector/id', 100)
+        graph.node.create_service(MarkerRoutine, 'move_arm', self._move)
+        graph.node.create_service(ReferenceName, 'ontology_map/reference_name', self._built)
+
+    def _move(self, request: Any, response: Any) -> Any:
+        self.poses.append(request.pos)
+        for marker_id in self.by_pose.get(request.pos, []):
+            self.show(marker_id)
+        response.success = True
+        return response
+
+    @staticmethod
+    def _built(_request: Any, response: Any) -> Any:
+        response.name = 'surveillance'
+        return response
+
+    def show(self, marker_id: int) -> None:
+        self.ids.publish(Int32(data=marker_id))
+
+    def start(self) -> Any:
+        client = self.graph.node.create_client(Empty, 'start')
+        self.graph.until(client.service_is_ready)
+        self.graph.until(lambda: self.ids.get_subscription_count())
+        return client.call_async(Empty.Request())
+
+    def rooms(self) -> set[str]:
+        return {place.name for place in self.maps[-1].places}
+
+
+def test_start_takes_the_poses_and_sends_the_map(graph: Any) -> None:
+    robot = Robot(graph, {1: [11, 12, 99], 2: [13, 14], 3: [15, 16, 17]})
+    graph.add(MarkerServer)
+    graph.add(InitialState, parameters={'robot_room': 'E', 'patience': 0.3})
+    first, second = robot.start(), robot.start()
+    graph.until(lambda: first.done() and second.done())
+    assert len(robot.maps) == 1
+    assert robot.rooms() == {'E', 'C1', 'C2', 'R1', 'R2', 'R3', 'R4'}
+    assert robot.maps[-1].robot_room == 'E'
+    by_name = {place.name: place for place in robot.maps[-1].places}
+    assert (by_name['R3'].position.x, by_name['R3'].position.y) == (9.0, 3.0)
+    doors = {each.through_door: each.connected_to for each in by_name['C2'].connections}
+    assert doors == {'D6': 'E', 'D7': 'C1', 'D3': 'R3', 'D4': 'R4'}
+    assert robot.poses == [1, 2, 3, MarkerRoutine.Request.HOME]
+
+
+def test_later_markers_extend_the_map(graph: Any) -> None:
+    robot = Robot(graph, {1: [11, 13]})
+    graph.add(MarkerServer)
+    options = {'robot_room': 'E', 'patience': 0.1, 'deadline': 0.0}
+    graph.add(InitialState, parameters=options)
+    graph.until(robot.start().done)
+    assert robot.rooms() == {'E', 'C2'}
+    robot.show(17)
+    graph.until(lambda: len(robot.maps) == 2)
+    assert robot.rooms() == {'E', 'C2', 'R4'}
+    robot.show(99)
+    robot.show(16)
+    graph.until(lambda: len(robot.maps) == 3)
+    assert robot.rooms() == {'E', 'C2', 'R3', 'R4'}
+
+
+def test_without_its_room_the_robot_is_in_the_nearest_place(graph: Any) -> None:
+    robot = Robot(graph, {1: [11, 12, 13, 14, 15, 16, 17]})
+    graph.add(MarkerServer)
+    node = graph.add(InitialState, parameters={'patience': 0.3})
+    odometry = graph.node.create_publisher(Odometry, 'odom', 10)
+    graph.until(odometry.get_subscription_count)
+    message = Odometry()
+    message.pose.pose.position.x, message.pose.pose.position.y = 8.0, 2.0
+    odometry.publish(message)
+    graph.until(lambda: node._survey.robot_position == (8.0, 2.0))
+    graph.until(robot.start().done)
+    assert robot.maps[-1].robot_room == 'R3'
+
+
+def test_map_can_come_from_the_configuration(graph: Any) -> None:
+    robot = Robot(graph, {})
+    graph.add(InitialState, parameters=CONFIGURED)
+    graph.until(robot.start().done)
+    assert robot.poses == []
+    assert robot.maps[-1].robot_room == 'A'
+    [a] = [place for place in robot.maps[-1].places if place.name == 'A']
+    assert [(c.connected_to, c.through_door) for c in a.connections] == [('B', 'D')]
+
+
+def test_configuration_that_is_no_place_is_refused(graph: Any) -> None:
+    with pytest.raises(StartError, match='robot_room'):
+        graph.add(InitialState, parameters=CONFIGURED | {'robot_room': 'Z'})
+
+
+def test_node_stops_while_it_waits_for_an_arm_that_is_not_there(graph: Any) -> None:
+    node = graph.add(InitialState, parameters={'robot_room': 'E'})
+    client = graph.node.create_client(Empty, 'start')
+    graph.until(client.service_is_ready)
+    client.call_async(Empty.Request())
+    graph.until(lambda: node._waiting)
+    graph.remove(node)
