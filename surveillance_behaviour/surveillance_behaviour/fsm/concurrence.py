@@ -306,6 +306,8 @@ class Concurrence(ActiveContainer):
                     state.recall_preempt()
                 if made_way:
                     return
+                # It ended by itself: a preempt that it was asked for, too, is not served by that.
+                self._preempted.discard(label)
             if getattr(state, '_fsm_progress', None) is not None:
                 state._fsm_progress = None
             self._child_outcomes[label] = outcome

@@ -100,6 +100,9 @@ class Control:
         """
         with self.condition:
             frames = self._run.frames() if self._run is not None else []
+            # Attention first, then a look: what is current now is held until this is done.
+            for each in frames:
+                each.attention = True
             active = {
                 f'{frame.path}/{frame.current.label}': frame
                 for frame in frames

@@ -230,6 +230,8 @@ class DrivenContainer(ActiveContainer):
                 if frame.cut is not None and frame.cut is not ended:
                     # It was asked to make way before it began.
                     let_go(frame.cut.state)
+                    if frame.preempted is frame.cut:
+                        frame.preempted = None  # It is asked again below.
                     frame.cut = None
                 if frame.forced is not None and frame.forced[0] is ended:
                     outcome, kind = frame.forced[1], 'forced'
