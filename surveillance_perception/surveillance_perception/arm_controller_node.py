@@ -17,9 +17,15 @@ from trajectory_msgs.msg import JointTrajectory
 from surveillance_interfaces.action import ScanSurroundings
 from surveillance_interfaces.srv import MarkerRoutine, PointCamera
 from surveillance_perception.arm_driver import ArmDriver, ArmError
-from surveillance_perception.arm_kinematics import UnreachableError, look_at
+from surveillance_perception.arm_kinematics import UnreachableError, in_base, look_at
+from surveillance_perception.arm_parameters import arm_settings
 from surveillance_perception.arm_trajectory import TrajectoryError
-from surveillance_perception.conversions import base_pose_from_ros, trajectory_to_ros
+from surveillance_perception.conversions import (
+    base_pose_from_ros,
+    scan_feedback_to_ros,
+    scan_result_to_ros,
+    trajectory_to_ros,
+)
 from surveillance_perception.surroundings_scan import ScanOutcome, ScanPlan, scan
 from surveillance_perception.view_coverage import View
 from surveillance_runtime.goals import GoalAborted, GoalRun, GoalServer
@@ -29,10 +35,10 @@ from surveillance_runtime.rested_pictures import RestedPictures
 from surveillance_runtime.robot_arm import ARM
 
 _POSES = {
-    MarkerRoutine.Request.LEFT: ('left', math.pi / 2),
-    MarkerRoutine.Request.HOME: ('home', 0.0),
-    MarkerRoutine.Request.RIGHT: ('right', -math.pi / 2),
-    MarkerRoutine.Request.BACK: ('back', math.pi),
+    MarkerRoutine.Request.LEFT: 'left',
+    MarkerRoutine.Request.HOME: 'home',
+    MarkerRoutine.Request.RIGHT: 'right',
+    MarkerRoutine.Request.BACK: 'back',
 }
 _FAILURES = (ArmError, TrajectoryError, UnreachableError, ValueError)
 
@@ -42,42 +48,7 @@ class ArmController(PatrolNode):
 
     def __init__(self, **node_options: Any) -> None:
         super().__init__('arm_controller', **node_options)
-        self._poses = {number: self._pose(*entry) for number, entry in _POSES.items()}
-        self._dwell = self.parameter(
-            'dwell',
-            0.5,
-            'Rest at each view of a scan, seconds.',
-            minimum=0.0,
-            on_change=lambda value: setattr(self, '_dwell', value),
-        )
-        self._pictures = self.parameter(
-            'pictures',
-            4,
-            'Pictures that the marker detector must have looked at before a view is left.',
-            minimum=0,
-            read_only=True,
-        )
-        self._patience = self.parameter(
-            'patience',
-            1.5,
-            'Seconds after which a view is left without them.',
-            minimum=0.0,
-            read_only=True,
-        )
-        fields = (('horizontal', 60.0), ('vertical', 46.8))
-        self._field_of_view = tuple(
-            math.radians(
-                self.parameter(
-                    f'{name}_field_of_view',
-                    degrees,
-                    f"The camera's {name} field of view, degrees.",
-                    minimum=5.0,
-                    maximum=150.0,
-                    read_only=True,
-                )
-            )
-            for name, degrees in fields
-        )
+        self._settings = arm_settings(self, ARM)
         group = ReentrantCallbackGroup()
         self._base: tuple[str, np.ndarray] | None = None
         self._trajectories = self.create_publisher(JointTrajectory, 'arm/joint_trajectory', 10)
@@ -101,26 +72,6 @@ class ArmController(PatrolNode):
         self.create_service(PointCamera, 'point_camera', self._on_point, callback_group=group)
         GoalServer(self, ScanSurroundings, 'scan_surroundings', self._scan)
 
-    def _pose(self, name: str, pan: float) -> list[float]:
-        def check(value: Sequence[float]) -> str | None:
-            pose = np.array(value)
-            if (
-                len(pose) == len(ARM.names)
-                and (ARM.lower <= pose).all()
-                and (pose <= ARM.upper).all()
-            ):
-                return None
-            return f'{len(ARM.names)} joint positions within the limits of the arm'
-
-        value: list[float] = self.parameter(
-            f'pose_{name}',
-            [pan, *ARM.home[1:]],
-            f'Joint positions of the pose {name}, rad, in the order {", ".join(ARM.names)}.',
-            check=check,
-            read_only=True,
-        )
-        return value
-
     def _on_odometry(self, message: Odometry) -> None:
         self._base = (message.header.frame_id, base_pose_from_ros(message))
 
@@ -129,17 +80,19 @@ class ArmController(PatrolNode):
             if request.pos == MarkerRoutine.Request.STOP:
                 self._driver.halt(self.stopping.is_set)
                 return 'stopped'
-            if request.pos not in self._poses:
+            if request.pos not in _POSES:
                 raise ValueError(f'no pose {request.pos}, expected 1 to 5')
-            self._driver.move(np.array(self._poses[request.pos]), self.stopping.is_set)
-            return f'at pose {_POSES[request.pos][0]}'
+            name = _POSES[request.pos]
+            self._driver.move(self._settings.poses[name], self.stopping.is_set)
+            return f'at pose {name}'
 
         response.success, response.message = await self._off_executor(work)
         return response
 
     async def _on_point(self, request: Any, response: Any) -> Any:
         def work() -> str:
-            target = self._in_base(request)
+            point = np.array([request.point.x, request.point.y, request.point.z])
+            target = in_base(point, request.frame_id, self._base)
             aim = look_at(ARM, target, self._start())
             response.error = aim.error
             self._driver.move(aim.positions, self.stopping.is_set)
@@ -147,16 +100,6 @@ class ArmController(PatrolNode):
 
         response.success, response.message = await self._off_executor(work)
         return response
-
-    def _in_base(self, request: Any) -> np.ndarray:
-        point = np.array([request.point.x, request.point.y, request.point.z])
-        if request.frame_id in ('', 'base_link'):
-            return point
-        base = self._base
-        if base is None or request.frame_id not in (base[0], 'map'):
-            known = "'base_link'" if base is None else f"'base_link', 'map' or '{base[0]}'"
-            raise ValueError(f"frame '{request.frame_id}' is not known, expected {known}")
-        return np.asarray((np.linalg.inv(base[1]) @ np.array([*point, 1.0]))[:3])
 
     def _start(self) -> np.ndarray:
         positions = self._driver.positions
@@ -181,21 +124,19 @@ class ArmController(PatrolNode):
         lowest, highest = goal.lowest, goal.highest
         if lowest == highest == 0.0:
             lowest, highest = -math.pi / 2, math.pi / 2
-        horizontal, vertical = self._field_of_view
-        plan = ScanPlan(horizontal, vertical, goal.overlap, lowest, highest)
+        settings = self._settings
+        plan = ScanPlan(settings.horizontal, settings.vertical, goal.overlap, lowest, highest)
         try:
             views = plan.views()
         except ValueError as error:
             raise GoalAborted(str(error)) from None
-        dwell = goal.dwell if goal.dwell > 0 else self._dwell
+        dwell = goal.dwell if goal.dwell > 0 else settings.dwell
 
         def tell(index: int, view: View, resting: bool) -> None:
-            feedback = ScanSurroundings.Feedback(view=index + 1, views=len(views), resting=resting)
-            feedback.azimuth, feedback.elevation = view.azimuth, view.elevation
-            run.feedback(feedback)
+            run.feedback(scan_feedback_to_ros(index, len(views), view, resting))
 
         def rest() -> bool:
-            return self._read.wait(self._pictures, dwell, self._patience, run.interrupt)
+            return self._read.wait(settings.pictures, dwell, settings.patience, run.interrupt)
 
         outcome = ScanOutcome([], [])
         failure = ''
@@ -206,10 +147,7 @@ class ArmController(PatrolNode):
             failure = str(error)
         finally:
             wake()
-        result = ScanSurroundings.Result(
-            views=len(outcome.rested), unreachable=len(outcome.unreachable), message=failure
-        )
-        result.coverage = plan.covered(outcome.rested)
+        result = scan_result_to_ros(outcome, plan.covered(outcome.rested), failure)
         if failure and not run.interrupt.is_set():
             raise GoalAborted(f'scan ended at view {result.views + 1}: {failure}', result)
         return result

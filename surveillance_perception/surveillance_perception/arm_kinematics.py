@@ -94,6 +94,26 @@ def direction_of(azimuth: float, elevation: float) -> Array:
     return np.array([flat * math.cos(azimuth), flat * math.sin(azimuth), math.sin(elevation)])
 
 
+def in_base(point: Array, frame: str, base: tuple[str, Array] | None) -> Array:
+    """A point (3,) of some frame in base_link, metres.
+
+    Args:
+        point: (3,) metres.
+        frame: `base_link` (also when empty), `map`, or the frame of the odometry.
+        base: Frame of the odometry and the transform (4, 4) from base_link to it; None when there
+            is no odometry. The map's frame is taken for the odometry's.
+
+    Raises:
+        ValueError: The frame is not known.
+    """
+    if frame in ('', 'base_link'):
+        return point
+    if base is None or frame not in (base[0], 'map'):
+        known = "'base_link'" if base is None else f"'base_link', 'map' or '{base[0]}'"
+        raise ValueError(f"frame '{frame}' is not known, expected {known}")
+    return np.asarray((np.linalg.inv(base[1]) @ np.array([*point, 1.0]))[:3])
+
+
 def _descend(arm: Arm, target: Array, start: Array, posture: Array) -> Aim:
     positions = start.copy()
     for iteration in range(_ITERATIONS):

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseArray
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.time import Time
@@ -18,13 +17,14 @@ from surveillance_perception.annotation import annotated
 from surveillance_perception.camera_model import CameraModel
 from surveillance_perception.conversions import (
     camera_from_ros,
-    detection_to_ros,
+    detections_to_ros,
+    diagnostics_to_ros,
     picture_from_compressed,
     picture_from_ros,
     picture_to_ros,
-    pose_to_ros,
+    poses_to_ros,
 )
-from surveillance_perception.detection_watch import DetectionWatch, Sighting
+from surveillance_perception.detection_watch import DetectionWatch
 from surveillance_perception.detector_parameters import DetectorParameters
 from surveillance_perception.latest import Latest
 from surveillance_perception.picture_files import Picture
@@ -46,24 +46,6 @@ class ArucoDetector(PatrolNode):
     def __init__(self, **node_options: Any) -> None:
         super().__init__('aruco_detector', **node_options)
         self._options = DetectorParameters(self, self._settings_changed)
-        self._field_of_view = self._changeable(
-            'field_of_view',
-            60.0,
-            'Horizontal, degrees, while there is no camera_info.',
-            minimum=5.0,
-            maximum=170.0,
-        )
-        self._max_pixels = self._changeable(
-            'max_pixels',
-            20_000_000,
-            'The largest picture that is looked at.',
-            minimum=1,
-        )
-        self._only_at_rest = self._changeable(
-            'only_at_rest',
-            True,
-            'Leave out pictures taken while arm/at_rest is false; without an arm it is never told.',
-        )
         self._camera: CameraModel | None = None
         self._rest_since: Time | None = Time(clock_type=self.get_clock().clock_type)
         self._stale = False
@@ -98,15 +80,6 @@ class ArucoDetector(PatrolNode):
         """End the worker."""
         self._pictures.close()
 
-    def _changeable(self, name: str, default: Any, description: str, **limits: Any) -> Any:
-        return self.parameter(
-            name,
-            default,
-            description,
-            on_change=lambda value: setattr(self, '_' + name, value),
-            **limits,
-        )
-
     def _settings_changed(self) -> None:
         self._stale = True
 
@@ -124,7 +97,7 @@ class ArucoDetector(PatrolNode):
             if self._stale:
                 self._stale = False
                 self._adopt()
-            if self._only_at_rest and not self._taken_at_rest(message):
+            if self._options.only_at_rest and not self._taken_at_rest(message):
                 self.skipped += 1
                 continue
             try:
@@ -145,13 +118,14 @@ class ArucoDetector(PatrolNode):
 
     def _look(self, message: Any) -> None:
         if isinstance(message, Image):
-            picture = picture_from_ros(message, self._max_pixels)
+            picture = picture_from_ros(message, self._options.max_pixels)
         else:
-            picture = picture_from_compressed(message, self._max_pixels)
+            picture = picture_from_compressed(message, self._options.max_pixels)
         sightings, new = self._watch.look(picture, self._camera_of(picture))
         for marker_id in new:
             self._ids.publish(Int32(data=marker_id))
-        self._publish(message.header, sightings)
+        self._detections.publish(detections_to_ros(message.header, sightings))
+        self._poses.publish(poses_to_ros(message.header, sightings))
         if self._annotated.get_subscription_count():
             drawn = annotated(picture, (s.detection for s in sightings), self._watch.confirmed)
             self._annotated.publish(picture_to_ros(drawn, message.header))
@@ -161,42 +135,17 @@ class ArucoDetector(PatrolNode):
         camera = self._camera
         if camera is not None and (camera.width, camera.height) == (width, height):
             return camera
-        return CameraModel.from_field_of_view(width, height, math.radians(self._field_of_view))
-
-    def _publish(self, header: Any, sightings: list[Sighting]) -> None:
-        self._detections.publish(
-            MarkerDetectionArray(
-                header=header,
-                detections=[
-                    detection_to_ros(each.detection, each.pose, each.size, each.confirmed)
-                    for each in sightings
-                ],
-            )
-        )
-        poses = [pose_to_ros(each.pose) for each in sightings if each.pose and each.confirmed]
-        self._poses.publish(PoseArray(header=header, poses=poses))
+        return CameraModel.from_field_of_view(width, height, self._options.field_of_view)
 
     def _diagnose(self) -> None:
-        counts = self._watch.take_statistics()
-        status = DiagnosticStatus(name=f'{self.get_name()}: pictures', hardware_id='camera')
-        status.level, status.message = DiagnosticStatus.OK, 'looking'
-        if counts.refused:
-            status.level, status.message = DiagnosticStatus.ERROR, counts.last_error
-        elif not counts.pictures:
-            status.level, status.message = DiagnosticStatus.WARN, 'no pictures'
-        mean = 1e3 * counts.seconds / counts.pictures if counts.pictures else 0.0
-        figures = {
-            'pictures': counts.pictures,
-            'refused': counts.refused,
+        further = {
             'dropped in all': self._pictures.dropped,
             'taken in motion in all': self.skipped,
-            'ms per picture': f'{mean:.1f}',
             'confirmed ids': ' '.join(str(each) for each in sorted(self._watch.confirmed)),
         }
-        status.values = [KeyValue(key=key, value=str(value)) for key, value in figures.items()]
-        message = DiagnosticArray(status=[status])
-        message.header.stamp = self.get_clock().now().to_msg()
-        self._diagnostics.publish(message)
+        stamp = self.get_clock().now().to_msg()
+        statistics = self._watch.take_statistics()
+        self._diagnostics.publish(diagnostics_to_ros(self.get_name(), stamp, statistics, further))
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -2,25 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import cv2
 import numpy as np
 import numpy.typing as npt
-from geometry_msgs.msg import Point, Pose, Quaternion
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from geometry_msgs.msg import Point, Pose, PoseArray, Quaternion
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from surveillance_interfaces.msg import MarkerDetection, RoomConnection
+from surveillance_interfaces.action import ScanSurroundings
+from surveillance_interfaces.msg import MarkerDetection, MarkerDetectionArray, RoomConnection
 from surveillance_interfaces.srv import RoomInformation
 from surveillance_perception.arm_trajectory import ArmTrajectory
 from surveillance_perception.camera_model import CameraModel
 from surveillance_perception.detection import Detection
+from surveillance_perception.detection_watch import Sighting, Statistics
 from surveillance_perception.marker_registry import MarkedPlace
 from surveillance_perception.picture_files import Picture, PictureError, decode_picture
 from surveillance_perception.pose import MarkerPose
+from surveillance_perception.surroundings_scan import ScanOutcome
+from surveillance_perception.view_coverage import View
 
 _CHANNELS = {'mono8': 1, 'rgb8': 3, 'bgr8': 3, 'rgba8': 4, 'bgra8': 4}
 _TO_BGR = {
@@ -133,6 +139,70 @@ def detection_to_ros(
         message.pose = pose_to_ros(pose)
         message.reprojection_error = pose.reprojection_error
     return message
+
+
+def detections_to_ros(header: Header, sightings: Iterable[Sighting]) -> MarkerDetectionArray:
+    """All markers of one picture."""
+    return MarkerDetectionArray(
+        header=header,
+        detections=[
+            detection_to_ros(each.detection, each.pose, each.size, each.confirmed)
+            for each in sightings
+        ],
+    )
+
+
+def poses_to_ros(header: Header, sightings: Iterable[Sighting]) -> PoseArray:
+    """The poses of those markers of a picture that are confirmed."""
+    poses = [pose_to_ros(each.pose) for each in sightings if each.pose and each.confirmed]
+    return PoseArray(header=header, poses=poses)
+
+
+def diagnostics_to_ros(
+    name: str, stamp: Any, statistics: Statistics, further: Mapping[str, Any]
+) -> DiagnosticArray:
+    """How the stream of pictures was, with further figures to show."""
+    status = DiagnosticStatus(name=f'{name}: pictures', hardware_id='camera')
+    status.level, status.message = DiagnosticStatus.OK, 'looking'
+    if statistics.refused:
+        status.level, status.message = DiagnosticStatus.ERROR, statistics.last_error
+    elif not statistics.pictures:
+        status.level, status.message = DiagnosticStatus.WARN, 'no pictures'
+    figures = {
+        'pictures': statistics.pictures,
+        'refused': statistics.refused,
+        'ms per picture': f'{statistics.mean_milliseconds:.1f}',
+        **further,
+    }
+    status.values = [KeyValue(key=key, value=str(value)) for key, value in figures.items()]
+    message = DiagnosticArray(status=[status])
+    message.header.stamp = stamp
+    return message
+
+
+def scan_feedback_to_ros(
+    index: int, count: int, view: View, resting: bool
+) -> ScanSurroundings.Feedback:
+    """Where a scan is."""
+    return ScanSurroundings.Feedback(
+        view=index + 1,
+        views=count,
+        azimuth=view.azimuth,
+        elevation=view.elevation,
+        resting=resting,
+    )
+
+
+def scan_result_to_ros(
+    outcome: ScanOutcome, covered: float, message: str
+) -> ScanSurroundings.Result:
+    """What came of a scan."""
+    return ScanSurroundings.Result(
+        views=len(outcome.rested),
+        unreachable=len(outcome.unreachable),
+        coverage=covered,
+        message=message,
+    )
 
 
 def pose_to_ros(pose: MarkerPose) -> Pose:

@@ -71,6 +71,11 @@ class Statistics:
     refused: int = 0
     last_error: str = ''
 
+    @property
+    def mean_milliseconds(self) -> float:
+        """Time for a picture; 0 without any."""
+        return 1e3 * self.seconds / self.pictures if self.pictures else 0.0
+
 
 class DetectionWatch:
     """Detects in picture after picture; what was seen in one is expected in the next."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -111,6 +112,19 @@ class DetectorParameters:
             minimum=2,
             maximum=99,
         )
+        self._add(
+            'field_of_view',
+            60.0,
+            'Horizontal, degrees, while there is no camera_info.',
+            minimum=5.0,
+            maximum=170.0,
+        )
+        self._add('max_pixels', 20_000_000, 'The largest picture that is looked at.', minimum=1)
+        self._add(
+            'only_at_rest',
+            True,
+            'Leave out pictures taken while arm/at_rest is false; without an arm it is never told.',
+        )
         for name, number, text, least, most in _NUMBERS:
             self._add(name, float(number), text, minimum=float(least), maximum=float(most))
         for name, count, text, lowest, highest in _COUNTS:
@@ -135,6 +149,21 @@ class DetectorParameters:
             values['confirmation_frames'],
             values['unknown_confirmation_frames'],
         )
+
+    @property
+    def field_of_view(self) -> float:
+        """Horizontal field of view of a camera that tells nothing of itself, rad."""
+        return math.radians(self._values['field_of_view'])
+
+    @property
+    def max_pixels(self) -> int:
+        """The largest picture that is looked at."""
+        return int(self._values['max_pixels'])
+
+    @property
+    def only_at_rest(self) -> bool:
+        """Whether pictures taken while the arm moves are left out."""
+        return bool(self._values['only_at_rest'])
 
     def _add(self, name: str, default: Any, description: str, **limits: Any) -> None:
         def adopt(value: Any) -> None:
