@@ -14,7 +14,7 @@ setup(
     zip_safe=True,
     maintainer='Surveillance robot maintainers',
     maintainer_email='surveillance@example.com',
-    description='ARMOR-compatible ontology service and reasoner in Python, and the map builder of the surveillance robot.',
+    description="OWL ontology service with ARMOR's interface, its reasoner, and the map builder.",
     license='Apache-2.0',
     entry_points={
         'console_scripts': [

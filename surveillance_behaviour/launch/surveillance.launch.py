@@ -1,4 +1,6 @@
-"""Starts the robot on an installed ROS 2: `ros2 launch surveillance_behaviour surveillance.launch.py`.
+"""Starts the robot where ROS 2 is installed.
+
+`ros2 launch surveillance_behaviour surveillance.launch.py`; arguments follow it as `name:=value`.
 
 Arguments: `mode`, `behaviour`, `map`, `params`, `record`, `namespace`, `log_level`; see
 `ros2 launch surveillance_behaviour surveillance.launch.py --show-args`. Without an installed ROS,
@@ -10,10 +12,11 @@ from __future__ import annotations
 from pathlib import Path
 
 from ament_index_python.packages import get_package_share_directory
-from launch import LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
+
+from launch import LaunchContext, LaunchDescription
 
 # Executables of each package, by what brings them in.
 ALWAYS = {

@@ -13,7 +13,6 @@ from typing import Protocol
 
 from surveillance_behaviour.survey import SurveyReport
 
-
 _OVERLAP = 0.12
 _REACH = 0.3
 

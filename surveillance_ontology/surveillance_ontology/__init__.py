@@ -1,1 +1,1 @@
-"""ARMOR-compatible ontology service and reasoner in Python, and the map builder of the surveillance robot."""
+"""OWL ontology service with ARMOR's interface, its reasoner, and the map builder."""
