@@ -34,8 +34,8 @@ from surveillance_controllers import polyline
 from surveillance_controllers.driving import Drive
 from surveillance_controllers.grid_map import GridMap
 from surveillance_controllers.grid_planning import GridPlanner, PlanningParameters
-from surveillance_controllers.localisation import Scan
 from surveillance_controllers.pilot import Pilot
+from surveillance_controllers.scans import Scan
 from surveillance_simulation import occupancy_grid, place_generation
 from surveillance_simulation.place_file import read_world
 from surveillance_simulation.robot import Robot

@@ -11,14 +11,7 @@ import math
 from collections.abc import Sequence
 
 from surveillance_controllers.battery_model import Battery
-
-Pose = tuple[float, float, float]
-"""x, y in metres, yaw in radians; world frame."""
-
-
-def angle_between(first: float, second: float) -> float:
-    """The turn from one yaw to another, -pi to pi, radians."""
-    return math.remainder(second - first, math.tau)
+from surveillance_controllers.poses import Pose, angle_between
 
 
 class MotionMeter:

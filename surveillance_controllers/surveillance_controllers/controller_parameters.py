@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 
 from surveillance_controllers.battery_model import BatteryParameters
-from surveillance_controllers.battery_use import Pose
 from surveillance_controllers.polyline import Points
+from surveillance_controllers.poses import Pose
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError
 

@@ -13,13 +13,13 @@ from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import BatteryState, LaserScan, PointCloud2, PointField
 
 from surveillance_controllers.battery_model import Battery
-from surveillance_controllers.battery_use import Pose
 from surveillance_controllers.polyline import Points
+from surveillance_controllers.poses import Pose
 
 if TYPE_CHECKING:
     from surveillance_controllers.grid_map import GridMap
-    from surveillance_controllers.localisation import Scan
     from surveillance_controllers.path_following import Velocity
+    from surveillance_controllers.scans import Scan
 
 
 def array_from_points(points: Iterable[Point]) -> Points:
@@ -121,7 +121,7 @@ def grid_from(message: OccupancyGrid) -> GridMap:
 
 def scan_from(message: LaserScan) -> Scan:
     """A turn of a lidar; rays that are out of its range or not a number met nothing."""
-    from surveillance_controllers.localisation import Scan
+    from surveillance_controllers.scans import Scan
 
     ranges = np.frombuffer(message.ranges, dtype=np.float32).astype(float)
     angles = message.angle_min + message.angle_increment * np.arange(len(ranges))

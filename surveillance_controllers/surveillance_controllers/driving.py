@@ -16,8 +16,6 @@ from enum import Enum
 import numpy as np
 from numpy.typing import ArrayLike
 
-from surveillance_controllers.battery_use import Pose, angle_between
-from surveillance_controllers.localisation import composed
 from surveillance_controllers.path_following import (
     DriveParameters,
     Guidance,
@@ -26,6 +24,7 @@ from surveillance_controllers.path_following import (
     room_ahead,
 )
 from surveillance_controllers.polyline import Points
+from surveillance_controllers.poses import Pose, angle_between, composed
 
 
 class State(Enum):

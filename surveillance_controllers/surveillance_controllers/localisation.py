@@ -21,36 +21,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from surveillance_controllers.battery_use import Pose
 from surveillance_controllers.grid_map import GridMap, distance_to
 from surveillance_controllers.polyline import Points
-
-
-@dataclass(frozen=True)
-class Scan:
-    """One turn of a lidar that sits at the robot's centre.
-
-    Attributes:
-        angles: Direction of each ray in the robot's frame, shape (n,), rad.
-        ranges: How far each ray went, shape (n,), metres; infinite where it met nothing.
-        range_max: The lidar's reach, metres.
-    """
-
-    angles: Points
-    ranges: Points
-    range_max: float
-
-    @property
-    def points(self) -> Points:
-        """The points met, in the robot's frame, shape (m, 2), m at most n."""
-        met = np.isfinite(self.ranges) & (self.ranges < self.range_max)
-        ranges, angles = self.ranges[met], self.angles[met]
-        return np.stack([ranges * np.cos(angles), ranges * np.sin(angles)], axis=1)
-
-    def thinned(self, count: int) -> Scan:
-        """About `count` of the rays, evenly taken."""
-        step = max(1, len(self.angles) // count)
-        return Scan(self.angles[::step], self.ranges[::step], self.range_max)
+from surveillance_controllers.poses import Pose, composed, relative
+from surveillance_controllers.scans import Scan
 
 
 @dataclass(frozen=True)
@@ -396,24 +370,6 @@ class Localiser:
             row = np.clip(y.astype(np.int32), 0, rows - 1)
             scores[begin : begin + 4096] = flat[row * columns + column].mean(axis=1)
         return scores
-
-
-def composed(pose: Pose, step: Pose) -> Pose:
-    """The pose reached from `pose` by a step given in its own frame."""
-    cos, sin = math.cos(pose[2]), math.sin(pose[2])
-    return (
-        pose[0] + cos * step[0] - sin * step[1],
-        pose[1] + sin * step[0] + cos * step[1],
-        math.remainder(pose[2] + step[2], math.tau),
-    )
-
-
-def relative(first: Pose, second: Pose) -> Pose:
-    """The step, in the first pose's own frame, that leads to the second."""
-    dx, dy = second[0] - first[0], second[1] - first[1]
-    cos, sin = math.cos(first[2]), math.sin(first[2])
-    turn = math.remainder(second[2] - first[2], math.tau)
-    return cos * dx + sin * dy, cos * dy - sin * dx, turn
 
 
 def _apart(poses: Points, scores: Points, count: int, distance: float) -> list[Pose]:

@@ -13,10 +13,10 @@ from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import PointCloud2
 
 from surveillance_controllers import conversions
-from surveillance_controllers.battery_use import Pose
 from surveillance_controllers.door_watch import DoorWatch
 from surveillance_controllers.grid_planning import GridPlanner, NoPath, PlanningParameters
 from surveillance_controllers.polyline import Points
+from surveillance_controllers.poses import Pose
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.waiting import Interrupt

@@ -10,10 +10,10 @@ import math
 
 import numpy as np
 
-from surveillance_controllers.battery_use import Pose
 from surveillance_controllers.grid_map import GridMap, distance_to
-from surveillance_controllers.localisation import Scan
 from surveillance_controllers.polyline import Points
+from surveillance_controllers.poses import Pose
+from surveillance_controllers.scans import Scan
 
 
 class ObstacleMemory:

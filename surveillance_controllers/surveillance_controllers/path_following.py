@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from surveillance_controllers import polyline
-from surveillance_controllers.battery_use import Pose, angle_between
 from surveillance_controllers.polyline import Points
+from surveillance_controllers.poses import Pose, angle_between
 
 
 @dataclass(frozen=True)

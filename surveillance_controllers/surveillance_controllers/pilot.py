@@ -12,14 +12,15 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
-from surveillance_controllers.battery_use import Pose
 from surveillance_controllers.driving import Drive, Spin
 from surveillance_controllers.grid_map import GridMap, with_walls
-from surveillance_controllers.localisation import LocalisationParameters, Localiser, Scan
+from surveillance_controllers.localisation import LocalisationParameters, Localiser
 from surveillance_controllers.obstacle_memory import ObstacleMemory
 from surveillance_controllers.path_following import Velocity
 from surveillance_controllers.place_regions import PlaceRegions, Segment
 from surveillance_controllers.polyline import Points
+from surveillance_controllers.poses import Pose
+from surveillance_controllers.scans import Scan
 
 SETTLE_SECONDS = 0.2
 """A place counts once the robot has been in it for this long, so that a doorway does not

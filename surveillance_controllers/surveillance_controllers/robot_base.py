@@ -16,12 +16,12 @@ from nav_msgs.msg import OccupancyGrid, Odometry
 from sensor_msgs.msg import LaserScan, PointCloud2
 
 from surveillance_controllers import conversions
-from surveillance_controllers.battery_use import Pose
 from surveillance_controllers.driving import Drive, Spin, State
 from surveillance_controllers.grid_planning import NoPath
 from surveillance_controllers.path_following import Velocity
 from surveillance_controllers.pilot import Pilot
 from surveillance_controllers.polyline import Points
+from surveillance_controllers.poses import Pose
 from surveillance_controllers.tf_correction import TfCorrection
 from surveillance_interfaces.msg import DoorStates
 from surveillance_runtime.node import PatrolNode

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from surveillance_controllers.battery_use import Pose
 from surveillance_controllers.controller_parameters import MotionSettings
 from surveillance_controllers.grid_planning import PlanningParameters
 from surveillance_controllers.path_following import DriveParameters
 from surveillance_controllers.place_regions import Segment, door_segment
 from surveillance_controllers.polyline import Points
+from surveillance_controllers.poses import Pose
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError
 

@@ -9,13 +9,13 @@ import numpy as np
 
 from surveillance_controllers import conversions
 from surveillance_controllers.arrival import MotionFailed
-from surveillance_controllers.battery_use import Pose
 from surveillance_controllers.driving import Drive, Spin, State
 from surveillance_controllers.grid_planning import NoPath
 from surveillance_controllers.map_knowledge import MapKnowledge
 from surveillance_controllers.pilot import Pilot
 from surveillance_controllers.place_tracking import PlaceTracking
 from surveillance_controllers.polyline import Points
+from surveillance_controllers.poses import Pose
 from surveillance_controllers.robot_base import RobotBase, RobotSilent
 from surveillance_controllers.robot_parameters import RobotSettings
 from surveillance_interfaces.action import ComputePath

@@ -10,8 +10,7 @@ from typing import Any
 from geometry_msgs.msg import TransformStamped
 
 from surveillance_controllers import conversions
-from surveillance_controllers.battery_use import Pose
-from surveillance_controllers.localisation import composed, relative
+from surveillance_controllers.poses import Pose, composed, relative
 from surveillance_runtime.node import PatrolNode
 
 try:

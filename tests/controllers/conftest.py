@@ -14,7 +14,7 @@ import pytest
 import yaml
 
 from surveillance_controllers.grid_map import GridMap, with_walls
-from surveillance_controllers.localisation import Scan
+from surveillance_controllers.scans import Scan
 
 
 class Operator:

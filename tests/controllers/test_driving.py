@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from surveillance_controllers.driving import Drive, RecoveryParameters, Spin, State
-from surveillance_controllers.localisation import composed
 from surveillance_controllers.path_following import DriveParameters, Velocity
+from surveillance_controllers.poses import composed
 
 NOTHING = np.zeros((0, 2))
 PERIOD = 0.1

@@ -11,13 +11,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from surveillance_controllers import polyline
-from surveillance_controllers.localisation import composed
 from surveillance_controllers.path_following import (
     DriveParameters,
     PathFollower,
     Velocity,
     room_ahead,
 )
+from surveillance_controllers.poses import composed
 
 NOTHING = np.zeros((0, 2))
 PERIOD = 0.1
