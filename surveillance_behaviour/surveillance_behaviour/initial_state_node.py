@@ -9,23 +9,21 @@ from typing import Any
 from nav_msgs.msg import Odometry
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.task import Future
-from std_msgs.msg import Int32
 from std_srvs.srv import Empty
 
-from surveillance_behaviour.conversions import map_message, place_note_from
+from surveillance_behaviour.conversions import map_message
+from surveillance_behaviour.marker_inquiry import MarkerInquiry
 from surveillance_behaviour.ros_eyes import RosEyes
 from surveillance_behaviour.surroundings import LookingAround
-from surveillance_behaviour.survey import PlaceNote, Survey, SurveyReport
-from surveillance_interfaces.msg import MarkerDetectionArray, OntologyMap
-from surveillance_interfaces.srv import ReferenceName, RoomInformation
+from surveillance_behaviour.survey import PlaceNote, Survey, SurveyReport, notes_of
+from surveillance_interfaces.msg import OntologyMap
+from surveillance_interfaces.srv import ReferenceName
 from surveillance_ontology.place import Place, PlaceError, make_place
 from surveillance_runtime.calls import CallFailed, ServiceCaller
 from surveillance_runtime.node import PatrolNode, StartError, run_node
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 
-_ANSWER_SECONDS = 5.0
 _BUILD_SECONDS = 20.0
-_START = -1
 
 
 class InitialState(PatrolNode):
@@ -64,25 +62,18 @@ class InitialState(PatrolNode):
         self._sent: tuple[PlaceNote, ...] = ()
         self._finished = False
         self._waiting: list[Future] = []
-        self._events: queue.SimpleQueue[int | None] = queue.SimpleQueue()
-        self._queued: set[int] = set()
+        self._events: queue.SimpleQueue[str] = queue.SimpleQueue()
+        self._inquiry = MarkerInquiry(self, self._survey, self._events)
         self._eyes = RosEyes(self, pictures, patience)
-        self._room_info = ServiceCaller(self, RoomInformation, 'room_info')
         self._reference = ServiceCaller(self, ReferenceName, 'ontology_map/reference_name')
         self._map = self.create_publisher(OntologyMap, 'ontology_map/build_map', STATE_QOS)
-        self.create_subscription(
-            Int32, 'aruco_detector/id', lambda message: self._on_id(message.data), 100
-        )
-        self.create_subscription(
-            MarkerDetectionArray, 'aruco_detector/detections', self._on_detections, 10
-        )
         self.create_subscription(Odometry, 'odom', self._on_odometry, SENSOR_QOS)
         self.create_service(Empty, 'start', self._on_start, callback_group=ReentrantCallbackGroup())
         self.spawn(self._work, 'initial state')
 
     def on_stop(self) -> None:
         """End the worker."""
-        self._events.put(None)
+        self._events.put('stop')
 
     def _place(self, robot_room: str) -> Place:
         rooms, positions = self.parameters_under('map'), self.parameters_under('room_positions')
@@ -97,19 +88,9 @@ class InitialState(PatrolNode):
         if not self._finished:
             future = Future(executor=self.executor)
             self._waiting.append(future)
-            self._events.put(_START)
+            self._events.put('start')
             await future
         return response
-
-    def _on_id(self, marker_id: int) -> None:
-        if marker_id >= 0 and marker_id not in self._queued:
-            self._queued.add(marker_id)
-            self._events.put(marker_id)
-
-    def _on_detections(self, message: MarkerDetectionArray) -> None:
-        for detection in message.detections:
-            if detection.confirmed:
-                self._on_id(detection.id)
 
     def _on_odometry(self, message: Odometry) -> None:
         if not self._finished:
@@ -119,63 +100,36 @@ class InitialState(PatrolNode):
     # --- work, on the worker's thread ---
 
     def _work(self) -> None:
-        while (event := self._events.get()) is not None:
-            if event == _START and not self._finished:
-                self._start()
-            elif event >= 0:
-                self._ask(event)
-                if self._finished and self._configured is None:
-                    self._extend()
+        ended = False
+        while (event := self._events.get()) != 'stop':
+            if event == 'start' and not ended:
+                ended = self._start()
+            elif event == 'id' and ended and self._configured is None:
+                self._extend(self._inquiry.judge())
 
-    def _start(self) -> None:
+    def _start(self) -> bool:
+        """Find out and send the map; False when the node stops first."""
         if self._configured is not None:
-            notes = _notes_of(self._configured)
+            notes = notes_of(self._configured)
             self._publish(notes, self._configured.start)
         else:
             logger = self.get_logger()
             report = self._looking.run(
                 self._eyes,
-                self._judge,
+                self._inquiry.judge,
                 lambda: self.get_clock().now().nanoseconds / 1e9,
                 lambda sentence: logger.info(sentence),
                 self.stopping.is_set,
             )
             if self.stopping.is_set():
-                return
+                return False
             self._tell(report)
             self._publish(report.places, report.robot_room)
         self._await_map()
         self.executor.create_task(self._answer)
+        return True
 
-    def _judge(self) -> SurveyReport:
-        while not self._events.empty() and not self.stopping.is_set():
-            event = self._events.get()
-            if event is None:
-                self._events.put(None)
-                break
-            if event >= 0:
-                self._ask(event)
-        return self._survey.report()
-
-    def _ask(self, marker_id: int) -> None:
-        request = RoomInformation.Request(id=marker_id)
-        try:
-            answer = self._room_info.call(request, _ANSWER_SECONDS, self.stopping)
-        except CallFailed as error:
-            self._queued.discard(marker_id)
-            if not self.stopping.is_set():
-                self.get_logger().warn(f'marker {marker_id}: {error}')
-            return
-        note = place_note_from(answer)
-        if note is None:
-            self._survey.discard(marker_id)
-            self.get_logger().info(f'marker {marker_id} is discarded: {answer.room}')
-        else:
-            self._survey.note(marker_id, note)
-            self.get_logger().info(f'marker {marker_id} stands for {note.room}')
-
-    def _extend(self) -> None:
-        report = self._survey.report()
+    def _extend(self, report: SurveyReport) -> None:
         if report.places != self._sent:
             known = {place.room for place in self._sent}
             new = [place.room for place in report.places if place.room not in known]
@@ -207,20 +161,6 @@ class InitialState(PatrolNode):
         waiting, self._waiting = self._waiting, []
         for future in waiting:
             future.set_result(None)
-
-
-def _notes_of(place: Place) -> tuple[PlaceNote, ...]:
-    notes = []
-    for room in place.rooms:
-        connections = {
-            door: other
-            for door in place.rooms[room]
-            for other in place.doors[door]
-            if other != room
-        }
-        x, y, _ = place.positions[room]
-        notes.append(PlaceNote(room, (x, y), connections))
-    return tuple(notes)
 
 
 def main(args: Sequence[str] | None = None) -> int:

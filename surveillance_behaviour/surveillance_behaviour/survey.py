@@ -13,6 +13,8 @@ from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from surveillance_ontology.place import Place
+
 Position = tuple[float, float]
 
 _SAME_POSITION = 0.05
@@ -193,3 +195,13 @@ def _reached(start: str, agreed: Mapping[str, Mapping[str, str]]) -> frozenset[s
                 reached.add(other)
                 queue.append(other)
     return frozenset(reached)
+
+
+def notes_of(place: Place) -> tuple[PlaceNote, ...]:
+    """A place that is described already, as notes."""
+    notes = []
+    for room, doors in place.rooms.items():
+        behind = {door: other for door in doors for other in place.doors[door] if other != room}
+        x, y, _ = place.positions[room]
+        notes.append(PlaceNote(room, (x, y), behind))
+    return tuple(notes)
