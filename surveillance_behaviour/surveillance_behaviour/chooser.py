@@ -114,6 +114,7 @@ class Chooser:
             threshold=self.settings.urgency_threshold,
             target=self._target,
             avoided=avoided,
+            rules=self.settings.rules.classes,
         )
 
     def _restore(self, beliefs: Beliefs, interrupt: Interrupt) -> bool:

@@ -83,7 +83,7 @@ class AnyOrder(RuleBasedStateMachine):
         self.faults: dict[str, tuple[int, type[PeerError]]] = {}
         self.world.faults = self.fault
         self.record = MissionRecord(self.path)
-        choice = ChoiceSettings(urgency_threshold=THRESHOLD)
+        choice = ChoiceSettings(urgency_threshold=THRESHOLD, policy='oldest')
         mission_settings = MissionSettings(choice=choice, settle_seconds=0.0)
         self.mission = self.world.mission(mission_settings, self.record)
         self.fsm = MACHINES[self.machine](self.mission)
@@ -200,7 +200,7 @@ def search(machine: str) -> None:
     run_state_machine_as_test(
         kind,
         settings=settings(
-            max_examples=25,
+            max_examples=20,
             stateful_step_count=25,
             deadline=None,
             derandomize=True,

@@ -47,7 +47,7 @@ Transition = tuple[str, str, str]
 
 
 def settings(**choice: object) -> MissionSettings:
-    values = {'urgency_threshold': 30.0, **choice}
+    values = {'urgency_threshold': 30.0, 'policy': 'lookahead', **choice}
     return MissionSettings(
         choice=ChoiceSettings(**values),  # type: ignore[arg-type]
         settle_seconds=0.0,
@@ -91,8 +91,8 @@ def visited(world: World, since: float = 0.0) -> set[str]:
 
 
 def test_an_hour_of_patrol_reaches_all_places_and_charges_in_time(machine: str) -> None:
-    world = World(draw=0.4)
-    run = Run(machine, world).until(3600.0)
+    world = World(draw=0.8)
+    run = Run(machine, world, settings(policy='tour')).until(3600.0)
     assert visited(world) == set(SEVEN_ROOMS)
     assert world.stranded == 0
     assert sum(decision.rule == 'recharge' for decision in world.decisions) >= 5

@@ -8,7 +8,7 @@ remember (the target it was heading for) stands in the situation.
 seed      any allowed place, at random: what both of the project's ancestors do
 oldest    the allowed place that went unvisited longest
 lookahead the way to wherever on the whole map (time unvisited - time to get there) is highest
-tour      the place from which the rest of the shortest closed tour leaves the least waiting
+tour      the place from which riding on, within the rules, leaves the least waiting
 random    uniform choice, the literature's baseline
 CR        conscientious reactive: the neighbour idle longest (Machado et al. 2002)
 HCR       heuristic conscientious reactive: idleness and nearness, normalised (Almeida et al. 2004)
@@ -31,12 +31,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surveillance_behaviour.policy.graph import PatrolGraph
+from surveillance_behaviour.policy.rides import Rider
 from surveillance_behaviour.policy.situation import Score, Situation
 
 Scores = Mapping[str, Score]
 DEFAULT_POLICY = 'tour'
 MEAN_WEIGHT = 1e-3
 """How much the mean wait counts beside the longest one where ``tour`` compares two ways."""
+SQUARES_WEIGHT = 1e-9
+"""How much the sum of all squared waits counts beside the longest wait of a ride."""
+RIDES_UP_TO = 150
+"""The largest map, in places, on which ``tour`` rides ahead step by step."""
 
 
 class Policy(Protocol):
@@ -96,27 +101,40 @@ def lookahead(situation: Situation, allowed: Sequence[str]) -> Scores:
 
 
 def tour(situation: Situation, allowed: Sequence[str]) -> Scores:
-    """The longest wait of any place if the robot went round the tour from each candidate on.
+    """The longest wait of any place if the robot rides on from each candidate.
 
-    The robot may join the tour wherever it passes through the candidate, in either sense. On the
-    tour, its next step leaves the least waiting; off it (charged, blocked, held by a rule), this
-    finds where to join again.
+    Two rides are thought through within the rules: round the tour, joined in whichever sense and
+    at whichever pass through the candidate leaves the least waiting, and always to the place that
+    went unvisited longest. The better one counts. On large maps the ride round the tour is
+    estimated without the rules.
     """
     graph = situation.graph
     steps = np.array([graph.index[place] for place in graph.walk], dtype=np.intp)
+    rider = Rider(situation) if len(graph.places) <= RIDES_UP_TO else None
     scores = {}
     for place in allowed:
+        first = graph.index[place]
         start = graph.seconds(situation.place, place)
-        longest, mean, target = min(
-            _wait_on_the_way(situation, way, start, int(begin))
-            for way in (steps, steps[::-1])
-            for begin in np.flatnonzero(way == graph.index[place])
+        longest, mean, waiting, way, begin = min(
+            (
+                (*_wait_on_the_way(situation, way, start, int(begin)), sense, int(begin))
+                for sense, way in enumerate((steps, steps[::-1]))
+                for begin in np.flatnonzero(way == first)
+            ),
         )
-        name = graph.places[target]
+        if rider is None:
+            value = -(longest + MEAN_WEIGHT * mean)
+        else:
+            course = (steps, steps[::-1])[way].tolist()
+            rides = (rider.ride(first, course, begin), rider.ride(first))
+            best = min(rides, key=lambda ride: (ride.longest, ride.squares))
+            longest, waiting = best.longest, best.waiting
+            value = -(longest + SQUARES_WEIGHT * best.squares)
+        name = graph.places[waiting]
         scores[place] = Score(
-            -(longest + MEAN_WEIGHT * mean),
+            value,
             name,
-            f'the tour from there leaves no place longer than {longest:.1f} s ({name})',
+            f'riding on from there leaves no place longer than {longest:.1f} s ({name})',
         )
     return scores
 

@@ -97,21 +97,21 @@ class Patrol:
     def situation(self) -> Situation:
         """What the robot knows now."""
         reachable = tuple(sorted(self.graph.legs[self.place]))
-        classes = {
+        urgent = {
             place: self._classes[place] | {URGENT}
-            if self.now - self.visited_at[place] > self.threshold
-            else self._classes[place]
             for place in reachable
+            if self.now - self.visited_at[place] > self.threshold
         }
         return Situation(
             place=self.place,
             now=self.now,
             reachable=reachable,
-            classes=classes,
+            classes={**self._classes, **urgent},
             visited_at=self.visited_at,
             graph=self.graph,
             threshold=self.threshold,
             target=self.target,
+            rules=self.rules.classes,
         )
 
     def step(self) -> Decision:

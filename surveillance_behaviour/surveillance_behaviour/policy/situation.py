@@ -28,6 +28,7 @@ class Situation:
         threshold: Seconds after which a place is URGENT.
         target: What the last decision was heading for, if that was not reached yet.
         avoided: Places that could not be reached lately.
+        rules: The classes of places by priority, for policies that think ahead.
     """
 
     place: str
@@ -40,6 +41,7 @@ class Situation:
     threshold: float = 0.0
     target: str | None = None
     avoided: frozenset[str] = frozenset()
+    rules: tuple[str, ...] = ()
 
     def unvisited(self, place: str) -> float:
         """Seconds since ``place`` was visited."""
