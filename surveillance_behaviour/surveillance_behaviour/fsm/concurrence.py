@@ -428,7 +428,8 @@ class Concurrence(ActiveContainer):
                 raise LeftBehind
             frame.strand.heeded()
             frame.current = _TOGETHER
-            served = not branch.state.preempt_requested() or outcome == 'preempted'
+            pending = branch.state.preempt_requested()
+            served = not pending or outcome == 'preempted'
             branch.state.recall_preempt()
             if outcome is SUSPENDED or (frame.cut is node and served):
                 self._fsm_raised.append(branch)
@@ -437,6 +438,8 @@ class Concurrence(ActiveContainer):
                     return SUSPENDED
                 return None
             forget(branch.state)
+            if self._preempt_requested and not pending:
+                self.service_preempt()
         target = branch.transitions.get(outcome, RESUME)
         if target == RESUME:
             return None
