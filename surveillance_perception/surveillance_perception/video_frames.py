@@ -48,7 +48,7 @@ def open_source(source: str) -> FrameSource:
             raise PictureError(f'{path} holds no pictures ({", ".join(PICTURE_SUFFIXES)})')
         return _Files(files)
     if not path.exists():
-        raise PictureError(f'{source}: no such camera number, video file or folder of pictures')
+        raise PictureError(f'{source}: no such video file or folder of pictures')
     if path.suffix.lower() in PICTURE_SUFFIXES:
         return _Files([path])
     return _Capture(str(path), f'video {path}')

@@ -23,12 +23,12 @@ class VideoSource(PatrolNode):
 
     def __init__(self, **node_options: Any) -> None:
         super().__init__('video_source', **node_options)
-        source = self.parameter(
-            'source',
-            '0',
-            'Number of a webcam, a video file, or a folder of pictures.',
-            read_only=True,
+        path = self.parameter(
+            'source', '', 'A video file or a folder of pictures; empty: a webcam.', read_only=True
         )
+        camera = self.parameter('camera', 0, 'Number of the webcam.', minimum=0, read_only=True)
+        self._source = path or str(camera)
+        self._is_camera = not path
         self._rate = self.parameter(
             'rate',
             0.0,
@@ -54,11 +54,9 @@ class VideoSource(PatrolNode):
             maximum=170.0,
             on_change=lambda value: setattr(self, '_field_of_view', value),
         )
-        self._is_camera = str(source).isdigit()
         self._images = self.create_publisher(Image, 'camera/rgb/image_raw', PICTURES_QOS)
         self._infos = self.create_publisher(CameraInfo, 'camera/rgb/camera_info', PICTURES_QOS)
         self._wait = ClockWait(self)
-        self._source = str(source)
         try:
             opened = open_source(self._source)
         except PictureError as error:

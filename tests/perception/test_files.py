@@ -105,7 +105,7 @@ def test_video_file_is_played_at_its_own_rate(tmp_path):
 
 
 def test_source_that_is_not_there_is_named(tmp_path):
-    with pytest.raises(PictureError, match='no such camera number, video file or folder'):
+    with pytest.raises(PictureError, match='no such video file or folder'):
         open_source(str(tmp_path / 'none.avi'))
     with pytest.raises(PictureError, match='holds no pictures'):
         open_source(str(tmp_path))

@@ -236,8 +236,10 @@ def test_video_source_sends_a_folder_as_the_camera(graph: Any, tmp_path: Any) ->
 
 
 def test_video_source_does_not_start_without_a_source(graph: Any) -> None:
-    with pytest.raises(StartError, match='no such camera number, video file or folder'):
+    with pytest.raises(StartError, match='no such video file or folder of pictures'):
         graph.add(VideoSource, parameters={'source': 'none.mp4'})
+    with pytest.raises(StartError, match='camera 77 cannot be opened'):
+        graph.add(VideoSource, parameters={'camera': 77})
 
 
 class FollowingArm:
