@@ -149,6 +149,22 @@ def resident_bytes() -> int:
     return int(Path('/proc/self/statm').read_text().split()[1]) * resource.getpagesize()
 
 
+def best_first_reason(kb: KnowledgeBase) -> float:
+    """Seconds of the first reasoning; the best of three, of which the last is of `kb` itself."""
+    times = []
+    for candidate in (kb.copy(), kb.copy(), kb):
+        start = time.perf_counter()
+        candidate.reason()
+        times.append(time.perf_counter() - start)
+    return min(times)
+
+
+def recomputing(kb: KnowledgeBase) -> float:
+    start = time.perf_counter()
+    kb.recompute()
+    return time.perf_counter() - start
+
+
 def measure(places: int, visits: int) -> Figures:
     """All figures of one size, in this process."""
     patrol = Patrol(places)
@@ -160,10 +176,8 @@ def measure(places: int, visits: int) -> Figures:
         start = time.perf_counter()
         kb = KnowledgeBase(IRI, read_ontology(path, IRI).axioms)
         load = time.perf_counter() - start
-    start = time.perf_counter()
-    consistent = kb.reason()
-    first = time.perf_counter() - start
-    if not consistent or kb.unsupported:
+    first = best_first_reason(kb)
+    if not kb.consistent or kb.unsupported:
         raise SystemExit(f'{places} places: the generated map does not suit the ontology')
     gc.collect()
     memory = resident_bytes() - before
@@ -192,9 +206,7 @@ def measure(places: int, visits: int) -> Figures:
     due = {place for place, seen in patrol.visited.items() if patrol.now - seen > patrol.threshold}
     if urgent != due or corridors != {p for p, doors in patrol.doors.items() if len(doors) > 1}:
         raise SystemExit(f'{places} places: wrong classes')
-    start = time.perf_counter()
-    kb.recompute()
-    full = time.perf_counter() - start
+    full = min(recomputing(kb) for _ in range(3))
     middle = statistics.median
     return Figures(
         places, load, first, middle(whole), middle(reasoning), middle(asking), full, memory

@@ -33,6 +33,7 @@ from surveillance_ontology.axioms import (
     SubClassOf,
     entities_of,
 )
+from surveillance_ontology.bulk_building import uncollected
 from surveillance_ontology.explanation import Explanation
 from surveillance_ontology.knowledge_changes import Changes as Changes
 from surveillance_ontology.knowledge_changes import Feed, visible
@@ -182,7 +183,8 @@ class KnowledgeBase:
         if old is not None:
             engine.take_spelling(old)
         self._told.settle()
-        engine.update(assertions, ())
+        with uncollected():
+            engine.update(assertions, ())
         self._consistent = engine.consistent
         self._snapshots.clear()
         self._watched.clear()

@@ -8,9 +8,10 @@ from pathlib import Path
 
 from surveillance_ontology import foreign_formats
 from surveillance_ontology.axioms import Axiom
+from surveillance_ontology.bulk_building import uncollected
 from surveillance_ontology.owl_mapping import Mapping
 from surveillance_ontology.rdf_ntriples import parse_ntriples
-from surveillance_ontology.rdf_xml import RdfSyntaxError, parse_rdf_xml
+from surveillance_ontology.rdf_xml import Graph, RdfSyntaxError, parse_rdf_xml
 
 _NTRIPLES = re.compile(rb'<[^\s<>]*>\s+[<_]')
 DEFAULT_SIZE_LIMIT = 256 * 1024 * 1024
@@ -72,19 +73,9 @@ def read_ontology(
         raise OntologyFileError(name, 0, 0, f'larger than the limit of {size_limit} bytes')
     start = data.lstrip(b'\xef\xbb\xbf \t\r\n')
     try:
-        if foreign_formats.is_owl_xml(start):
-            triples, form = foreign_formats.owl_xml_to_ntriples(data, iri), 'owlxml'
-            graph = parse_ntriples(triples)
-        elif start[:1] != b'<' and foreign_formats.is_turtle(start):
-            triples, form = foreign_formats.turtle_to_ntriples(data, iri), 'turtle'
-            graph = parse_ntriples(triples)
-        elif not _NTRIPLES.match(start) and start[:1] in (b'<', b'\xff', b'\xfe'):
-            graph, form = parse_rdf_xml(data, iri), 'rdfxml'
-        elif not start:
-            raise RdfSyntaxError('the document is empty', 1, 1)
-        else:
-            graph, form = parse_ntriples(data), 'ntriples'
-        mapping = Mapping(graph)
+        with uncollected():
+            graph, form = _parsed(data, start, iri)
+            mapping = Mapping(graph)
     except RdfSyntaxError as error:
         raise OntologyFileError(name, error.line, error.column, error.message) from None
     except RecursionError:
@@ -92,3 +83,16 @@ def read_ontology(
     return OntologyDocument(
         list(mapping.axioms), mapping.unsupported, form, mapping.iri, graph.prefixes
     )
+
+
+def _parsed(data: bytes, start: bytes, iri: str) -> tuple[Graph, str]:
+    """The document as triples, and its format."""
+    if not start:
+        raise RdfSyntaxError('the document is empty', 1, 1)
+    if foreign_formats.is_owl_xml(start):
+        return parse_ntriples(foreign_formats.owl_xml_to_ntriples(data, iri)), 'owlxml'
+    if start[:1] != b'<' and foreign_formats.is_turtle(start):
+        return parse_ntriples(foreign_formats.turtle_to_ntriples(data, iri)), 'turtle'
+    if not _NTRIPLES.match(start) and start[:1] in (b'<', b'\xff', b'\xfe'):
+        return parse_rdf_xml(data, iri), 'rdfxml'
+    return parse_ntriples(data), 'ntriples'
