@@ -55,6 +55,7 @@ class Watch:
         waits: Longest time each place went without the robot, seconds.
         wrong: Periods in which the ontology was wrong for too long: from, seconds, said, true.
         longest_wrong: The longest such period however short, seconds.
+        collided: Times at which the robot ran into something.
         empty: Times at which the battery was empty away from the station.
         least_charge: Least charge seen away from the station, percent.
     """
@@ -73,6 +74,7 @@ class Watch:
         self._left = dict.fromkeys(self._world.plan.place.rooms, 0.0)
         self.wrong: list[tuple[float, float, str, str]] = []
         self.longest_wrong = 0.0
+        self.collided: list[float] = []
         self.empty: list[float] = []
         self.least_charge = 100.0
         node = stack.observer
@@ -118,6 +120,8 @@ class Watch:
             self.waits[place] = max(self.waits[place], now - self._left[place])
             self.visits[place] += 1
             self._place = place
+        if self.collisions > len(self.collided):
+            self.collided.append(now)
         self._judge(now)
         with self._changed:
             self.now = now
@@ -321,7 +325,8 @@ def main() -> int:
     made = ', '.join(f'{kind} {count}' for kind, count in sorted(trouble.made.items()))
     print(f'{watch.now / 3600:.2f} simulated hours in {took:.0f} s, {watch.now / took:.1f} times')
     print(f'trouble made          {made}')
-    print(f'collisions            {watch.collisions}')
+    at = ', '.join(f'{when:.1f} s' for when in watch.collided)
+    print(f'collisions            {watch.collisions}{f" (at {at})" if at else ""}')
     print(f'empty away from home  {len(watch.empty)} (least charge {watch.least_charge:.0f} %)')
     print(
         f'wrong about its place {len(watch.wrong)} times for more than {LONGEST_WRONG:g} s', end=''
