@@ -46,6 +46,7 @@ class LocalisationParameters:
         far_better: A pose far away must explain this much more, and win in several searches: that
             somebody carried the robot there is unlikely, and rooms look alike.
         far_wins: In so many, one after the other.
+        rounds: After so many searches without a winner the present pose is kept.
         doubts: Doubtful scans in a row before it looks; one is enough when it would be lost.
         lost_pause: Scans between two looks while it is lost.
         top_step: Odometry that jumps further than this between two readings is not believed, m.
@@ -69,6 +70,7 @@ class LocalisationParameters:
     better: float = 0.1
     far_better: float = 0.2
     far_wins: int = 3
+    rounds: int = 5
     doubts: int = 3
     lost_pause: int = 10
     top_step: float = 0.3
@@ -106,6 +108,7 @@ class Localiser:
         self._doubts = 0
         self._tolerated = 1.0
         self._rival: tuple[Pose, int] | None = None
+        self._rounds = 0
         self._moved = (0.0, 0.0)
         self._used_at: float | None = None
         self.set_map(grid)
@@ -122,6 +125,11 @@ class Localiser:
         self._edges: NDArray[np.float32] = np.minimum(signed, np.float32(10.0))
         self._occupied = occupied
         self._standable = grid.free & (outside - half >= self.parameters.body)
+
+    @property
+    def plausible(self) -> bool:
+        """Whether the estimate is good enough to say which place the robot is in."""
+        return not self.lost and self.agreement >= self.parameters.lost_below
 
     @property
     def certain(self) -> bool:
@@ -199,8 +207,9 @@ class Localiser:
         if found is not None and self._is_convincing(found, agreement):
             self.jumps += 1
             self._settle(*found)
-        elif self._rival is not None:
+        elif self._rival is not None and self._rounds < p.rounds:
             # Somewhere far away fits better: the next scans decide.
+            self._rounds += 1
             self._doubts = p.doubts - 1
         elif agreement >= p.lost_below:
             # Nothing explains the scan better: what is seen is not on the map.
@@ -229,7 +238,7 @@ class Localiser:
     def _settle(self, pose: Pose, agreement: float) -> None:
         self.pose, self.agreement = pose, agreement
         self.lost = False
-        self._doubts = 0
+        self._doubts = self._rounds = 0
         self._rival = None
 
     def search(self, scan: Scan) -> tuple[Pose, float] | None:

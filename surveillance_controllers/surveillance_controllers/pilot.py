@@ -143,7 +143,7 @@ class Pilot:
             self._localiser = self._first_localiser(scan, self._odometry)
         if self._localiser.see(scan, now) and self._localiser.certain:
             self._remember(scan, now)
-        if self._localiser.certain:
+        if self._localiser.plausible:
             self._settle_place(now)
         pose = self._localiser.pose
         if isinstance(self.task, Drive):

@@ -9,7 +9,7 @@ from surveillance_ontology.armor_client import FactSubscription
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.waiting import Interrupt
 
-RETRY_PERIOD = 1.0
+RETRY_PERIOD = 0.3
 """Pause before map and ontology are asked again after they did not answer, seconds."""
 
 
@@ -57,7 +57,7 @@ class PlaceTracking:
                 self._follow_map()
                 self._correct()
             except KnowledgeError as error:
-                self._node.get_logger().debug(f'place tracking: {error}')
+                self._node.get_logger().debug(f'where the robot is was not written: {error}')
                 stopping.wait(RETRY_PERIOD)
             else:
                 self._news.wait()
