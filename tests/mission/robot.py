@@ -36,12 +36,15 @@ NODES: dict[str, Callable[..., Any]] = {
 BEHAVIOUR = {
     'urgency_threshold': 60,
     'recovery.help_seconds': 5.0,
-    'deadline.answer': 1.0,
-    'deadline.build': 5.0,
-    'deadline.plan': 1.0,
-    'deadline.move': 2.0,
-    'deadline.charge': 2.0,
 }
+IMPATIENT = {
+    'deadline__answer': 1.0,
+    'deadline__build': 5.0,
+    'deadline__plan': 1.0,
+    'deadline__move': 2.0,
+    'deadline__charge': 2.0,
+}
+"""For tests in which peers do not answer; without need a busy machine would miss them."""
 
 
 def place_parameters(name: str = 'seven_rooms.yaml') -> dict[str, Any]:

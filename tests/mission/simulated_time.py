@@ -129,7 +129,7 @@ class SimulatedTime:
                 # A node that has just come had not met this topic yet.
                 self._topic.publish(message)
                 told = time.monotonic()
-            threading.Event().wait(0.0002)
+            threading.Event().wait(0.001)
 
 
 @contextmanager
