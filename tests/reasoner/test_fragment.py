@@ -408,3 +408,13 @@ def test_what_is_not_supported_is_reported(axiom: Axiom, words: str) -> None:
     assert words in kb.unsupported[0]
     if isinstance(axiom, EquivalentClasses):
         assert i in kb.instances(A), 'the direction that is supported still counts'
+
+
+def test_a_rule_that_makes_values_without_end_is_stopped_and_reported() -> None:
+    counting = Rule(
+        (DataPropertyAtom(S, X, V), computed('add', W, V, 1)), (DataPropertyAtom(S, X, W),)
+    )
+    kb = KnowledgeBase('x:', [counting, has(S, i, 1)])
+    assert kb.reason()
+    assert 'without end' in kb.unsupported[0]
+    assert num(2) in kb.data_values(S, i)

@@ -16,10 +16,13 @@ from surveillance_ontology.axioms import (
     Axiom,
     DifferentIndividuals,
     SameIndividual,
+    local_name,
 )
-from surveillance_ontology.reasoner.clauses import Fact, Program
+from surveillance_ontology.reasoner.clauses import Fact, Predicate, Program
 from surveillance_ontology.reasoner.identification import Identification
 from surveillance_ontology.reasoner.translation import individuals_of
+
+_MOST_VALUES = 20_000
 
 
 class Engine(Identification):
@@ -185,6 +188,7 @@ class Engine(Identification):
     def _propagate(self) -> None:
         queue, touched, flushes = self._queue, self._touched, self._flushes
         changed = self.changed
+        values_left = _MOST_VALUES + 4 * len(self.asserted)
         while True:
             for fact in queue:
                 predicate = fact[0]
@@ -217,6 +221,11 @@ class Engine(Identification):
                     changed.setdefault(fact, False)
                 for fire in predicate.on_insert:
                     fire(x, y)
+                if predicate.kind == 'data':
+                    values_left -= 1
+                    if values_left < 0:
+                        self._stop_generating(predicate)
+                        break
             queue.clear()
             if self._requests:
                 self._run_requests()
@@ -227,6 +236,15 @@ class Engine(Identification):
                     flush()
                 if not queue:
                     return
+
+    def _stop_generating(self, predicate: Predicate) -> None:
+        """Ends a rule that makes a new value of every value; what it made so far stays."""
+        text = (
+            f'the rules on {local_name(predicate.name)} make values without end:'
+            f' stopped after {_MOST_VALUES} in one step'
+        )
+        if text not in self.program.unsupported:
+            self.program.unsupported.append(text)
 
     def _run_touched(self) -> None:
         pending = tuple(self._touched)

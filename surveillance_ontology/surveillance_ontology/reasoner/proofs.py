@@ -67,7 +67,7 @@ class ProofSearch:
         self._failed[fact] = depth
         return False
 
-    def find(self, fact: Fact, deepest: int = 64, budget: int = 500_000) -> Proof | None:
+    def find(self, fact: Fact, deepest: int = 64, budget: int = 100_000) -> Proof | None:
         """A shallowest proof; None where there is none within the bounds."""
         self._budget = budget
         for depth in range(deepest + 1):
