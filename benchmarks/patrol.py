@@ -49,6 +49,8 @@ SPEED, DWELL = 1.0, 2.0
 SEED = 1
 URGENCY = 7.0
 """Threshold of the seeds' ontology, seconds."""
+LARGE = 60
+"""Thresholds and batteries are compared on maps of up to so many places."""
 RULED = ('tour', 'lookahead', 'oldest', 'seed')
 """Policies run within the seeds' rules; the literature's run without any."""
 FREE = ('random', 'CR', 'HCR', 'HPCC', 'cycle')
@@ -306,14 +308,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 graph = read_patrolling_sim(file, SPEED, DWELL)
                 chosen.append(Map(Path(file).stem, graph, graph.places[0]))
         else:
-            chosen = list(maps(options.quick))
+            words = options.only or ['']
+            chosen = [
+                place for place in maps(options.quick) if any(word in place.name for word in words)
+            ]
     except (GraphError, OSError, ValueError, yaml.YAMLError) as error:
         print(error, file=sys.stderr)
         return 1
     results = {place.name: (place.graph.tour.bound, compare(place, hours)) for place in chosen}
-    for place in chosen[:2]:
-        thresholds(place, min(hours, 6.0))
-        strandings(place, min(hours, 24.0))
+    for place in chosen:
+        if len(place.graph.places) <= LARGE:
+            thresholds(place, min(hours, 6.0))
+            strandings(place, hours)
     if options.plot:
         plot(options.plot, results)
     return 0

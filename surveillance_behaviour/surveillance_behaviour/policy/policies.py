@@ -42,6 +42,8 @@ SQUARES_WEIGHT = 1e-9
 """How much the sum of all squared waits counts beside the longest wait of a ride."""
 RIDES_UP_TO = 150
 """The largest map, in places, on which ``tour`` rides ahead step by step."""
+RULES_BIND = 0.25
+"""From which threshold on, as a part of the tour, the rules are thought of ahead."""
 
 
 class Policy(Protocol):
@@ -103,14 +105,16 @@ def lookahead(situation: Situation, allowed: Sequence[str]) -> Scores:
 def tour(situation: Situation, allowed: Sequence[str]) -> Scores:
     """The longest wait of any place if the robot rides on from each candidate.
 
-    Two rides are thought through within the rules: round the tour, joined in whichever sense and
-    at whichever pass through the candidate leaves the least waiting, and always to the place that
-    went unvisited longest. The better one counts. On large maps the ride round the tour is
-    estimated without the rules.
+    It rides round the tour, joined in whichever sense and at whichever pass through the candidate
+    leaves the least waiting. Where the threshold is long enough for the rules to forbid much of
+    that, two rides are thought through within the rules instead: round the tour as far as they
+    allow, and always to the place that went unvisited longest; the better one counts.
     """
     graph = situation.graph
     steps = np.array([graph.index[place] for place in graph.walk], dtype=np.intp)
-    rider = Rider(situation) if len(graph.places) <= RIDES_UP_TO else None
+    bound_by_rules = situation.rules and situation.threshold >= RULES_BIND * graph.tour.length
+    small = len(graph.places) <= RIDES_UP_TO
+    rider = Rider(situation) if bound_by_rules and small else None
     scores = {}
     for place in allowed:
         first = graph.index[place]
