@@ -98,6 +98,7 @@ class Mission:
         self._started: float | None = None
         self._told_threshold: float | None = None
         self._warned = ''
+        self._sent_to_charge = ''
         gauge.watch(self._learn_draw)
 
     # The way of the mission.
@@ -163,6 +164,7 @@ class Mission:
         why = self.why_charge(situation.reachable)
         if why:
             decision = self.chooser.choose_station(situation, why)
+            self._sent_to_charge = why
         else:
             decision = self.chooser.choose(situation)
         self.heading_to = decision.place
@@ -179,6 +181,7 @@ class Mission:
             NowhereToGoError: None can be reached.
         """
         decision = self.chooser.choose_station(self.look(interrupt), why)
+        self._sent_to_charge = why
         self.heading_to = decision.place
         self.ports.announcer.decision(decision)
         return decision
@@ -214,6 +217,7 @@ class Mission:
 
     def charged(self, place: str, seconds: float) -> None:
         """The battery was charged in ``place``."""
+        self._sent_to_charge = ''
         self.recovery.charged(place)
         self.failure = None
         self._write('recharge', place=place, seconds=seconds)
@@ -227,8 +231,15 @@ class Mission:
     # The battery.
 
     def why_charge(self, reachable: tuple[str, ...] | None = None) -> str:
-        """Why the robot must charge now, as a sentence; empty: it need not."""
+        """Why the robot must charge now, as a sentence; empty: it need not.
+
+        Once it was sent to charge it must until it has: what is too little for the far end of the
+        map may be enough beside the station.
+        """
         level = self.gauge.level
+        if self._sent_to_charge and not self.charged_enough():
+            return self._sent_to_charge
+        self._sent_to_charge = ''
         if self.gauge.low:
             return f'the battery is low ({self.level_text()})'
         if level is None:

@@ -363,6 +363,15 @@ def test_an_ontology_built_anew_is_told_of_the_visits(machine: str) -> None:
     assert len(kept) >= 4
 
 
+def test_a_robot_that_came_to_charge_charges_enough(machine: str) -> None:
+    world = World(draw=0.9, low_below=5.0)
+    Run(machine, world, settings(urgency_threshold=90.0)).until(1200.0)
+    times = [decision.time for decision in world.decisions if decision.rule == 'recharge']
+    assert len(times) > 3
+    assert min(later - sooner for sooner, later in itertools.pairwise(times)) > 40.0
+    assert world.stranded == 0
+
+
 def test_a_station_that_does_not_charge_is_driven_to_again_and_cried_about(machine: str) -> None:
     world = World(charge=0.0)
     world.clock.after(50.0, lambda: world.set_level(10.0))
