@@ -298,6 +298,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument(
         '--graph', nargs='+', metavar='FILE', help="maps in patrolling_sim's format"
     )
+    parser.add_argument('--only', nargs='+', metavar='WORDS', help='maps with these in their names')
     parser.add_argument('--plot', type=Path, metavar='FILE.png', help='draw the ratios')
     options = parser.parse_args(arguments)
     hours = options.hours or (4.0 if options.quick else 24.0)
