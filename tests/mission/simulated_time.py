@@ -23,6 +23,8 @@ from surveillance_runtime.waiting import ClockWait
 CARRIES_ON = ('surveillance', 'patrol', ' goal', '_recharge')
 """Ends of the names of threads whose sleep means that nothing else is under way."""
 
+STEP = 0.5
+"""Time passes in steps of at least this many seconds; sleeps may last that much longer."""
 START = 1.0
 """The first moment, seconds; at 0 nothing has a time yet."""
 
@@ -93,6 +95,7 @@ class SimulatedTime:
                 if self._ended:
                     return
                 due = min(deadline for deadline, _ in self._sleepers.values())
+                due = max(due, self.now + STEP)
                 action = None
                 if self.alarms and self.alarms[0][0] <= due:
                     due, action = self.alarms.pop(0)
