@@ -316,7 +316,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (GraphError, OSError, ValueError, yaml.YAMLError) as error:
         print(error, file=sys.stderr)
         return 1
-    results = {place.name: (place.graph.tour.bound, compare(place, hours)) for place in chosen}
+    results = {}
+    for place in chosen:
+        runs = compare(place, hours)
+        results[place.name] = (place.graph.tour.bound, runs)
     for place in chosen:
         if len(place.graph.places) <= LARGE:
             thresholds(place, min(hours, 6.0))
