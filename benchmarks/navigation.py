@@ -231,7 +231,6 @@ def stack(*, quick: bool) -> None:
     rows = []
     for name, measure in (
         ('composed', lambda: composed(seconds)),
-        ("composed, rclpy's executor", lambda: composed(seconds, plain=True)),
         ('a process per node', lambda: processes(seconds)),
     ):
         rate, cpu, distance = measure()
@@ -243,19 +242,9 @@ def stack(*, quick: bool) -> None:
     )
 
 
-def composed(seconds: float, *, plain: bool = False) -> tuple[float, float, float]:
+def composed(seconds: float) -> tuple[float, float, float]:
     """Return simulated seconds per real and per CPU second and metres driven, in one process."""
-    from rclpy.executors import SingleThreadedExecutor
-
-    from surveillance_runtime import node
-
-    made = node.make_executor
-    if plain:
-        node.make_executor = lambda context=None: SingleThreadedExecutor(context=context)
-    try:
-        patrol = Stack(ROOT / 'config' / 'seven_rooms.yaml')
-    finally:
-        node.make_executor = made
+    patrol = Stack(ROOT / 'config' / 'seven_rooms.yaml')
     patrol.start()
     try:
         _await(lambda: patrol.robot.base.travelled > 1.0, 60.0)

@@ -28,12 +28,12 @@ from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValu
 from rclpy.executors import (
     ExternalShutdownException,
     ShutdownException,
+    SingleThreadedExecutor,
 )
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 
-from surveillance_runtime.lean_executor import make_executor
 from surveillance_runtime.parameters import Check, ParameterError, ParameterSpec, element_type
 from surveillance_runtime.waiting import Interrupt
 
@@ -315,7 +315,7 @@ class ExecutorThread:
     """
 
     def __init__(self, context: Any = None) -> None:
-        self.executor = make_executor(context)
+        self.executor = SingleThreadedExecutor(context=context)
         self.error: BaseException | None = None
         self._thread: threading.Thread | None = None
         self._stopping = False

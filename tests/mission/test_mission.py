@@ -45,7 +45,7 @@ def test_a_mission_reaches_all_places_and_charges(robot: Robot, graph: Any) -> N
     summary = robot.summary()
     assert set(summary.visits) == PLACES
     assert min(summary.visits.values()) >= 2
-    assert sum(summary.visits.values()) >= 50
+    assert sum(summary.visits.values()) >= 40
     assert summary.recharges >= 1
     assert not summary.failures
     assert {'URGENT', 'CORRIDOR', 'recharge'} <= set(summary.rules)
