@@ -11,7 +11,7 @@ spends 2 s in each place it enters; all places count as just visited at the star
 - late:    longest - threshold
 
     python benchmarks/patrol.py                       all maps, a few minutes
-    python benchmarks/patrol.py --quick               small maps, 4 hours
+    python benchmarks/patrol.py --quick               small maps, 2 hours
     python benchmarks/patrol.py --graph FILE ...      maps of patrolling_sim
     python benchmarks/patrol.py --plot docs/patrol.png
 """
@@ -293,15 +293,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         epilog=(__doc__ or '').partition('\n')[2],
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument('--quick', action='store_true', help='small maps, 4 simulated hours')
-    parser.add_argument('--hours', type=float, help='simulated hours (default 24, or 4)')
+    parser.add_argument('--quick', action='store_true', help='small maps, 2 simulated hours')
+    parser.add_argument('--hours', type=float, help='simulated hours (default 24, or 2)')
     parser.add_argument(
         '--graph', nargs='+', metavar='FILE', help="maps in patrolling_sim's format"
     )
     parser.add_argument('--only', nargs='+', metavar='WORDS', help='maps with these in their names')
     parser.add_argument('--plot', type=Path, metavar='FILE.png', help='draw the ratios')
     options = parser.parse_args(arguments)
-    hours = options.hours or (4.0 if options.quick else 24.0)
+    hours = options.hours or (2.0 if options.quick else 24.0)
     try:
         if options.graph:
             chosen = []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -15,8 +16,17 @@ from surveillance_runtime.calls import (
     Unavailable,
 )
 
+LOOK_SECONDS = 0.02
+"""Time between two looks for a server; rclpy offers no event for its appearance."""
 
-def call(caller: ServiceCaller, request: Any, deadline: float, interrupt: Interrupt) -> Any:
+
+def call(
+    caller: ServiceCaller,
+    request: Any,
+    deadline: float,
+    interrupt: Interrupt,
+    discovery: float | None = None,
+) -> Any:
     """Calls a service.
 
     Args:
@@ -24,11 +34,20 @@ def call(caller: ServiceCaller, request: Any, deadline: float, interrupt: Interr
         request: The request message.
         deadline: Seconds of steady time.
         interrupt: Ends the wait.
+        discovery: Seconds after which a server that is not there is given up, for services whose
+            answer may take much longer; default: the deadline.
 
     Raises:
         PeerError: No server, or no answer in time.
         InterruptedWaitError: The interrupt was raised.
     """
+    if discovery is not None and discovery < deadline:
+        late = time.monotonic() + discovery
+        while not caller.is_ready() and time.monotonic() < late:
+            if interrupt.wait(LOOK_SECONDS):
+                raise InterruptedWaitError
+        if not caller.is_ready():
+            raise AwayError(caller.name, 'no server')
     try:
         return caller.call(request, deadline, interrupt)
     except Interrupted:

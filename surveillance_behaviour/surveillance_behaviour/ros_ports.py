@@ -7,6 +7,7 @@ clock (a move, a charge) has none but that its server lives and gets on.
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -17,6 +18,7 @@ from surveillance_behaviour.armor_knowledge import ArmorKnowledge
 from surveillance_behaviour.battery_gauge import BatteryGauge
 from surveillance_behaviour.fsm import Interrupt
 from surveillance_behaviour.ports import (
+    AwayError,
     InterruptedWaitError,
     PeerError,
     Point,
@@ -44,7 +46,7 @@ class Deadlines:
     """
 
     answer: float = 5.0
-    build: float = 60.0
+    build: float = 120.0
     plan: float = 600.0
     move: float = 600.0
     charge: float = 60.0
@@ -56,10 +58,21 @@ def ros_knowledge(node: PatrolNode, deadlines: Deadlines) -> ArmorKnowledge:
     wake = waiting.Interrupt()
 
     def reference(interrupt: Interrupt) -> str:
-        answer = call(names, ReferenceName.Request(), deadlines.build, interrupt)
-        if not answer.name:
-            raise PeerError(names.name, 'the reference name is empty')
-        return str(answer.name)
+        # Asked again and again: a builder that was killed does not know who waits for it.
+        late = time.monotonic() + deadlines.build
+        while True:
+            patience = min(ASK_AGAIN, max(deadlines.answer, late - time.monotonic()))
+            try:
+                answer = call(names, ReferenceName.Request(), patience, interrupt, deadlines.answer)
+            except AwayError:
+                raise
+            except PeerError:
+                if time.monotonic() < late:
+                    continue
+                raise
+            if not answer.name:
+                raise PeerError(names.name, 'the reference name is empty')
+            return str(answer.name)
 
     transport = RosTransport(
         node, 'armor_interface_srv', 'armor_interface_serialized_srv', deadlines.answer, wake
@@ -132,7 +145,8 @@ class RosRoutine:
 
     def start(self, interrupt: Interrupt) -> None:
         """Has the robot look around and build the ontology."""
-        call(self._start, Empty.Request(), self._deadlines.build, interrupt)
+        limits = self._deadlines
+        call(self._start, Empty.Request(), limits.build, interrupt, limits.answer)
 
     def reason(self, interrupt: Interrupt) -> str:
         """The reasoner's choice."""
@@ -172,7 +186,8 @@ class RosRoutine:
         forget = (interrupt.subscribe(either.set), self._gauge.watch(watchdog.feed))
         try:
             watchdog.feed()
-            call(self._recharge, Empty.Request(), LONGEST_CHARGE, either)
+            limits = self._deadlines
+            call(self._recharge, Empty.Request(), LONGEST_CHARGE, either, limits.answer)
         except InterruptedWaitError:
             if interrupt.is_set() or not stalled.is_set():
                 raise
@@ -185,6 +200,8 @@ class RosRoutine:
             watchdog.stop()
 
 
+ASK_AGAIN = 10.0
+"""How long one question for the ontology's name waits for its answer, seconds."""
 LONGEST_CHARGE = 24 * 3600.0
 """The longest time a charge may take even when it gets on, seconds."""
 
