@@ -1,0 +1,36 @@
+"""What goes out as a message comes back as it was."""
+
+from __future__ import annotations
+
+from builtin_interfaces.msg import Time
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from surveillance_behaviour import conversions
+from surveillance_behaviour.policy.situation import Decision
+
+numbers = st.floats(allow_nan=False, allow_infinity=False)
+names = st.text('ABCR0123456789_', min_size=1, max_size=6)
+
+
+@settings(max_examples=50, deadline=None, derandomize=True)
+@given(st.lists(st.tuples(numbers, numbers, numbers), max_size=5))
+def test_paths_come_back(path: list[tuple[float, float, float]]) -> None:
+    assert conversions.points_from(conversions.point_messages(path)) == path
+
+
+@settings(max_examples=50, deadline=None, derandomize=True)
+@given(names, names, names, names, st.text(max_size=40), st.dictionaries(names, numbers))
+def test_decisions_come_back(
+    here: str, place: str, target: str, rule: str, reason: str, scores: dict[str, float]
+) -> None:
+    reason = reason.replace('\0', '')
+    decision = Decision(12.5, here, place, target, rule, 'tour', reason, scores)
+    message = conversions.decision_message(decision, 3, Time(sec=12, nanosec=500_000_000))
+    assert message.sequence == 3
+    assert conversions.decision_from(message) == decision
+
+
+def test_a_point_without_height_lies_on_the_floor() -> None:
+    message = conversions.point_message((1, 2))
+    assert (message.x, message.y, message.z) == (1.0, 2.0, 0.0)
