@@ -122,7 +122,7 @@ def _service_rows(label: str, store: Any, rounds: int) -> list[Row]:
     from surveillance_ontology.armor.service import ArmorService
     from surveillance_ontology.armor.settings import DATA
     from surveillance_ontology.map_building import MapBuilding
-    from surveillance_ontology.place import read_place
+    from surveillance_runtime.place import read_place
 
     service = ArmorService(store=store)
     client = ArmorClient('benchmark', 'map', InProcessTransport(service))

@@ -42,7 +42,7 @@ from surveillance_behaviour.policy.graph_files import read_patrolling_sim  # noq
 from surveillance_behaviour.policy.policies import DEFAULT_POLICY, make_policy  # noqa: E402
 from surveillance_behaviour.policy.rules import Rules  # noqa: E402
 from surveillance_behaviour.policy.simulation import Battery, Patrol, PatrolRun  # noqa: E402
-from surveillance_ontology.place import read_place  # noqa: E402
+from surveillance_runtime.place import read_place  # noqa: E402
 
 DAY = 86400.0
 SPEED, DWELL = 1.0, 2.0

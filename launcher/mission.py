@@ -21,8 +21,8 @@ from launcher import graph
 from launcher.log import ROS_FORMAT, MergedLog
 from launcher.supervisor import Program, Supervisor
 from surveillance_behaviour import mission_record
-from surveillance_ontology.parameter_file import ParameterFileError
-from surveillance_ontology.place import read_place
+from surveillance_runtime.parameter_file import ParameterFileError
+from surveillance_runtime.place import read_place
 
 CHILD = Path(__file__).with_name('child.py')
 PLACES = {'surveillance': 'seven_rooms.yaml', 'patrol': 'patrol_world.yaml'}

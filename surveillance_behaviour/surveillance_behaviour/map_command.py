@@ -11,8 +11,8 @@ from typing import NoReturn
 
 from surveillance_behaviour import mission_record
 from surveillance_behaviour.policy.graph import PatrolGraph
-from surveillance_ontology.parameter_file import ParameterFileError
-from surveillance_ontology.place import Place
+from surveillance_runtime.parameter_file import ParameterFileError
+from surveillance_runtime.place import Place
 from surveillance_simulation.floor_plan import FloorPlan
 from surveillance_simulation.place_file import read_world
 from surveillance_simulation.place_picture import Run, draw_place

@@ -13,7 +13,7 @@ from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from surveillance_ontology.place import Place
+from surveillance_runtime.place import Place
 
 Position = tuple[float, float]
 

@@ -19,7 +19,7 @@ from surveillance_ontology.armor.facts import ShortFact, short_facts
 from surveillance_ontology.armor.protocol import DirectiveRequest, DirectiveResponse
 from surveillance_ontology.axioms import Axiom
 from surveillance_ontology.map_building import RoomNote
-from surveillance_ontology.place import Position
+from surveillance_runtime.place import Position
 
 
 def request_from_ros(msg: ArmorDirectiveReq) -> DirectiveRequest:

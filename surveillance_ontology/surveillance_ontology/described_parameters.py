@@ -8,8 +8,8 @@ from surveillance_ontology.armor.journal import JournalError
 from surveillance_ontology.armor.service import ArmorService
 from surveillance_ontology.armor.settings import Settings
 from surveillance_ontology.armor.store import Store
-from surveillance_ontology.place import Place, PlaceError, make_place
 from surveillance_runtime.node import PatrolNode, StartError
+from surveillance_runtime.place import Place, PlaceError, make_place
 
 CHOICES = {
     'enforce_mount': 'Refuse changes by others while a client is mounted; ARMOR 2.2 does not.',

@@ -16,7 +16,7 @@ from surveillance_ontology.armor.client import (
     name_in,
 )
 from surveillance_ontology.armor.protocol import DirectiveRequest, DirectiveResponse
-from surveillance_ontology.place import Place, PlaceError, Position
+from surveillance_runtime.place import Place, PlaceError, Position
 
 ROBOT = 'Robot1'
 CHUNK = 2000

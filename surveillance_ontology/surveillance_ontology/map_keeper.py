@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from surveillance_ontology.armor.client import ArmorServiceCallError, ArmorServiceInternalError
 from surveillance_ontology.map_building import MapBuilding, RoomNote, extended
-from surveillance_ontology.place import Place, PlaceError
+from surveillance_runtime.place import Place, PlaceError
 
 
 @dataclass(frozen=True)

@@ -22,8 +22,8 @@ from surveillance_ontology.conversions import point_to_ros, position_from_ros, r
 from surveillance_ontology.described_parameters import described_place
 from surveillance_ontology.map_building import ROBOT, MapBuilding
 from surveillance_ontology.map_keeper import MapKeeper, Reports
-from surveillance_ontology.place import Place
 from surveillance_runtime.node import PatrolNode, run_node
+from surveillance_runtime.place import Place
 from surveillance_runtime.qos import STATE_QOS
 
 SECONDS_PER_ROOM = 0.005

@@ -1,1 +1,1 @@
-"""Rclpy ground of the surveillance nodes: parameters, waits, calls, actions, process life cycle."""
+"""Shared ground of the packages: what rclpy nodes stand on, a place's description, the arm."""

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from surveillance_ontology.place import Place, PlaceError, make_place
+from surveillance_runtime.place import Place, PlaceError, make_place
 
 Point = tuple[float, float]
 Pose = tuple[float, float, float]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from surveillance_ontology.parameter_file import read_parameter_file
+from surveillance_runtime.parameter_file import read_parameter_file
 from surveillance_simulation.floor_plan import WorldError
 from surveillance_simulation.world import World
 

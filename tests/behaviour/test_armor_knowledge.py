@@ -14,7 +14,7 @@ from surveillance_ontology.armor.in_process import InProcessTransport
 from surveillance_ontology.armor.service import ArmorService
 from surveillance_ontology.armor.settings import DATA
 from surveillance_ontology.map_building import MapBuilding
-from surveillance_ontology.place import read_place
+from surveillance_runtime.place import read_place
 
 PLACE = read_place(Path(__file__).parents[2] / 'config' / 'seven_rooms.yaml')
 RULES = ('URGENT', 'CORRIDOR', 'ROOM')

@@ -26,7 +26,7 @@ from surveillance_ontology.map_building import (
     shown_doors,
 )
 from surveillance_ontology.map_keeper import MapKeeper, Reports
-from surveillance_ontology.place import Place, PlaceError, make_place
+from surveillance_runtime.place import Place, PlaceError, make_place
 
 from .seven_rooms import IRI, ONTOLOGY, SEVEN_ROOMS
 

@@ -8,7 +8,7 @@ import random
 import numpy as np
 import pytest
 
-from surveillance_ontology.parameter_file import ParameterFileError
+from surveillance_runtime.parameter_file import ParameterFileError
 from surveillance_simulation import occupancy_grid, place_generation
 from surveillance_simulation.floor_plan import Marker, WorldError
 from surveillance_simulation.place_file import read_world

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from surveillance_ontology.parameter_file import KeyPath, read_parameter_file
+from surveillance_runtime.parameter_file import KeyPath, read_parameter_file
 
 PLACE_KEYS = ('map', 'room_positions', 'robot_room', 'recharge_rooms')
 GEOMETRY_KEYS = ('walls', 'doors', 'markers', 'marker_size', 'marker_dictionary', 'station')

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from surveillance_ontology.parameter_file import ParameterFileError
-from surveillance_ontology.place import Place, PlaceError, make_place, read_place
+from surveillance_runtime.parameter_file import ParameterFileError
+from surveillance_runtime.place import Place, PlaceError, make_place, read_place
 
 ROOMS = {
     'R1': ['D1'],
