@@ -32,16 +32,16 @@ sys.path.insert(0, str(ROOT))
 
 from benchmarks.java_reasoner import KINDS, JavaFailed, JavaReasoner, absent  # noqa: E402
 from surveillance_ontology.axioms import (  # noqa: E402
-    XSD,
     Axiom,
     DataPropertyAssertion,
     DifferentIndividuals,
-    Literal,
     ObjectPropertyAssertion,
 )
+from surveillance_ontology.expressions import Literal  # noqa: E402
 from surveillance_ontology.knowledge_base import KnowledgeBase  # noqa: E402
 from surveillance_ontology.owl_reading import read_ontology  # noqa: E402
 from surveillance_ontology.owl_writing import write_ontology  # noqa: E402
+from surveillance_ontology.vocabulary import XSD  # noqa: E402
 
 IRI = 'http://bnc/exp-rob-lab/2022-23'
 SCHEMA = ROOT / 'surveillance_ontology' / 'surveillance_ontology' / 'data' / 'surveillance.owl'

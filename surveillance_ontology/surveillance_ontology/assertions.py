@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from surveillance_ontology.axioms import (
-    THING,
     Assertion,
     Axiom,
     DataPropertyAssertion,
     Declaration,
     DifferentIndividuals,
-    Literal,
     ObjectPropertyAssertion,
     SameIndividual,
     SubClassOf,
-    entities_of,
 )
+from surveillance_ontology.entities import entities_of
+from surveillance_ontology.expressions import Literal
+from surveillance_ontology.vocabulary import THING
 
 
 class Assertions:

@@ -5,7 +5,9 @@ sentences.
 from __future__ import annotations
 
 from surveillance_ontology import axioms as ax
-from surveillance_ontology.axioms import XSD, Literal, local_name
+from surveillance_ontology import expressions as ex
+from surveillance_ontology.expressions import Literal
+from surveillance_ontology.vocabulary import XSD, local_name
 
 _FACETS = {'minInclusive': '>=', 'maxInclusive': '<=', 'minExclusive': '>', 'maxExclusive': '<'}
 _PLAIN = {
@@ -39,29 +41,29 @@ def expression_text(expression: object) -> str:
         return local_name(expression)
     if isinstance(expression, Literal):
         return literal_text(expression)
-    if isinstance(expression, ax.ObjectInverseOf):
+    if isinstance(expression, ex.ObjectInverseOf):
         return f'inverse {local_name(expression.prop)}'
-    if isinstance(expression, (ax.ObjectIntersectionOf, ax.DataIntersectionOf)):
+    if isinstance(expression, (ex.ObjectIntersectionOf, ex.DataIntersectionOf)):
         return '(' + ' and '.join(map(expression_text, expression.operands)) + ')'
-    if isinstance(expression, (ax.ObjectUnionOf, ax.DataUnionOf)):
+    if isinstance(expression, (ex.ObjectUnionOf, ex.DataUnionOf)):
         return '(' + ' or '.join(map(expression_text, expression.operands)) + ')'
-    if isinstance(expression, (ax.ObjectComplementOf, ax.DataComplementOf)):
+    if isinstance(expression, (ex.ObjectComplementOf, ex.DataComplementOf)):
         return 'not ' + expression_text(expression.operand)
-    if isinstance(expression, ax.ObjectOneOf):
+    if isinstance(expression, ex.ObjectOneOf):
         return '{' + ', '.join(map(local_name, expression.individuals)) + '}'
-    if isinstance(expression, ax.DataOneOf):
+    if isinstance(expression, ex.DataOneOf):
         return '{' + ', '.join(map(literal_text, expression.literals)) + '}'
-    if isinstance(expression, ax.DatatypeRestriction):
+    if isinstance(expression, ex.DatatypeRestriction):
         facets = ', '.join(
             f'{_FACETS.get(local_name(name), local_name(name))} {literal_text(bound)}'
             for name, bound in expression.facets
         )
         return f'{local_name(expression.datatype)}[{facets}]'
-    if isinstance(expression, ax.ObjectHasValue):
+    if isinstance(expression, ex.ObjectHasValue):
         return f'{expression_text(expression.prop)} value {local_name(expression.individual)}'
-    if isinstance(expression, ax.DataHasValue):
+    if isinstance(expression, ex.DataHasValue):
         return f'{local_name(expression.prop)} value {literal_text(expression.literal)}'
-    if isinstance(expression, ax.ObjectHasSelf):
+    if isinstance(expression, ex.ObjectHasSelf):
         return f'{expression_text(expression.prop)} Self'
     word = {'Some': 'some', 'AllV': 'only', 'MinC': 'min', 'MaxC': 'max', 'Exac': 'exactly'}.get(
         type(expression).__name__.removeprefix('Object').removeprefix('Data')[:4]
@@ -75,23 +77,23 @@ def expression_text(expression: object) -> str:
 
 
 def _argument(argument: object) -> str:
-    if isinstance(argument, ax.Variable):
+    if isinstance(argument, ex.Variable):
         name = local_name(argument.name).rpartition(':')[2]
         return f'?{name}'
     return expression_text(argument)
 
 
-def _atom_text(atom: ax.Atom) -> str:
-    if isinstance(atom, ax.ClassAtom):
+def _atom_text(atom: ex.Atom) -> str:
+    if isinstance(atom, ex.ClassAtom):
         return f'{expression_text(atom.cls)}({_argument(atom.argument)})'
-    if isinstance(atom, ax.DataRangeAtom):
+    if isinstance(atom, ex.DataRangeAtom):
         return f'{expression_text(atom.range)}({_argument(atom.argument)})'
-    if isinstance(atom, ax.BuiltinAtom):
+    if isinstance(atom, ex.BuiltinAtom):
         return f'{local_name(atom.builtin)}({", ".join(map(_argument, atom.arguments))})'
-    if isinstance(atom, (ax.ObjectPropertyAtom, ax.DataPropertyAtom)):
+    if isinstance(atom, (ex.ObjectPropertyAtom, ex.DataPropertyAtom)):
         name = expression_text(atom.prop)
     else:
-        name = 'sameAs' if isinstance(atom, ax.SameIndividualAtom) else 'differentFrom'
+        name = 'sameAs' if isinstance(atom, ex.SameIndividualAtom) else 'differentFrom'
     return f'{name}({_argument(atom.first)}, {_argument(atom.second)})'
 
 

@@ -9,19 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
+from surveillance_ontology.vocabulary import THING, TOP_LITERAL, XSD
+
 if TYPE_CHECKING:
     from surveillance_ontology.reasoner.datatypes import Value
-
-OWL = 'http://www.w3.org/2002/07/owl#'
-RDF = 'http://www.w3.org/1999/02/22-rdf-syntax-ns#'
-RDFS = 'http://www.w3.org/2000/01/rdf-schema#'
-XSD = 'http://www.w3.org/2001/XMLSchema#'
-SWRL = 'http://www.w3.org/2003/11/swrl#'
-SWRLB = 'http://www.w3.org/2003/11/swrlb#'
-
-THING = OWL + 'Thing'
-NOTHING = OWL + 'Nothing'
-TOP_LITERAL = RDFS + 'Literal'
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,21 +17,18 @@ from dataclasses import replace
 from typing import Any
 
 from surveillance_ontology.axioms import (
-    OWL,
-    RDF,
-    RDFS,
-    THING,
     Axiom,
     ClassAssertion,
     DataPropertyAssertion,
-    Literal,
     ObjectPropertyAssertion,
     SubClassOf,
 )
 from surveillance_ontology.explanation import Explanation
+from surveillance_ontology.expressions import Literal
 from surveillance_ontology.knowledge_base import Fact, KnowledgeBase
 from surveillance_ontology.knowledge_changes import Changes
 from surveillance_ontology.owl_writing import ontology_bytes
+from surveillance_ontology.vocabulary import OWL, RDF, RDFS, THING
 
 KINDS = ('hermit', 'pellet')
 _ONE_AT_A_TIME = threading.Lock()

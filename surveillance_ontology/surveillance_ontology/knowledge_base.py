@@ -20,21 +20,19 @@ from typing import TypeAlias
 from surveillance_ontology.assertions import Assertions, is_assertion
 from surveillance_ontology.axiom_text import axiom_text
 from surveillance_ontology.axioms import (
-    THING,
     Axiom,
     ClassAssertion,
-    ClassExpression,
     DataPropertyAssertion,
     DifferentIndividuals,
     EquivalentClasses,
-    Literal,
     ObjectPropertyAssertion,
     SameIndividual,
     SubClassOf,
-    entities_of,
 )
 from surveillance_ontology.bulk_building import uncollected
+from surveillance_ontology.entities import entities_of
 from surveillance_ontology.explanation import Explanation
+from surveillance_ontology.expressions import ClassExpression, Literal
 from surveillance_ontology.knowledge_changes import Changes as Changes
 from surveillance_ontology.knowledge_changes import Feed, visible
 from surveillance_ontology.reasoner.clauses import Predicate
@@ -43,6 +41,7 @@ from surveillance_ontology.reasoner.reasons import Reasons
 from surveillance_ontology.reasoner.schema import Schema
 from surveillance_ontology.reasoner.view import FactView
 from surveillance_ontology.renaming import renamed
+from surveillance_ontology.vocabulary import THING
 
 Fact: TypeAlias = ClassAssertion | ObjectPropertyAssertion | DataPropertyAssertion | SameIndividual
 

@@ -10,7 +10,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from surveillance_ontology import axioms as ax
-from surveillance_ontology.axioms import OWL, RDF, RDFS, SWRL, XSD, Axiom, Literal, local_name
+from surveillance_ontology import expressions as ex
+from surveillance_ontology.axioms import Axiom
+from surveillance_ontology.expressions import Literal
 from surveillance_ontology.owl_nodes import (
     ANNOTATIONS,
     BUILT_IN,
@@ -19,6 +21,7 @@ from surveillance_ontology.owl_nodes import (
     NodeReader,
 )
 from surveillance_ontology.rdf_xml import Graph, Node
+from surveillance_ontology.vocabulary import NOTHING, OWL, RDF, RDFS, SWRL, THING, XSD, local_name
 
 _TYPE = RDF + 'type'
 _MARKS = {
@@ -87,7 +90,7 @@ class Mapping(NodeReader):
                 self._add(ax.FunctionalObjectProperty(self._property(subject)))
         elif name in _MARKS or (name.startswith(SWRL) and name.endswith('Atom')):
             pass  # Read where the node is used.
-        elif name.startswith(BUILT_IN[:3]) and name not in (ax.THING, ax.NOTHING):
+        elif name.startswith(BUILT_IN[:3]) and name not in (THING, NOTHING):
             self._report(subject, f'type {name} of {subject} is not understood')
         else:
             self._add(ax.ClassAssertion(self.expression(name), subject))
@@ -145,17 +148,17 @@ class Mapping(NodeReader):
             return
         operands = [value] if predicate == OWL + 'complementOf' else self._list(value)
         if predicate == OWL + 'complementOf':
-            other: ax.ClassExpression = ax.ObjectComplementOf(self.expression(operands[0]))
+            other: ex.ClassExpression = ex.ObjectComplementOf(self.expression(operands[0]))
         elif predicate == OWL + 'oneOf':
             if self._is_data_range(subject):
                 literals = tuple(item for item in operands if isinstance(item, Literal))
-                self._add(ax.DatatypeDefinition(subject, ax.DataOneOf(literals)))
+                self._add(ax.DatatypeDefinition(subject, ex.DataOneOf(literals)))
                 return
-            other = ax.ObjectOneOf(tuple(self._resources(value)))
+            other = ex.ObjectOneOf(tuple(self._resources(value)))
         elif predicate == OWL + 'unionOf':
-            other = ax.ObjectUnionOf(tuple(map(self.expression, operands)))
+            other = ex.ObjectUnionOf(tuple(map(self.expression, operands)))
         else:
-            other = ax.ObjectIntersectionOf(tuple(map(self.expression, operands)))
+            other = ex.ObjectIntersectionOf(tuple(map(self.expression, operands)))
         self._add(ax.EquivalentClasses((subject, other)))
 
     def _sub_property(self, subject: str, value: Node) -> None:
@@ -248,7 +251,7 @@ class Mapping(NodeReader):
             return
         target = self._resource(node, OWL + 'targetIndividual')
         expression = self._property(prop)
-        if isinstance(expression, ax.ObjectInverseOf):
+        if isinstance(expression, ex.ObjectInverseOf):
             source, target, prop = target, source, expression.prop
         self._add(ax.NegativeObjectPropertyAssertion(prop, source, target))
 
@@ -270,38 +273,38 @@ class Mapping(NodeReader):
         )
         self._add(ax.Rule(body, head, annotations))
 
-    def _argument(self, value: Node | None, atom: str) -> str | ax.Variable | Literal:
+    def _argument(self, value: Node | None, atom: str) -> str | ex.Variable | Literal:
         if value is None:
             raise self._fail(atom, 'a rule atom lacks an argument')
         if isinstance(value, str) and value in self._variables:
-            return ax.Variable(value)
+            return ex.Variable(value)
         return value
 
-    def _atom(self, node: str) -> ax.Atom:
+    def _atom(self, node: str) -> ex.Atom:
         kind = self._one(node, _TYPE)
         first = self._one(node, SWRL + 'argument1')
         second = self._one(node, SWRL + 'argument2')
         if kind == SWRL + 'BuiltinAtom':
             head = self._one(node, SWRL + 'arguments') or RDF + 'nil'
             arguments = tuple(self._argument(item, node) for item in self._list(head))
-            return ax.BuiltinAtom(self._resource(node, SWRL + 'builtin'), arguments)  # type: ignore[arg-type]
+            return ex.BuiltinAtom(self._resource(node, SWRL + 'builtin'), arguments)  # type: ignore[arg-type]
         one = self._argument(first, node)
         if kind == SWRL + 'ClassAtom':
             cls = self.expression(self._resource(node, SWRL + 'classPredicate'))
-            return ax.ClassAtom(cls, one)  # type: ignore[arg-type]
+            return ex.ClassAtom(cls, one)  # type: ignore[arg-type]
         if kind == SWRL + 'DataRangeAtom':
-            return ax.DataRangeAtom(self.data_range(self._resource(node, SWRL + 'dataRange')), one)  # type: ignore[arg-type]
+            return ex.DataRangeAtom(self.data_range(self._resource(node, SWRL + 'dataRange')), one)  # type: ignore[arg-type]
         two = self._argument(second, node)
         if kind == SWRL + 'IndividualPropertyAtom':
             prop = self._property(self._resource(node, SWRL + 'propertyPredicate'))
-            return ax.ObjectPropertyAtom(prop, one, two)  # type: ignore[arg-type]
+            return ex.ObjectPropertyAtom(prop, one, two)  # type: ignore[arg-type]
         if kind == SWRL + 'DatavaluedPropertyAtom':
             name = self._resource(node, SWRL + 'propertyPredicate')
-            return ax.DataPropertyAtom(name, one, two)  # type: ignore[arg-type]
+            return ex.DataPropertyAtom(name, one, two)  # type: ignore[arg-type]
         if kind == SWRL + 'SameIndividualAtom':
-            return ax.SameIndividualAtom(one, two)  # type: ignore[arg-type]
+            return ex.SameIndividualAtom(one, two)  # type: ignore[arg-type]
         if kind == SWRL + 'DifferentIndividualsAtom':
-            return ax.DifferentIndividualsAtom(one, two)  # type: ignore[arg-type]
+            return ex.DifferentIndividualsAtom(one, two)  # type: ignore[arg-type]
         raise self._fail(node, f'rule atom of type {kind} is not understood')
 
 

@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from surveillance_ontology import axioms as ax
-from surveillance_ontology.axioms import OWL, RDF, RDFS, SWRL, XSD, Axiom, Literal, local_name
+from surveillance_ontology import expressions as ex
+from surveillance_ontology.axioms import Axiom
+from surveillance_ontology.expressions import Literal
 from surveillance_ontology.rdf_xml import Graph, Node, RdfSyntaxError
+from surveillance_ontology.vocabulary import OWL, RDF, RDFS, SWRL, XSD, local_name
 
 _TYPE = RDF + 'type'
 DECLARATIONS = {
@@ -20,7 +23,7 @@ DECLARATIONS = {
     RDFS + 'Datatype': 'datatype',
     OWL + 'DataRange': 'datatype',
 }
-CHARACTERISTICS: dict[str, Callable[[ax.PropertyExpression], Axiom]] = {
+CHARACTERISTICS: dict[str, Callable[[ex.PropertyExpression], Axiom]] = {
     OWL + 'InverseFunctionalProperty': ax.InverseFunctionalObjectProperty,
     OWL + 'ReflexiveProperty': ax.ReflexiveObjectProperty,
     OWL + 'IrreflexiveProperty': ax.IrreflexiveObjectProperty,
@@ -34,9 +37,9 @@ ANNOTATIONS = {
     *(OWL + name for name in ('backwardCompatibleWith', 'incompatibleWith')),
 }
 _CARDINALITIES = (
-    ('minCardinality', 'minQualifiedCardinality', ax.ObjectMinCardinality, ax.DataMinCardinality),
-    ('maxCardinality', 'maxQualifiedCardinality', ax.ObjectMaxCardinality, ax.DataMaxCardinality),
-    ('cardinality', 'qualifiedCardinality', ax.ObjectExactCardinality, ax.DataExactCardinality),
+    ('minCardinality', 'minQualifiedCardinality', ex.ObjectMinCardinality, ex.DataMinCardinality),
+    ('maxCardinality', 'maxQualifiedCardinality', ex.ObjectMaxCardinality, ex.DataMaxCardinality),
+    ('cardinality', 'qualifiedCardinality', ex.ObjectExactCardinality, ex.DataExactCardinality),
 )
 BUILT_IN = (OWL, RDF, RDFS, XSD, SWRL)
 
@@ -51,7 +54,7 @@ class NodeReader:
         self._subject_read = ''
         self._nodes: dict[str, dict[str, list[Node]]] = {}
         self._kinds: dict[str, set[str]] = {}
-        self._expressions: dict[str, ax.ClassExpression] = {}
+        self._expressions: dict[str, ex.ClassExpression] = {}
         self._open: set[str] = set()
         self._variables: set[str] = set()
         for subject, predicate, value in graph.triples:
@@ -134,10 +137,10 @@ class NodeReader:
                 )
         return items  # type: ignore[return-value]
 
-    def _property(self, node: str) -> ax.PropertyExpression:
+    def _property(self, node: str) -> ex.PropertyExpression:
         inverse = self._one(node, OWL + 'inverseOf')
         if node.startswith('_:') and isinstance(inverse, str):
-            return ax.ObjectInverseOf(inverse)
+            return ex.ObjectInverseOf(inverse)
         return node
 
     def _is_data(self, prop: str, range_node: Node | None = None) -> bool:
@@ -168,7 +171,7 @@ class NodeReader:
             )
         return number
 
-    def data_range(self, node: Node) -> ax.DataRange:
+    def data_range(self, node: Node) -> ex.DataRange:
         """The data range a node stands for."""
         if not isinstance(node, str):
             raise RdfSyntaxError(f'expected a data range, got the literal {node.lexical!r}')
@@ -177,24 +180,24 @@ class NodeReader:
         properties = self._nodes.get(node, {})
         if OWL + 'oneOf' in properties:
             items = self._list(properties[OWL + 'oneOf'][0])
-            return ax.DataOneOf(tuple(item for item in items if isinstance(item, Literal)))
+            return ex.DataOneOf(tuple(item for item in items if isinstance(item, Literal)))
         for predicate, record in (
-            (OWL + 'intersectionOf', ax.DataIntersectionOf),
-            (OWL + 'unionOf', ax.DataUnionOf),
+            (OWL + 'intersectionOf', ex.DataIntersectionOf),
+            (OWL + 'unionOf', ex.DataUnionOf),
         ):
             if predicate in properties:
                 return record(tuple(map(self.data_range, self._list(properties[predicate][0]))))
         if OWL + 'datatypeComplementOf' in properties:
-            return ax.DataComplementOf(self.data_range(properties[OWL + 'datatypeComplementOf'][0]))
+            return ex.DataComplementOf(self.data_range(properties[OWL + 'datatypeComplementOf'][0]))
         if OWL + 'onDatatype' in properties:
             facets = []
             for facet in self._resources(self._one(node, OWL + 'withRestrictions') or RDF + 'nil'):
                 for name, values in self._nodes.get(facet, {}).items():
                     facets += [(name, value) for value in values if isinstance(value, Literal)]
-            return ax.DatatypeRestriction(self._resource(node, OWL + 'onDatatype'), tuple(facets))
+            return ex.DatatypeRestriction(self._resource(node, OWL + 'onDatatype'), tuple(facets))
         raise self._fail(node, 'expected a data range')
 
-    def expression(self, node: Node) -> ax.ClassExpression:
+    def expression(self, node: Node) -> ex.ClassExpression:
         """The class expression a node stands for."""
         if not isinstance(node, str):
             raise RdfSyntaxError(f'expected a class, got the literal {node.lexical!r}')
@@ -210,39 +213,39 @@ class NodeReader:
         self._open.discard(node)
         return expression
 
-    def _expression(self, node: str) -> ax.ClassExpression:
+    def _expression(self, node: str) -> ex.ClassExpression:
         properties = self._nodes.get(node, {})
         for predicate, record in (
-            (OWL + 'intersectionOf', ax.ObjectIntersectionOf),
-            (OWL + 'unionOf', ax.ObjectUnionOf),
+            (OWL + 'intersectionOf', ex.ObjectIntersectionOf),
+            (OWL + 'unionOf', ex.ObjectUnionOf),
         ):
             if predicate in properties:
                 return record(tuple(map(self.expression, self._list(properties[predicate][0]))))
         if OWL + 'complementOf' in properties:
-            return ax.ObjectComplementOf(self.expression(properties[OWL + 'complementOf'][0]))
+            return ex.ObjectComplementOf(self.expression(properties[OWL + 'complementOf'][0]))
         if OWL + 'oneOf' in properties:
-            return ax.ObjectOneOf(tuple(self._resources(properties[OWL + 'oneOf'][0])))
+            return ex.ObjectOneOf(tuple(self._resources(properties[OWL + 'oneOf'][0])))
         if OWL + 'onProperty' in properties:
             return self._restriction(node, properties)
         raise self._fail(node, 'expected a class expression')
 
-    def _restriction(self, node: str, properties: dict[str, list[Node]]) -> ax.ClassExpression:
+    def _restriction(self, node: str, properties: dict[str, list[Node]]) -> ex.ClassExpression:
         on = self._resource(node, OWL + 'onProperty')
         prop = self._property(on)
         filler = self._one(node, OWL + 'someValuesFrom') or self._one(node, OWL + 'allValuesFrom')
         if OWL + 'hasValue' in properties:
             value = properties[OWL + 'hasValue'][0]
             if isinstance(value, Literal):
-                return ax.DataHasValue(on, value)
-            return ax.ObjectHasValue(prop, value)
+                return ex.DataHasValue(on, value)
+            return ex.ObjectHasValue(prop, value)
         if OWL + 'hasSelf' in properties:
-            return ax.ObjectHasSelf(prop)
+            return ex.ObjectHasSelf(prop)
         if filler is not None:
             some = OWL + 'someValuesFrom' in properties
             if self._is_data(on, filler):
-                data = ax.DataSomeValuesFrom if some else ax.DataAllValuesFrom
+                data = ex.DataSomeValuesFrom if some else ex.DataAllValuesFrom
                 return data(on, self.data_range(filler))
-            quantified = ax.ObjectSomeValuesFrom if some else ax.ObjectAllValuesFrom
+            quantified = ex.ObjectSomeValuesFrom if some else ex.ObjectAllValuesFrom
             return quantified(prop, self.expression(filler))
         on_class = self._one(node, OWL + 'onClass')
         on_range = self._one(node, OWL + 'onDataRange')

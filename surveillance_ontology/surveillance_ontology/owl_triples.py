@@ -6,8 +6,12 @@ from collections.abc import Iterable, Iterator, Sequence
 from itertools import count
 
 from surveillance_ontology import axioms as ax
-from surveillance_ontology.axioms import OWL, RDF, RDFS, SWRL, XSD, Axiom, Literal
+from surveillance_ontology import expressions as ex
+from surveillance_ontology.axioms import Axiom
+from surveillance_ontology.entities import entities_of
+from surveillance_ontology.expressions import Literal
 from surveillance_ontology.rdf_xml import Node, Triple
+from surveillance_ontology.vocabulary import OWL, RDF, RDFS, SWRL, THING, TOP_LITERAL, XSD
 
 _TYPE = RDF + 'type'
 _KIND_TYPES = {
@@ -52,22 +56,22 @@ class _Mapping:
 
     # --- parts ---
 
-    def prop(self, prop: ax.PropertyExpression) -> str:
+    def prop(self, prop: ex.PropertyExpression) -> str:
         if isinstance(prop, str):
             return prop
         node = self.blank()
         self.add(node, OWL + 'inverseOf', prop.prop)
         return node
 
-    def data_range(self, data_range: ax.DataRange) -> str:
+    def data_range(self, data_range: ex.DataRange) -> str:
         if isinstance(data_range, str):
             return data_range
         node = self.blank(RDFS + 'Datatype')
-        if isinstance(data_range, ax.DataOneOf):
+        if isinstance(data_range, ex.DataOneOf):
             self.add(node, OWL + 'oneOf', self.sequence(data_range.literals))
-        elif isinstance(data_range, ax.DataComplementOf):
+        elif isinstance(data_range, ex.DataComplementOf):
             self.add(node, OWL + 'datatypeComplementOf', self.data_range(data_range.operand))
-        elif isinstance(data_range, ax.DatatypeRestriction):
+        elif isinstance(data_range, ex.DatatypeRestriction):
             self.add(node, OWL + 'onDatatype', data_range.datatype)
             facets = []
             for name, bound in data_range.facets:
@@ -76,47 +80,47 @@ class _Mapping:
                 facets.append(facet)
             self.add(node, OWL + 'withRestrictions', self.sequence(facets))
         else:
-            union = isinstance(data_range, ax.DataUnionOf)
+            union = isinstance(data_range, ex.DataUnionOf)
             operands = [self.data_range(operand) for operand in data_range.operands]
             self.add(
                 node, OWL + ('unionOf' if union else 'intersectionOf'), self.sequence(operands)
             )
         return node
 
-    def cls(self, expression: ax.ClassExpression) -> str:
+    def cls(self, expression: ex.ClassExpression) -> str:
         if isinstance(expression, str):
             return expression
-        if isinstance(expression, (ax.ObjectIntersectionOf, ax.ObjectUnionOf)):
-            union = isinstance(expression, ax.ObjectUnionOf)
+        if isinstance(expression, (ex.ObjectIntersectionOf, ex.ObjectUnionOf)):
+            union = isinstance(expression, ex.ObjectUnionOf)
             operands = [self.cls(operand) for operand in expression.operands]
             node = self.blank(OWL + 'Class')
             self.add(
                 node, OWL + ('unionOf' if union else 'intersectionOf'), self.sequence(operands)
             )
             return node
-        if isinstance(expression, ax.ObjectComplementOf):
+        if isinstance(expression, ex.ObjectComplementOf):
             node = self.blank(OWL + 'Class')
             self.add(node, OWL + 'complementOf', self.cls(expression.operand))
             return node
-        if isinstance(expression, ax.ObjectOneOf):
+        if isinstance(expression, ex.ObjectOneOf):
             node = self.blank(OWL + 'Class')
             self.add(node, OWL + 'oneOf', self.sequence(expression.individuals))
             return node
         node = self.blank(OWL + 'Restriction')
         self.add(node, OWL + 'onProperty', self.prop(expression.prop))
-        if isinstance(expression, ax.ObjectHasValue):
+        if isinstance(expression, ex.ObjectHasValue):
             self.add(node, OWL + 'hasValue', expression.individual)
-        elif isinstance(expression, ax.DataHasValue):
+        elif isinstance(expression, ex.DataHasValue):
             self.add(node, OWL + 'hasValue', expression.literal)
-        elif isinstance(expression, ax.ObjectHasSelf):
+        elif isinstance(expression, ex.ObjectHasSelf):
             self.add(node, OWL + 'hasSelf', Literal('true', XSD + 'boolean'))
-        elif isinstance(expression, ax.ObjectSomeValuesFrom):
+        elif isinstance(expression, ex.ObjectSomeValuesFrom):
             self.add(node, OWL + 'someValuesFrom', self.cls(expression.filler))
-        elif isinstance(expression, ax.ObjectAllValuesFrom):
+        elif isinstance(expression, ex.ObjectAllValuesFrom):
             self.add(node, OWL + 'allValuesFrom', self.cls(expression.filler))
-        elif isinstance(expression, ax.DataSomeValuesFrom):
+        elif isinstance(expression, ex.DataSomeValuesFrom):
             self.add(node, OWL + 'someValuesFrom', self.data_range(expression.range))
-        elif isinstance(expression, ax.DataAllValuesFrom):
+        elif isinstance(expression, ex.DataAllValuesFrom):
             self.add(node, OWL + 'allValuesFrom', self.data_range(expression.range))
         else:
             self.cardinality(node, expression)
@@ -125,25 +129,25 @@ class _Mapping:
     def cardinality(
         self,
         node: str,
-        expression: ax.ObjectMinCardinality
-        | ax.ObjectMaxCardinality
-        | ax.ObjectExactCardinality
-        | ax.DataMinCardinality
-        | ax.DataMaxCardinality
-        | ax.DataExactCardinality,
+        expression: ex.ObjectMinCardinality
+        | ex.ObjectMaxCardinality
+        | ex.ObjectExactCardinality
+        | ex.DataMinCardinality
+        | ex.DataMaxCardinality
+        | ex.DataExactCardinality,
     ) -> None:
         name = type(expression).__name__
         number = Literal(str(expression.n), XSD + 'nonNegativeInteger')
         plain, qualified = _CARDINALITIES[name.removeprefix('Object').removeprefix('Data')]
         if isinstance(
             expression,
-            (ax.ObjectMinCardinality, ax.ObjectMaxCardinality, ax.ObjectExactCardinality),
+            (ex.ObjectMinCardinality, ex.ObjectMaxCardinality, ex.ObjectExactCardinality),
         ):
-            unqualified = expression.filler == ax.THING
+            unqualified = expression.filler == THING
             filler, on = expression.filler, OWL + 'onClass'
             named = '' if unqualified else self.cls(filler)
         else:
-            unqualified = expression.range == ax.TOP_LITERAL
+            unqualified = expression.range == TOP_LITERAL
             on = OWL + 'onDataRange'
             named = self.data_range(expression.range)
         self.add(node, OWL + (plain if unqualified and on.endswith('Class') else qualified), number)
@@ -251,38 +255,38 @@ class _Mapping:
 
     # --- rules ---
 
-    def variable(self, variable: ax.Variable) -> str:
+    def variable(self, variable: ex.Variable) -> str:
         name = variable.name if ':' in variable.name else f'urn:swrl:var#{variable.name}'
         if name not in self._variables:
             self._variables[name] = None
             self.add(name, _TYPE, SWRL + 'Variable')
         return name
 
-    def argument(self, argument: str | ax.Variable | Literal) -> Node:
-        return self.variable(argument) if isinstance(argument, ax.Variable) else argument
+    def argument(self, argument: str | ex.Variable | Literal) -> Node:
+        return self.variable(argument) if isinstance(argument, ex.Variable) else argument
 
-    def atom(self, atom: ax.Atom) -> str:
+    def atom(self, atom: ex.Atom) -> str:
         add = self.add
-        if isinstance(atom, ax.BuiltinAtom):
+        if isinstance(atom, ex.BuiltinAtom):
             node = self.blank(SWRL + 'BuiltinAtom')
             add(node, SWRL + 'builtin', atom.builtin)
             arguments = [self.argument(argument) for argument in atom.arguments]
             add(node, SWRL + 'arguments', self.sequence(arguments))
             return node
-        if isinstance(atom, ax.ClassAtom):
+        if isinstance(atom, ex.ClassAtom):
             node = self.blank(SWRL + 'ClassAtom')
             add(node, SWRL + 'classPredicate', self.cls(atom.cls))
             add(node, SWRL + 'argument1', self.argument(atom.argument))
             return node
-        if isinstance(atom, ax.DataRangeAtom):
+        if isinstance(atom, ex.DataRangeAtom):
             node = self.blank(SWRL + 'DataRangeAtom')
             add(node, SWRL + 'dataRange', self.data_range(atom.range))
             add(node, SWRL + 'argument1', self.argument(atom.argument))
             return node
-        if isinstance(atom, ax.ObjectPropertyAtom):
+        if isinstance(atom, ex.ObjectPropertyAtom):
             node = self.blank(SWRL + 'IndividualPropertyAtom')
             add(node, SWRL + 'propertyPredicate', self.prop(atom.prop))
-        elif isinstance(atom, ax.DataPropertyAtom):
+        elif isinstance(atom, ex.DataPropertyAtom):
             node = self.blank(SWRL + 'DatavaluedPropertyAtom')
             add(node, SWRL + 'propertyPredicate', atom.prop)
         else:
@@ -315,7 +319,7 @@ def triples_of(axioms: Iterable[Axiom], iri: str) -> Iterator[Triple]:
         if isinstance(axiom, ax.Declaration):
             declared.add((axiom.kind, axiom.iri))
         elif not isinstance(axiom, (ax.SameIndividual, ax.DifferentIndividuals)):
-            for kind, name in ax.entities_of(axiom):
+            for kind, name in entities_of(axiom):
                 if kind not in ('individual', 'annotated'):
                     used[kind, name] = None
     for kind, name in used:

@@ -5,36 +5,36 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from surveillance_ontology.axioms import (
-    SWRLB,
-    XSD,
     Axiom,
-    BuiltinAtom,
-    ClassAtom,
-    DataExactCardinality,
     DataPropertyAssertion,
-    DataPropertyAtom,
     DataPropertyDomain,
     DataPropertyRange,
     DifferentIndividuals,
-    DifferentIndividualsAtom,
     DisjointClasses,
     EquivalentClasses,
     FunctionalObjectProperty,
+    ObjectPropertyAssertion,
+    ObjectPropertyDomain,
+    ObjectPropertyRange,
+    Rule,
+    SubClassOf,
+)
+from surveillance_ontology.expressions import (
+    BuiltinAtom,
+    ClassAtom,
+    DataExactCardinality,
+    DataPropertyAtom,
+    DifferentIndividualsAtom,
     Literal,
     ObjectExactCardinality,
     ObjectIntersectionOf,
     ObjectMinCardinality,
-    ObjectPropertyAssertion,
     ObjectPropertyAtom,
-    ObjectPropertyDomain,
-    ObjectPropertyRange,
     ObjectSomeValuesFrom,
-    Rule,
-    SubClassOf,
     Variable,
-    local_name,
 )
 from surveillance_ontology.knowledge_base import KnowledgeBase
+from surveillance_ontology.vocabulary import SWRLB, XSD, local_name
 
 IRI = 'http://bnc/exp-rob-lab/2022-23'
 NOW = 1665579740

@@ -5,7 +5,10 @@ from __future__ import annotations
 import random
 
 from surveillance_ontology import axioms as ax
-from surveillance_ontology.axioms import SWRLB, XSD, Axiom, ClassExpression, Literal, Variable
+from surveillance_ontology import expressions as ex
+from surveillance_ontology.axioms import Axiom
+from surveillance_ontology.expressions import ClassExpression, Literal, Variable
+from surveillance_ontology.vocabulary import SWRLB, THING, TOP_LITERAL, XSD
 
 BASE = 'http://example.org/random#'
 CLASSES = [BASE + name for name in 'ABCDE']
@@ -39,25 +42,25 @@ class RandomOntology:
             return Literal(f'{self.random.randrange(4)}.0', XSD + 'decimal')
         return Literal('text', XSD + 'string')
 
-    def prop(self) -> ax.PropertyExpression:
+    def prop(self) -> ex.PropertyExpression:
         name = self.random.choice(OBJECTS)
-        return ax.ObjectInverseOf(name) if self.random.random() < 0.2 else name
+        return ex.ObjectInverseOf(name) if self.random.random() < 0.2 else name
 
-    def data_range(self) -> ax.DataRange:
+    def data_range(self) -> ex.DataRange:
         choice = self.random.random()
         if choice < 0.5:
             return XSD + 'integer'
         if choice < 0.8:
             bound = Literal(str(self.random.randrange(4)), XSD + 'integer')
             facet = self.random.choice(['minInclusive', 'maxExclusive'])
-            return ax.DatatypeRestriction(XSD + 'integer', ((XSD + facet, bound),))
-        return ax.TOP_LITERAL
+            return ex.DatatypeRestriction(XSD + 'integer', ((XSD + facet, bound),))
+        return TOP_LITERAL
 
     def named(self) -> str:
         return self.random.choice(CLASSES)
 
     def filler(self) -> ClassExpression:
-        return ax.THING if self.random.random() < 0.3 else self.named()
+        return THING if self.random.random() < 0.3 else self.named()
 
     def left(self, depth: int = 2) -> ClassExpression:
         """An expression whose members can be recognised."""
@@ -65,25 +68,25 @@ class RandomOntology:
         if choice <= 3:
             return self.named()
         if choice == 4:
-            return ax.ObjectIntersectionOf((self.left(depth - 1), self.left(depth - 1)))
+            return ex.ObjectIntersectionOf((self.left(depth - 1), self.left(depth - 1)))
         if choice == 5:
-            return ax.ObjectUnionOf((self.left(depth - 1), self.left(depth - 1)))
+            return ex.ObjectUnionOf((self.left(depth - 1), self.left(depth - 1)))
         if choice == 6:
-            return ax.ObjectSomeValuesFrom(self.prop(), self.filler())
+            return ex.ObjectSomeValuesFrom(self.prop(), self.filler())
         if choice == 7:
-            return ax.ObjectMinCardinality(
+            return ex.ObjectMinCardinality(
                 self.random.choice([1, 2, 2, 3]), self.prop(), self.filler()
             )
         if choice == 8:
             if self.random.random() < 0.5:
-                return ax.ObjectHasValue(self.prop(), self.random.choice(INDIVIDUALS))
-            return ax.ObjectOneOf((self.random.choice(INDIVIDUALS),))
+                return ex.ObjectHasValue(self.prop(), self.random.choice(INDIVIDUALS))
+            return ex.ObjectOneOf((self.random.choice(INDIVIDUALS),))
         if choice == 9:
             data = self.random.choice(DATAS)
             if self.random.random() < 0.5:
-                return ax.DataHasValue(data, self.literal())
-            return ax.DataSomeValuesFrom(data, self.data_range())
-        return ax.DataMinCardinality(2, self.random.choice(DATAS), self.data_range())
+                return ex.DataHasValue(data, self.literal())
+            return ex.DataSomeValuesFrom(data, self.data_range())
+        return ex.DataMinCardinality(2, self.random.choice(DATAS), self.data_range())
 
     def right(self) -> ClassExpression:
         """An expression whose membership has Horn consequences."""
@@ -91,62 +94,62 @@ class RandomOntology:
         if choice <= 4:
             return self.named()
         if choice == 5:
-            return ax.ObjectIntersectionOf((self.named(), self.right()))
+            return ex.ObjectIntersectionOf((self.named(), self.right()))
         if choice == 6:
-            return ax.ObjectAllValuesFrom(self.prop(), self.named())
+            return ex.ObjectAllValuesFrom(self.prop(), self.named())
         if choice == 7:
-            return ax.ObjectMaxCardinality(
+            return ex.ObjectMaxCardinality(
                 self.random.choice([0, 1, 1, 2]), self.prop(), self.filler()
             )
         if choice == 8:
-            return ax.ObjectHasValue(self.prop(), self.random.choice(INDIVIDUALS))
+            return ex.ObjectHasValue(self.prop(), self.random.choice(INDIVIDUALS))
         if choice == 9:
-            return ax.ObjectComplementOf(self.named())
+            return ex.ObjectComplementOf(self.named())
         if choice == 10:
-            return ax.DataMaxCardinality(1, self.random.choice(DATAS), self.data_range())
+            return ex.DataMaxCardinality(1, self.random.choice(DATAS), self.data_range())
         if choice == 11:
-            return ax.ObjectExactCardinality(1, self.prop(), self.filler())
+            return ex.ObjectExactCardinality(1, self.prop(), self.filler())
         if choice == 12:
-            return ax.ObjectSomeValuesFrom(self.prop(), self.filler())
-        return ax.DataHasValue(self.random.choice(DATAS), self.literal())
+            return ex.ObjectSomeValuesFrom(self.prop(), self.filler())
+        return ex.DataHasValue(self.random.choice(DATAS), self.literal())
 
     def rule(self) -> ax.Rule:
         p, q, r = (self.random.choice(OBJECTS) for _ in range(3))
         s, t = self.random.choice(DATAS), self.random.choice(DATAS)
         shape = self.random.randrange(3 if self.plain else 7)
-        link = ax.ObjectPropertyAtom
-        value = ax.DataPropertyAtom
+        link = ex.ObjectPropertyAtom
+        value = ex.DataPropertyAtom
         if shape == 0:
-            body: tuple[ax.Atom, ...] = (link(p, _X, _Y), link(q, _Y, _Z))
+            body: tuple[ex.Atom, ...] = (link(p, _X, _Y), link(q, _Y, _Z))
             return ax.Rule(body, (link(r, _X, _Z),))
         if shape == 1:
-            body = (link(p, _X, _Y), link(q, _Z, _Y), ax.DifferentIndividualsAtom(_X, _Z))
+            body = (link(p, _X, _Y), link(q, _Z, _Y), ex.DifferentIndividualsAtom(_X, _Z))
             return ax.Rule(body, (link(r, _X, _Z),))
         if shape == 2:
-            body = (ax.ClassAtom(self.named(), _X), link(p, _X, _Y))
+            body = (ex.ClassAtom(self.named(), _X), link(p, _X, _Y))
             if self.random.random() < 0.5:
-                return ax.Rule(body, (ax.ClassAtom(self.named(), _Y),))
-            pair = self.random.choice([ax.SameIndividualAtom, ax.DifferentIndividualsAtom])
+                return ax.Rule(body, (ex.ClassAtom(self.named(), _Y),))
+            pair = self.random.choice([ex.SameIndividualAtom, ex.DifferentIndividualsAtom])
             return ax.Rule(body, (pair(_X, _Y),))
         compare = SWRLB + self.random.choice(['greaterThan', 'lessThanOrEqual'])
         if shape in (3, 4):
             body = (
                 value(s, _X, _V),
                 value(t, _Y, _W),
-                ax.ClassAtom(self.named(), _Y),
-                ax.BuiltinAtom(SWRLB + 'subtract', (_Z, _V, _W)),
-                ax.BuiltinAtom(compare, (_Z, Literal('1', XSD + 'integer'))),
+                ex.ClassAtom(self.named(), _Y),
+                ex.BuiltinAtom(SWRLB + 'subtract', (_Z, _V, _W)),
+                ex.BuiltinAtom(compare, (_Z, Literal('1', XSD + 'integer'))),
             )
-            return ax.Rule(body, (ax.ClassAtom(self.named(), self.random.choice([_X, _Y])),))
+            return ax.Rule(body, (ex.ClassAtom(self.named(), self.random.choice([_X, _Y])),))
         if shape == 5:
             body = (value(s, _X, _V), link(p, _X, _Y), value(t, _Y, _W))
-            body = (*body, ax.BuiltinAtom(compare, (_V, _W)))
+            body = (*body, ex.BuiltinAtom(compare, (_V, _W)))
             return ax.Rule(body, (link(q, _Y, _X),))
         body = (
             value(s, _X, _V),
-            ax.BuiltinAtom(SWRLB + 'add', (_W, _V, Literal('1', XSD + 'integer'))),
+            ex.BuiltinAtom(SWRLB + 'add', (_W, _V, Literal('1', XSD + 'integer'))),
         )
-        limit = ax.BuiltinAtom(SWRLB + 'lessThan', (_V, Literal('5', XSD + 'integer')))
+        limit = ex.BuiltinAtom(SWRLB + 'lessThan', (_V, Literal('5', XSD + 'integer')))
         return ax.Rule((*body, limit), (value(t, _X, _W),))
 
     # --- axioms ---

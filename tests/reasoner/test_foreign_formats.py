@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from surveillance_ontology import axioms as ax
+from surveillance_ontology import expressions as ex
 from surveillance_ontology.owl_reading import OntologyFileError, read_ontology
 
 IRI = 'http://example.org/place'
@@ -37,7 +38,7 @@ def test_axioms_are_read_with_exact_datatypes(text, form):
     assert (document.format, document.iri, document.unsupported) == (form, IRI, [])
     assert ax.SubClassOf(f'{IRI}#ROOM', f'{IRI}#LOCATION') in document.axioms
     assert ax.ClassAssertion(f'{IRI}#ROOM', f'{IRI}#R1') in document.axioms
-    five = ax.Literal('5', f'{XSD}long')
+    five = ex.Literal('5', f'{XSD}long')
     assert ax.DataPropertyAssertion(f'{IRI}#visitedAt', f'{IRI}#R1', five) in document.axioms
 
 

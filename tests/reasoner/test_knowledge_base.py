@@ -5,16 +5,16 @@ changes.
 from __future__ import annotations
 
 from surveillance_ontology.axioms import (
-    THING,
     AnnotationAssertion,
     ClassAssertion,
     Declaration,
     DifferentIndividuals,
-    Literal,
     ObjectPropertyAssertion,
     SubClassOf,
 )
+from surveillance_ontology.expressions import Literal
 from surveillance_ontology.knowledge_base import Changes, KnowledgeBase
+from surveillance_ontology.vocabulary import THING
 from tests.reasoner.patrol_map import (
     IRI,
     NOW,

@@ -9,17 +9,14 @@ from pathlib import Path
 import pytest
 
 from surveillance_ontology.axioms import (
-    OWL,
-    RDF,
-    XSD,
     Axiom,
     DataPropertyAssertion,
     Declaration,
     DifferentIndividuals,
     Import,
-    Literal,
     Rule,
 )
+from surveillance_ontology.expressions import Literal
 from surveillance_ontology.knowledge_base import KnowledgeBase
 from surveillance_ontology.owl_reading import OntologyFileError, read_ontology
 from surveillance_ontology.owl_writing import (
@@ -27,6 +24,7 @@ from surveillance_ontology.owl_writing import (
     ontology_bytes,
     write_ontology,
 )
+from surveillance_ontology.vocabulary import OWL, RDF, XSD
 from tests.reasoner.patrol_map import IRI, SCHEMA, VISITS, link, n, names, seven_rooms, value
 from tests.reasoner.random_ontologies import RandomOntology
 

@@ -5,21 +5,22 @@ from __future__ import annotations
 import pytest
 
 from surveillance_ontology.axioms import (
-    OWL,
-    XSD,
     ClassAssertion,
+    EquivalentClasses,
+    SameIndividual,
+    SubClassOf,
+)
+from surveillance_ontology.expressions import (
     DataExactCardinality,
     DataMaxCardinality,
-    EquivalentClasses,
     Literal,
     ObjectComplementOf,
     ObjectExactCardinality,
     ObjectMaxCardinality,
     ObjectMinCardinality,
-    SameIndividual,
-    SubClassOf,
 )
 from surveillance_ontology.knowledge_base import KnowledgeBase
+from surveillance_ontology.vocabulary import OWL, XSD
 from tests.reasoner.patrol_map import (
     DOOR_FACTS,
     DOORS,

@@ -6,8 +6,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass, fields, is_dataclass
 from typing import Any
 
-from surveillance_ontology import axioms
-from surveillance_ontology.axioms import Axiom, Literal
+from surveillance_ontology import axioms, expressions
+from surveillance_ontology.axioms import Axiom
+from surveillance_ontology.expressions import Literal
 from surveillance_ontology.knowledge_base import KnowledgeBase
 
 
@@ -46,7 +47,8 @@ Change = AddAxiom | RemoveAxiom | RenameEntity | RemoveEntity
 
 _RECORDS: dict[str, type] = {
     name: member
-    for name, member in vars(axioms).items()
+    for module in (axioms, expressions)
+    for name, member in vars(module).items()
     if isinstance(member, type) and is_dataclass(member) and member is not Literal
 } | {change.__name__: change for change in (AddAxiom, RemoveAxiom, RenameEntity, RemoveEntity)}
 _FIELDS = {name: tuple(f.name for f in fields(record)) for name, record in _RECORDS.items()}

@@ -16,8 +16,8 @@ from surveillance_ontology.axioms import (
     DataPropertyAssertion,
     ObjectPropertyAssertion,
     SameIndividual,
-    local_name,
 )
+from surveillance_ontology.vocabulary import local_name
 
 SAME_AS = 'owl:sameAs'
 ANY = '?'

@@ -28,20 +28,21 @@ from surveillance_ontology.armor.table import (
     manipulation,
 )
 from surveillance_ontology.axioms import (
-    NOTHING,
-    THING,
     ClassAssertion,
-    ClassExpression,
     DataPropertyAssertion,
     DifferentIndividuals,
     DisjointClasses,
     EquivalentClasses,
-    Literal,
-    ObjectIntersectionOf,
-    ObjectMinCardinality,
     ObjectPropertyAssertion,
     SubClassOf,
 )
+from surveillance_ontology.expressions import (
+    ClassExpression,
+    Literal,
+    ObjectIntersectionOf,
+    ObjectMinCardinality,
+)
+from surveillance_ontology.vocabulary import NOTHING, THING
 
 MOST_CLASSES = 500
 """Classes in one statement of disjointness; what it costs grows with their square."""

@@ -16,15 +16,14 @@ from surveillance_ontology.armor.rendering import render_literal as _literal
 from surveillance_ontology.armor.restrictions import describe
 from surveillance_ontology.armor.table import CLS, DAT, IND, OBJ, flag, query, text
 from surveillance_ontology.axioms import (
-    NOTHING,
     Axiom,
     ClassAssertion,
     DataPropertyAssertion,
     ObjectPropertyAssertion,
     SameIndividual,
-    local_name,
 )
 from surveillance_ontology.knowledge_base import Fact
+from surveillance_ontology.vocabulary import NOTHING, local_name
 
 
 def _entities(iris: Iterable[str]) -> list[str]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from surveillance_ontology.axioms import (
+from surveillance_ontology.expressions import (
     ClassExpression,
     DataAllValuesFrom,
     DataExactCardinality,
@@ -29,8 +29,8 @@ from surveillance_ontology.axioms import (
     ObjectSomeValuesFrom,
     ObjectUnionOf,
     PropertyExpression,
-    local_name,
 )
+from surveillance_ontology.vocabulary import local_name
 
 _VALUES = {
     ObjectSomeValuesFrom: 'SOME_OBJECT',

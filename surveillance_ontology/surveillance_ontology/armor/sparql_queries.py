@@ -10,14 +10,14 @@ from surveillance_ontology.armor.rendering import shown
 from surveillance_ontology.armor.sparql import Binding, Graph, SparqlError, SparqlTimeoutError
 from surveillance_ontology.armor.table import query, text
 from surveillance_ontology.axioms import (
-    XSD,
     Axiom,
     Declaration,
     EquivalentClasses,
     SubClassOf,
-    entities_of,
 )
+from surveillance_ontology.entities import entities_of
 from surveillance_ontology.owl_writing import ontology_bytes
+from surveillance_ontology.vocabulary import XSD
 
 if TYPE_CHECKING:
     from surveillance_ontology.armor.service import ArmorService

@@ -2,24 +2,25 @@
 
 from __future__ import annotations
 
-from surveillance_ontology import axioms as ax
+from surveillance_ontology import expressions as ex
 from surveillance_ontology.reasoner.datatypes import range_test, value_of
+from surveillance_ontology.vocabulary import OWL, TOP_LITERAL, XSD
 
 
-def includes(outer: ax.DataRange, inner: ax.DataRange) -> bool:
+def includes(outer: ex.DataRange, inner: ex.DataRange) -> bool:
     """Whether every value of `inner` is known to be in `outer` (sound, not complete)."""
-    if outer == inner or outer == ax.TOP_LITERAL:
+    if outer in (inner, TOP_LITERAL):
         return True
-    if isinstance(inner, ax.DatatypeRestriction):
+    if isinstance(inner, ex.DatatypeRestriction):
         return includes(outer, inner.datatype)
-    if isinstance(inner, ax.DataOneOf):
+    if isinstance(inner, ex.DataOneOf):
         test = range_test(outer)
         return test is not None and all(test(value_of(literal)) for literal in inner.literals)
-    if isinstance(inner, ax.DataUnionOf):
+    if isinstance(inner, ex.DataUnionOf):
         return all(includes(outer, operand) for operand in inner.operands)
-    if isinstance(inner, ax.DataIntersectionOf):
+    if isinstance(inner, ex.DataIntersectionOf):
         return any(includes(outer, operand) for operand in inner.operands)
-    if isinstance(outer, ax.DataUnionOf):
+    if isinstance(outer, ex.DataUnionOf):
         return any(includes(operand, inner) for operand in outer.operands)
     if isinstance(outer, str) and isinstance(inner, str):
         return outer in _WIDER.get(inner, ())
@@ -47,14 +48,14 @@ def _wider() -> dict[str, set[str]]:
     wider: dict[str, set[str]] = {}
 
     def mark(name: str, above: set[str]) -> None:
-        wider.setdefault(ax.XSD + name, set()).update(above)
+        wider.setdefault(XSD + name, set()).update(above)
         for child in below.get(name, ()):
-            mark(child, above | {ax.XSD + name})
+            mark(child, above | {XSD + name})
 
     for name in below:
         mark(name, set())
     for name in ('decimal', 'integer'):
-        wider.setdefault(ax.XSD + name, set()).update((ax.OWL + 'real', ax.OWL + 'rational'))
+        wider.setdefault(XSD + name, set()).update((OWL + 'real', OWL + 'rational'))
     return wider
 
 

@@ -18,11 +18,7 @@ from fractions import Fraction
 from functools import cache
 from typing import Any, TypeAlias
 
-from surveillance_ontology.axioms import (
-    OWL,
-    RDF,
-    RDFS,
-    XSD,
+from surveillance_ontology.expressions import (
     DataComplementOf,
     DataIntersectionOf,
     DataOneOf,
@@ -31,6 +27,7 @@ from surveillance_ontology.axioms import (
     DataUnionOf,
     Literal,
 )
+from surveillance_ontology.vocabulary import OWL, RDF, RDFS, XSD
 
 Value: TypeAlias = 'int | Fraction | str | tuple[Any, ...]'
 

@@ -16,11 +16,11 @@ from surveillance_ontology.axioms import (
     Axiom,
     DifferentIndividuals,
     SameIndividual,
-    local_name,
 )
 from surveillance_ontology.reasoner.clauses import Fact, Predicate, Program
 from surveillance_ontology.reasoner.identification import Identification
 from surveillance_ontology.reasoner.translation import individuals_of
+from surveillance_ontology.vocabulary import local_name
 
 _MOST_VALUES = 20_000
 

@@ -7,8 +7,10 @@ from itertools import product
 from typing import Any
 
 from surveillance_ontology import axioms as ax
+from surveillance_ontology import expressions as ex
 from surveillance_ontology.axiom_text import axiom_text, expression_text
-from surveillance_ontology.axioms import NOTHING, THING, Axiom, ClassExpression, local_name
+from surveillance_ontology.axioms import Axiom
+from surveillance_ontology.expressions import ClassExpression
 from surveillance_ontology.reasoner.clauses import (
     AtLeast,
     BodyAtom,
@@ -27,6 +29,7 @@ from surveillance_ontology.reasoner.data_inclusion import includes
 from surveillance_ontology.reasoner.datatypes import Test, Value, range_test, value_of
 from surveillance_ontology.reasoner.normal_forms import normal
 from surveillance_ontology.reasoner.property_hierarchy import PropertyHierarchy
+from surveillance_ontology.vocabulary import NOTHING, THING, TOP_LITERAL, local_name
 
 Body = tuple[BodyAtom, ...]
 _X, _Y = 0, 1
@@ -111,15 +114,15 @@ class LeftSides:
         expression = normal(expression)
         return None if expression == THING else self._recognise(expression)
 
-    def _direction(self, prop: ax.PropertyExpression) -> tuple[Predicate, bool]:
+    def _direction(self, prop: ex.PropertyExpression) -> tuple[Predicate, bool]:
         if isinstance(prop, str):
             return self.program.object(prop), False
         return self.program.object(prop.prop), True
 
-    def test(self, data_range: ax.DataRange) -> Test | None:
+    def test(self, data_range: ex.DataRange) -> Test | None:
         """The test of a range, None where it admits every value."""
         data_range = self._defined(data_range, ())
-        if data_range == ax.TOP_LITERAL:
+        if data_range == TOP_LITERAL:
             return None
         test = range_test(data_range)
         if test is None:
@@ -134,7 +137,7 @@ class LeftSides:
 
         return abstract_test
 
-    def _defined(self, data_range: ax.DataRange, seen: tuple[str, ...]) -> ax.DataRange:
+    def _defined(self, data_range: ex.DataRange, seen: tuple[str, ...]) -> ex.DataRange:
         if isinstance(data_range, str):
             definition = self._datatypes.get(data_range)
             if definition is None:
@@ -142,11 +145,11 @@ class LeftSides:
             if data_range in seen:
                 raise Unsupported(f'the datatype {local_name(data_range)} is defined by itself')
             return self._defined(definition, (*seen, data_range))
-        if isinstance(data_range, (ax.DataIntersectionOf, ax.DataUnionOf)):
+        if isinstance(data_range, (ex.DataIntersectionOf, ex.DataUnionOf)):
             kind = type(data_range)
             return kind(tuple(self._defined(operand, seen) for operand in data_range.operands))
-        if isinstance(data_range, ax.DataComplementOf):
-            return ax.DataComplementOf(self._defined(data_range.operand, seen))
+        if isinstance(data_range, ex.DataComplementOf):
+            return ex.DataComplementOf(self._defined(data_range.operand, seen))
         return data_range
 
     # --- left sides ---
@@ -160,34 +163,34 @@ class LeftSides:
             if expression == NOTHING:
                 return [(PredicateAtom(self.program.nothing, (x,)),)]
             return [(PredicateAtom(self.program.cls(expression), (x,)),)]
-        if isinstance(expression, ax.ObjectIntersectionOf):
+        if isinstance(expression, ex.ObjectIntersectionOf):
             parts = [self.bodies(operand, x) for operand in expression.operands]
             return [tuple(atom for part in parts for atom in part) for parts in product(*parts)]
-        if isinstance(expression, ax.ObjectUnionOf):
+        if isinstance(expression, ex.ObjectUnionOf):
             return [body for operand in expression.operands for body in self.bodies(operand, x)]
-        if isinstance(expression, ax.ObjectOneOf):
+        if isinstance(expression, ex.ObjectOneOf):
             return [(SameAtom((x, Constant(name))),) for name in expression.individuals]
-        if isinstance(expression, ax.ObjectHasValue):
+        if isinstance(expression, ex.ObjectHasValue):
             return [(self.property(expression.prop, x, Constant(expression.individual)),)]
-        if isinstance(expression, ax.ObjectHasSelf):
+        if isinstance(expression, ex.ObjectHasSelf):
             return [(self.property(expression.prop, x, x),)]
-        if isinstance(expression, ax.DataHasValue):
+        if isinstance(expression, ex.DataHasValue):
             value = Constant(value_of(expression.literal), True)
             return [(PredicateAtom(self.program.data(expression.prop), (x, value)),)]
-        if isinstance(expression, ax.ObjectSomeValuesFrom):
+        if isinstance(expression, ex.ObjectSomeValuesFrom):
             return self._related(expression.prop, expression.filler, x)
-        if isinstance(expression, ax.DataSomeValuesFrom):
+        if isinstance(expression, ex.DataSomeValuesFrom):
             return [self._valued(expression.prop, expression.range, x)]
         return self._labelled_bodies(expression, x)
 
-    def property(self, prop: ax.PropertyExpression, x: Term, y: Term) -> PredicateAtom:
+    def property(self, prop: ex.PropertyExpression, x: Term, y: Term) -> PredicateAtom:
         return property_atom(self.program, prop, x, y)
 
-    def _related(self, prop: ax.PropertyExpression, filler: ClassExpression, x: Term) -> list[Body]:
+    def _related(self, prop: ex.PropertyExpression, filler: ClassExpression, x: Term) -> list[Body]:
         y = self.fresh()
         return [(self.property(prop, x, y), *body) for body in self.bodies(filler, y)]
 
-    def _valued(self, prop: str, data_range: ax.DataRange, x: Term) -> Body:
+    def _valued(self, prop: str, data_range: ex.DataRange, x: Term) -> Body:
         v = self.fresh()
         atom = PredicateAtom(self.program.data(prop), (x, v))
         test = self.test(data_range)
@@ -196,53 +199,53 @@ class LeftSides:
     def _labelled_bodies(self, expression: ClassExpression, x: Term) -> list[Body]:
         """Bodies for an expression that needs a label beside them."""
         functional = self.hierarchy.is_functional
-        if isinstance(expression, ax.ObjectMinCardinality):
+        if isinstance(expression, ex.ObjectMinCardinality):
             if expression.n == 0:
                 return [()]
             if expression.n == 1:
                 return self._related(expression.prop, expression.filler, x)
-        elif isinstance(expression, ax.DataMinCardinality):
+        elif isinstance(expression, ex.DataMinCardinality):
             if expression.n == 0:
                 return [()]
             if expression.n == 1:
                 return [self._valued(expression.prop, expression.range, x)]
-        elif isinstance(expression, (ax.ObjectMaxCardinality, ax.DataMaxCardinality)) and (
+        elif isinstance(expression, (ex.ObjectMaxCardinality, ex.DataMaxCardinality)) and (
             expression.n >= 1 and functional(expression.prop)
         ):
             return [()]
         label = self._label(expression)
         bodies: list[Body] = [(PredicateAtom(label, (x,)),)]
-        if isinstance(expression, (ax.ObjectMinCardinality, ax.DataMinCardinality)):
+        if isinstance(expression, (ex.ObjectMinCardinality, ex.DataMinCardinality)):
             self._count(label, expression)
-        elif isinstance(expression, ax.ObjectExactCardinality):
+        elif isinstance(expression, ex.ObjectExactCardinality):
             parts = (expression.n, expression.prop, expression.filler)
             if expression.n >= 1 and functional(expression.prop):
-                return bodies + self.bodies(ax.ObjectMinCardinality(*parts), x)
-        elif isinstance(expression, ax.DataExactCardinality):
+                return bodies + self.bodies(ex.ObjectMinCardinality(*parts), x)
+        elif isinstance(expression, ex.DataExactCardinality):
             values = (expression.n, expression.prop, expression.range)
             if expression.n >= 1 and functional(expression.prop):
-                return bodies + self.bodies(ax.DataMinCardinality(*values), x)
-        elif isinstance(expression, ax.ObjectAllValuesFrom):
+                return bodies + self.bodies(ex.DataMinCardinality(*values), x)
+        elif isinstance(expression, ex.ObjectAllValuesFrom):
             if normal(expression.filler) == THING:
                 return [()]
             if functional(expression.prop):
                 return bodies + self._related(expression.prop, expression.filler, x)
-        elif isinstance(expression, ax.DataAllValuesFrom):
+        elif isinstance(expression, ex.DataAllValuesFrom):
             if functional(expression.prop):
                 return [*bodies, self._valued(expression.prop, expression.range, x)]
-        elif isinstance(expression, ax.ObjectComplementOf) and isinstance(expression.operand, str):
+        elif isinstance(expression, ex.ObjectComplementOf) and isinstance(expression.operand, str):
             self._complements[expression.operand] = label
         return bodies
 
     def _count(
-        self, label: Predicate, expression: ax.ObjectMinCardinality | ax.DataMinCardinality
+        self, label: Predicate, expression: ex.ObjectMinCardinality | ex.DataMinCardinality
     ) -> None:
         """Has a label recognised by counting."""
         if expression in self._recognised:
             return
         self._recognised.add(expression)
         filler: Predicate | Test | None
-        if isinstance(expression, ax.ObjectMinCardinality):
+        if isinstance(expression, ex.ObjectMinCardinality):
             prop, inverse = self._direction(expression.prop)
             filler = self._filler(expression.filler)
         else:

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from surveillance_ontology import axioms as ax
-from surveillance_ontology.axioms import NOTHING, THING, ClassExpression
+from surveillance_ontology import expressions as ex
+from surveillance_ontology.expressions import ClassExpression
+from surveillance_ontology.vocabulary import NOTHING, THING
 
 _POSITIVE = (
-    ax.ObjectSomeValuesFrom,
-    ax.ObjectMinCardinality,
-    ax.ObjectHasValue,
-    ax.ObjectHasSelf,
-    ax.ObjectOneOf,
-    ax.DataSomeValuesFrom,
-    ax.DataMinCardinality,
-    ax.DataHasValue,
+    ex.ObjectSomeValuesFrom,
+    ex.ObjectMinCardinality,
+    ex.ObjectHasValue,
+    ex.ObjectHasSelf,
+    ex.ObjectOneOf,
+    ex.DataSomeValuesFrom,
+    ex.DataMinCardinality,
+    ex.DataHasValue,
 )
 
 
@@ -22,54 +23,54 @@ def negated(expression: ClassExpression) -> ClassExpression:
     if isinstance(expression, str):
         if expression == THING:
             return NOTHING
-        return THING if expression == NOTHING else ax.ObjectComplementOf(expression)
-    if isinstance(expression, ax.ObjectComplementOf):
+        return THING if expression == NOTHING else ex.ObjectComplementOf(expression)
+    if isinstance(expression, ex.ObjectComplementOf):
         return normal(expression.operand)
-    if isinstance(expression, ax.ObjectIntersectionOf):
-        return ax.ObjectUnionOf(tuple(map(negated, expression.operands)))
-    if isinstance(expression, ax.ObjectUnionOf):
-        return ax.ObjectIntersectionOf(tuple(map(negated, expression.operands)))
-    if isinstance(expression, ax.ObjectSomeValuesFrom):
-        return ax.ObjectAllValuesFrom(expression.prop, negated(expression.filler))
-    if isinstance(expression, ax.ObjectAllValuesFrom):
-        return ax.ObjectSomeValuesFrom(expression.prop, negated(expression.filler))
-    if isinstance(expression, ax.ObjectMinCardinality):
+    if isinstance(expression, ex.ObjectIntersectionOf):
+        return ex.ObjectUnionOf(tuple(map(negated, expression.operands)))
+    if isinstance(expression, ex.ObjectUnionOf):
+        return ex.ObjectIntersectionOf(tuple(map(negated, expression.operands)))
+    if isinstance(expression, ex.ObjectSomeValuesFrom):
+        return ex.ObjectAllValuesFrom(expression.prop, negated(expression.filler))
+    if isinstance(expression, ex.ObjectAllValuesFrom):
+        return ex.ObjectSomeValuesFrom(expression.prop, negated(expression.filler))
+    if isinstance(expression, ex.ObjectMinCardinality):
         if expression.n == 0:
             return NOTHING
-        return ax.ObjectMaxCardinality(expression.n - 1, expression.prop, expression.filler)
-    if isinstance(expression, ax.ObjectMaxCardinality):
-        return ax.ObjectMinCardinality(expression.n + 1, expression.prop, expression.filler)
-    if isinstance(expression, ax.DataSomeValuesFrom):
-        return ax.DataMaxCardinality(0, expression.prop, expression.range)
-    if isinstance(expression, ax.DataAllValuesFrom):
-        return ax.DataSomeValuesFrom(expression.prop, ax.DataComplementOf(expression.range))
-    if isinstance(expression, ax.DataMinCardinality):
+        return ex.ObjectMaxCardinality(expression.n - 1, expression.prop, expression.filler)
+    if isinstance(expression, ex.ObjectMaxCardinality):
+        return ex.ObjectMinCardinality(expression.n + 1, expression.prop, expression.filler)
+    if isinstance(expression, ex.DataSomeValuesFrom):
+        return ex.DataMaxCardinality(0, expression.prop, expression.range)
+    if isinstance(expression, ex.DataAllValuesFrom):
+        return ex.DataSomeValuesFrom(expression.prop, ex.DataComplementOf(expression.range))
+    if isinstance(expression, ex.DataMinCardinality):
         if expression.n == 0:
             return NOTHING
-        return ax.DataMaxCardinality(expression.n - 1, expression.prop, expression.range)
-    if isinstance(expression, ax.DataMaxCardinality):
-        return ax.DataMinCardinality(expression.n + 1, expression.prop, expression.range)
-    if isinstance(expression, ax.ObjectExactCardinality):
-        few = ax.ObjectMinCardinality(expression.n + 1, expression.prop, expression.filler)
+        return ex.DataMaxCardinality(expression.n - 1, expression.prop, expression.range)
+    if isinstance(expression, ex.DataMaxCardinality):
+        return ex.DataMinCardinality(expression.n + 1, expression.prop, expression.range)
+    if isinstance(expression, ex.ObjectExactCardinality):
+        few = ex.ObjectMinCardinality(expression.n + 1, expression.prop, expression.filler)
         if expression.n == 0:
             return few
-        less = ax.ObjectMaxCardinality(expression.n - 1, expression.prop, expression.filler)
-        return ax.ObjectUnionOf((few, less))
-    if isinstance(expression, ax.DataExactCardinality):
-        more = ax.DataMinCardinality(expression.n + 1, expression.prop, expression.range)
+        less = ex.ObjectMaxCardinality(expression.n - 1, expression.prop, expression.filler)
+        return ex.ObjectUnionOf((few, less))
+    if isinstance(expression, ex.DataExactCardinality):
+        more = ex.DataMinCardinality(expression.n + 1, expression.prop, expression.range)
         if expression.n == 0:
             return more
-        fewer = ax.DataMaxCardinality(expression.n - 1, expression.prop, expression.range)
-        return ax.ObjectUnionOf((more, fewer))
-    return ax.ObjectComplementOf(expression)
+        fewer = ex.DataMaxCardinality(expression.n - 1, expression.prop, expression.range)
+        return ex.ObjectUnionOf((more, fewer))
+    return ex.ObjectComplementOf(expression)
 
 
 def normal(expression: ClassExpression) -> ClassExpression:
     """The expression with complements pushed inwards and no nested intersections or unions."""
-    if isinstance(expression, ax.ObjectComplementOf):
+    if isinstance(expression, ex.ObjectComplementOf):
         pushed = negated(expression.operand)
         return pushed if pushed == expression else normal(pushed)
-    if isinstance(expression, (ax.ObjectIntersectionOf, ax.ObjectUnionOf)):
+    if isinstance(expression, (ex.ObjectIntersectionOf, ex.ObjectUnionOf)):
         kind = type(expression)
         flat: list[ClassExpression] = []
         for operand in map(normal, expression.operands):
@@ -83,8 +84,8 @@ def is_positive(expression: ClassExpression) -> bool:
     """Whether facts that hold can show membership, so that a clause body can state it."""
     if isinstance(expression, str):
         return True
-    if isinstance(expression, (ax.ObjectIntersectionOf, ax.ObjectUnionOf)):
+    if isinstance(expression, (ex.ObjectIntersectionOf, ex.ObjectUnionOf)):
         return all(map(is_positive, expression.operands))
-    if isinstance(expression, (ax.ObjectSomeValuesFrom, ax.ObjectMinCardinality)):
+    if isinstance(expression, (ex.ObjectSomeValuesFrom, ex.ObjectMinCardinality)):
         return is_positive(normal(expression.filler))
     return isinstance(expression, _POSITIVE)

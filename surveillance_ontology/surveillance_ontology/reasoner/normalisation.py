@@ -10,8 +10,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from surveillance_ontology import axioms as ax
+from surveillance_ontology import expressions as ex
 from surveillance_ontology.axiom_text import expression_text
-from surveillance_ontology.axioms import Axiom, ClassExpression, local_name
+from surveillance_ontology.axioms import Axiom
+from surveillance_ontology.expressions import ClassExpression
 from surveillance_ontology.reasoner.clauses import (
     Clause,
     Key,
@@ -22,6 +24,7 @@ from surveillance_ontology.reasoner.clauses import (
 from surveillance_ontology.reasoner.left_sides import Unsupported
 from surveillance_ontology.reasoner.normal_forms import normal
 from surveillance_ontology.reasoner.right_sides import RightSides
+from surveillance_ontology.vocabulary import local_name
 
 _X, _Y = 0, 1
 
@@ -111,7 +114,7 @@ class Normaliser(RightSides):
             self._all_disjoint(axiom.classes)
             for part in axiom.classes:
                 self._attempt(self._sub_class, part, axiom.cls)
-            self._attempt(self._sub_class, axiom.cls, ax.ObjectUnionOf(axiom.classes))
+            self._attempt(self._sub_class, axiom.cls, ex.ObjectUnionOf(axiom.classes))
         elif isinstance(axiom, ax.Rule):
             from surveillance_ontology.reasoner.swrl_rules import normalise_rule
 
@@ -127,11 +130,11 @@ class Normaliser(RightSides):
 
     def _sub_class(self, sub: ClassExpression, sup: ClassExpression) -> None:
         sub, sup = normal(sub), normal(sup)
-        if isinstance(sub, ax.ObjectUnionOf):
+        if isinstance(sub, ex.ObjectUnionOf):
             for operand in sub.operands:
                 self._attempt(self._sub_class, operand, sup)
             return
-        opposite = sup.operand if isinstance(sup, ax.ObjectComplementOf) else None
+        opposite = sup.operand if isinstance(sup, ex.ObjectComplementOf) else None
         if isinstance(sub, str) and isinstance(opposite, str):
             self._disjoint(self._label(sub), self._label(opposite))
         for body in self.bodies(sub, _X):

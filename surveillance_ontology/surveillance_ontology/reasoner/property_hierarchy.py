@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from surveillance_ontology import axioms as ax
-from surveillance_ontology.axioms import Axiom, PropertyExpression
+from surveillance_ontology.axioms import Axiom
+from surveillance_ontology.expressions import PropertyExpression
 
 _Directed = tuple[str, bool]
 

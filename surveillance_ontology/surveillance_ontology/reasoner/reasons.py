@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from surveillance_ontology import axioms as ax
+from surveillance_ontology import expressions as ex
 from surveillance_ontology.axiom_text import axiom_text, expression_text, literal_text
-from surveillance_ontology.axioms import Axiom, Rule, local_name
+from surveillance_ontology.axioms import Axiom, Rule
 from surveillance_ontology.explanation import Explanation
 from surveillance_ontology.reasoner.clauses import Fact
 from surveillance_ontology.reasoner.datatypes import Value
@@ -13,6 +14,7 @@ from surveillance_ontology.reasoner.equality import Merge
 from surveillance_ontology.reasoner.proofs import Proof
 from surveillance_ontology.reasoner.swrl_builtins import builtin
 from surveillance_ontology.reasoner.view import FactView
+from surveillance_ontology.vocabulary import local_name
 
 _SIGNS = {
     'add': '+',
@@ -197,12 +199,12 @@ class Reasons:
 
     def _calculation(self, rule: Rule, proof: Proof) -> str:
         """The rule's built-ins with the values they were applied to, '' for a rule without."""
-        computed = [atom for atom in rule.body if isinstance(atom, ax.BuiltinAtom)]
+        computed = [atom for atom in rule.body if isinstance(atom, ex.BuiltinAtom)]
         if not computed:
             return ''
         values: dict[object, Value] = {}
         texts: dict[object, str] = {}
-        sources = [atom for atom in rule.body if isinstance(atom, ax.DataPropertyAtom)]
+        sources = [atom for atom in rule.body if isinstance(atom, ex.DataPropertyAtom)]
         facts = [premise.fact for premise in proof.premises]
         for source in sources:
             for fact in facts:
@@ -216,7 +218,7 @@ class Reasons:
             ready = [
                 atom
                 for atom in pending
-                if all(isinstance(a, ax.Literal) or a in values for a in atom.arguments[1:])
+                if all(isinstance(a, ex.Literal) or a in values for a in atom.arguments[1:])
             ]
             if not ready:
                 break
@@ -227,7 +229,7 @@ class Reasons:
 
     def _calculate(
         self,
-        atom: ax.BuiltinAtom,
+        atom: ex.BuiltinAtom,
         values: dict[object, Value],
         texts: dict[object, str],
         parts: list[str],
@@ -235,7 +237,7 @@ class Reasons:
         name = local_name(atom.builtin)
         shown: list[str] = []
         for argument in atom.arguments:
-            if isinstance(argument, ax.Literal):
+            if isinstance(argument, ex.Literal):
                 values[argument] = self._engine.value(argument)
                 texts[argument] = literal_text(argument)
             shown.append(texts.get(argument, ''))

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from surveillance_ontology import axioms as ax
-from surveillance_ontology.axioms import NOTHING, THING, ClassExpression
+from surveillance_ontology import expressions as ex
+from surveillance_ontology.expressions import ClassExpression
 from surveillance_ontology.reasoner.clauses import (
     AtMost,
     Constant,
@@ -17,6 +17,7 @@ from surveillance_ontology.reasoner.clauses import (
 from surveillance_ontology.reasoner.datatypes import Test, Value, value_of
 from surveillance_ontology.reasoner.left_sides import Body, LeftSides, Unsupported
 from surveillance_ontology.reasoner.normal_forms import is_positive, negated, normal
+from surveillance_ontology.vocabulary import NOTHING, THING
 
 _X = 0
 
@@ -34,22 +35,22 @@ class RightSides(LeftSides):
                 self.contradict(body, x)
             elif expression != THING:
                 self.clause(body, PredicateAtom(self.program.cls(expression), (x,)))
-        elif isinstance(expression, ax.ObjectIntersectionOf):
+        elif isinstance(expression, ex.ObjectIntersectionOf):
             for operand in expression.operands:
                 self._attempt(self.imply, body, operand, x)
-        elif isinstance(expression, ax.ObjectUnionOf):
+        elif isinstance(expression, ex.ObjectUnionOf):
             self._imply_union(body, expression, x)
-        elif isinstance(expression, ax.ObjectOneOf):
+        elif isinstance(expression, ex.ObjectOneOf):
             if len(expression.individuals) != 1:
                 raise Unsupported(
                     'which of several individuals it is would need reasoning by cases'
                 )
             self.clause(body, SameAtom((x, Constant(expression.individuals[0]))))
-        elif isinstance(expression, ax.ObjectHasValue):
+        elif isinstance(expression, ex.ObjectHasValue):
             self.clause(body, self.property(expression.prop, x, Constant(expression.individual)))
-        elif isinstance(expression, ax.ObjectHasSelf):
+        elif isinstance(expression, ex.ObjectHasSelf):
             self.clause(body, self.property(expression.prop, x, x))
-        elif isinstance(expression, ax.DataHasValue):
+        elif isinstance(expression, ex.DataHasValue):
             value = Constant(value_of(expression.literal), True)
             self.clause(body, PredicateAtom(self.program.data(expression.prop), (x, value)))
         else:
@@ -63,7 +64,7 @@ class RightSides(LeftSides):
     def contradict(self, body: Body, x: Term) -> None:
         self.clause(body, PredicateAtom(self.program.nothing, (x,)))
 
-    def _imply_union(self, body: Body, expression: ax.ObjectUnionOf, x: Term) -> None:
+    def _imply_union(self, body: Body, expression: ex.ObjectUnionOf, x: Term) -> None:
         positive: list[ClassExpression] = []
         for operand in expression.operands:
             opposite = negated(operand)
@@ -82,10 +83,10 @@ class RightSides(LeftSides):
         """What membership in a labelled expression implies."""
         x, body = _X, (PredicateAtom(label, (_X,)),)
         program = self.program
-        if isinstance(expression, (ax.ObjectSomeValuesFrom, ax.ObjectMinCardinality)):
-            n = expression.n if isinstance(expression, ax.ObjectMinCardinality) else 1
+        if isinstance(expression, (ex.ObjectSomeValuesFrom, ex.ObjectMinCardinality)):
+            n = expression.n if isinstance(expression, ex.ObjectMinCardinality) else 1
             filler = normal(expression.filler)
-            if n == 1 and isinstance(filler, ax.ObjectOneOf) and len(filler.individuals) == 1:
+            if n == 1 and isinstance(filler, ex.ObjectOneOf) and len(filler.individuals) == 1:
                 self.clause(
                     body, self.property(expression.prop, x, Constant(filler.individuals[0]))
                 )
@@ -95,8 +96,8 @@ class RightSides(LeftSides):
                 if n == 1 and self.hierarchy.is_functional(expression.prop):
                     y = self.fresh()
                     self.imply((*body, self.property(expression.prop, x, y)), filler, y)
-        elif isinstance(expression, (ax.DataSomeValuesFrom, ax.DataMinCardinality)):
-            n = expression.n if isinstance(expression, ax.DataMinCardinality) else 1
+        elif isinstance(expression, (ex.DataSomeValuesFrom, ex.DataMinCardinality)):
+            n = expression.n if isinstance(expression, ex.DataMinCardinality) else 1
             data = program.data(expression.prop)
             if n > 0:
                 self.test(expression.range)
@@ -104,12 +105,12 @@ class RightSides(LeftSides):
                 program.existentials.append(Existential(label, n, data, False, value_range))
             if n > 0 and self.hierarchy.is_functional(expression.prop):
                 self.only(body, expression.prop, expression.range)
-        elif isinstance(expression, ax.ObjectAllValuesFrom):
+        elif isinstance(expression, ex.ObjectAllValuesFrom):
             y = self.fresh()
             self.imply((*body, self.property(expression.prop, x, y)), expression.filler, y)
-        elif isinstance(expression, ax.DataAllValuesFrom):
+        elif isinstance(expression, ex.DataAllValuesFrom):
             self.only(body, expression.prop, expression.range)
-        elif isinstance(expression, ax.ObjectMaxCardinality):
+        elif isinstance(expression, ex.ObjectMaxCardinality):
             prop, inverse = self._direction(expression.prop)
             if expression.n == 0:
                 for related in self._related(expression.prop, expression.filler, x):
@@ -119,29 +120,29 @@ class RightSides(LeftSides):
                 program.at_most.append(
                     AtMost(label, expression.n, prop, inverse, filler_label, self._origin)
                 )
-        elif isinstance(expression, ax.DataMaxCardinality):
+        elif isinstance(expression, ex.DataMaxCardinality):
             data = program.data(expression.prop)
             if expression.n == 0:
                 self.contradict((*body, *self._valued(expression.prop, expression.range, x)), x)
             else:
                 test = self.test(expression.range)
                 program.at_most.append(AtMost(label, expression.n, data, False, test, self._origin))
-        elif isinstance(expression, ax.ObjectExactCardinality):
+        elif isinstance(expression, ex.ObjectExactCardinality):
             parts = (expression.n, expression.prop, expression.filler)
-            self.imply(body, ax.ObjectMinCardinality(*parts), x)
-            self.imply(body, ax.ObjectMaxCardinality(*parts), x)
-        elif isinstance(expression, ax.DataExactCardinality):
+            self.imply(body, ex.ObjectMinCardinality(*parts), x)
+            self.imply(body, ex.ObjectMaxCardinality(*parts), x)
+        elif isinstance(expression, ex.DataExactCardinality):
             values = (expression.n, expression.prop, expression.range)
-            self.imply(body, ax.DataMinCardinality(*values), x)
-            self.imply(body, ax.DataMaxCardinality(*values), x)
-        elif isinstance(expression, ax.ObjectComplementOf):
+            self.imply(body, ex.DataMinCardinality(*values), x)
+            self.imply(body, ex.DataMaxCardinality(*values), x)
+        elif isinstance(expression, ex.ObjectComplementOf):
             if isinstance(expression.operand, str):
                 self._disjoint(label, program.cls(expression.operand))
             else:
                 for other in self.bodies(expression.operand, x):
                     self.contradict((*body, *other), x)
 
-    def only(self, body: Body, prop: str, data_range: ax.DataRange) -> None:
+    def only(self, body: Body, prop: str, data_range: ex.DataRange) -> None:
         test = self.test(data_range)
         if test is not None:
             v = self.fresh()

@@ -14,7 +14,9 @@ from collections.abc import Iterable
 from itertools import count
 
 from surveillance_ontology import axioms as ax
-from surveillance_ontology.axioms import Axiom, ClassExpression
+from surveillance_ontology import expressions as ex
+from surveillance_ontology.axioms import Axiom
+from surveillance_ontology.expressions import ClassExpression
 from surveillance_ontology.reasoner.clauses import (
     Clause,
     Constant,
@@ -28,6 +30,7 @@ from surveillance_ontology.reasoner.datatypes import Value
 from surveillance_ontology.reasoner.engine import Engine
 from surveillance_ontology.reasoner.normalisation import Normaliser
 from surveillance_ontology.reasoner.simplification import simplify
+from surveillance_ontology.vocabulary import NOTHING, THING
 
 _ROOT = '_:prototype'
 _MADE_UP = '_:made'
@@ -36,13 +39,13 @@ _MAX_MADE_UP = 200
 _MAX_PAIRS = 400
 _MAX_COUNT = 12
 _MAX_PROPERTIES = 24
-_EXISTENTIALS = (ax.ObjectSomeValuesFrom, ax.ObjectMinCardinality)
+_EXISTENTIALS = (ex.ObjectSomeValuesFrom, ex.ObjectMinCardinality)
 _RESTRICTIONS = (
     *_EXISTENTIALS,
-    ax.ObjectAllValuesFrom,
-    ax.ObjectMaxCardinality,
-    ax.DataAllValuesFrom,
-    ax.DataMaxCardinality,
+    ex.ObjectAllValuesFrom,
+    ex.ObjectMaxCardinality,
+    ex.DataAllValuesFrom,
+    ex.DataMaxCardinality,
 )
 
 
@@ -228,9 +231,9 @@ class _Prototypes:
     def _filled(self, existential: Existential) -> Predicate | None:
         filler = existential.filler
         if isinstance(filler, str):
-            if filler == ax.NOTHING:
+            if filler == NOTHING:
                 return self.program.nothing
-            return None if filler == ax.THING else self.program.cls(filler)
+            return None if filler == THING else self.program.cls(filler)
         return self._labels[filler]
 
     def interacting(self, label: Predicate) -> list[Predicate]:

@@ -6,7 +6,8 @@ from itertools import product
 from typing import TYPE_CHECKING
 
 from surveillance_ontology import axioms as ax
-from surveillance_ontology.axioms import SWRLB, Literal, local_name
+from surveillance_ontology import expressions as ex
+from surveillance_ontology.expressions import Literal
 from surveillance_ontology.reasoner.clauses import (
     BodyAtom,
     ComputedAtom,
@@ -19,6 +20,7 @@ from surveillance_ontology.reasoner.clauses import (
 )
 from surveillance_ontology.reasoner.datatypes import value_of
 from surveillance_ontology.reasoner.swrl_builtins import builtin
+from surveillance_ontology.vocabulary import NOTHING, SWRLB, local_name
 
 if TYPE_CHECKING:
     from surveillance_ontology.reasoner.normalisation import Normaliser
@@ -29,19 +31,19 @@ class _Terms:
 
     def __init__(self, normaliser: Normaliser) -> None:
         self._normaliser = normaliser
-        self._numbers: dict[ax.Variable, int] = {}
+        self._numbers: dict[ex.Variable, int] = {}
         self.individuals: set[int] = set()
         self.values: set[int] = set()
 
-    def individual(self, argument: ax.IndividualArgument) -> Term:
-        if isinstance(argument, ax.Variable):
+    def individual(self, argument: ex.IndividualArgument) -> Term:
+        if isinstance(argument, ex.Variable):
             number = self._number(argument)
             self.individuals.add(number)
             return number
         return Constant(argument)
 
-    def value(self, argument: ax.DataArgument) -> Term:
-        if isinstance(argument, ax.Variable):
+    def value(self, argument: ex.DataArgument) -> Term:
+        if isinstance(argument, ex.Variable):
             number = self._number(argument)
             self.values.add(number)
             return number
@@ -49,7 +51,7 @@ class _Terms:
             _unsupported(f'{argument} stands where a literal or a variable is expected')
         return Constant(value_of(argument), True)
 
-    def _number(self, variable: ax.Variable) -> int:
+    def _number(self, variable: ex.Variable) -> int:
         number = self._numbers.get(variable)
         if number is None:
             number = self._numbers[variable] = self._normaliser.fresh()
@@ -62,7 +64,7 @@ def _unsupported(text: str) -> None:
     raise Unsupported(text)
 
 
-def _computed(atom: ax.BuiltinAtom, terms: _Terms) -> ComputedAtom:
+def _computed(atom: ex.BuiltinAtom, terms: _Terms) -> ComputedAtom:
     name = atom.builtin.removeprefix(SWRLB)
     known = builtin(name, len(atom.arguments)) if atom.builtin.startswith(SWRLB) else None
     if known is None:
@@ -80,23 +82,23 @@ def normalise_rule(normaliser: Normaliser, rule: ax.Rule) -> None:
     program, terms = normaliser.program, _Terms(normaliser)
     alternatives: list[list[tuple[BodyAtom, ...]]] = []
     for atom in rule.body:
-        if isinstance(atom, ax.ClassAtom):
+        if isinstance(atom, ex.ClassAtom):
             alternatives.append(normaliser.bodies(atom.cls, terms.individual(atom.argument)))
-        elif isinstance(atom, ax.DataRangeAtom):
+        elif isinstance(atom, ex.DataRangeAtom):
             term, test = terms.value(atom.argument), normaliser.test(atom.range)
             if test is not None:
                 alternatives.append([(RangeAtom(test, (term,)),)])
-        elif isinstance(atom, ax.ObjectPropertyAtom):
+        elif isinstance(atom, ex.ObjectPropertyAtom):
             pair = terms.individual(atom.first), terms.individual(atom.second)
             alternatives.append([(normaliser.property(atom.prop, *pair),)])
-        elif isinstance(atom, ax.DataPropertyAtom):
+        elif isinstance(atom, ex.DataPropertyAtom):
             data = program.data(atom.prop)
             both = (terms.individual(atom.first), terms.value(atom.second))
             alternatives.append([(PredicateAtom(data, both),)])
-        elif isinstance(atom, ax.SameIndividualAtom):
+        elif isinstance(atom, ex.SameIndividualAtom):
             pair = terms.individual(atom.first), terms.individual(atom.second)
             alternatives.append([(SameAtom(pair),)])
-        elif isinstance(atom, ax.DifferentIndividualsAtom):
+        elif isinstance(atom, ex.DifferentIndividualsAtom):
             pair = terms.individual(atom.first), terms.individual(atom.second)
             alternatives.append([(DifferentAtom(pair),)])
         else:
@@ -155,20 +157,20 @@ def _heads(
 
     if not rule.head:
         subject = next((term for term in sorted(bound) if term in terms.individuals), None)
-        term: Term = Constant(ax.NOTHING) if subject is None else subject
+        term: Term = Constant(NOTHING) if subject is None else subject
         normaliser.contradict(body, term)
     for atom in rule.head:
-        if isinstance(atom, ax.ClassAtom):
+        if isinstance(atom, ex.ClassAtom):
             normaliser.imply(body, atom.cls, known(terms.individual(atom.argument)))
-        elif isinstance(atom, ax.ObjectPropertyAtom):
+        elif isinstance(atom, ex.ObjectPropertyAtom):
             pair = known(terms.individual(atom.first)), known(terms.individual(atom.second))
             normaliser.clause(body, normaliser.property(atom.prop, *pair))
-        elif isinstance(atom, ax.DataPropertyAtom):
+        elif isinstance(atom, ex.DataPropertyAtom):
             both = (known(terms.individual(atom.first)), known(terms.value(atom.second)))
             normaliser.clause(body, PredicateAtom(program.data(atom.prop), both))
-        elif isinstance(atom, (ax.SameIndividualAtom, ax.DifferentIndividualsAtom)):
+        elif isinstance(atom, (ex.SameIndividualAtom, ex.DifferentIndividualsAtom)):
             pair = known(terms.individual(atom.first)), known(terms.individual(atom.second))
-            if isinstance(atom, ax.SameIndividualAtom):
+            if isinstance(atom, ex.SameIndividualAtom):
                 normaliser.clause(body, SameAtom(pair))
             else:
                 normaliser.clause(body, PredicateAtom(program.different, pair))

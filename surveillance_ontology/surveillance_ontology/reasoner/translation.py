@@ -5,24 +5,22 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 
 from surveillance_ontology.axioms import (
-    NOTHING,
-    THING,
     Assertion,
     Axiom,
     ClassAssertion,
-    ClassExpression,
     DataPropertyAssertion,
     Declaration,
-    Literal,
     NegativeDataPropertyAssertion,
     NegativeObjectPropertyAssertion,
     ObjectPropertyAssertion,
     SameIndividual,
-    entities_of,
 )
+from surveillance_ontology.entities import entities_of
+from surveillance_ontology.expressions import ClassExpression, Literal
 from surveillance_ontology.reasoner.clauses import Fact, Program
 from surveillance_ontology.reasoner.datatypes import Value, value_of
 from surveillance_ontology.reasoner.equality import Equality
+from surveillance_ontology.vocabulary import NOTHING, THING
 
 
 class Translation:

@@ -8,10 +8,10 @@ from surveillance_ontology.axioms import (
     Axiom,
     ClassAssertion,
     DataPropertyAssertion,
-    Literal,
     ObjectPropertyAssertion,
     SameIndividual,
 )
+from surveillance_ontology.expressions import Literal
 from surveillance_ontology.reasoner.clauses import Fact, Predicate
 from surveillance_ontology.reasoner.datatypes import Value, literal_of
 from surveillance_ontology.reasoner.engine import Engine
