@@ -25,7 +25,8 @@ from surveillance_ontology.axioms import (
 )
 from surveillance_ontology.explanation import Explanation
 from surveillance_ontology.expressions import Literal
-from surveillance_ontology.knowledge_base import Fact, KnowledgeBase
+from surveillance_ontology.knowledge import Fact
+from surveillance_ontology.knowledge_base import KnowledgeBase
 from surveillance_ontology.knowledge_changes import Changes
 from surveillance_ontology.owl_writing import ontology_bytes
 from surveillance_ontology.vocabulary import OWL, RDF, RDFS, THING

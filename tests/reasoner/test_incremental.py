@@ -20,7 +20,8 @@ from surveillance_ontology.axioms import (
     SymmetricObjectProperty,
     TransitiveObjectProperty,
 )
-from surveillance_ontology.knowledge_base import Changes, KnowledgeBase
+from surveillance_ontology.knowledge_base import KnowledgeBase
+from surveillance_ontology.knowledge_changes import Changes
 from tests.reasoner.patrol_map import (
     DOOR_FACTS,
     DOORS_DIFFER,

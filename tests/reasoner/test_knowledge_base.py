@@ -13,7 +13,8 @@ from surveillance_ontology.axioms import (
     SubClassOf,
 )
 from surveillance_ontology.expressions import Literal
-from surveillance_ontology.knowledge_base import Changes, KnowledgeBase
+from surveillance_ontology.knowledge_base import KnowledgeBase
+from surveillance_ontology.knowledge_changes import Changes
 from surveillance_ontology.vocabulary import THING
 from tests.reasoner.patrol_map import (
     IRI,

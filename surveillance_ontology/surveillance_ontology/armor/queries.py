@@ -22,7 +22,7 @@ from surveillance_ontology.axioms import (
     ObjectPropertyAssertion,
     SameIndividual,
 )
-from surveillance_ontology.knowledge_base import Fact
+from surveillance_ontology.knowledge import Fact
 from surveillance_ontology.vocabulary import NOTHING, local_name
 
 
