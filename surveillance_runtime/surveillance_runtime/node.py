@@ -9,6 +9,7 @@ messages still flow (a running goal can be cancelled), and only then takes ROS d
 from __future__ import annotations
 
 import itertools
+import queue
 import signal
 import sys
 import threading
@@ -258,10 +259,15 @@ def run_nodes(
     factories: Sequence[Callable[[], PatrolNode]], args: Sequence[str] | None = None
 ) -> int:
     """Run several nodes in this process on one executor; otherwise as `run_node`."""
-    ended = threading.Event()
+    # A handler may run in the middle of the main thread's own wait, where an Event's lock is taken
+    # and would never be let go: only SimpleQueue.put may be entered anew.
+    ended: queue.SimpleQueue[None] = queue.SimpleQueue()
+
+    def end() -> None:
+        ended.put(None)
 
     def on_signal(_number: int, _frame: Any) -> None:
-        ended.set()
+        end()
 
     # Set by hand: background jobs of a shell inherit an ignored SIGINT.
     for number in (signal.SIGINT, signal.SIGTERM):
@@ -280,9 +286,9 @@ def run_nodes(
         for factory in factories:
             nodes.append(factory())
             spinner.executor.add_node(nodes[-1])
-            nodes[-1].ended.subscribe(ended.set)
-        spinner.start(on_end=ended.set)
-        ended.wait()
+            nodes[-1].ended.subscribe(end)
+        spinner.start(on_end=end)
+        ended.get()
     except (ParameterError, StartError) as error:
         print(f'cannot start: {_one_line(error)}', file=sys.stderr)
         code = EXIT_CANNOT_START

@@ -131,6 +131,33 @@ def test_process_stops_cleanly_on_a_signal(number):
     assert err == ''
 
 
+SIGNALS_IN_EVERY_STEP = """
+import signal, sys, threading
+def trace(frame, event, argument):
+    if frame.f_code.co_filename == threading.__file__:
+        signal.raise_signal(signal.SIGTERM)
+        return trace
+class Traced(Program):
+    def __init__(self):
+        super().__init__()
+        sys.settrace(trace)
+    def on_stop(self):
+        sys.settrace(None)
+        super().on_stop()
+sys.exit(run_node(Traced, []))
+"""
+
+
+def test_signals_in_the_middle_of_any_step_of_a_wait_stop_the_process():
+    program = PROGRAM.rpartition('sys.exit')[0] + SIGNALS_IN_EVERY_STEP
+    run = subprocess.run(
+        [sys.executable, '-c', program], capture_output=True, text=True, timeout=20
+    )
+    assert run.returncode == 0
+    assert 'stopping' in run.stdout
+    assert run.stderr == ''
+
+
 @pytest.mark.parametrize(
     ('arguments', 'complaint'),
     [
