@@ -2,16 +2,30 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Sequence
 from typing import Any
 
 from geometry_msgs.msg import Point as PointMessage
 
+from surveillance_behaviour.fsm.active import ActiveContainer
+from surveillance_behaviour.fsm.export import to_mermaid
+from surveillance_behaviour.fsm.record import Transition
+from surveillance_behaviour.fsm.structure import structure_of
 from surveillance_behaviour.policy.situation import Decision
 from surveillance_behaviour.ports import Point
 from surveillance_behaviour.survey import PlaceNote
 from surveillance_interfaces.msg import Decision as DecisionMessage
-from surveillance_interfaces.msg import OntologyMap, OntologyPlace, RoomConnection
+from surveillance_interfaces.msg import (
+    FsmContainer,
+    FsmEdge,
+    FsmStatus,
+    FsmStructure,
+    FsmTransition,
+    OntologyMap,
+    OntologyPlace,
+    RoomConnection,
+)
 
 
 def point_from(message: PointMessage) -> Point:
@@ -54,7 +68,7 @@ def decision_message(decision: Decision, sequence: int, stamp: Any) -> DecisionM
 def decision_from(message: DecisionMessage) -> Decision:
     """A decision as it was published."""
     return Decision(
-        time=message.stamp.sec + message.stamp.nanosec / 1e9,
+        time=_seconds(message.stamp),
         from_place=message.from_place,
         place=message.place,
         target=message.target,
@@ -89,3 +103,81 @@ def map_message(places: Iterable[PlaceNote], robot_room: str) -> OntologyMap:
         ],
         robot_room=robot_room,
     )
+
+
+def transition_message(transition: Transition, active: list[str], stamp: Any) -> FsmTransition:
+    """A transition of a machine, with the paths that are active and the time of publishing."""
+    return FsmTransition(
+        stamp=stamp,
+        sequence=transition.sequence,
+        path=transition.path,
+        from_state=transition.from_state,
+        outcome=transition.outcome,
+        to_state=transition.to_state,
+        kind=transition.kind,
+        duration=float(transition.duration),
+        visits=transition.visits,
+        active=active,
+        userdata_keys=list(transition.userdata),
+        userdata_values=[json.dumps(value) for value in transition.userdata.values()],
+    )
+
+
+def transition_from(message: FsmTransition) -> Transition:
+    """The transition of a message; its time is the time of publishing, in seconds."""
+    return Transition(
+        sequence=message.sequence,
+        time=_seconds(message.stamp),
+        path=message.path,
+        from_state=message.from_state,
+        outcome=message.outcome,
+        to_state=message.to_state,
+        kind=message.kind,
+        duration=message.duration,
+        visits=message.visits,
+        userdata={
+            key: json.loads(value)
+            for key, value in zip(message.userdata_keys, message.userdata_values, strict=True)
+        },
+    )
+
+
+def status_message(root: ActiveContainer, sequence: int, stamp: Any) -> FsmStatus:
+    """What a machine's root is doing, after the transition with number `sequence`."""
+    return FsmStatus(
+        stamp=stamp,
+        root=root.get_name(),
+        sequence=sequence,
+        running=root.is_running(),
+        paused=root.control.paused,
+        active=root.control.active_paths(),
+        left_behind=root.control.left_behind(),
+    )
+
+
+def structure_message(root: ActiveContainer, stamp: Any) -> FsmStructure:
+    """A machine's root and all its containers."""
+    return FsmStructure(
+        stamp=stamp,
+        root=root.get_name(),
+        containers=[
+            FsmContainer(
+                path=structure.path,
+                kind=structure.kind,
+                states=list(structure.states),
+                interrupts=list(structure.interrupts),
+                initial_states=structure.initial,
+                outcomes=structure.outcomes,
+                edges=[
+                    FsmEdge(from_state=edge.source, outcome=edge.outcome, to_state=edge.target)
+                    for edge in structure.edges
+                ],
+            )
+            for structure in structure_of(root).walk()
+        ],
+        mermaid=to_mermaid(root),
+    )
+
+
+def _seconds(stamp: Any) -> float:
+    return float(stamp.sec + stamp.nanosec / 1e9)

@@ -9,9 +9,9 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_srvs.srv import Trigger
 
 from surveillance_behaviour import fsm
+from surveillance_behaviour.conversions import transition_from, transition_message
 from surveillance_behaviour.fsm.record import Transition
 from surveillance_behaviour.fsm_ros import IntrospectionServer
-from surveillance_behaviour.fsm_ros.conversions import transition_from_ros, transition_to_ros
 from surveillance_interfaces.msg import FsmStatus, FsmStructure, FsmTransition
 from surveillance_interfaces.srv import ForceOutcome, SetInitialState
 from surveillance_runtime.calls import ServiceCaller
@@ -175,5 +175,5 @@ def test_a_transition_survives_the_message():
     )
     from builtin_interfaces.msg import Time
 
-    message = transition_to_ros(transition, ['A/B'], Time(sec=12, nanosec=500_000_000))
-    assert transition_from_ros(message) == transition
+    message = transition_message(transition, ['A/B'], Time(sec=12, nanosec=500_000_000))
+    assert transition_from(message) == transition

@@ -13,8 +13,10 @@ from surveillance_behaviour.fsm.exceptions import (
     InvalidStateError,
     InvalidTransitionError,
 )
-from surveillance_behaviour.fsm.run import DEFAULT_PREEMPT_TIMEOUT, Run, Strand, supervise
+from surveillance_behaviour.fsm.interface import has_smach_interface
+from surveillance_behaviour.fsm.run import DEFAULT_PREEMPT_TIMEOUT, Run, Strand
 from surveillance_behaviour.fsm.state import State
+from surveillance_behaviour.fsm.supervision import supervise
 from surveillance_behaviour.fsm.this_thread import this_thread
 from surveillance_behaviour.fsm.waiting import WALL_CLOCK, Clock, Interrupt
 
@@ -44,8 +46,31 @@ class ActiveContainer(Container):
         self._fsm_raised: list[Branch] = []
         # Asked to be put aside in the moment before it began.
         self._fsm_aside = False
+        self._states: dict[str, State] = {}
         self._branches: dict[str, Branch] = {}
         self._table_version = 0
+
+    # States by label.
+
+    def __getitem__(self, key: str) -> State:
+        try:
+            return self._states[key]
+        except KeyError:
+            raise KeyError(
+                f"'{self._fsm_path}' has no state '{key}': its states are {sorted(self._states)}"
+            ) from None
+
+    def get_children(self) -> dict[str, State]:
+        """The states by label."""
+        return dict(self._states)
+
+    def _check_new(self, label: str, state: State) -> None:
+        """Raise `InvalidStateError` when `state` cannot be added as `label`."""
+        path = self._path_of(label)
+        if label in self._states or label in self._branches:
+            raise InvalidStateError(f"State '{path}' is already there: a label names one state")
+        if not has_smach_interface(state) or not callable(getattr(state, 'execute', None)):
+            raise InvalidStateError(f"State '{path}' must be an instance of State, not {state!r}")
 
     # Settings.
 

@@ -86,7 +86,7 @@ def _history(container: ActiveContainer) -> History | None:
     if isinstance(container, DrivenContainer):
         return frame.history(frame.current)
     if isinstance(container, Concurrence):
-        return History(outcomes=container._ended())
+        return History(outcomes=container._children.ended())
     return None
 
 

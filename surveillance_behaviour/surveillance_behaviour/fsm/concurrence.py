@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable, Mapping
+from collections.abc import Hashable, Iterable, Mapping
 from collections.abc import Sequence as LabelSequence
 from typing import Any
 
 from surveillance_behaviour.fsm import log
 from surveillance_behaviour.fsm.active import ActiveContainer, forget, stop_for_now
+from surveillance_behaviour.fsm.children import Children
 from surveillance_behaviour.fsm.engine import (
     LOWEST,
     RESUME,
@@ -23,25 +24,19 @@ from surveillance_behaviour.fsm.exceptions import (
     InvalidTransitionError,
     SmachError,
 )
-from surveillance_behaviour.fsm.interface import has_smach_interface
 from surveillance_behaviour.fsm.limits import Limits, make_limits
 from surveillance_behaviour.fsm.nodes import make_node, user_fault, wrong_outcome
 from surveillance_behaviour.fsm.outcome_policy import (
     ChildTerminationCallback,
     OutcomeCallback,
     OutcomePolicy,
-    Outcomes,
 )
-from surveillance_behaviour.fsm.run import LeftBehind, Strand, supervise
+from surveillance_behaviour.fsm.run import LeftBehind, Strand
 from surveillance_behaviour.fsm.state import State
 from surveillance_behaviour.fsm.user_data import UserData
-from surveillance_behaviour.fsm.waiting import Clock, Interrupt
+from surveillance_behaviour.fsm.waiting import Clock
 
 _TOGETHER = Exit('')
-
-
-def _preempt(state: State) -> None:
-    state.request_preempt()
 
 
 class Concurrence(ActiveContainer):
@@ -75,7 +70,7 @@ class Concurrence(ActiveContainer):
         child_termination_cb: ChildTerminationCallback | None = None,
     ) -> None:
         super().__init__(outcomes, input_keys, output_keys)
-        self._states: dict[str, State] = {}
+        self._children = Children(self._states)
         self._remappings: dict[str, dict[str, str]] = {}
         self._limits: dict[str, Limits] = {}
         self._policy = OutcomePolicy(
@@ -85,13 +80,6 @@ class Concurrence(ActiveContainer):
             outcome_cb,
             child_termination_cb,
         )
-        self._child_outcomes: Outcomes = {}
-        self._wakeup = Interrupt()
-        self._strands: dict[str, Strand] = {}
-        self._nodes: dict[str, Node] = {}
-        self._making_way: set[str] = set()
-        self._preempted: set[str] = set()
-        self._gone: set[str] = set()
 
     @staticmethod
     def add(
@@ -121,10 +109,7 @@ class Concurrence(ActiveContainer):
         """
         concurrence = Concurrence._currently_opened_container()
         path = concurrence._path_of(label)
-        if label in concurrence._states or label in concurrence._branches:
-            raise InvalidStateError(f"State '{path}' is already there: a label names one state")
-        if not has_smach_interface(state) or not callable(getattr(state, 'execute', None)):
-            raise InvalidStateError(f"State '{path}' must be an instance of State, not {state!r}")
+        concurrence._check_new(label, state)
         limits = make_limits(path, state, {}, timeout, deadline, retry, retry_on)
         if limits is not None:
             concurrence._limits[label] = limits
@@ -166,9 +151,7 @@ class Concurrence(ActiveContainer):
             if history is None:
                 self._copy_input_keys(parent_ud, self.userdata)
             with run.condition:
-                self._child_outcomes = dict.fromkeys(self._states)
-                if history is not None:
-                    self._child_outcomes.update(history.outcomes)
+                self._children.begin(history.outcomes if history is not None else {})
             if log.chatty():
                 log.loginfo(f"'{self._fsm_path}' starts {sorted(self._states)} together")
             if history is None:
@@ -189,51 +172,45 @@ class Concurrence(ActiveContainer):
 
     def _run_children(self, frame: Frame) -> Any:
         """Run children, and interrupts in between, until there is an outcome."""
+        children = self._children
         while True:
             with frame.strand.run.condition:
                 branch = self._next_branch(frame)
             if branch is None:
                 self._start_children(frame)
-                error = self._await_children(frame)
+                error = children.wait(
+                    frame,
+                    lambda: self._policy.to_stop(self._fsm_path, children.outcomes),
+                    lambda label, outcome: self._tell_end(frame, label, outcome),
+                )
                 if error is not None:
                     raise error
                 with frame.strand.run.condition:
                     if frame.suspending and not self._preempt_requested:
-                        self._fsm_history = History(outcomes=self._ended())
+                        self._fsm_history = History(outcomes=children.ended())
                         return SUSPENDED
-                    if len(self._ended()) == len(self._states):
+                    if children.all_ended():
                         break
                 continue
             outcome = self._run_branch(frame, branch)
             if outcome is not None:
                 return outcome
-        self._service_children()
-        return self._policy.decide(self._fsm_path, self._child_outcomes)
-
-    def _ended(self) -> dict[str, str]:
-        return {label: end for label, end in self._child_outcomes.items() if end is not None}
+        if children.served_preempt(self._fsm_path, preempted=self._preempt_requested):
+            self.service_preempt()
+        return self._policy.decide(self._fsm_path, children.outcomes)
 
     def _start_children(self, frame: Frame) -> None:
         run = frame.strand.run
-        strands = {}
         with run.condition:
-            self._making_way.clear()
-            self._preempted.clear()
-            self._gone.clear()
-            for label, state in self._states.items():
-                if self._child_outcomes[label] is None:
-                    node = self._nodes[label] = self._node(label, state, run.clock)
-                    strand = strands[label] = Strand(run, self._path_of(label), self._wakeup)
-                    strand.begin_with(state, node)
-            self._strands = strands
+            nodes = self._children.make_strands(
+                run, self._fsm_path, lambda label, state: self._node(label, state, run.clock)
+            )
         self.call_transition_cbs()
-        for label, strand in strands.items():
-            node = self._nodes[label]
-            strand.start(lambda node=node: self._execute(node))  # type: ignore[misc]
+        self._children.start(nodes, self._execute)
         with run.condition:
             # What was asked before there was anybody to ask.
             if self._preempt_requested:
-                self._preempt_children()
+                self._children.preempt()
             elif frame.suspending or self._urgent(frame):
                 self._cut(frame)
 
@@ -265,52 +242,7 @@ class Concurrence(ActiveContainer):
             raise wrong_outcome(path, node, outcome)
         return outcome
 
-    def _await_children(self, frame: Frame) -> BaseException | None:
-        """Watch the children until all have ended; the first error of one stops the others."""
-        run = frame.strand.run
-        running = dict(self._strands)
-        first_error: BaseException | None = None
-        while running:
-            supervise(run, list(running.values()), self._wakeup)
-            if frame.stale:
-                self._abandon(running)
-            for label in [label for label, strand in running.items() if strand.done]:
-                strand = running.pop(label)
-                if strand.error is not None:
-                    first_error = first_error or strand.error
-                    self._stop(running, _preempt)
-                    continue
-                if strand.without_leaf:
-                    self._gone.add(label)
-                self._note_end(frame, label, strand.outcome)
-                if first_error is None:
-                    try:
-                        stop = self._policy.to_stop(self._fsm_path, self._child_outcomes)
-                    except SmachError as error:
-                        first_error, stop = error, frozenset(running)
-                    self._stop(
-                        {other: running[other] for other in stop if other in running}, _preempt
-                    )
-        with run.condition:
-            self._strands = {}
-        return first_error
-
-    def _note_end(self, frame: Frame, label: str, outcome: Any) -> None:
-        state = self._states[label]
-        with frame.strand.run.condition:
-            if outcome is SUSPENDED:
-                return
-            if label in self._making_way:
-                made_way = not state.preempt_requested() or outcome == 'preempted'
-                if label not in self._gone:
-                    state.recall_preempt()
-                if made_way:
-                    return
-                # It ended by itself: a preempt that it was asked for, too, is not served by that.
-                self._preempted.discard(label)
-            if getattr(state, '_fsm_progress', None) is not None:
-                state._fsm_progress = None
-            self._child_outcomes[label] = outcome
+    def _tell_end(self, frame: Frame, label: str, outcome: str) -> None:
         if frame.trace is not None:
             data = self.userdata._data.copy()
             frame.trace((frame.path, label, outcome, '', frame.now(), data, 'ended'))
@@ -318,48 +250,10 @@ class Concurrence(ActiveContainer):
             log.loginfo(f"'{frame.path}': '{label}' ended with '{outcome}'")
         self.call_transition_cbs()
 
-    def _stop(self, strands: Mapping[str, Strand], ask: Callable[[State], object]) -> None:
-        for label, strand in strands.items():
-            if not strand.done:
-                strand.asked()
-                ask(self._states[label])
-
-    def _abandon(self, running: Mapping[str, Strand]) -> None:
-        self._stop(running, _preempt)
-        for strand in running.values():
-            strand.disown()
-        raise LeftBehind
-
-    def _preempt_children(self) -> None:
-        # Each is asked once: a second request could come after it has served the first.
-        asked = {
-            label: strand
-            for label, strand in self._strands.items()
-            if not strand.done and label not in self._preempted
-        }
-        self._preempted.update(asked)
-        self._stop(asked, _preempt)
-
-    def _service_children(self) -> None:
-        """Acknowledge the preempt if one of those asked did; recall what the rest left pending."""
-        # A state that was left behind keeps the request, so that it ends some time.
-        ignored = [
-            label
-            for label, state in self._states.items()
-            if state.preempt_requested() and label not in self._gone
-        ]
-        for label in ignored:
-            self._states[label].recall_preempt()
-        if self._preempt_requested:
-            if ignored:
-                log.logwarn(f"'{self._fsm_path}': {ignored} did not acknowledge the preempt")
-            if self._preempted.difference(ignored):
-                self.service_preempt()
-
     # Preempts and interrupts.
 
     def _fsm_woken(self) -> None:
-        self._wakeup.set()
+        self._children.wakeup.set()
 
     def request_preempt(self) -> None:
         """Ask all children that run to stop."""
@@ -372,7 +266,7 @@ class Concurrence(ActiveContainer):
             if isinstance(current, Node):
                 frame.strand.asked()
                 current.state.request_preempt()
-            self._preempt_children()
+            self._children.preempt()
             frame.strand.run.condition.notify_all()
 
     def _urgent(self, frame: Frame) -> bool:
@@ -398,10 +292,7 @@ class Concurrence(ActiveContainer):
             frame.strand.asked()
             stop_for_now(current.state)
         else:
-            self._making_way.update(
-                label for label, strand in self._strands.items() if not strand.done
-            )
-            self._stop(self._strands, stop_for_now)
+            self._children.make_way()
 
     def _next_branch(self, frame: Frame) -> Branch | None:
         if self._preempt_requested or not self._fsm_raised:
@@ -434,7 +325,7 @@ class Concurrence(ActiveContainer):
             if outcome is SUSPENDED or (frame.cut is node and served):
                 self._fsm_raised.append(branch)
                 if frame.suspending:
-                    self._fsm_history = History(outcomes=self._ended())
+                    self._fsm_history = History(outcomes=self._children.ended())
                     return SUSPENDED
                 return None
             forget(branch.state)
@@ -448,18 +339,6 @@ class Concurrence(ActiveContainer):
         return target
 
     # The container's interface.
-
-    def __getitem__(self, key: str) -> State:
-        try:
-            return self._states[key]
-        except KeyError:
-            raise KeyError(
-                f"'{self._fsm_path}' has no state '{key}': its states are {sorted(self._states)}"
-            ) from None
-
-    def get_children(self) -> dict[str, State]:
-        """The states by label."""
-        return dict(self._states)
 
     def get_initial_states(self) -> list[str]:
         """The labels of all states."""
@@ -478,7 +357,7 @@ class Concurrence(ActiveContainer):
         """The labels of the states that run."""
         if self._frame is None:
             return []
-        return [label for label, outcome in self._child_outcomes.items() if outcome is None]
+        return [label for label, outcome in self._children.outcomes.items() if outcome is None]
 
     def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
         """The outcome map as (child outcome, label, outcome)."""

@@ -1,8 +1,7 @@
-"""Containers in which one state runs at a time: their loop and all that may come between states.
+"""Containers in which one state runs at a time: their table of nodes and the loop that runs it.
 
-`StateMachine` and `Iterator` differ in how their table of nodes is made; what happens between two
-states is the same for both and is here: preempts are passed on, interrupts cut in and are resumed
-from, transitions are reported, a paused machine stands still.
+`StateMachine` and `Iterator` differ in how the table is made; all else is the same for both and is
+here, except what may come between two states (`between_states`).
 """
 
 from __future__ import annotations
@@ -13,33 +12,20 @@ from collections.abc import Iterable
 from typing import Any
 
 from surveillance_behaviour.fsm import log, shutdown
-from surveillance_behaviour.fsm.active import ActiveContainer, forget, let_go, stop_for_now
-from surveillance_behaviour.fsm.container import Container
-from surveillance_behaviour.fsm.engine import (
-    LOWEST,
-    RESUME,
-    RESUMPTION,
-    SUSPENDED,
-    Exit,
-    Frame,
-    Node,
-)
-from surveillance_behaviour.fsm.exceptions import (
-    InvalidStateError,
-    SmachError,
-)
+from surveillance_behaviour.fsm.active import ActiveContainer, stop_for_now
+from surveillance_behaviour.fsm.between_states import ASIDE, SHUTDOWN, BetweenStates
+from surveillance_behaviour.fsm.engine import RESUME, RESUMPTION, SUSPENDED, Exit, Frame, Node
+from surveillance_behaviour.fsm.exceptions import InvalidStateError, SmachError
 from surveillance_behaviour.fsm.limits import settle
 from surveillance_behaviour.fsm.nodes import make_node, user_fault, wrong_outcome
-from surveillance_behaviour.fsm.run import LeftBehind, Strand
+from surveillance_behaviour.fsm.run import Strand
 from surveillance_behaviour.fsm.state import State
 from surveillance_behaviour.fsm.waiting import Clock
 
 _start_lock = threading.Lock()
-_SHUTDOWN = Exit('shutdown')
-_ASIDE = Exit('aside')
 
 
-class DrivenContainer(ActiveContainer):
+class DrivenContainer(BetweenStates):
     """Base of the containers that run one state at a time."""
 
     def __init__(
@@ -182,17 +168,11 @@ class DrivenContainer(ActiveContainer):
                 trace((path, node.label, outcome, target.label, now(), data.copy(), target.kind))
         return target  # type: ignore[return-value]
 
-    def _target(self, node: Node, outcome: Any) -> Node | Exit:
-        try:
-            return node.targets[outcome]
-        except (KeyError, TypeError):
-            raise wrong_outcome(self._path_of(node.label), node, outcome) from None
-
     def _finish(self, frame: Frame, target: Exit) -> Any:
-        if target is _ASIDE:
+        if target is ASIDE:
             return SUSPENDED
         self._copy_output_keys(self.userdata, frame.parent_ud)
-        return None if target is _SHUTDOWN else target.label
+        return None if target is SHUTDOWN else target.label
 
     def _leave(self, frame: Frame) -> None:
         run = frame.strand.run
@@ -201,161 +181,6 @@ class DrivenContainer(ActiveContainer):
             if self._frame is frame:
                 self._frame = None
             run.condition.notify_all()
-
-    # Between two states.
-
-    def _attend(
-        self, frame: Frame, left: Node | None, outcome: Any, target: Node | Exit
-    ) -> Node | Exit:
-        """Do what comes between two states beside the transition itself.
-
-        Args:
-            frame: The execution.
-            left: The state that ended; None at the start.
-            outcome: What it returned.
-            target: Where that leads by the table.
-
-        Returns:
-            Where to go.
-        """
-        run = frame.strand.run
-        ended = left
-        with run.condition:
-            if frame.stale:
-                raise LeftBehind
-            frame.strand.heeded()
-            frame.attention = False
-            kind = 'start' if left is None else 'transition'
-            while True:
-                if frame.cut is not None and frame.cut is not ended:
-                    # It was asked to make way before it began.
-                    let_go(frame.cut.state)
-                    if frame.preempted is frame.cut:
-                        frame.preempted = None  # It is asked again below.
-                    frame.cut = None
-                if frame.forced is not None and frame.forced[0] is ended:
-                    outcome, kind = frame.forced[1], 'forced'
-                    target = self._target(frame.forced[0], outcome)
-                    self._drop_requests(frame, frame.forced[0])
-                elif ended is not None:
-                    target = self._sort_requests(frame, ended, outcome, target)
-                if ended is not None and ended.priority > LOWEST and target is not ended:
-                    target, kind = self._leave_branch(frame, target, kind)
-                ended = None
-                if self._preempt_requested and isinstance(target, Node):
-                    self._preempt_next(frame, target)
-                elif frame.suspending and isinstance(target, Node):
-                    self._fsm_history = frame.history(target)
-                    return _ASIDE
-                elif self._fsm_raised and not self._preempt_requested:
-                    target, kind = self._branch_off(frame, target, kind)
-                if shutdown.is_shutdown():
-                    target = _SHUTDOWN
-                frame.current = target
-                if not self._stands_still(frame, target):
-                    break
-                run.condition.wait()
-                if frame.stale:
-                    raise LeftBehind
-                if frame.forced is not None and frame.forced[0] is target:
-                    left = ended = frame.forced[0]
-            frame.attention = self._wants_attention(frame, target)
-            frame.trace = run.trace
-        if target is _SHUTDOWN:
-            pass
-        elif left is not None:
-            self._tell(frame, left, outcome, target, kind)
-        elif frame.trace is not None:
-            frame.trace((frame.path, '', '', target.label, frame.now(), {}, 'start'))
-        return target
-
-    def _sort_requests(
-        self, frame: Frame, left: Node, outcome: Any, target: Node | Exit
-    ) -> Node | Exit:
-        """Settle what was asked of the state that ended: a preempt, or to make way."""
-        state, cut, made_way = left.state, frame.cut, False
-        asked = frame.preempted is left
-        gone = frame.gone is left
-        # A state that was left behind keeps the request, and has not ignored it any longer.
-        pending = state.preempt_requested() and not gone
-        frame.cut = frame.gone = None
-        if asked:
-            frame.preempted = None
-        if cut is left and outcome is not SUSPENDED and (pending or not asked):
-            # With both asked and one still pending, what it served was to make way.
-            made_way = not pending or outcome == 'preempted'
-            if not gone:
-                state.recall_preempt()
-        elif asked and pending:
-            state.recall_preempt()
-        elif asked and self._preempt_requested:
-            self.service_preempt()
-        if made_way:
-            target = left
-        if made_way or outcome is SUSPENDED:
-            frame.repeat = True
-        if not made_way and getattr(state, '_fsm_progress', None) is not None:
-            state._fsm_progress = None
-        return target
-
-    def _drop_requests(self, frame: Frame, left: Node) -> None:
-        left.state.recall_preempt()
-        forget(left.state)
-        frame.forced = frame.preempted = frame.cut = None
-
-    def _preempt_next(self, frame: Frame, target: Any) -> None:
-        """Ask the next state to stop, because the last one did not acknowledge the preempt."""
-        if frame.preempted is not target:
-            if frame.preempted is not None:
-                frame.preempted.state.recall_preempt()
-            frame.preempted = target
-            frame.strand.asked()
-            target.state.request_preempt()
-
-    def _stands_still(self, frame: Frame, target: Node | Exit) -> bool:
-        """Whether the machine is paused here; takes one step if it may."""
-        run = frame.strand.run
-        if not run.paused or not isinstance(target, Node) or isinstance(target.state, Container):
-            return False
-        if frame.forced is not None or frame.suspending:
-            return False
-        if any(other.container._preempt_requested for other in frame.strand.stack):
-            return False
-        if run.steps:
-            run.steps -= 1
-            return False
-        return True
-
-    def _wants_attention(self, frame: Frame, target: Node | Exit) -> bool:
-        return bool(
-            log.chatty()
-            or self._transition_cbs
-            or self._termination_cbs
-            or self._preempt_requested
-            or self._fsm_raised
-            or frame.saved
-            or frame.suspending
-            or frame.cut
-            or frame.forced
-            or frame.strand.run.paused
-            or self._always_attend
-            or (isinstance(target, Node) and getattr(target.state, '_fsm_progress', None))
-        )
-
-    _always_attend = False
-
-    def _tell(self, frame: Frame, left: Node, outcome: Any, target: Node | Exit, kind: str) -> None:
-        if frame.trace is not None:
-            kind = target.kind if target.is_exit else kind
-            data = self.userdata._data.copy()
-            frame.trace((frame.path, left.label, outcome, target.label, frame.now(), data, kind))
-        if log.chatty():
-            verb = 'ends' if target.is_exit else 'goes on'
-            log.loginfo(f"'{frame.path}' {verb}: '{left.label}' : '{outcome}' --> '{target.label}'")
-        if target.is_exit:
-            self.call_termination_cbs([left.label], target.label)
-        else:
-            self.call_transition_cbs()
 
     # Preempts.
 
@@ -378,27 +203,6 @@ class DrivenContainer(ActiveContainer):
             frame.strand.run.condition.notify_all()
 
     # Interrupts.
-
-    def _branch_off(self, frame: Frame, target: Node | Exit, kind: str) -> tuple[Node | Exit, str]:
-        """Enter the branch of the most urgent interrupt, if it is more urgent than `target`."""
-        urgent = max(self._fsm_raised, key=lambda branch: branch.priority)
-        if urgent.priority <= target.priority:
-            return target, kind
-        self._fsm_raised.remove(urgent)
-        frame.saved.append(target)
-        return self._table[urgent.label], 'interrupt'
-
-    def _leave_branch(
-        self, frame: Frame, target: Node | Exit, kind: str
-    ) -> tuple[Node | Exit, str]:
-        """Go back to where the interrupt came, or forget that place."""
-        if target is RESUMPTION:
-            return frame.saved.pop(), 'resume'
-        for node in frame.saved:
-            if isinstance(node, Node):
-                forget(node.state)
-        frame.saved.clear()
-        return target, kind
 
     def _interrupted(self) -> None:
         frame = self._frame

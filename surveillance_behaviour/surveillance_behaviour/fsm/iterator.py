@@ -50,7 +50,6 @@ class Iterator(DrivenContainer):
         self._items_label = it_label
         self._exhausted_outcome = exhausted_outcome
         self._state_label = ''
-        self._state: State | None = None
         self._loop_outcomes: list[str] = []
         self._break_outcomes: list[str] = []
         self._final_outcome_map: dict[str, str] = {}
@@ -96,10 +95,11 @@ class Iterator(DrivenContainer):
         """
         iterator = Iterator._currently_opened_container()
         path = iterator._path_of(label)
-        if iterator._state is not None:
+        if iterator._states:
             raise InvalidStateError(
                 f"Iterator '{iterator._fsm_path}' has the state '{iterator._state_label}' already"
             )
+        iterator._check_new(label, state)
         loop, breaking = list(loop_outcomes), list(break_outcomes)
         limits = make_limits(
             path, state, dict.fromkeys([*loop, *breaking]), timeout, deadline, retry, retry_on
@@ -121,7 +121,7 @@ class Iterator(DrivenContainer):
             loop = [outcome for outcome in outcomes if outcome not in breaking]
         else:
             breaking = [outcome for outcome in outcomes if outcome not in loop]
-        iterator._state_label, iterator._state = label, state
+        iterator._state_label, iterator._states = label, {label: state}
         iterator._loop_outcomes, iterator._break_outcomes = loop, breaking
         iterator._final_outcome_map = dict(final_outcome_map or {})
         iterator._limits = limits
@@ -130,7 +130,7 @@ class Iterator(DrivenContainer):
 
     def check_consistency(self) -> None:
         """Raise `InvalidTransitionError` when the iterator has no state or a wrong interrupt."""
-        faults = [] if self._state is not None else ['it has no state']
+        faults = [] if self._states else ['it has no state']
         faults += self._branch_faults()
         if faults:
             raise InvalidTransitionError(
@@ -143,8 +143,7 @@ class Iterator(DrivenContainer):
         return self._state_label
 
     def _make_table(self) -> dict[str, Node]:
-        assert self._state is not None
-        node = self._node(self._state_label, self._state, limits=self._limits)
+        node = self._node(self._state_label, self._states[self._state_label], limits=self._limits)
         for outcome in self._loop_outcomes:
             node.targets[outcome] = node
         for outcome in self._break_outcomes:
@@ -200,17 +199,6 @@ class Iterator(DrivenContainer):
         return target
 
     # The container's interface.
-
-    def __getitem__(self, key: str) -> State:
-        if key != self._state_label or self._state is None:
-            raise KeyError(
-                f"'{self._fsm_path}' has no state '{key}': its state is '{self._state_label}'"
-            )
-        return self._state
-
-    def get_children(self) -> dict[str, State]:
-        """The state by its label."""
-        return {} if self._state is None else {self._state_label: self._state}
 
     def get_initial_states(self) -> list[str]:
         """The state's label."""

@@ -1,9 +1,7 @@
-"""Who runs a machine and who watches it: strands of execution, their limits, their takeover.
+"""Who runs a machine: an execution of it, and the strands that it consists of.
 
 A machine executes on a thread of its own, the strand, while the thread that called ``execute``
-watches it. When a state neither returns nor heeds a preempt within its bound, the watcher leaves
-that thread behind, starts another one where the state would have ended, and names the culprit. A
-concurrence has one strand per child and watches them itself.
+watches it (`supervision`). A concurrence has one strand per child and watches them itself.
 """
 
 from __future__ import annotations
@@ -11,14 +9,12 @@ from __future__ import annotations
 import contextvars
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from surveillance_behaviour.fsm.engine import Frame, Node, Trace
-from surveillance_behaviour.fsm.exceptions import PreemptIgnoredError
-from surveillance_behaviour.fsm.log import logerr, logwarn
-from surveillance_behaviour.fsm.takeover import STOPPED, go_on, keep_out, stopped_outcome
+from surveillance_behaviour.fsm.log import logwarn
 from surveillance_behaviour.fsm.this_thread import this_thread
 from surveillance_behaviour.fsm.waiting import WALL_CLOCK, Clock, Interrupt
 
@@ -107,6 +103,12 @@ class Strand:
         without_leaf: It ended because its own state, outside any container, was left behind.
         outcome: What it ended with.
         error: What it was ended by.
+        watches: Limits at work, outermost first.
+        asked_at: When the state that executes was asked to stop, steady time; None: it was not.
+        thread: Its present thread, the last of those that it had.
+        thread_ended: Raised when that thread has ended.
+        token: Which of its threads is the present one.
+        leaf: The state that it executes outside any container, a concurrence's child.
     """
 
     def __init__(self, run: Run, path: str, wakeup: Interrupt) -> None:
@@ -118,12 +120,12 @@ class Strand:
         self.outcome: Any = None
         self.error: BaseException | None = None
         self._wakeup = wakeup
-        self._watches: list[Watch] = []
-        self._asked_at: float | None = None
-        self._token: object = None
-        self._thread: threading.Thread | None = None
-        self._ended = threading.Event()
-        self._leaf: Node | None = None
+        self.watches: list[Watch] = []
+        self.asked_at: float | None = None
+        self.token: object = None
+        self.thread: threading.Thread | None = None
+        self.thread_ended = threading.Event()
+        self.leaf: Node | None = None
         self._root: object = None
         run.strands.append(self)
 
@@ -131,7 +133,7 @@ class Strand:
 
     def begin_with(self, state: object, node: Node | None = None) -> None:
         """Say what the strand executes outside any frame: a root, or a concurrence's child."""
-        self._root, self._leaf = state, node
+        self._root, self.leaf = state, node
 
     def enters(self, container: object) -> bool:
         """Whether `container` is what the strand itself executes next, not some user code."""
@@ -148,8 +150,8 @@ class Strand:
 
     def start(self, body: Callable[[], Any]) -> None:
         """Run `body` on a new thread; its value is the strand's outcome."""
-        token = self._token = object()
-        ended = self._ended = threading.Event()
+        token = self.token = object()
+        ended = self.thread_ended = threading.Event()
         context = contextvars.copy_context()
 
         def thread() -> None:
@@ -158,13 +160,13 @@ class Strand:
             finally:
                 ended.set()
 
-        self._thread = threading.Thread(target=thread, name=self.path, daemon=True)
-        self._thread.start()
+        self.thread = threading.Thread(target=thread, name=self.path, daemon=True)
+        self.thread.start()
 
     def run_here(self, body: Callable[[], Any]) -> Any:
         """Run `body` on the calling thread, unwatched."""
         outer = this_thread.strand, this_thread.token
-        token = self._token = object()
+        token = self.token = object()
         this_thread.strand, this_thread.token = self, token
         try:
             return body()
@@ -182,13 +184,14 @@ class Strand:
         except BaseException as raised:
             error = raised
         with self.run.condition:
-            if token is not self._token:
+            if token is not self.token:
                 if error is not None:
                     logwarn(f"'{self.path}', left behind, ended with {type(error).__name__}")
                 return
-            self._end(outcome, error)
+            self.end(outcome, error)
 
-    def _end(self, outcome: Any, error: BaseException | None) -> None:
+    def end(self, outcome: Any, error: BaseException | None) -> None:
+        """Note what the strand ended with, and wake whoever watches it; under the condition."""
         self.outcome, self.error, self.done = outcome, error, True
         self._retire()
         self._wakeup.set()
@@ -201,7 +204,7 @@ class Strand:
     def disown(self) -> None:
         """Leave the thread behind without a successor."""
         with self.run.condition:
-            self._token = object()
+            self.token = object()
             for frame in self.stack:
                 frame.stale = frame.attention = True
                 frame.container._frame = None
@@ -219,7 +222,7 @@ class Strand:
 
     def check(self) -> None:
         """Raise `LeftBehind` in a thread that is not the strand's any more."""
-        if this_thread.strand is self and this_thread.token is not self._token:
+        if this_thread.strand is self and this_thread.token is not self.token:
             raise LeftBehind
 
     def watch(self, node: Node, limits: Limits) -> Watch:
@@ -233,7 +236,7 @@ class Strand:
                 None if limits.timeout is None else now + limits.timeout,
                 None if limits.deadline is None else now + limits.deadline,
             )
-            self._watches.append(watch)
+            self.watches.append(watch)
         self._wakeup.set()
         return watch
 
@@ -241,11 +244,11 @@ class Strand:
         """End the limits of a state that has returned."""
         with self.run.condition:
             self.check()
-            self._watches.remove(watch)
+            self.watches.remove(watch)
 
     def watch_of(self, frame: Frame) -> Watch | None:
         """The limits at work on the state that `frame` executes."""
-        for watch in self._watches:
+        for watch in self.watches:
             if self.stack[watch.depth] is frame:
                 return watch
         return None
@@ -255,15 +258,15 @@ class Strand:
     def asked(self) -> None:
         """Note that the state that executes was asked to stop; its bound begins to count."""
         with self.run.condition:
-            if self._asked_at is None:
-                self._asked_at = time.monotonic()
+            if self.asked_at is None:
+                self.asked_at = time.monotonic()
         self._wakeup.set()
 
     def renew_request(self, node: Node) -> None:
         """Take the request of an earlier execution back from a state, but not a present one."""
         with self.run.condition:
             node.state.recall_preempt()
-            if self._asked_at is not None:
+            if self.asked_at is not None:
                 node.state.request_preempt()
 
     def still_gone(self, node: Node) -> None:
@@ -276,163 +279,4 @@ class Strand:
 
     def heeded(self) -> None:
         """Note that the state that was asked to stop has returned."""
-        self._asked_at = None
-
-    # The side of the thread that watches.
-
-    def due(self) -> tuple[float | None, float | None]:
-        """When something is due next: (on the machine's clock, in steady time)."""
-        times = [t for watch in self._watches for t in (watch.soft, watch.hard) if t is not None]
-        bound = self.run.preempt_timeout
-        steady = None
-        if self._asked_at is not None and bound is not None and not self._bounds_itself():
-            steady = self._asked_at + bound
-        return (min(times) if times else None), steady
-
-    def _bounds_itself(self) -> bool:
-        return bool(self.stack) and self.stack[-1].container._fsm_bounds_itself
-
-    def enforce(self) -> None:
-        """Do what is due: ask states to stop, or go on without them."""
-        now = self.run.clock.now()
-        with self.run.condition:
-            if self.done:
-                return
-            for watch in tuple(self._watches):
-                if watch.hard is not None and now >= watch.hard:
-                    self._go_on_without(watch)
-                    return
-                if watch.soft is not None and now >= watch.soft:
-                    watch.soft, watch.asked = None, True
-                    watch.node.state.request_preempt()
-            _, steady = self.due()
-            if steady is not None and time.monotonic() >= steady:
-                self._preempt_ignored()
-
-    def _go_on_without(self, watch: Watch) -> None:
-        limits = watch.node.limits
-        assert limits is not None
-        within = limits.deadline
-        self._take_over(
-            watch.depth,
-            watch.node,
-            limits.late_outcome,
-            f'did not return within its deadline of {within:g} s',
-        )
-
-    def _preempt_ignored(self) -> None:
-        """Go on without the innermost state: with its preempted outcome, or its container's."""
-        bound = self.run.preempt_timeout
-        reason = f'ignored a preempt for {bound:g} s'
-        culprit = self.path_inside()
-        for depth in range(len(self.stack) - 1, -1, -1):
-            node = self.stack[depth].current
-            if not isinstance(node, Node):
-                return  # It is ending by itself.
-            forced = self.stack[depth].forced
-            outcome = forced[1] if forced is not None else stopped_outcome(node)
-            if outcome is not None:
-                self._take_over(depth, node, outcome, reason, culprit)
-                return
-        outcome = stopped_outcome(self._leaf) if self._leaf is not None else None
-        if outcome is not None:
-            assert self._leaf is not None
-            self._take_over(-1, self._leaf, outcome, reason, culprit)
-            return
-        root = self.stack[0].container if self.stack else None
-        outcomes = root.get_registered_outcomes() if root is not None else ()
-        for ending in STOPPED:
-            if ending in outcomes:
-                self._take_over(-1, None, ending, reason, culprit)
-                return
-        error = PreemptIgnoredError(
-            f"State '{culprit}' {reason}, and no container around it can "
-            f"end with 'preempted' or 'aborted'"
-        )
-        self._take_over(-1, None, error, reason, culprit)
-
-    def _take_over(
-        self,
-        depth: int,
-        node: Node | None,
-        outcome: str | BaseException,
-        reason: str,
-        culprit: str | None = None,
-    ) -> None:
-        """Leave the thread behind and go on as if the state in frame `depth` had ended.
-
-        Args:
-            depth: Index of the frame to go on in; -1 to end the strand.
-            node: The state to go on without, whose userdata is taken away.
-            outcome: What it is taken to have returned, or the error to end the strand with.
-            reason: What it did wrong, for the log.
-            culprit: Its path.
-        """
-        assert self._thread is not None
-        culprit = culprit or self.path_inside()
-        leaf = self.stack[-1].current if self.stack else self._leaf
-        ended = f"with '{outcome}'" if isinstance(outcome, str) else 'with an error'
-        logerr(f"State '{culprit}' {reason}: the machine goes on without it, {ended}")
-        self.run.left_behind.append((culprit, self._thread))
-        old = self.stack
-        frames = [frame.successor() for frame in old[: depth + 1]]
-        for frame in old:
-            frame.stale = frame.attention = True
-            frame.container._frame = None
-        for frame in old[depth + 1 :]:
-            frame.container.recall_preempt()
-        for frame in frames:
-            frame.container._frame = frame
-        if frames:
-            frames[-1].gone = node
-        if isinstance(leaf, Node):
-            # The request stays with the state, so that the thread left behind ends some time.
-            leaf.state.request_preempt()
-            leaf.revoke()
-            keep_out(leaf, self._ended)
-        if node is not None and node is not leaf:
-            node.revoke()
-        self.stack = list(frames)
-        self._watches = [watch for watch in self._watches if watch.depth < depth]
-        self._asked_at = None
-        self.run.condition.notify_all()
-        for frame in old:
-            frame.container._fsm_woken()
-        if not frames:
-            self._token = object()
-            self.without_leaf = leaf is self._leaf
-            if isinstance(outcome, str):
-                self._end(outcome, None)
-            else:
-                self._end(None, outcome)
-            return
-        self.start(lambda: go_on(self, frames, outcome))
-
-
-def supervise(run: Run, strands: Sequence[Strand], wakeup: Interrupt) -> None:
-    """Watch strands until one of them ends or `wakeup` is raised by somebody else.
-
-    Args:
-        run: The execution they belong to.
-        strands: The strands; each raises `wakeup` when it ends or its limits change.
-        wakeup: What the wait ends by.
-    """
-    with run.condition:
-        wakeup.clear()
-        if any(strand.done for strand in strands):
-            return
-        dues = [strand.due() for strand in strands]
-    clocked = min((due for due, _ in dues if due is not None), default=None)
-    steady = min((due for _, due in dues if due is not None), default=None)
-    left = None if steady is None else max(0.0, steady - time.monotonic())
-    if clocked is None:
-        wakeup.wait(left)
-    else:
-        alarm = threading.Timer(left, wakeup.set) if left is not None else None
-        if alarm is not None:
-            alarm.start()
-        run.clock.sleep(max(0.0, clocked - run.clock.now()), wakeup)
-        if alarm is not None:
-            alarm.cancel()
-    for strand in strands:
-        strand.enforce()
+        self.asked_at = None

@@ -8,7 +8,6 @@ from typing import Any
 from surveillance_behaviour.fsm.driven import DrivenContainer
 from surveillance_behaviour.fsm.engine import Exit, Node
 from surveillance_behaviour.fsm.exceptions import InvalidStateError, InvalidTransitionError
-from surveillance_behaviour.fsm.interface import has_smach_interface
 from surveillance_behaviour.fsm.limits import TIMEOUT, Limits, make_limits
 from surveillance_behaviour.fsm.state import State
 from surveillance_behaviour.fsm.user_data import UserData
@@ -37,7 +36,6 @@ class StateMachine(DrivenContainer):
         output_keys: Iterable[str] = (),
     ) -> None:
         super().__init__(outcomes, input_keys, output_keys)
-        self._states: dict[str, State] = {}
         self._transitions: dict[str, dict[str, str | None]] = {}
         self._remappings: dict[str, dict[str, str]] = {}
         self._constants: dict[str, dict[str, Any]] = {}
@@ -125,14 +123,7 @@ class StateMachine(DrivenContainer):
         constants: Mapping[str, Any] | None,
         limits: tuple[float | None, float | None, int, tuple[str, ...]],
     ) -> State:
-        if label in self._states or label in self._branches:
-            raise InvalidStateError(
-                f"State '{self._path_of(label)}' is already there: a label names one state"
-            )
-        if not has_smach_interface(state) or not callable(getattr(state, 'execute', None)):
-            raise InvalidStateError(
-                f"State '{self._path_of(label)}' must be an instance of State, not {state!r}"
-            )
+        self._check_new(label, state)
         bound = dict(transitions or {})
         made = make_limits(self._path_of(label), state, bound, *limits)
         declared = {k: v for k, v in bound.items() if made is None or k != TIMEOUT}
@@ -222,18 +213,6 @@ class StateMachine(DrivenContainer):
         return table
 
     # The container's interface.
-
-    def __getitem__(self, key: str) -> State:
-        try:
-            return self._states[key]
-        except KeyError:
-            raise KeyError(
-                f"'{self._fsm_path}' has no state '{key}': its states are {sorted(self._states)}"
-            ) from None
-
-    def get_children(self) -> dict[str, State]:
-        """The states by label."""
-        return dict(self._states)
 
     def get_initial_states(self) -> list[str]:
         """The label of the state a run begins with."""

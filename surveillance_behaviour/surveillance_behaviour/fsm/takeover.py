@@ -6,6 +6,7 @@ import threading
 from typing import TYPE_CHECKING, Any
 
 from surveillance_behaviour.fsm.engine import Frame, Node
+from surveillance_behaviour.fsm.exceptions import PreemptIgnoredError
 from surveillance_behaviour.fsm.log import logerr
 from surveillance_behaviour.fsm.this_thread import this_thread
 
@@ -64,3 +65,99 @@ def go_on(strand: Strand, frames: list[Frame], outcome: Any) -> Any:
                 if rest.container._frame is rest:
                     rest.container._frame = None
     return outcome
+
+
+def go_on_past(strand: Strand) -> None:
+    """Go on without a state that ignores a preempt: with its preempted outcome, or its container's.
+
+    Under the run's condition.
+    """
+    bound = strand.run.preempt_timeout
+    reason = f'ignored a preempt for {bound:g} s'
+    culprit = strand.path_inside()
+    for depth in range(len(strand.stack) - 1, -1, -1):
+        node = strand.stack[depth].current
+        if not isinstance(node, Node):
+            return  # It is ending by itself.
+        forced = strand.stack[depth].forced
+        outcome = forced[1] if forced is not None else stopped_outcome(node)
+        if outcome is not None:
+            take_over(strand, depth, node, outcome, reason, culprit)
+            return
+    outcome = stopped_outcome(strand.leaf) if strand.leaf is not None else None
+    if outcome is not None:
+        assert strand.leaf is not None
+        take_over(strand, -1, strand.leaf, outcome, reason, culprit)
+        return
+    root = strand.stack[0].container if strand.stack else None
+    outcomes = root.get_registered_outcomes() if root is not None else ()
+    for ending in STOPPED:
+        if ending in outcomes:
+            take_over(strand, -1, None, ending, reason, culprit)
+            return
+    error = PreemptIgnoredError(
+        f"State '{culprit}' {reason}, and no container around it can "
+        f"end with 'preempted' or 'aborted'"
+    )
+    take_over(strand, -1, None, error, reason, culprit)
+
+
+def take_over(
+    strand: Strand,
+    depth: int,
+    node: Node | None,
+    outcome: str | BaseException,
+    reason: str,
+    culprit: str | None = None,
+) -> None:
+    """Leave a strand's thread behind and go on as if the state in frame `depth` had ended.
+
+    Under the run's condition.
+
+    Args:
+        strand: The strand.
+        depth: Index of the frame to go on in; -1 to end the strand.
+        node: The state to go on without, whose userdata is taken away.
+        outcome: What it is taken to have returned, or the error to end the strand with.
+        reason: What it did wrong, for the log.
+        culprit: Its path.
+    """
+    assert strand.thread is not None
+    culprit = culprit or strand.path_inside()
+    leaf = strand.stack[-1].current if strand.stack else strand.leaf
+    ended = f"with '{outcome}'" if isinstance(outcome, str) else 'with an error'
+    logerr(f"State '{culprit}' {reason}: the machine goes on without it, {ended}")
+    strand.run.left_behind.append((culprit, strand.thread))
+    old = strand.stack
+    frames = [frame.successor() for frame in old[: depth + 1]]
+    for frame in old:
+        frame.stale = frame.attention = True
+        frame.container._frame = None
+    for frame in old[depth + 1 :]:
+        frame.container.recall_preempt()
+    for frame in frames:
+        frame.container._frame = frame
+    if frames:
+        frames[-1].gone = node
+    if isinstance(leaf, Node):
+        # The request stays with the state, so that the thread left behind ends some time.
+        leaf.state.request_preempt()
+        leaf.revoke()
+        keep_out(leaf, strand.thread_ended)
+    if node is not None and node is not leaf:
+        node.revoke()
+    strand.stack = list(frames)
+    strand.watches = [watch for watch in strand.watches if watch.depth < depth]
+    strand.asked_at = None
+    strand.run.condition.notify_all()
+    for frame in old:
+        frame.container._fsm_woken()
+    if not frames:
+        strand.token = object()
+        strand.without_leaf = leaf is strand.leaf
+        if isinstance(outcome, str):
+            strand.end(outcome, None)
+        else:
+            strand.end(None, outcome)
+        return
+    strand.start(lambda: go_on(strand, frames, outcome))

@@ -11,15 +11,15 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_srvs.srv import Trigger
 
 from surveillance_behaviour import fsm
+from surveillance_behaviour.conversions import (
+    status_message,
+    structure_message,
+    transition_message,
+)
 from surveillance_behaviour.fsm.active import ActiveContainer
 from surveillance_behaviour.fsm.export import to_ascii
 from surveillance_behaviour.fsm.record import Transition, TransitionFeed
 from surveillance_behaviour.fsm.structure import state_at
-from surveillance_behaviour.fsm_ros.conversions import (
-    status_to_ros,
-    structure_to_ros,
-    transition_to_ros,
-)
 from surveillance_interfaces.msg import FsmStatus, FsmStructure, FsmTransition
 from surveillance_interfaces.srv import ForceOutcome, SetInitialState
 
@@ -80,7 +80,7 @@ class IntrospectionServer:
     def start(self) -> None:
         """Draw the machine in the log and begin to publish."""
         self._node.get_logger().info(f'state machine:\n{to_ascii(self._root)}')
-        self._structure.publish(structure_to_ros(self._root, self._stamp()))
+        self._structure.publish(structure_message(self._root, self._stamp()))
         self._feed = TransitionFeed(self._root, self._publish)
         self._root.register_start_cb(self._changed)
         self._root.register_termination_cb(self._changed)
@@ -97,12 +97,12 @@ class IntrospectionServer:
 
     def _publish(self, transition: Transition) -> None:
         self._sequence = transition.sequence
-        message = transition_to_ros(transition, self._root.control.active_paths(), self._stamp())
+        message = transition_message(transition, self._root.control.active_paths(), self._stamp())
         self._transitions.publish(message)
         self._publish_status()
 
     def _publish_status(self) -> None:
-        self._status.publish(status_to_ros(self._root, self._sequence, self._stamp()))
+        self._status.publish(status_message(self._root, self._sequence, self._stamp()))
 
     def _changed(self, *_: Any) -> None:
         if self._feed is not None:
