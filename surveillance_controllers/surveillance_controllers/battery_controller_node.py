@@ -13,7 +13,6 @@ from functools import partial
 from typing import Any, TextIO
 
 from rclpy.callback_groups import ReentrantCallbackGroup
-from rclpy.task import Future
 from std_msgs.msg import Bool, UInt8
 from std_srvs.srv import Empty
 
@@ -23,6 +22,7 @@ from surveillance_controllers.console_commands import BATTERY, BATTERY_SET, Pars
 from surveillance_controllers.controller_parameters import battery_settings, execution_mode
 from surveillance_controllers.operator_console import OperatorConsole
 from surveillance_controllers.robot_battery import RobotBattery
+from surveillance_runtime.awaited_work import AwaitedEvent
 from surveillance_runtime.node import PatrolNode, run_node
 from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.waiting import ClockWait
@@ -49,7 +49,8 @@ class BatteryController(PatrolNode):
         self._said: tuple[int, bool] | None = None
         self._level_topic = self.create_publisher(UInt8, 'battery_level', STATE_QOS)
         self._low_topic = self.create_publisher(Bool, 'state/battery_low', STATE_QOS)
-        self._recharging: list[Future] = []
+        self._recharging = False
+        self._recharged = AwaitedEvent(self)
         group = ReentrantCallbackGroup()
         self.create_service(Empty, 'recharge', self._on_recharge, callback_group=group)
         self._console = OperatorConsole(self, BATTERY, self._carry_out, self._status)
@@ -99,13 +100,12 @@ class BatteryController(PatrolNode):
             self._set_level(100.0 if self._battery.percent == 0 else 0.0)
 
     async def _on_recharge(self, _request: Any, response: Any) -> Any:
-        done = Future()
         with self._lock:
-            self._recharging.append(done)
-            first = len(self._recharging) == 1
+            recharged = self._recharged.next_time()
+            first, self._recharging = not self._recharging, True
         if first:
             self.spawn(self._recharge)
-        await done
+        await recharged
         return response
 
     def _recharge(self) -> None:
@@ -118,11 +118,8 @@ class BatteryController(PatrolNode):
                 charge(show)
         finally:
             with self._lock:
-                clients, self._recharging = self._recharging, []
-            for done in clients:
-                done.set_result(None)
-            # A future that is set from another thread does not wake the executor.
-            self.executor.wake()
+                self._recharging = False
+                self._recharged.happen()
 
     def _fill(self, show: Callable[[float], None]) -> None:
         pause = self._settings.recharge_seconds / RECHARGE_STEPS

@@ -11,17 +11,16 @@ from collections.abc import Callable
 from typing import Any
 
 from rclpy.callback_groups import ReentrantCallbackGroup
-from rclpy.task import Future
 
 from surveillance_interfaces.msg import OntologyMap
 from surveillance_interfaces.srv import AddRoom, ReferenceName, RemoveRoom, RoomPosition, SetDoor
 from surveillance_ontology.armor.settings import DATA
 from surveillance_ontology.armor_client import ArmorClient, FactSubscription
-from surveillance_ontology.awaited_work import AwaitedWork
 from surveillance_ontology.conversions import point_to_ros, position_from_ros, room_note_from_ros
 from surveillance_ontology.described_parameters import described_place
 from surveillance_ontology.map_building import ROBOT, MapBuilding
 from surveillance_ontology.map_keeper import MapKeeper, Reports
+from surveillance_runtime.awaited_work import AwaitedEvent, AwaitedWork
 from surveillance_runtime.node import PatrolNode, run_node
 from surveillance_runtime.place import Place
 from surveillance_runtime.qos import STATE_QOS
@@ -53,6 +52,7 @@ class OntologyMapBuilder(PatrolNode):
         armor = ArmorClient(
             self, self.get_name(), self._reference, timeout=timeout, interrupt=self.stopping
         )
+        self._built = AwaitedEvent(self)
         log = self.get_logger()
         self._keeper = MapKeeper(
             MapBuilding(armor, path, uri),
@@ -60,9 +60,8 @@ class OntologyMapBuilder(PatrolNode):
             lambda: int(self.get_clock().now().nanoseconds // 1_000_000_000),
             self.stopping.is_set,
             Reports(log.info, log.warn, log.error, self.fail),
-            lambda: self.executor.create_task(self._answer_waiting),
+            self._built.happen,
         )
-        self._waiting: list[Future] = []
         self._work = AwaitedWork(self, 1)
         pattern = f'isIn({ROBOT}, ?)'
         self._is_in = FactSubscription(self, armor, pattern, self._on_moved, self._look)
@@ -90,16 +89,8 @@ class OntologyMapBuilder(PatrolNode):
     def _look(self) -> None:
         self._work.put(self._keeper.ensure_built)
 
-    def _answer_waiting(self) -> None:
-        waiting, self._waiting = self._waiting, []
-        for future in waiting:
-            future.set_result(None)
-
     async def _on_reference_name(self, _request: Any, response: Any) -> Any:
-        if not self._keeper.is_built:
-            future = Future(executor=self.executor)
-            self._waiting.append(future)
-            await future
+        await self._built.wait_for(lambda: self._keeper.is_built)
         response.name = self._reference
         return response
 

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 from nav_msgs.msg import Odometry
 from rclpy.callback_groups import ReentrantCallbackGroup
-from rclpy.task import Future
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
 from trajectory_msgs.msg import JointTrajectory
@@ -23,11 +21,13 @@ from surveillance_perception.arm_trajectory import TrajectoryError
 from surveillance_perception.conversions import (
     base_pose_from_ros,
     scan_feedback_to_ros,
+    scan_plan_from_ros,
     scan_result_to_ros,
     trajectory_to_ros,
 )
-from surveillance_perception.surroundings_scan import ScanOutcome, ScanPlan, scan
+from surveillance_perception.surroundings_scan import scan
 from surveillance_perception.view_coverage import View
+from surveillance_runtime.awaited_work import work_aside
 from surveillance_runtime.goals import GoalAborted, GoalRun, GoalServer
 from surveillance_runtime.node import PatrolNode, run_node
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
@@ -93,7 +93,7 @@ class ArmController(PatrolNode):
         def work() -> str:
             point = np.array([request.point.x, request.point.y, request.point.z])
             target = in_base(point, request.frame_id, self._base)
-            aim = look_at(ARM, target, self._start())
+            aim = look_at(ARM, target, self._driver.posture)
             response.error = aim.error
             self._driver.move(aim.positions, self.stopping.is_set)
             return 'looking at the point'
@@ -101,55 +101,35 @@ class ArmController(PatrolNode):
         response.success, response.message = await self._off_executor(work)
         return response
 
-    def _start(self) -> np.ndarray:
-        positions = self._driver.positions
-        return np.array(ARM.home) if positions is None else positions
-
     async def _off_executor(self, work: Callable[[], str]) -> tuple[bool, str]:
         """Do blocking work on a thread of its own; whether it went well, and what to say."""
-        done = Future(executor=self.executor)
-
-        def body() -> None:
-            try:
-                done.set_result((True, work()))
-            except _FAILURES as error:
-                done.set_result((False, str(error)))
-            self.executor.wake()
-
-        self.spawn(body, 'arm motion')
-        result: tuple[bool, str] = await done
-        return result
+        try:
+            return True, await work_aside(self, work, 'arm motion')
+        except _FAILURES as error:
+            return False, str(error)
 
     def _scan(self, goal: Any, run: GoalRun) -> Any:
-        lowest, highest = goal.lowest, goal.highest
-        if lowest == highest == 0.0:
-            lowest, highest = -math.pi / 2, math.pi / 2
         settings = self._settings
-        plan = ScanPlan(settings.horizontal, settings.vertical, goal.overlap, lowest, highest)
+        dwell = goal.dwell if goal.dwell > 0 else settings.dwell
         try:
-            views = plan.views()
+            plan = scan_plan_from_ros(goal, settings.horizontal, settings.vertical)
         except ValueError as error:
             raise GoalAborted(str(error)) from None
-        dwell = goal.dwell if goal.dwell > 0 else settings.dwell
 
         def tell(index: int, view: View, resting: bool) -> None:
-            run.feedback(scan_feedback_to_ros(index, len(views), view, resting))
+            run.feedback(scan_feedback_to_ros(index, len(plan.views), view, resting))
 
         def rest() -> bool:
             return self._read.wait(settings.pictures, dwell, settings.patience, run.interrupt)
 
-        outcome = ScanOutcome([], [])
-        failure = ''
         wake = run.interrupt.subscribe(self._driver.wake)
         try:
-            scan(self._driver, views, rest, tell, run.interrupt.is_set, outcome)
-        except (ArmError, TrajectoryError) as error:
-            failure = str(error)
+            outcome = scan(self._driver, plan, rest, tell, run.interrupt.is_set)
         finally:
             wake()
-        result = scan_result_to_ros(outcome, plan.covered(outcome.rested), failure)
-        if failure and not run.interrupt.is_set():
-            raise GoalAborted(f'scan ended at view {result.views + 1}: {failure}', result)
+        result = scan_result_to_ros(outcome)
+        if outcome.failure and not run.interrupt.is_set():
+            raise GoalAborted(f'scan ended at {outcome.failure}', result)
         return result
 
 

@@ -68,6 +68,12 @@ class ArmDriver:
         measured = self._measured
         return None if measured is None else measured.positions
 
+    @property
+    def posture(self) -> Array:
+        """Joint positions (n,) as last reported, rad; the arm's home before the first report."""
+        positions = self.positions
+        return np.array(self.arm.home) if positions is None else positions
+
     def report(
         self, names: Sequence[str], positions: Sequence[float], speeds: Sequence[float]
     ) -> None:

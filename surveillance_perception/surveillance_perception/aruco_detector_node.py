@@ -14,20 +14,18 @@ from std_msgs.msg import Bool, Int32
 
 from surveillance_interfaces.msg import MarkerDetectionArray
 from surveillance_perception.annotation import annotated
-from surveillance_perception.camera_model import CameraModel
+from surveillance_perception.camera_model import CameraModel, camera_of
 from surveillance_perception.conversions import (
     camera_from_ros,
     detections_to_ros,
     diagnostics_to_ros,
-    picture_from_compressed,
-    picture_from_ros,
+    picture_from_any,
     picture_to_ros,
     poses_to_ros,
 )
 from surveillance_perception.detection_watch import DetectionWatch
 from surveillance_perception.detector_parameters import DetectorParameters
 from surveillance_perception.latest import Latest
-from surveillance_perception.picture_files import Picture
 from surveillance_perception.picture_subscription import PICTURES_QOS, PictureSubscription
 from surveillance_runtime.node import PatrolNode, run_node
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
@@ -117,11 +115,10 @@ class ArucoDetector(PatrolNode):
         return since is not None and Time.from_msg(message.header.stamp) >= since
 
     def _look(self, message: Any) -> None:
-        if isinstance(message, Image):
-            picture = picture_from_ros(message, self._options.max_pixels)
-        else:
-            picture = picture_from_compressed(message, self._options.max_pixels)
-        sightings, new = self._watch.look(picture, self._camera_of(picture))
+        picture = picture_from_any(message, self._options.max_pixels)
+        height, width = picture.shape[:2]
+        camera = camera_of(width, height, self._camera, self._options.field_of_view)
+        sightings, new = self._watch.look(picture, camera)
         for marker_id in new:
             self._ids.publish(Int32(data=marker_id))
         self._detections.publish(detections_to_ros(message.header, sightings))
@@ -129,13 +126,6 @@ class ArucoDetector(PatrolNode):
         if self._annotated.get_subscription_count():
             drawn = annotated(picture, (s.detection for s in sightings), self._watch.confirmed)
             self._annotated.publish(picture_to_ros(drawn, message.header))
-
-    def _camera_of(self, picture: Picture) -> CameraModel:
-        height, width = picture.shape[:2]
-        camera = self._camera
-        if camera is not None and (camera.width, camera.height) == (width, height):
-            return camera
-        return CameraModel.from_field_of_view(width, height, self._options.field_of_view)
 
     def _diagnose(self) -> None:
         further = {

@@ -76,3 +76,19 @@ class CameraModel:
         """Pixels (n, 2) of points (n, 3) in the optical frame, ignoring distortion."""
         homogeneous = points @ self.matrix.T
         return np.asarray(homogeneous[:, :2] / homogeneous[:, 2:])
+
+
+def camera_of(
+    width: int, height: int, described: CameraModel | None, horizontal: float
+) -> CameraModel:
+    """The camera that took a picture.
+
+    Args:
+        width: The picture's width in pixels.
+        height: Its height in pixels.
+        described: The camera as it describes itself, of use for pictures of its size alone.
+        horizontal: Horizontal field of view in radians of a camera that does not.
+    """
+    if described is not None and (described.width, described.height) == (width, height):
+        return described
+    return CameraModel.from_field_of_view(width, height, horizontal)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -25,7 +26,7 @@ from surveillance_perception.detection_watch import Sighting, Statistics
 from surveillance_perception.marker_registry import MarkedPlace
 from surveillance_perception.picture_files import Picture, PictureError, decode_picture
 from surveillance_perception.pose import MarkerPose
-from surveillance_perception.surroundings_scan import ScanOutcome
+from surveillance_perception.surroundings_scan import ScanOutcome, ScanPlan
 from surveillance_perception.view_coverage import View
 
 _CHANNELS = {'mono8': 1, 'rgb8': 3, 'bgr8': 3, 'rgba8': 4, 'bgra8': 4}
@@ -87,6 +88,13 @@ def picture_from_compressed(message: CompressedImage, max_pixels: int) -> Pictur
         size = f'{picture.shape[1]}x{picture.shape[0]}'
         raise PictureError(f'picture of {size} pixels is larger than {max_pixels} pixels')
     return picture
+
+
+def picture_from_any(message: Image | CompressedImage, max_pixels: int) -> Picture:
+    """A picture from either kind of message; otherwise as the two above."""
+    if isinstance(message, Image):
+        return picture_from_ros(message, max_pixels)
+    return picture_from_compressed(message, max_pixels)
 
 
 def picture_to_ros(picture: npt.NDArray[np.uint8], header: Header) -> Image:
@@ -180,6 +188,18 @@ def diagnostics_to_ros(
     return message
 
 
+def scan_plan_from_ros(goal: ScanSurroundings.Goal, horizontal: float, vertical: float) -> ScanPlan:
+    """What a goal asks a camera with these fields of view (rad) to look at.
+
+    Raises:
+        ValueError: An elevation or the overlap is out of range.
+    """
+    lowest, highest = goal.lowest, goal.highest
+    if lowest == highest == 0.0:
+        lowest, highest = -math.pi / 2, math.pi / 2
+    return ScanPlan(horizontal, vertical, goal.overlap, lowest, highest)
+
+
 def scan_feedback_to_ros(
     index: int, count: int, view: View, resting: bool
 ) -> ScanSurroundings.Feedback:
@@ -193,15 +213,13 @@ def scan_feedback_to_ros(
     )
 
 
-def scan_result_to_ros(
-    outcome: ScanOutcome, covered: float, message: str
-) -> ScanSurroundings.Result:
+def scan_result_to_ros(outcome: ScanOutcome) -> ScanSurroundings.Result:
     """What came of a scan."""
     return ScanSurroundings.Result(
-        views=len(outcome.rested),
-        unreachable=len(outcome.unreachable),
-        coverage=covered,
-        message=message,
+        views=outcome.rested,
+        unreachable=outcome.unreachable,
+        coverage=outcome.covered,
+        message=outcome.failure,
     )
 
 

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
-import numpy as np
-
-from surveillance_perception.arm_driver import ArmDriver
+from surveillance_perception.arm_driver import ArmDriver, ArmError
 from surveillance_perception.arm_kinematics import UnreachableError, direction_of, look_at
+from surveillance_perception.arm_trajectory import TrajectoryError
 from surveillance_perception.view_coverage import View, coverage, views_covering
 from surveillance_runtime.robot_arm import Array
 
@@ -25,6 +24,10 @@ class ScanPlan:
         overlap: Share of the picture's angles at its edge that does not count.
         lowest: Lowest elevation, rad.
         highest: Highest elevation, rad.
+        views: The views that show it all, in order.
+
+    Raises:
+        ValueError: An angle or the overlap is out of range.
     """
 
     horizontal: float
@@ -32,16 +35,13 @@ class ScanPlan:
     overlap: float
     lowest: float
     highest: float
+    views: tuple[View, ...] = field(init=False)
 
-    def views(self) -> list[View]:
-        """The views, in order.
-
-        Raises:
-            ValueError: An angle or the overlap is out of range.
-        """
-        return views_covering(
+    def __post_init__(self) -> None:
+        views = views_covering(
             self.horizontal, self.vertical, self.overlap, self.lowest, self.highest
         )
+        object.__setattr__(self, 'views', tuple(views))
 
     def covered(self, views: list[View]) -> float:
         """Share of the asked directions that lie in the pictures of some views."""
@@ -53,53 +53,58 @@ class ScanOutcome:
     """What came of a scan.
 
     Attributes:
-        rested: Views at which the camera rested for the whole time.
-        unreachable: Views that the joints' limits forbid.
+        rested: How many views the camera rested at for the whole time.
+        unreachable: How many views the joints' limits forbid.
+        covered: Share of the asked directions that a resting camera has seen.
+        failure: Why the scan ended before its last view, '' where nothing failed.
     """
 
-    rested: list[View]
-    unreachable: list[View]
+    rested: int = 0
+    unreachable: int = 0
+    covered: float = 0.0
+    failure: str = ''
 
 
 def scan(
     driver: ArmDriver,
-    views: list[View],
+    plan: ScanPlan,
     dwell: Callable[[], bool],
     tell: Callable[[int, View, bool], None],
     ended: Callable[[], bool],
-    outcome: ScanOutcome,
-) -> None:
+) -> ScanOutcome:
     """Look in each direction in turn.
 
     Args:
         driver: The arm.
-        views: Where to look.
+        plan: Where to look.
         dwell: Rests at a view; False when the scan shall end.
         tell: Told the index of each view when the arm sets out and when it rests there.
         ended: Tells whether the scan shall end; the arm is stopped then.
-        outcome: Filled in as the scan goes on, so that it holds what was done when it ends early.
-
-    Raises:
-        ArmError: The arm does not get somewhere, or another motion took over.
     """
-    for index, view in enumerate(views):
+    outcome = ScanOutcome()
+    rested: list[View] = []
+    for index, view in enumerate(plan.views):
         try:
             positions = _aim(driver, view)
         except UnreachableError:
-            outcome.unreachable.append(view)
+            outcome.unreachable += 1
             continue
         tell(index, view, False)
-        driver.move(positions, ended)
+        try:
+            driver.move(positions, ended)
+        except (ArmError, TrajectoryError) as error:
+            outcome.failure = f'view {index + 1} of {len(plan.views)}: {error}'
+            break
         tell(index, view, True)
         if not dwell():
-            return
-        outcome.rested.append(view)
+            break
+        rested.append(view)
+    outcome.rested, outcome.covered = len(rested), plan.covered(rested)
+    return outcome
 
 
 def _aim(driver: ArmDriver, view: View) -> Array:
     arm = driver.arm
-    start = np.array(arm.home) if driver.positions is None else driver.positions
     shoulder = arm.camera_frame(arm.home)[:3, 3]
-    return look_at(
-        arm, shoulder + _FAR * direction_of(view.azimuth, view.elevation), start
-    ).positions
+    target = shoulder + _FAR * direction_of(view.azimuth, view.elevation)
+    return look_at(arm, target, driver.posture).positions

@@ -12,8 +12,8 @@ from typing import Any
 
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.callback_groups import ReentrantCallbackGroup
-from rclpy.task import Future
 
+from surveillance_runtime.awaited_work import work_aside
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.waiting import ClockWait, Interrupt
 
@@ -137,19 +137,13 @@ class GoalServer:
         run = self._runs[bytes(handle.goal_id.uuid)]
         if self._node.stopping.is_set():
             run.interrupt.set()
-        finished = Future()
-        executor = self._node.executor
 
-        def work() -> None:
+        def work() -> tuple[Any, str | None]:
             # One goal works at a time: the one that is replaced lets go first.
             with self._turn:
-                result, error = self._work(handle.request, run)
-            finished.set_result((result, error))
-            # A future that is set from another thread does not wake the executor.
-            executor.wake()
+                return self._work(handle.request, run)
 
-        self._node.spawn(work, name=f'{self.name} goal')
-        result, error = await finished
+        result, error = await work_aside(self._node, work, f'{self.name} goal')
         with self._lock:
             del self._runs[bytes(handle.goal_id.uuid)]
             if self._current is run:
