@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import termios
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -45,8 +46,8 @@ class TerminalLines:
 
     @contextmanager
     def shown(self) -> Iterator[None]:
-        """What is printed meanwhile appears above the prompt."""
-        with patch_stdout(raw=True):
+        """What is printed meanwhile appears above the prompt; what is typed, only in a prompt."""
+        with _silent(self._session.app.input), patch_stdout(raw=True):
             yield
 
     def read(self) -> str:
@@ -69,6 +70,26 @@ class TerminalLines:
         app = self._session.app
         if self._stopped and app.is_running and not app.is_done:
             app.exit(exception=EOFError)
+
+
+@contextmanager
+def _silent(keyboard: Input) -> Iterator[None]:
+    """Keeps the terminal from echoing keys between two prompts: they wait for the next one.
+
+    Ctrl-C is a signal meanwhile.
+    """
+    try:
+        before = termios.tcgetattr(keyboard.fileno())
+    except (termios.error, OSError, NotImplementedError):  # no terminal
+        yield
+        return
+    silent = list(before)
+    silent[3] &= ~(termios.ECHO | termios.ICANON)
+    termios.tcsetattr(keyboard.fileno(), termios.TCSANOW, silent)
+    try:
+        yield
+    finally:
+        termios.tcsetattr(keyboard.fileno(), termios.TCSANOW, before)
 
 
 class WordCompleter(Completer):

@@ -3,12 +3,16 @@ controllers."""
 
 from __future__ import annotations
 
+import os
+import pty
+import termios
 import threading
 from typing import Any
 
 from prompt_toolkit.completion import CompleteEvent
 from prompt_toolkit.document import Document
 from prompt_toolkit.input import create_pipe_input
+from prompt_toolkit.input.vt100 import Vt100Input
 from prompt_toolkit.output import DummyOutput
 from std_msgs.msg import UInt8
 
@@ -17,7 +21,7 @@ from surveillance_controllers.console import Console
 from surveillance_controllers.console_commands import BATTERY, Grammar
 from surveillance_controllers.console_node import ConsoleNode
 from surveillance_controllers.planner_controller_node import PlannerController
-from surveillance_controllers.terminal_lines import WordCompleter
+from surveillance_controllers.terminal_lines import TerminalLines, WordCompleter
 from surveillance_runtime.qos import STATE_QOS
 
 
@@ -41,6 +45,23 @@ def test_completion_replaces_the_word_being_typed() -> None:
 
     assert proposed('bat') == [('battery', -3)]
     assert proposed('battery ') == [('offset', 0), ('set', 0)]
+
+
+def test_keys_between_two_prompts_are_not_echoed_and_go_to_the_next_one() -> None:
+    ours, theirs = pty.openpty()
+    before = termios.tcgetattr(theirs)
+    with os.fdopen(theirs) as stream:
+        lines = TerminalLines('test', lambda _: [], (Vt100Input(stream), DummyOutput()))
+        with lines.shown():
+            os.write(ours, b'battery')
+            between = termios.tcgetattr(theirs)[3]
+            os.write(ours, b' set 15\r')
+            assert lines.read() == 'battery set 15'
+            assert termios.tcgetattr(theirs)[3] == between
+        assert termios.tcgetattr(theirs) == before
+    os.close(ours)
+    assert not between & termios.ECHO
+    assert between & termios.ISIG
 
 
 def test_control_c_at_the_prompt_interrupts() -> None:

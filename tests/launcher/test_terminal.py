@@ -32,8 +32,10 @@ class Terminal:
         self.settings = termios.tcgetattr(theirs)
         self.theirs = theirs
         environ = {**os.environ, 'TERM': 'xterm', 'PYTHONPATH': str(ROOT)}
+        # Its own session's terminal, so that Ctrl-C between two prompts is a signal.
+        words = ['setsid', '--ctty', *command]
         self.process = subprocess.Popen(
-            command, stdin=theirs, stdout=theirs, stderr=theirs, env=environ, start_new_session=True
+            words, stdin=theirs, stdout=theirs, stderr=theirs, env=environ
         )
         self.seen = b''
 
