@@ -7,30 +7,22 @@ submission (https://www.w3.org/Submission/SWRL/). All are frozen, hashable recor
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 from surveillance_ontology.vocabulary import THING, TOP_LITERAL, XSD
-
-if TYPE_CHECKING:
-    from surveillance_ontology.reasoner.datatypes import Value
 
 
 @dataclass(frozen=True, slots=True)
 class Literal:
     """A literal as written: equal only to one with the same lexical form, datatype and language.
 
-    Two literals that denote one value (`"5"^^xsd:int`, `"5.0"^^xsd:decimal`) have equal `value()`.
+    What it denotes is the matter of `reasoner.datatypes.value_of`: `"5"^^xsd:int` and
+    `"5.0"^^xsd:decimal` are two literals of one value.
     """
 
     lexical: str
     datatype: str = XSD + 'string'
     language: str = ''
-
-    def value(self) -> Value:
-        """The value denoted, comparable by value space; an ill-formed literal denotes itself."""
-        from surveillance_ontology.reasoner.datatypes import value_of
-
-        return value_of(self)
 
 
 @dataclass(frozen=True, slots=True)

@@ -29,6 +29,7 @@ from surveillance_ontology.knowledge import Fact
 from surveillance_ontology.knowledge_base import KnowledgeBase
 from surveillance_ontology.knowledge_changes import Changes
 from surveillance_ontology.owl_writing import ontology_bytes
+from surveillance_ontology.reasoner.datatypes import value_of
 from surveillance_ontology.vocabulary import OWL, RDF, RDFS, THING
 
 KINDS = ('hermit', 'pellet')
@@ -162,11 +163,11 @@ class JavaKnowledgeBase(KnowledgeBase):
     def data_values(self, prop: str, individual: str) -> set[Literal]:
         """Values of a data property."""
         found = super().data_values(prop, individual)
-        values = {literal.value() for literal in found}
+        values = {value_of(literal) for literal in found}
         return found | {
             a.literal
             for a in self._of(DataPropertyAssertion)
-            if a.prop == prop and a.subject == individual and a.literal.value() not in values
+            if a.prop == prop and a.subject == individual and value_of(a.literal) not in values
         }
 
     def object_properties_of(self, individual: str) -> set[str]:

@@ -69,6 +69,7 @@ from surveillance_ontology.expressions import (
     Variable,
 )
 from surveillance_ontology.knowledge_base import KnowledgeBase
+from surveillance_ontology.reasoner.datatypes import value_of
 from surveillance_ontology.vocabulary import NOTHING, SWRLB, THING, XSD
 
 A, B, C, D = 'x:A', 'x:B', 'x:C', 'x:D'
@@ -357,8 +358,8 @@ TRUE, FALSE = Literal('true', XSD + 'boolean'), Literal('false', XSD + 'boolean'
 def test_builtins(given: object, atoms: list[BuiltinAtom], result: Literal | None) -> None:
     rule = Rule((DataPropertyAtom(S, X, V), *atoms), (DataPropertyAtom(T, X, W),))
     kb = base(rule, has(S, i, given))
-    found = {literal.value() for literal in kb.data_values(T, i)}
-    assert found == (set() if result is None else {result.value()})
+    found = {value_of(literal) for literal in kb.data_values(T, i)}
+    assert found == (set() if result is None else {value_of(result)})
     kb.remove(has(S, i, given))
     kb.reason()
     assert kb.data_values(T, i) == set()

@@ -22,6 +22,7 @@ from surveillance_ontology.axioms import (
 )
 from surveillance_ontology.knowledge_base import KnowledgeBase
 from surveillance_ontology.knowledge_changes import Changes
+from surveillance_ontology.reasoner.datatypes import value_of
 from tests.reasoner.patrol_map import (
     DOOR_FACTS,
     DOORS_DIFFER,
@@ -47,7 +48,7 @@ def by_value(axiom: Axiom) -> object:
     ways.
     """
     if isinstance(axiom, DataPropertyAssertion):
-        return axiom.prop, axiom.subject, axiom.literal.value()
+        return axiom.prop, axiom.subject, value_of(axiom.literal)
     return axiom
 
 

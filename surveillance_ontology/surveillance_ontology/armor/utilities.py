@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from surveillance_ontology.armor.protocol import (
     DirectiveError,
@@ -36,16 +36,8 @@ _WEB_DIFFERS = 'Refused unless the parameter allow_web is set.'
 
 
 @utility('LOAD FILE', text('path'), *_LOAD, summary=_LOAD_SUMMARY, differs=_LOAD_DIFFERS, slow=True)
-def _load_file(
-    service: ArmorService,
-    request: DirectiveRequest,
-    path: str,
-    iri: str,
-    buffered: bool,
-    reasoner: str,
-    lazy: bool,
-) -> DirectiveResponse:
-    return service.load(request, path, iri, buffered, reasoner, lazy)
+def _load_file(service: ArmorService, request: DirectiveRequest, *values: Any) -> DirectiveResponse:
+    return service.load(request, *values)
 
 
 @utility(
@@ -55,15 +47,9 @@ def _load_file(
     slow=True,
 )
 def _load_file_mounted(
-    service: ArmorService,
-    request: DirectiveRequest,
-    path: str,
-    iri: str,
-    buffered: bool,
-    reasoner: str,
-    lazy: bool,
+    service: ArmorService, request: DirectiveRequest, *values: Any
 ) -> DirectiveResponse:
-    response = service.load(request, path, iri, buffered, reasoner, lazy)
+    response = service.load(request, *values)
     service.mount(request)
     return response
 
@@ -75,16 +61,8 @@ def _load_file_mounted(
     differs=_WEB_DIFFERS,
     slow=True,
 )
-def _load_web(
-    service: ArmorService,
-    request: DirectiveRequest,
-    url: str,
-    iri: str,
-    buffered: bool,
-    reasoner: str,
-    lazy: bool,
-) -> DirectiveResponse:
-    return service.load(request, url, iri, buffered, reasoner, lazy, web=True)
+def _load_web(service: ArmorService, request: DirectiveRequest, *values: Any) -> DirectiveResponse:
+    return service.load(request, *values, web=True)
 
 
 @utility(
@@ -95,15 +73,9 @@ def _load_web(
     slow=True,
 )
 def _load_web_mounted(
-    service: ArmorService,
-    request: DirectiveRequest,
-    url: str,
-    iri: str,
-    buffered: bool,
-    reasoner: str,
-    lazy: bool,
+    service: ArmorService, request: DirectiveRequest, *values: Any
 ) -> DirectiveResponse:
-    response = service.load(request, url, iri, buffered, reasoner, lazy, web=True)
+    response = service.load(request, *values, web=True)
     service.mount(request)
     return response
 

@@ -23,7 +23,9 @@ from surveillance_ontology.reasoner.clauses import (
 )
 from surveillance_ontology.reasoner.left_sides import Unsupported
 from surveillance_ontology.reasoner.normal_forms import normal
+from surveillance_ontology.reasoner.property_axioms import normalise_property_axiom
 from surveillance_ontology.reasoner.right_sides import RightSides
+from surveillance_ontology.reasoner.swrl_rules import normalise_rule
 from surveillance_ontology.vocabulary import local_name
 
 _X, _Y = 0, 1
@@ -116,16 +118,12 @@ class Normaliser(RightSides):
                 self._attempt(self._sub_class, part, axiom.cls)
             self._attempt(self._sub_class, axiom.cls, ex.ObjectUnionOf(axiom.classes))
         elif isinstance(axiom, ax.Rule):
-            from surveillance_ontology.reasoner.swrl_rules import normalise_rule
-
             normalise_rule(self, axiom)
         elif isinstance(axiom, ax.Import):
             raise Unsupported('imports are not followed')
         elif isinstance(axiom, ax.HasKey):
             self._key(axiom)
         elif not isinstance(axiom, (ax.Declaration, ax.DatatypeDefinition)):
-            from surveillance_ontology.reasoner.property_axioms import normalise_property_axiom
-
             normalise_property_axiom(self, axiom)
 
     def _sub_class(self, sub: ClassExpression, sup: ClassExpression) -> None:

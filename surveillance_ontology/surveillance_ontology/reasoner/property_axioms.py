@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from surveillance_ontology import axioms as ax
 from surveillance_ontology.axioms import Axiom
 from surveillance_ontology.reasoner.clauses import AtMost, PredicateAtom
-
-if TYPE_CHECKING:
-    from surveillance_ontology.reasoner.normalisation import Normaliser
+from surveillance_ontology.reasoner.right_sides import RightSides
 
 _X, _Y, _Z = 0, 1, 2
 
 
-def normalise_property_axiom(normaliser: Normaliser, axiom: Axiom) -> None:
+def normalise_property_axiom(normaliser: RightSides, axiom: Axiom) -> None:
     """Adds the clauses of one property axiom to the normaliser's program."""
     program, clause, prop = normaliser.program, normaliser.clause, normaliser.property
     if isinstance(axiom, ax.SubObjectPropertyOf):
@@ -82,7 +78,7 @@ def normalise_property_axiom(normaliser: Normaliser, axiom: Axiom) -> None:
         normaliser.only((), axiom.prop, axiom.range)
 
 
-def _imply_data(normaliser: Normaliser, sub: str, sup: str) -> None:
+def _imply_data(normaliser: RightSides, sub: str, sup: str) -> None:
     program = normaliser.program
     body = (PredicateAtom(program.data(sub), (_X, _Y)),)
     normaliser.clause(body, PredicateAtom(program.data(sup), (_X, _Y)))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from itertools import product
-from typing import TYPE_CHECKING
 
 from surveillance_ontology import axioms as ax
 from surveillance_ontology import expressions as ex
@@ -19,17 +18,16 @@ from surveillance_ontology.reasoner.clauses import (
     Term,
 )
 from surveillance_ontology.reasoner.datatypes import value_of
+from surveillance_ontology.reasoner.left_sides import Unsupported
+from surveillance_ontology.reasoner.right_sides import RightSides
 from surveillance_ontology.reasoner.swrl_builtins import builtin
 from surveillance_ontology.vocabulary import NOTHING, SWRLB, local_name
-
-if TYPE_CHECKING:
-    from surveillance_ontology.reasoner.normalisation import Normaliser
 
 
 class _Terms:
     """Numbers a rule's variables; tells individuals from values."""
 
-    def __init__(self, normaliser: Normaliser) -> None:
+    def __init__(self, normaliser: RightSides) -> None:
         self._normaliser = normaliser
         self._numbers: dict[ex.Variable, int] = {}
         self.individuals: set[int] = set()
@@ -48,7 +46,7 @@ class _Terms:
             self.values.add(number)
             return number
         if not isinstance(argument, Literal):
-            _unsupported(f'{argument} stands where a literal or a variable is expected')
+            raise Unsupported(f'{argument} stands where a literal or a variable is expected')
         return Constant(value_of(argument), True)
 
     def _number(self, variable: ex.Variable) -> int:
@@ -58,26 +56,19 @@ class _Terms:
         return number
 
 
-def _unsupported(text: str) -> None:
-    from surveillance_ontology.reasoner.left_sides import Unsupported
-
-    raise Unsupported(text)
-
-
 def _computed(atom: ex.BuiltinAtom, terms: _Terms) -> ComputedAtom:
     name = atom.builtin.removeprefix(SWRLB)
     known = builtin(name, len(atom.arguments)) if atom.builtin.startswith(SWRLB) else None
     if known is None:
         count = len(atom.arguments)
-        _unsupported(
+        raise Unsupported(
             f'the built-in {local_name(atom.builtin)} with {count} arguments is not supported'
         )
-        raise AssertionError
     holds, solve = known
     return ComputedAtom(name, holds, solve, tuple(map(terms.value, atom.arguments)))
 
 
-def normalise_rule(normaliser: Normaliser, rule: ax.Rule) -> None:
+def normalise_rule(normaliser: RightSides, rule: ax.Rule) -> None:
     """Adds the clauses of one rule to the normaliser's program."""
     program, terms = normaliser.program, _Terms(normaliser)
     alternatives: list[list[tuple[BodyAtom, ...]]] = []
@@ -109,7 +100,7 @@ def normalise_rule(normaliser: Normaliser, rule: ax.Rule) -> None:
 
 
 def _bound(
-    normaliser: Normaliser, body: tuple[BodyAtom, ...], terms: _Terms
+    normaliser: RightSides, body: tuple[BodyAtom, ...], terms: _Terms
 ) -> tuple[BodyAtom, ...]:
     """The body, with owl:Thing for individuals that nothing else binds; refuses unbound values."""
     program = normaliser.program
@@ -140,19 +131,19 @@ def _bound(
                 progress = True
     if waiting:
         name = waiting[0].builtin if isinstance(waiting[0], ComputedAtom) else 'a data range'
-        _unsupported(f'an argument of {name} is bound by no other atom')
+        raise Unsupported(f'an argument of {name} is bound by no other atom')
     return body
 
 
 def _heads(
-    normaliser: Normaliser, rule: ax.Rule, body: tuple[BodyAtom, ...], terms: _Terms
+    normaliser: RightSides, rule: ax.Rule, body: tuple[BodyAtom, ...], terms: _Terms
 ) -> None:
     program = normaliser.program
     bound = {term for atom in body for term in atom.terms if isinstance(term, int)}
 
     def known(term: Term) -> Term:
         if isinstance(term, int) and term not in bound:
-            _unsupported('a variable of the head does not stand in the body')
+            raise Unsupported('a variable of the head does not stand in the body')
         return term
 
     if not rule.head:
@@ -175,4 +166,4 @@ def _heads(
             else:
                 normaliser.clause(body, PredicateAtom(program.different, pair))
         else:
-            _unsupported('a built-in or data range in the head has no meaning here')
+            raise Unsupported('a built-in or data range in the head has no meaning here')
