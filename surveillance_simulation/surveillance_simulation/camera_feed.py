@@ -12,7 +12,7 @@ from sensor_msgs.msg import CameraInfo, Image
 
 from surveillance_runtime.node import PatrolNode
 from surveillance_simulation import conversions, simulator_parameters
-from surveillance_simulation.camera import Conditions
+from surveillance_simulation.camera import Conditions, expose
 from surveillance_simulation.mujoco_rendering import MujocoRenderer
 from surveillance_simulation.rendering import Renderer
 from surveillance_simulation.robot import Robot
@@ -99,5 +99,5 @@ class CameraFeed:
                 stamp = self._stamp()
             self._infos.publish(conversions.camera_info_to_ros(self._camera, _FRAME, stamp))
             if self.is_watched:
-                picture = self._renderer.render(pose, self.conditions, self._rng)
+                picture = expose(self._renderer.ideal(pose), self.conditions, self._rng)
                 self._images.publish(conversions.image_to_ros(picture, _FRAME, stamp))

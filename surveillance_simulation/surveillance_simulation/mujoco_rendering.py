@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from surveillance_simulation import boxes, textures
-from surveillance_simulation.camera import Array, Camera, Conditions, Picture, expose
+from surveillance_simulation.camera import Array, Camera
 from surveillance_simulation.floor_plan import WALL_HEIGHT, WALL_THICKNESS, Door
 from surveillance_simulation.scene import DOOR_HEIGHT, OBSTACLE_HEIGHT, STATION_SIDE
 from surveillance_simulation.textures import Texture
@@ -63,25 +63,14 @@ class MujocoRenderer:
             self._model = _model(self._world, self._camera)
             self._version = self._world.version
 
-    def render(
-        self, camera_pose: Array, conditions: Conditions, rng: np.random.Generator
-    ) -> Picture:
-        """Return a picture (rows, columns, 3) in RGB of the world as it was at `refresh`.
-
-        Args:
-            camera_pose: Transform (4, 4) from the camera's optical frame to the world, metres.
-            conditions: Light, noise and blur.
-            rng: Source of the noise.
-        """
-        return expose(self._ideal(camera_pose), conditions, rng)
-
     def close(self) -> None:
         """Free the graphics context; in the thread that took the pictures."""
         if self._renderer is not None:
             self._renderer.close()
             self._renderer = self._drawn = None
 
-    def _ideal(self, camera_pose: Array) -> npt.NDArray[np.float32]:
+    def ideal(self, camera_pose: Array) -> npt.NDArray[np.float32]:
+        """Return the picture of the world as `rendering.Renderer.ideal` does."""
         if self._drawn is not self._model:
             # A graphics context belongs to a thread: it is made in the one that draws.
             self.close()

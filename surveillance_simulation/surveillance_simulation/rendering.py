@@ -46,18 +46,6 @@ class Renderer:
         self._shrunk: dict[tuple[int, int, int], Texture] = {}
         self.refresh()
 
-    def render(
-        self, camera_pose: Array, conditions: Conditions, rng: np.random.Generator
-    ) -> Picture:
-        """Return a picture (rows, columns, 3) in RGB of the world as it was at `refresh`.
-
-        Args:
-            camera_pose: Transform (4, 4) from the camera's optical frame to the world, metres.
-            conditions: Light, noise and blur.
-            rng: Source of the noise.
-        """
-        return expose(self.ideal(camera_pose), conditions, rng)
-
     def refresh(self) -> None:
         """Take over what has changed in the world since the last time.
 
@@ -73,7 +61,14 @@ class Renderer:
         """Free what the pictures needed: nothing but memory."""
 
     def ideal(self, camera_pose: Array) -> npt.NDArray[np.float32]:
-        """Return the picture (rows, columns, 3) before light, noise and blur."""
+        """Return the picture of the world as it was at `refresh`, before light, noise and blur.
+
+        Args:
+            camera_pose: Transform (4, 4) from the camera's optical frame to the world, metres.
+
+        Returns:
+            (rows, columns, 3) in RGB; `expose` makes of it what a camera takes.
+        """
         width, height = self._size
         colours = np.empty((height, width, 3), np.uint8)
         colours[:] = _CEILING
@@ -176,8 +171,8 @@ def render(
     conditions: Conditions,
     rng: np.random.Generator,
 ) -> Picture:
-    """Return one picture of a world; see `Renderer.render`. For many, keep a `Renderer`."""
-    return Renderer(world, camera).render(camera_pose, conditions, rng)
+    """Return one picture (rows, columns, 3) of a world in RGB. For many, keep a `Renderer`."""
+    return expose(Renderer(world, camera).ideal(camera_pose), conditions, rng)
 
 
 def _halvings(texels: float, pixels: float) -> int:

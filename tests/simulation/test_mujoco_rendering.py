@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from surveillance_simulation import mujoco_rendering
-from surveillance_simulation.camera import Camera, Conditions, camera_pose
+from surveillance_simulation.camera import Camera, Conditions, camera_pose, expose
 from surveillance_simulation.mujoco_rendering import MujocoMissing, MujocoRenderer
 from surveillance_simulation.place_file import read_world
 from surveillance_simulation.rendering import Renderer
@@ -35,8 +35,8 @@ def test_both_renderers_show_the_same_markers_at_the_same_pixels() -> None:
     seen = set()
     for degrees in range(0, 360, 40):
         pose = camera_pose(1.5, 8.0, 0.8, math.radians(degrees))
-        found = corners_in(renderer.render(pose, CLEAN, rng))
-        expected = corners_in(other.render(pose, CLEAN, rng))
+        found = corners_in(expose(renderer.ideal(pose), CLEAN, rng))
+        expected = corners_in(expose(other.ideal(pose), CLEAN, rng))
         for marker in found.keys() & expected.keys():
             assert found[marker] == pytest.approx(expected[marker], abs=2.0)
         seen |= found.keys()
@@ -49,11 +49,11 @@ def test_changes_are_shown_after_refresh() -> None:
     world = two_rooms()
     renderer = MujocoRenderer(world, Camera.from_field_of_view())
     pose, rng = camera_pose(1.0, 1.4, 1.0, -math.pi / 2), np.random.default_rng(0)
-    before = renderer.render(pose, CLEAN, rng)
+    before = expose(renderer.ideal(pose), CLEAN, rng)
     world.place_obstacle('box', 1.0, 0.6, 0.2)
-    assert (renderer.render(pose, CLEAN, rng) == before).all()
+    assert (expose(renderer.ideal(pose), CLEAN, rng) == before).all()
     renderer.refresh()
-    assert (renderer.render(pose, CLEAN, rng) != before).any()
+    assert (expose(renderer.ideal(pose), CLEAN, rng) != before).any()
     renderer.close()
 
 

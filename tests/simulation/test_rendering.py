@@ -45,7 +45,7 @@ def test_every_marker_of_the_patrol_world_can_be_read_from_the_start() -> None:
     seen = set()
     for yaw in np.arange(0, 2 * math.pi, math.radians(40)):
         pose = camera_pose(x, y, 0.8, float(yaw))
-        seen |= ids_in(renderer.render(pose, Conditions(), np.random.default_rng(1)))
+        seen |= ids_in(expose(renderer.ideal(pose), Conditions(), np.random.default_rng(1)))
     assert seen == {marker.id for marker in world.plan.markers.values()}
 
 
@@ -110,9 +110,9 @@ def test_a_kept_renderer_shows_changes_after_refresh() -> None:
     renderer = Renderer(world, CAMERA)
     rng = np.random.default_rng(0)
     world.set_marker('m1', 'covered')
-    assert ids_in(renderer.render(camera_pose(*pose), CLEAN, rng)) == {7}
+    assert ids_in(expose(renderer.ideal(camera_pose(*pose)), CLEAN, rng)) == {7}
     renderer.refresh()
-    assert ids_in(renderer.render(camera_pose(*pose), CLEAN, rng)) == set()
+    assert ids_in(expose(renderer.ideal(camera_pose(*pose)), CLEAN, rng)) == set()
 
 
 def test_a_camera_inside_a_wall_still_gives_a_picture() -> None:
