@@ -137,9 +137,8 @@ def _service_rows(label: str, store: Any, rounds: int) -> list[Row]:
 
 
 @contextmanager
-def servers(domain: str) -> Any:
+def servers() -> Any:
     """The processes that answer."""
-    environment = {**os.environ, 'ROS_DOMAIN_ID': domain}
     module = 'surveillance_ontology.'
     arguments = [
         ['-m', module + 'armor_server_node'],
@@ -148,7 +147,7 @@ def servers(domain: str) -> Any:
     ]
     quiet = subprocess.DEVNULL
     processes = [
-        subprocess.Popen([sys.executable, *each], env=environment, stdout=quiet, stderr=quiet)
+        subprocess.Popen([sys.executable, *each], stdout=quiet, stderr=quiet)
         for each in arguments
     ]
     try:
@@ -160,18 +159,19 @@ def servers(domain: str) -> Any:
             process.wait(10)
 
 
-def through_ros(rounds: int, domain: str) -> list[Row]:
+def through_ros(rounds: int) -> list[Row]:
     """Calls over ROS, beside a bare service call."""
-    os.environ['ROS_DOMAIN_ID'] = domain
     import rclpy
     from std_srvs.srv import Trigger
 
     from surveillance_interfaces.srv import ReferenceName
     from surveillance_ontology.armor_client import ArmorClient
     from surveillance_runtime.calls import ServiceCaller
+    from surveillance_runtime.domains import claim_domain
     from surveillance_runtime.node import ExecutorThread, PatrolNode
 
-    with servers(domain):
+    os.environ['ROS_DOMAIN_ID'] = str(claim_domain())
+    with servers():
         rclpy.init()
         node = PatrolNode('benchmark')
         spinner = ExecutorThread()
@@ -197,19 +197,18 @@ def through_ros(rounds: int, domain: str) -> list[Row]:
     return [(f'{name}, ROS', ms, f'{ms / reference:.2f} x Trigger') for name, ms in taken.items()]
 
 
-def rows(quick: bool, domain: str = '97') -> list[Row]:
+def rows(quick: bool) -> list[Row]:
     """All rows of the table."""
-    return [*inside(200 if quick else 2000), *through_ros(200 if quick else 2000, domain)]
+    return [*inside(200 if quick else 2000), *through_ros(200 if quick else 2000)]
 
 
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--quick', action='store_true', help='fewer calls')
-    parser.add_argument('--domain', default='97', help='ROS domain')
     options = parser.parse_args()
     print(f'{"call (seven rooms)":48}{"median":>12}')
-    for name, milliseconds, comparison in rows(options.quick, options.domain):
+    for name, milliseconds, comparison in rows(options.quick):
         print(f'{name:48}{milliseconds:9.3f} ms  {comparison}')
 
 

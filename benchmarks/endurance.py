@@ -279,14 +279,15 @@ def run(
     seed: int,
     pause: tuple[float, float] = (40.0, 120.0),
     tell: Callable[[str], None] = lambda _: None,
-    domain: int | None = None,
+    log_level: str = 'fatal',
 ) -> tuple[Watch, Trouble]:
     """Patrol for simulated seconds with trouble every `pause` seconds; return what was seen.
 
     The seconds count from when the robot first drives.
     """
     rng = random.Random(seed)
-    stack = Stack(place, {'simulator': {'random_seed': seed, 'top_speed': TOP_SPEED}}, domain)
+    simulator = {'random_seed': seed, 'top_speed': TOP_SPEED}
+    stack = Stack(place, {'simulator': simulator}, log_level=log_level)
     watch = Watch(stack)
     trouble = Trouble(stack, watch, rng)
     stack.start()

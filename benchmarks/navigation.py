@@ -263,10 +263,11 @@ def processes(seconds: float) -> tuple[float, float, float]:
     import rclpy
     from geometry_msgs.msg import PoseStamped
 
+    from surveillance_runtime.domains import claim_domain
     from surveillance_runtime.node import ExecutorThread, PatrolNode
     from surveillance_runtime.qos import SENSOR_QOS
 
-    domain = int(os.environ.get('ROS_DOMAIN_ID', '0'))
+    domain = claim_domain()
     poses: list[tuple[float, float, float]] = []
     context = rclpy.Context()
     rclpy.init(context=context, domain_id=domain)
@@ -284,6 +285,7 @@ def processes(seconds: float) -> tuple[float, float, float]:
     started: list[subprocess.Popen[bytes]] = []
     with tempfile.TemporaryDirectory() as folder:
         arguments = ros_arguments(ROOT / 'config' / 'seven_rooms.yaml', Path(folder))
+        arguments += ['--log-level', 'fatal']
         environ = mission.node_environ(mission.Run(domain=domain))
         try:
             for each in graph.select('SIMULATED'):

@@ -24,6 +24,8 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+from surveillance_runtime.domains import claim_domain
+
 CHECKOUT = Path(__file__).resolve().parent.parent
 BASE_PYTHON = str(getattr(sys, '_base_executable', sys.executable))
 NO_EXPLORING = '/**/robot_behavior:\n  ros__parameters:\n    exploration_seconds: 0.0\n'
@@ -109,7 +111,6 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or '').partition('\n')[0])
     parser.add_argument('--quick', action='store_true', help='two starts of each kind')
     parser.add_argument('--cold', action='store_true', help='also a start from nothing (minutes)')
-    parser.add_argument('--domain', default='101', help='ROS domain to start in')
     options = parser.parse_args()
     repeats = 2 if options.quick else 5
     python = str(CHECKOUT / '.venv' / 'bin' / 'python')
@@ -120,7 +121,7 @@ def main() -> None:
         parameters.write(NO_EXPLORING)
         parameters.flush()
         at_once = ['--params', parameters.name]
-        domain = ['--domain', options.domain]
+        domain = ['--domain', str(claim_domain())]
         kinds = {
             'processes': domain,
             'processes, start not explored': [*domain, *at_once],

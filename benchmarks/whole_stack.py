@@ -21,6 +21,7 @@ if str(ROOT) not in sys.path:
 import rclpy  # noqa: E402
 
 from launcher import graph  # noqa: E402
+from surveillance_runtime.domains import claim_domain  # noqa: E402
 from surveillance_runtime.node import ExecutorThread, PatrolNode  # noqa: E402
 from surveillance_simulation.robot import Robot  # noqa: E402
 from surveillance_simulation.simulator_node import Simulator  # noqa: E402
@@ -38,21 +39,22 @@ class Stack:
         self,
         place: Path,
         parameters: Mapping[str, Mapping[str, Any]] | None = None,
-        domain: int | None = None,
         nodes: Sequence[str] = (),
+        log_level: str = 'fatal',
     ) -> None:
         """Create all nodes; `start` lets them run.
 
         Args:
             place: The place's file.
             parameters: Further parameters by node; those of '*' are for every node.
-            domain: ROS domain; None takes that of the environment.
             nodes: Only these nodes; it needs the simulator. All those of a patrol by default.
+            log_level: Of all nodes, also of others in this process from now on.
         """
         self._folder = tempfile.TemporaryDirectory(prefix='patrol-')
         arguments = ros_arguments(place, Path(self._folder.name), parameters)
+        arguments += ['--log-level', log_level]
         self.context = rclpy.Context()
-        rclpy.init(args=arguments, context=self.context, domain_id=domain)
+        rclpy.init(args=arguments, context=self.context, domain_id=claim_domain())
         self._spinner = ExecutorThread(self.context)
         options = {'context': self.context, 'cli_args': arguments, 'use_global_arguments': False}
         self.nodes: dict[str, PatrolNode] = {}
@@ -99,7 +101,7 @@ def ros_arguments(
     arguments = ['--ros-args']
     for file in (ROOT / 'config' / 'parameters.yaml', place, own):
         arguments += ['--params-file', str(file)]
-    return [*arguments, '--log-level', 'fatal']
+    return arguments
 
 
 def _own_parameters(parameters: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:

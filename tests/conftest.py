@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import fcntl
 import os
-import pathlib
-import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -13,27 +10,11 @@ from typing import Any, TypeVar
 
 import pytest
 
+from surveillance_runtime.domains import claim_domain
+
 T = TypeVar('T')
 
-LAST_DOMAIN = 101  # Ports of higher domains may collide with the system's ephemeral ports.
-
-
-def _claim_domain() -> tuple[int, Any]:
-    """Take a ROS domain that no other test process on this machine holds."""
-    folder = pathlib.Path(tempfile.gettempdir()) / 'surveillance-test-domains'
-    folder.mkdir(mode=0o777, exist_ok=True)
-    for domain in range(1, LAST_DOMAIN + 1):
-        lock = open(folder / str(domain), 'w')  # noqa: SIM115 - held until the process ends
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            lock.close()
-            continue
-        return domain, lock
-    raise RuntimeError(f'all ROS domains from 1 to {LAST_DOMAIN} are in use')
-
-
-_domain, _domain_lock = _claim_domain()
+_domain = claim_domain()
 os.environ['ROS_DOMAIN_ID'] = str(_domain)
 
 

@@ -65,11 +65,12 @@ class ConsoleNode(PatrolNode):
             'console', self._on_line, self._grammar.completions, source=console_source
         )
         self.stopping.subscribe(self._console.stop)
-        _tell('You can type these commands:\n' + self._grammar.help())
+        if self._console.on_terminal:
+            _tell('You can type these commands:\n' + self._grammar.help())
         self.spawn(self._read)
 
     def _on_announcement(self, controller: str, message: String) -> None:
-        _tell(f'[{controller}] {message.data}')
+        _tell(message.data, controller)
 
     def _read(self) -> None:
         if self._console.run() != 'stopped':
@@ -89,21 +90,23 @@ class ConsoleNode(PatrolNode):
             self.finish()
         elif command.name == STATUS.name:
             for controller in COMMANDS:
-                _tell(f'[{controller}] {self._ask(controller, line)}')
+                self._hand_on(controller, line)
         else:
-            _tell(self._ask(self._controller_of[command.name], line))
+            self._hand_on(self._controller_of[command.name], line)
 
-    def _ask(self, controller: str, line: str) -> str:
+    def _hand_on(self, controller: str, line: str) -> None:
         request = ConsoleCommand.Request(line=line)
         try:
             answer = self._callers[controller].call(request, self._timeout, self.stopping)
         except CallFailed as error:
-            return f'{controller} does not answer: {error}'
-        return str(answer.answer)
+            _tell(f'{controller} does not answer: {error}')
+        else:
+            _tell(answer.answer, controller)
 
 
-def _tell(text: str) -> None:
-    print(text, file=sys.stdout, flush=True)
+def _tell(text: str, controller: str = '') -> None:
+    head = f'[{controller}] ' if controller else ''
+    print('\n'.join(head + line for line in text.splitlines()), file=sys.stdout, flush=True)
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -47,8 +47,9 @@ class LocalisationParameters:
             somebody carried the robot there is unlikely, and rooms look alike.
         far_wins: In so many, one after the other.
         rounds: After so many searches without a winner the present pose is kept.
-        doubts: Doubtful scans in a row before it looks; one is enough when it would be lost.
-        lost_pause: Scans between two looks while it is lost.
+        doubt_time: How long scans are doubtful before it looks, seconds; one scan is enough when it
+            would be lost.
+        lost_pause: Time between two looks while it is lost, seconds.
         top_step: Odometry that jumps further than this between two readings is not believed, m.
         top_turn: Likewise, rad.
         near: Radius of the first search around the last pose, metres.
@@ -71,8 +72,8 @@ class LocalisationParameters:
     far_better: float = 0.2
     far_wins: int = 3
     rounds: int = 5
-    doubts: int = 3
-    lost_pause: int = 10
+    doubt_time: float = 0.2
+    lost_pause: float = 1.0
     top_step: float = 0.3
     top_turn: float = 0.6
     near: float = 2.5
@@ -105,7 +106,7 @@ class Localiser:
         self.lost = False
         self.jumps = 0
         self._odometry: Pose | None = None
-        self._doubts = 0
+        self._look_at: float | None = None
         self._tolerated = 1.0
         self._rival: tuple[Pose, int] | None = None
         self._rounds = 0
@@ -134,13 +135,13 @@ class Localiser:
     @property
     def certain(self) -> bool:
         """Whether the last scan fitted, so that the estimate is to be trusted."""
-        return not self.lost and self._doubts == 0
+        return not self.lost and self._look_at is None
 
     def believe(self, pose: Pose) -> None:
         """Takes a pose that somebody gave as the estimate."""
         self.pose = pose
         self.lost = False
-        self._doubts = 0
+        self._look_at = None
         self._tolerated = 1.0
         self._used_at = None
 
@@ -172,7 +173,8 @@ class Localiser:
         thin = scan.thinned(p.rays)
         moved, self._moved = self._moved, (0.0, 0.0)
         corrected = self._matched(self.pose, thin.points, moved)
-        self._judge(corrected, self.explained(corrected, thin.thinned(p.cast_rays)), thin)
+        agreement = self.explained(corrected, thin.thinned(p.cast_rays))
+        self._judge(corrected, agreement, thin, now)
         return True
 
     def _is_due(self, now: float) -> bool:
@@ -180,13 +182,13 @@ class Localiser:
         return (
             self._used_at is None
             or self.lost
-            or self._doubts > 0
+            or self._look_at is not None
             or self._moved[0] >= p.update_distance
             or self._moved[1] >= p.update_turn
             or not 0 <= now - self._used_at < p.update_period
         )
 
-    def _judge(self, corrected: Pose, agreement: float, thin: Scan) -> None:
+    def _judge(self, corrected: Pose, agreement: float, thin: Scan, now: float) -> None:
         p = self.parameters
         if agreement >= p.doubt_below:
             self._tolerated = 1.0
@@ -194,15 +196,13 @@ class Localiser:
             self._settle(corrected, agreement)
             return
         self.agreement = agreement
-        self._doubts += 1
-        if self.lost:
-            patience = p.lost_pause
-        else:
+        if self._look_at is None:
+            self._look_at = now + p.doubt_time
+        if agreement < p.lost_below and not self.lost:
             # Next to nothing fits: that is no passer-by.
-            patience = p.doubts if agreement >= p.lost_below else 1
-        if self._doubts < patience:
+            self._look_at = min(self._look_at, now)
+        if now < self._look_at - 1e-9:
             return
-        self._doubts = 0
         found = self.search(thin)
         if found is not None and self._is_convincing(found, agreement):
             self.jumps += 1
@@ -210,13 +210,13 @@ class Localiser:
         elif self._rival is not None and self._rounds < p.rounds:
             # Somewhere far away fits better: the next scans decide.
             self._rounds += 1
-            self._doubts = p.doubts - 1
         elif agreement >= p.lost_below:
             # Nothing explains the scan better: what is seen is not on the map.
             self._tolerated = agreement
             self._settle(corrected, agreement)
         else:
             self.lost = True
+            self._look_at = now + p.lost_pause
 
     def _is_convincing(self, found: tuple[Pose, float], agreement: float) -> bool:
         p = self.parameters
@@ -238,7 +238,8 @@ class Localiser:
     def _settle(self, pose: Pose, agreement: float) -> None:
         self.pose, self.agreement = pose, agreement
         self.lost = False
-        self._doubts = self._rounds = 0
+        self._look_at = None
+        self._rounds = 0
         self._rival = None
 
     def search(self, scan: Scan) -> tuple[Pose, float] | None:

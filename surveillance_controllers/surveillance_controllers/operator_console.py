@@ -57,7 +57,10 @@ class OperatorConsole:
         """Starts to read commands from a terminal or pipe, standard input unless given."""
         name = self._node.get_name()
         self._console = Console(name, self._on_line, self._grammar.completions, source=source)
-        _tell('You can type these commands:\n' + self._grammar.help())
+        if self._console.on_terminal:
+            _tell('You can type these commands:\n' + self._grammar.help())
+        else:
+            _tell('Commands come from standard input, a line each; help lists them.')
         self._node.stopping.subscribe(self._console.stop)
         self._node.spawn(self._read, name=f'{name} console')
 
@@ -68,7 +71,8 @@ class OperatorConsole:
 
     def announce(self, text: str) -> None:
         """Tells the operator something, wherever the operator is."""
-        _tell(text)
+        if self._console is not None:
+            _tell(text)
         self._announcements.publish(String(data=text))
 
     def _read(self) -> None:

@@ -85,7 +85,7 @@ class PlaceTracking:
         try:
             self._write(place)
         finally:
-            self._base.release()
+            self._base.release(place)
 
     def _write(self, place: str | None) -> None:
         assert self._where is not None

@@ -62,7 +62,8 @@ class PlannerController(PatrolNode):
         (points,) = command.values
         assert isinstance(points, tuple)
         self._desk.answer(points)
-        return f'A path with {len(points)} points between start and goal.'
+        count = '1 point' if len(points) == 1 else f'{len(points)} points'
+        return f'A path with {count} between start and goal.'
 
     def _compute_path(self, goal: Any, run: GoalRun) -> ComputePath.Result:
         start, end = conversions.array_from_points([goal.start, goal.goal])

@@ -9,6 +9,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any
 
 from geometry_msgs.msg import PoseWithCovarianceStamped, Twist
@@ -31,9 +32,28 @@ from surveillance_runtime.waiting import ClockWait, Interrupt
 POSE_PERIOD = 0.2
 """Least time between two messages on amcl_pose, seconds."""
 
+LONGEST_HOLD = 0.15
+"""How long answers are held until the ontology knows the robot's place, seconds; the drive counts
+on commands that are no older."""
+
 
 class RobotSilent(Exception):
     """What the robot's sensors must give does not come; the text names the topic."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a scan leads to.
+
+    Attributes:
+        at: When the scan came, seconds.
+        velocity: The velocity to command; None when there is no task.
+        estimate: Where the robot is; None when that was told a moment ago, or is not known yet.
+    """
+
+    at: float
+    velocity: Velocity | None
+    estimate: PoseWithCovarianceStamped | None
 
 
 class RobotBase:
@@ -63,7 +83,8 @@ class RobotBase:
         self._stepped = threading.Condition(self._lock)
         self._steps = 0
         self._pose_sent = float('-inf')
-        self._held: Velocity | None = None
+        self._held: Answer | None = None
+        self._holding_since: float | None = None
         self._was_lost = False
         self._jumps = 0
         self._commands = node.create_publisher(Twist, 'cmd_vel', 1)
@@ -95,12 +116,17 @@ class RobotBase:
         with self._lock:
             self._pilot.set_positions(positions)
 
-    def release(self) -> None:
-        """Gives out the command that was held until the ontology knew the robot's place."""
+    def release(self, place: str | None) -> None:
+        """Goes on: the ontology knows that the robot is in a place, or does not answer."""
         with self._lock:
-            if self._held is not None and self._pilot.task is not None:
-                self._commands.publish(conversions.twist_from(self._held))
-            self._held = None
+            if place == self.place:
+                self._release()
+
+    def _release(self) -> None:
+        with self._lock:
+            held, self._held, self._holding_since = self._held, None, None
+            if held is not None:
+                self._give(held)
 
     def drive(
         self,
@@ -212,21 +238,34 @@ class RobotBase:
         with self._stepped:
             place = self.place
             velocity = self._pilot.see(conversions.scan_from(message), now)
-            moved_on = self.place != place
-            self._held = None
-            if velocity is not None and moved_on and self._on_place():
-                # In another place now: the ontology shall know before the robot goes on. What is
-                # held goes out when it knows, or else with the next scan's command.
-                self._held = velocity
-            elif velocity is not None:
-                self._commands.publish(conversions.twist_from(velocity))
-            elif moved_on:
-                self._on_place()
+            answer = Answer(now, velocity, self._estimate(now, message.header.stamp))
+            if self.place != place and self._on_place():
+                # In another place now: the ontology shall know before anybody goes on.
+                self._holding_since = now
+            self._held = answer
+            if self._holding_since is None or not 0 <= now - self._holding_since < LONGEST_HOLD:
+                self._release()
             self._steps += 1
             self._stepped.notify_all()
-        self._tell(now, message.header.stamp)
+        self._tell(message.header.stamp)
 
-    def _tell(self, now: float, stamp: Any) -> None:
+    def _give(self, answer: Answer) -> None:
+        if answer.velocity is not None and self._pilot.task is not None:
+            self._commands.publish(conversions.twist_from(answer.velocity))
+        if answer.estimate is not None:
+            self._pose_sent = answer.at
+            self._poses.publish(answer.estimate)
+
+    def _estimate(self, now: float, stamp: Any) -> PoseWithCovarianceStamped | None:
+        pilot = self._pilot
+        if pilot.pose is None or 0 <= now - self._pose_sent < POSE_PERIOD:
+            return None
+        deviation = (5.0, 3.0) if pilot.lost else (0.03, 0.02)
+        estimate = conversions.pose_estimate(pilot.pose, *deviation)
+        estimate.header.stamp = stamp
+        return estimate
+
+    def _tell(self, stamp: Any) -> None:
         pilot = self._pilot
         if pilot.pose is None:
             return
@@ -243,11 +282,5 @@ class RobotBase:
             cloud = conversions.cloud_from_points(pilot.obstacles)
             cloud.header.stamp = stamp
             self._obstacles.publish(cloud)
-        if not 0 <= now - self._pose_sent < POSE_PERIOD:
-            self._pose_sent = now
-            deviation = (5.0, 3.0) if pilot.lost else (0.03, 0.02)
-            estimate = conversions.pose_estimate(pilot.pose, *deviation)
-            estimate.header.stamp = stamp
-            self._poses.publish(estimate)
         if pilot.odometry is not None:
             self._tf.tick(pilot.pose, pilot.odometry, stamp)

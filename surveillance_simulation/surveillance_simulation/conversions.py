@@ -30,6 +30,11 @@ def time_to_ros(seconds: float) -> Time:
     return Time(sec=nanoseconds // 10**9, nanosec=nanoseconds % 10**9)
 
 
+def seconds_from(stamp: Time) -> float:
+    """Convert a time message to seconds since the clock's start."""
+    return float(stamp.sec + stamp.nanosec / 1e9)
+
+
 def duration_from_ros(duration: Duration) -> float:
     """Convert a duration message to seconds."""
     return float(duration.sec) + float(duration.nanosec) / 1e9

@@ -2,9 +2,10 @@
 
 `speed` is simulated seconds per real second; 0 means as fast as the robot's programs keep up. Two
 things hold time back then: a ceiling, so that a program's thinking does not cost the robot minutes;
-and lockstep: while the base is under command, time waits for the next command, since a controller
-that has not answered the last measurement yet is still at work on it. A controller that stays
-silent for `patience` real seconds is given up, and time goes on.
+and lockstep: time waits while a program that has not answered the last measurement yet is still at
+work on it. While the base is under command the answer is the next command; from a robot that
+estimates where it is, it is the next estimate. A program that stays silent for `patience` real
+seconds is given up until it answers again, and time goes on.
 """
 
 from __future__ import annotations
@@ -22,7 +23,8 @@ class PaceModel:
         step: Simulated seconds between two ticks of the clock.
         idle_step: The same while nothing moves and `speed` is 0.
         window: Simulated seconds that may pass after a command before the next one must come.
-        patience: Real seconds that time waits for a command.
+        estimate_window: Likewise after the measurement that an estimate of the pose answers.
+        patience: Real seconds that time waits for either.
     """
 
     speed: float = 1.0
@@ -30,6 +32,7 @@ class PaceModel:
     step: float = 0.1
     idle_step: float = 0.5
     window: float = 0.15
+    estimate_window: float = 0.35
     patience: float = 0.2
 
     @property
@@ -38,11 +41,45 @@ class PaceModel:
         return self.step / (self.speed or self.ceiling)
 
 
+class Answers:
+    """The answers of a program that works in step with the measurements.
+
+    Args:
+        window: Simulated seconds that may pass after what was answered last.
+        patience: Real seconds after which a late answer is not waited for any more.
+    """
+
+    def __init__(self, window: float, patience: float) -> None:
+        self._window = window
+        self._patience = patience
+        self._answered: float | None = None
+        self._late_since: float | None = None
+
+    def note(self, answered: float) -> None:
+        """Note an answer to what was measured at this simulated time, seconds."""
+        self._answered, self._late_since = answered, None
+
+    def end(self) -> None:
+        """Expect no further answer until one comes."""
+        self._answered = self._late_since = None
+
+    def are_late(self, simulated: float, steady: float) -> bool:
+        """Return whether time must wait for the next answer."""
+        if self._answered is None or simulated - self._answered < self._window - 1e-9:
+            return False
+        if self._late_since is None:
+            self._late_since = steady
+        if steady - self._late_since < self._patience:
+            return True
+        self.end()
+        return False
+
+
 class Pace:
     """Decides how much simulated time passes at each tick.
 
     Attributes:
-        is_waiting: Whether time stands still until a command comes.
+        is_waiting: Whether time stands still until a command or an estimate comes.
     """
 
     def __init__(self, model: PaceModel, steady: float) -> None:
@@ -50,12 +87,20 @@ class Pace:
         self._model = model
         self._last = steady
         self._owed = 0.0
-        self._commanded: tuple[float, float] | None = None
+        self._commands = Answers(model.window, model.patience)
+        self._estimates = Answers(model.estimate_window, model.patience)
         self.is_waiting = False
 
-    def command(self, moving: bool, simulated: float, steady: float) -> None:
-        """Note a command: whether it moves the base, and when it came by both clocks."""
-        self._commanded = (simulated, steady) if moving else None
+    def command(self, moving: bool, simulated: float) -> None:
+        """Note a command: whether it moves the base, and the simulated time when it came."""
+        if moving:
+            self._commands.note(simulated)
+        else:
+            self._commands.end()
+
+    def estimate(self, measured: float) -> None:
+        """Note an estimate of the pose from what was measured at this simulated time, seconds."""
+        self._estimates.note(measured)
 
     def due(self, simulated: float, steady: float, *, moving: bool) -> float:
         """Return how many simulated seconds pass now; 0 to wait.
@@ -68,9 +113,12 @@ class Pace:
         model = self._model
         elapsed, self._last = steady - self._last, steady
         step = model.step
-        self.is_waiting = self._waits(simulated, steady)
+        late = [
+            answers.are_late(simulated, steady) for answers in (self._commands, self._estimates)
+        ]
+        self.is_waiting = model.speed == 0.0 and any(late)
         if self.is_waiting:
-            # Ready to go on at once when the command comes.
+            # Ready to go on at once when the answer comes.
             self._owed = min(self._owed + elapsed * model.ceiling, step)
             return 0.0
         if model.speed == 0.0:
@@ -84,14 +132,3 @@ class Pace:
             return 0.0
         self._owed -= step
         return step
-
-    def _waits(self, simulated: float, steady: float) -> bool:
-        if self._model.speed != 0.0 or self._commanded is None:
-            return False
-        commanded, since = self._commanded
-        if simulated - commanded < self._model.window - 1e-9:
-            return False
-        if steady - since < self._model.patience:
-            return True
-        self._commanded = None
-        return False

@@ -9,12 +9,13 @@ from typing import Any
 
 import numpy as np
 from builtin_interfaces.msg import Time
-from geometry_msgs.msg import Twist
+from geometry_msgs.msg import PoseWithCovarianceStamped, Twist
 from rclpy.clock import Clock as RclpyClock
 from rclpy.clock import ClockType
 from trajectory_msgs.msg import JointTrajectory
 
 from surveillance_runtime.node import PatrolNode, StartError, run_node
+from surveillance_runtime.qos import STATE_QOS
 from surveillance_simulation import conversions, simulator_parameters
 from surveillance_simulation.arm_motion import TrajectoryError
 from surveillance_simulation.camera_feed import CameraFeed
@@ -59,10 +60,14 @@ class Simulator(PatrolNode):
             raise StartError(f'simulator: {error}') from None
         FaultServices(self, self.robot, self._changing, self._sensors.tell_doors)
         self.create_subscription(Twist, 'cmd_vel', self._on_command, 1)
+        self.create_subscription(
+            PoseWithCovarianceStamped, 'amcl_pose', self._on_estimate, STATE_QOS
+        )
         self.create_subscription(JointTrajectory, 'arm/joint_trajectory', self._on_trajectory, 1)
         steady = RclpyClock(clock_type=ClockType.STEADY_TIME)
         self._sensors.publish(self._stamp())
         self._timer = self.create_timer(pace.period, self._tick, clock=steady)
+        self.create_timer(pace.patience, self._go_on, clock=steady)
 
     def _stamp(self) -> Time:
         if self._drives_clock:
@@ -72,19 +77,32 @@ class Simulator(PatrolNode):
     def _tick(self) -> None:
         with self._changing:
             passed = self._pace.due(self.robot.time, time.monotonic(), moving=self.robot.is_moving)
+            if self._pace.is_waiting:
+                # The answer wakes it: ticks in vain would take the time that the answer needs.
+                self._timer.cancel()
             if not passed:
                 return
             self.robot.advance(passed)
         self._sensors.publish(self._stamp())
         self._camera.tick()
 
+    def _go_on(self) -> None:
+        if self._pace.is_waiting:
+            self._timer.reset()
+            self._tick()
+
     def _on_command(self, message: Twist) -> None:
         speed, turn_speed = message.linear.x, message.angular.z
         with self._changing:
             self.robot.base.command(speed, turn_speed)
-            self._pace.command(self.robot.base.is_moving, self.robot.time, time.monotonic())
-        if self._pace.is_waiting:
-            self._tick()
+            self._pace.command(self.robot.base.is_moving, self.robot.time)
+        self._go_on()
+
+    def _on_estimate(self, message: PoseWithCovarianceStamped) -> None:
+        if self._drives_clock:
+            measured = conversions.seconds_from(message.header.stamp)
+            self._pace.estimate(measured)
+            self._go_on()
 
     def _on_trajectory(self, message: JointTrajectory) -> None:
         names, points = conversions.trajectory_from_ros(message)

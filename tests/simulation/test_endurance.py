@@ -11,11 +11,12 @@ sys.path.insert(0, str(ROOT / 'benchmarks'))
 import endurance  # noqa: E402
 
 
-def test_minutes_of_trouble_cost_neither_collisions_nor_the_way_home(ros_domain: int) -> None:
+def test_minutes_of_trouble_cost_neither_collisions_nor_the_way_home() -> None:
     watch, trouble = endurance.run(
-        ROOT / 'config' / 'seven_rooms.yaml', 150.0, seed=3, pause=(8.0, 20.0), domain=ros_domain
+        ROOT / 'config' / 'seven_rooms.yaml', 150.0, seed=3, pause=(8.0, 20.0), log_level='info'
     )
     assert sum(trouble.made.values()) >= 5
     assert watch.collisions == 0
     assert not watch.empty
+    assert not watch.wrong
     assert sum(watch.visits.values()) >= 3

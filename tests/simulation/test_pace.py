@@ -35,24 +35,48 @@ def test_as_fast_as_possible_ends_at_the_ceiling() -> None:
 
 def test_time_waits_for_the_next_command_of_a_controller_at_work() -> None:
     pace = Pace(PaceModel(speed=0.0, step=0.1, window=0.15, patience=0.2), 0.0)
-    pace.command(True, 0.0, 0.0)
+    pace.command(True, 0.0)
     passed = [pace.due(0.1 * count, 0.01 * count, moving=True) for count in range(1, 6)]
     assert passed == pytest.approx([0.1, 0.0, 0.0, 0.0, 0.0])
     assert pace.is_waiting
-    pace.command(True, 0.2, 0.05)
+    pace.command(True, 0.2)
     # At once: what was owed while it waited is not lost.
     assert pace.due(0.2, 0.05, moving=True) == pytest.approx(0.1)
     assert not pace.is_waiting
 
 
-def test_a_silent_controller_is_given_up() -> None:
+def test_time_waits_for_a_robot_that_works_out_where_it_is() -> None:
+    pace = Pace(PaceModel(speed=0.0, estimate_window=0.35), 0.0)
+    assert pace.due(0.5, 0.01, moving=False) > 0.0  # Nobody has told a pose yet.
+    pace.estimate(0.5)
+    assert pace.due(0.5, 0.02, moving=False) > 0.0
+    assert pace.due(1.0, 0.03, moving=False) == 0.0
+    assert pace.is_waiting
+    pace.estimate(1.0)
+    assert pace.due(1.0, 0.04, moving=False) > 0.0
+
+
+def test_a_silent_program_is_given_up_until_it_answers_again() -> None:
     pace = Pace(PaceModel(speed=0.0, patience=0.2), 0.0)
-    pace.command(True, 0.0, 0.0)
-    assert pace.due(1.0, 0.1, moving=True) == 0.0
-    assert pace.due(1.0, 0.25, moving=True) > 0.0
+    pace.command(True, 0.0)
+    assert pace.due(1.0, 5.0, moving=True) == 0.0  # A machine that stood still is no silence.
+    assert pace.due(1.0, 5.1, moving=True) == 0.0
+    assert pace.due(1.0, 5.25, moving=True) > 0.0
+    assert pace.due(1.1, 5.26, moving=True) > 0.0
+    pace.command(True, 1.2)
+    assert pace.due(1.4, 5.27, moving=True) == 0.0
 
 
 def test_nothing_waits_when_the_base_was_told_to_stand() -> None:
     pace = Pace(PaceModel(speed=0.0), 0.0)
-    pace.command(False, 0.0, 0.0)
+    pace.command(True, 0.0)
+    pace.command(False, 0.1)
     assert pace.due(1.0, 0.01, moving=False) > 0.0
+
+
+def test_nothing_is_waited_for_at_a_set_speed() -> None:
+    pace = Pace(PaceModel(speed=1.0), 0.0)
+    pace.command(True, 0.0)
+    pace.estimate(0.0)
+    assert pace.due(5.0, 5.0, moving=True) > 0.0
+    assert not pace.is_waiting
