@@ -24,7 +24,7 @@ EXIT_INTERRUPTED = 130
 # the exit code.
 PACKAGE_COMMANDS = {
     'map': ('surveillance_behaviour.map_command', 'check a place and draw it as a picture'),
-    'detect': ('surveillance_perception.detect_command', 'find markers in pictures'),
+    'detect': ('surveillance_perception.detect_command', 'find ArUco markers in pictures'),
     'check-behaviour': (
         'surveillance_behaviour.check_command',
         'check the state machines and draw them',
@@ -32,17 +32,24 @@ PACKAGE_COMMANDS = {
 }
 
 _DESCRIPTION = """\
-Sets the project up when that is needed, then runs it. Without a command: every node as its own
-process, patrolling until Ctrl-C."""
-_EXAMPLES = """\
+Patrols, with every node as a process of its own, until Ctrl-C; or does what COMMAND says. What the
+project needs is set up first, where it is not yet."""
+_COMMANDS = """\
 commands (each has its own --help):
-  run                       the default
-  node NAME [ROS args]      one node by itself in this terminal
-  list                      the nodes
-  setup                     only the set-up
-  test [pytest args]        the test suite
-  lint                      formatting, lint and type checks
+  run                       patrol: the same as without a command
+  node NAME [ROS args]      run one node by itself in this terminal
+  list                      name the nodes
+  setup                     set up and do no more
+  test [pytest args]        run the test suite
+  lint                      check format, lint and types
 """
+_TEST_HELP = """\
+usage: launch.py test [pytest arguments]
+
+Runs the whole test suite on two processes. Further words go to pytest:
+  python3 launch.py test tests/fsm -k preempt
+  python3 launch.py test -n 0 -x tests/launcher
+All that pytest takes: .venv/bin/python -m pytest --help"""
 
 
 class Parser(argparse.ArgumentParser):
@@ -69,20 +76,50 @@ def _seconds(text: str) -> float:
 def _shared_options() -> argparse.ArgumentParser:
     """Options of `run` and of `node`."""
     parser = Parser(add_help=False)
-    parser.add_argument('--map', type=Path, metavar='FILE', help='the place, a file of config/')
-    parser.add_argument('--params', type=Path, metavar='FILE', help='further node parameters')
-    parser.add_argument(
-        '--log-level', choices=('debug', 'info', 'warn', 'error', 'fatal'), type=str.lower
-    )
-    parser.add_argument('--namespace', metavar='NAME', help='of all nodes, for a second robot')
-    parser.add_argument('--domain', type=int, metavar='N', help='ROS domain, 0 to 101')
     parser.add_argument(
         '--mode',
         choices=graph.MODES,
         type=str.upper,
-        help=f'how the controllers work (default {graph.DEFAULT_MODE})',
+        metavar='|'.join(graph.MODES),
+        help='what stands in for the hardware: a simulated place, chance, or you at the console '
+        f'(default: {graph.DEFAULT_MODE})',
     )
-    parser.add_argument('--behaviour', choices=graph.BEHAVIOURS, default='surveillance')
+    parser.add_argument(
+        '--behaviour',
+        choices=graph.BEHAVIOURS,
+        default='surveillance',
+        metavar='|'.join(graph.BEHAVIOURS),
+        help='surveillance knows its map, patrol learns it from markers (default: surveillance)',
+    )
+    parser.add_argument(
+        '--map',
+        type=Path,
+        metavar='FILE',
+        help='the place (default: config/seven_rooms.yaml, for patrol config/patrol_world.yaml)',
+    )
+    parser.add_argument(
+        '--params',
+        type=Path,
+        metavar='FILE',
+        help='a ROS parameter file; what it says goes before config/parameters.yaml and the place',
+    )
+    parser.add_argument(
+        '--log-level',
+        choices=graph.LOG_LEVELS,
+        type=str.lower,
+        metavar='|'.join(graph.LOG_LEVELS),
+        help='the least severity that the nodes print (default: info)',
+    )
+    parser.add_argument(
+        '--namespace', metavar='NAME', help='goes before all names, for a second robot'
+    )
+    parser.add_argument(
+        '--domain',
+        type=int,
+        metavar='N',
+        help='ROS domain, 0 to 101: robots in different ones do not hear each other '
+        '(default: ROS_DOMAIN_ID, else 0)',
+    )
     return parser
 
 
@@ -94,17 +131,36 @@ def make_parser() -> argparse.ArgumentParser:
     parser = Parser(
         prog='launch.py',
         description=_DESCRIPTION,
-        epilog=_EXAMPLES + package_lines,
+        usage='%(prog)s [COMMAND] [options]',
+        epilog=_COMMANDS + package_lines,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         parents=[_shared_options()],
     )
-    parser.add_argument('--for', dest='seconds', type=_seconds, metavar='SECONDS')
-    parser.add_argument('--composed', action='store_true', help='all nodes in one process')
     parser.add_argument(
-        '--only', type=_names, default=[], metavar='NODE,...', help='start these nodes alone'
+        '--for',
+        dest='seconds',
+        type=_seconds,
+        metavar='SECONDS',
+        help='stop after this time (default: at Ctrl-C)',
     )
     parser.add_argument(
-        '--without', type=_names, default=[], metavar='NODE,...', help='these run elsewhere'
+        '--composed',
+        action='store_true',
+        help='all nodes in one process, which takes less memory and starts sooner',
+    )
+    parser.add_argument(
+        '--only',
+        type=_names,
+        default=[],
+        metavar='NODE,...',
+        help='start these nodes and no others: the rest runs elsewhere',
+    )
+    parser.add_argument(
+        '--without',
+        type=_names,
+        default=[],
+        metavar='NODE,...',
+        help='start all but these nodes, which run elsewhere',
     )
     return parser
 
@@ -172,11 +228,17 @@ def wanted_run(options: argparse.Namespace) -> Run:
 def _node(argv: list[str]) -> int:
     parser = Parser(
         prog='launch.py node',
+        usage='%(prog)s [options] NAME [--ros-args ...]',
         description='Runs one node in this terminal, with the parameters of config/.',
         parents=[_shared_options()],
     )
     parser.add_argument('name', metavar='NAME', help='see launch.py list')
-    parser.add_argument('rest', nargs=argparse.REMAINDER, metavar='ROS arguments')
+    parser.add_argument(
+        'rest',
+        nargs=argparse.REMAINDER,
+        metavar='--ros-args ...',
+        help='as with ros2 run: -p PARAMETER:=VALUE, -r FROM:=TO, --params-file FILE',
+    )
     options = parser.parse_args(argv)
     node = graph.find(options.name)
     _enter(['node', *argv])
@@ -204,7 +266,9 @@ def _list(argv: list[str]) -> int:
 
 
 def _setup(argv: list[str]) -> int:
-    Parser(prog='launch.py setup', description='Only the set-up.').parse_args(argv)
+    Parser(prog='launch.py setup', description='Sets up what the other commands need.').parse_args(
+        argv
+    )
     environment = _environment(())
     if environment is not None:
         environment.prepare()
@@ -213,6 +277,9 @@ def _setup(argv: list[str]) -> int:
 
 
 def _test(argv: list[str]) -> int:
+    if argv in (['-h'], ['--help']):
+        print(_TEST_HELP)
+        return 0
     _enter(['test', *argv])
     spread = any(a.startswith(('-n', '--numprocesses', '--pdb', '-p')) for a in argv)
     _exec(['-m', 'pytest', *([] if spread else ['-n', '2', '--dist', 'loadfile']), *argv])
@@ -220,7 +287,9 @@ def _test(argv: list[str]) -> int:
 
 
 def _lint(argv: list[str]) -> int:
-    Parser(prog='launch.py lint', description='Ruff and mypy.').parse_args(argv)
+    Parser(
+        prog='launch.py lint', description='Runs ruff check, ruff format --check and mypy.'
+    ).parse_args(argv)
     _enter(['lint'], extras=('lint',))
     import subprocess
 

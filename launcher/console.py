@@ -93,6 +93,10 @@ class OperatorConsole:
         self._thread = threading.Thread(target=self._read, name='console', daemon=True)
 
     def start(self) -> None:
+        """Says what can be typed and begins to read."""
+        self._log.say('You can type these commands:')
+        for line in route('help', self._controllers).message.splitlines():
+            self._log.say(line)
         self._thread.start()
 
     def stop(self) -> None:

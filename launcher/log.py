@@ -5,7 +5,9 @@ from __future__ import annotations
 import contextlib
 import os
 import re
+import shutil
 import sys
+import textwrap
 from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
@@ -14,10 +16,13 @@ from typing import TextIO
 # What the nodes are told to print, so that severity and origin can be read back from a line.
 ROS_FORMAT = '[{severity}] [{name}] {message}'
 _ROS_LINE = re.compile(r'\[(DEBUG|INFO|WARN|ERROR|FATAL)\] \[([\w./~-]+)\] ?(.*)')
+_NODE_LINE = re.compile(r'\[(\w+)\] (.*)')
 _ESCAPES = re.compile(r'\x1b\[[0-9;?]*[ -/]*[@-~]')
 _SEVERITY_COLOURS = {'WARN': '33', 'ERROR': '31', 'FATAL': '1;31', 'DEBUG': '2'}
 _NODE_COLOURS = ('36', '32', '35', '34', '96', '92', '95', '94')
 LAUNCHER = 'launch'
+_LEAST_TEXT = 40
+"""Columns that text must have beside time and name for long lines to be broken at words."""
 
 
 class MergedLog:
@@ -44,8 +49,9 @@ class MergedLog:
         self._width = max(map(len, (*names, LAUNCHER)))
         self._colours = {n: _NODE_COLOURS[i % len(_NODE_COLOURS)] for i, n in enumerate(names)}
         self._colours[LAUNCHER] = '1'
+        self._terminal = (stream or sys.stdout).isatty()
         if colour is None:
-            colour = (stream or sys.stdout).isatty() and not os.environ.get('NO_COLOR')
+            colour = self._terminal and not os.environ.get('NO_COLOR')
         self._colour = colour
         self._file = path.open('a', encoding='utf-8') if path is not None else None
 
@@ -70,6 +76,8 @@ class MergedLog:
                 self._write(name, severity, message)
             else:
                 self._write(process, severity, f'{origin}: {message}')
+        elif (match := _NODE_LINE.match(text)) and match[1] in self._names:
+            self._write(match[1], '', match[2])
         elif text:
             self._write(process, '', text)
 
@@ -86,16 +94,29 @@ class MergedLog:
         clock = datetime.now().strftime('%H:%M:%S.%f')[:-3]
         word = '' if severity in ('', 'INFO') else f'{severity}: '
         plain = f'{clock} {name:<{self._width}} | {word}{_ESCAPES.sub("", text)}'
+        if not self._terminal and not self._colour:
+            self._emit(plain, plain)
+            return
+        head, more = f'{clock} {name:<{self._width}} | ', f'{"":{len(clock) + self._width}}  | '
+        lines = self._fitting(word + text, len(head))
         if self._colour:
             shade = _SEVERITY_COLOURS.get(severity, '')
-            body = f'\x1b[{shade}m{word}{text}\x1b[0m' if shade else text
-            shown = (
+            if shade:
+                lines = [f'\x1b[{shade}m{line}\x1b[0m' for line in lines]
+            head = (
                 f'\x1b[2m{clock}\x1b[0m \x1b[{self._colours.get(name, "0")}m'
-                f'{name:<{self._width}}\x1b[0m | {body}'
+                f'{name:<{self._width}}\x1b[0m | '
             )
-        else:
-            shown = plain
-        self._emit(shown, plain)
+        self._emit('\n'.join([head + lines[0], *(more + line for line in lines[1:])]), plain)
+
+    def _fitting(self, text: str, taken: int) -> list[str]:
+        """The text as lines that fit beside what is `taken` of a terminal's columns."""
+        if not self._terminal or '\x1b' in text:
+            return [text]
+        room = shutil.get_terminal_size().columns - taken
+        if room < _LEAST_TEXT or len(text) <= room:
+            return [text]
+        return textwrap.wrap(text, room, break_on_hyphens=False) or [text]
 
     def _emit(self, shown: str, plain: str) -> None:
         if self._file is not None:

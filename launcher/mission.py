@@ -29,7 +29,6 @@ PLACES = {'surveillance': 'seven_rooms.yaml', 'patrol': 'patrol_world.yaml'}
 RECORD = 'mission.jsonl'
 COMPOSED = 'composed'
 BEHAVIOUR_NODE = 'robot_behavior'
-LOG_LEVELS = ('debug', 'info', 'warn', 'error', 'fatal')
 _NAMESPACE = re.compile(r'/?[A-Za-z]\w*(/[A-Za-z]\w*)*\Z', re.ASCII)
 MAX_DOMAIN = 101
 """The highest ROS domain whose ports lie below those that Linux gives to clients."""
@@ -50,7 +49,7 @@ class Run:
         parameters: further parameter file, None for none.
         composed: all nodes in one process.
         only, without: names of nodes, see `graph.select`.
-        log_level: one of `LOG_LEVELS`, None for ROS's own choice.
+        log_level: one of `graph.LOG_LEVELS`, None for ROS's own choice.
         namespace: of all nodes, None for none.
         domain: ROS domain, None for the environment's.
         seconds: how long to run, None until stopped.

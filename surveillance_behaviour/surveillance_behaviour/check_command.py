@@ -79,7 +79,7 @@ def report(name: str, findings: Sequence[Finding]) -> str:
 def main(args: Sequence[str] | None = None) -> int:
     """Check machines; returns the exit code."""
     parser = argparse.ArgumentParser(
-        prog='check-behaviour', description='Check state machines without running them.'
+        prog='launch.py check-behaviour', description='Check state machines without running them.'
     )
     parser.add_argument(
         'machine',

@@ -59,8 +59,6 @@ class OperatorConsole:
         self._console = Console(name, self._on_line, self._grammar.completions, source=source)
         if self._console.on_terminal:
             _tell('You can type these commands:\n' + self._grammar.help())
-        else:
-            _tell('Commands come from standard input, a line each; help lists them.')
         self._node.stopping.subscribe(self._console.stop)
         self._node.spawn(self._read, name=f'{name} console')
 

@@ -21,7 +21,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         0 when every picture could be read, 1 when one could not, 2 for a wrong command line.
     """
     parser = argparse.ArgumentParser(
-        prog='detect', description='Find ArUco markers in pictures and write annotated copies.'
+        prog='launch.py detect',
+        description='Find ArUco markers in pictures and write annotated copies.',
     )
     parser.add_argument('images', nargs='+', type=Path, metavar='IMAGE')
     parser.add_argument('--dictionary', default='DICT_5X5_100', help='default: %(default)s')

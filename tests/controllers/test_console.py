@@ -9,12 +9,13 @@ import termios
 import threading
 from typing import Any
 
+from geometry_msgs.msg import Point
 from prompt_toolkit.completion import CompleteEvent
 from prompt_toolkit.document import Document
 from prompt_toolkit.input import create_pipe_input
 from prompt_toolkit.input.vt100 import Vt100Input
 from prompt_toolkit.output import DummyOutput
-from std_msgs.msg import UInt8
+from std_msgs.msg import String, UInt8
 
 from surveillance_controllers.battery_controller_node import BatteryController
 from surveillance_controllers.console import Console
@@ -22,6 +23,8 @@ from surveillance_controllers.console_commands import BATTERY, Grammar
 from surveillance_controllers.console_node import ConsoleNode
 from surveillance_controllers.planner_controller_node import PlannerController
 from surveillance_controllers.terminal_lines import TerminalLines, WordCompleter
+from surveillance_interfaces.action import ComputePath
+from surveillance_runtime.calls import GoalCaller
 from surveillance_runtime.qos import STATE_QOS
 
 
@@ -113,9 +116,31 @@ def test_one_console_addresses_every_controller(graph: Any, operator: Any, capfd
     assert node.ended.wait(5)
     assert node.failure is None
     shown = capfd.readouterr().out
-    assert 'The battery is at 42 %.' in shown
+    assert '[battery_controller] The battery is at 42 %.' in shown
     assert 'no request is waiting: expected one before this command' in shown
     assert (
         'motion_controller does not answer: service motion_controller/command: no server' in shown
     )
     assert "'jump' is no command: expected 'battery', 'plan', 'move'" in shown
+
+
+def test_a_request_is_announced_once_with_its_controller_before_each_line(
+    graph: Any, operator: Any, capfd: Any
+) -> None:
+    graph.add(PlannerController, {'execution_mode': 'MANUAL', 'console': False})
+    graph.add(ConsoleNode, console_source=operator.source)
+    caller = GoalCaller(graph.node, ComputePath, 'compute_path')
+    ends: list[str] = []
+    goal = ComputePath.Goal(goal=Point(x=1.0))
+    thread = threading.Thread(
+        target=lambda: ends.append(caller.run(goal, accept_timeout=5.0).status)
+    )
+    thread.start()
+    told = graph.listen(String, 'planner_controller/announcement', STATE_QOS)
+    graph.until(lambda: told)
+    operator.type('plan set [[1, 2, 0]]')
+    thread.join(10)
+    assert ends == ['succeeded']
+    shown = [line for line in capfd.readouterr().out.splitlines() if 'Answer with' in line]
+    assert len(shown) == 1
+    assert shown[0].startswith('[planner_controller] ')

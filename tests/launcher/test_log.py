@@ -38,6 +38,31 @@ def test_a_process_of_several_nodes_is_shown_by_node(stream):
     assert body(stream.getvalue()) == ['two      | hello']
 
 
+def test_what_a_console_says_for_a_node_is_shown_by_node(stream):
+    log = MergedLog(stream, ['two', 'composed'])
+    log.line('composed', '[two] New request')
+    log.line('composed', '[0, 1] is no point')
+    assert body(stream.getvalue()) == ['two      | New request', 'composed | [0, 1] is no point']
+
+
+@pytest.mark.parametrize(('columns', 'shown'), [(64, 2), (30, 1), (120, 1)])
+def test_on_a_terminal_a_long_line_is_broken_at_words(monkeypatch, tmp_path, columns, shown):
+    monkeypatch.setenv('COLUMNS', str(columns))
+    monkeypatch.setenv('NO_COLOR', '1')
+    stream = io.StringIO()
+    stream.isatty = lambda: True
+    log = MergedLog(stream, ['one'], path=tmp_path / 'log')
+    text = 'E is the nearest charging place, seven seconds away from here'
+    log.line('one', f'[INFO] [one] {text}')
+    log.close()
+    lines = stream.getvalue().splitlines()
+    assert len(lines) == shown
+    assert ' '.join(line.partition('| ')[2] for line in lines) == text
+    assert all(line.startswith(' ' * 19 + ' | ') for line in lines[1:])
+    assert shown == 1 or all(len(line) <= columns for line in lines)
+    assert body((tmp_path / 'log').read_text()) == [f'one    | {text}']
+
+
 def test_a_redrawn_line_shows_what_it_ended_with(stream):
     log = MergedLog(stream, ['battery'])
     log.line('battery', 'charging 10 %\rcharging 100 %')

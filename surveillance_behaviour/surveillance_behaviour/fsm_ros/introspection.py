@@ -78,8 +78,8 @@ class IntrospectionServer:
         node.create_service(SetInitialState, f'{prefix}/set_initial_state', self._set_initial_state)
 
     def start(self) -> None:
-        """Draw the machine in the log and begin to publish."""
-        self._node.get_logger().info(f'state machine:\n{to_ascii(self._root)}')
+        """Draw the machine in the log, on level debug, and begin to publish."""
+        self._node.get_logger().debug(f'state machine:\n{to_ascii(self._root)}')
         self._structure.publish(structure_message(self._root, self._stamp()))
         self._feed = TransitionFeed(self._root, self._publish)
         self._root.register_start_cb(self._changed)
