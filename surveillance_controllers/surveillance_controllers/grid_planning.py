@@ -16,6 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import pairwise
 
 import cv2
@@ -68,10 +69,15 @@ class _Costs:
     cost: NDArray[np.float32]
     regions: NDArray[np.int32]
 
+    @cached_property
+    def search(self) -> MCP_Geometric:
+        # It copies the costs into its own layout, which takes about as long as a short search.
+        return MCP_Geometric(self.cost)
+
 
 @dataclass
 class GridPlanner:
-    """Finds paths on one map, with doors closed and obstacles seen since.
+    """Finds paths on one map, with doors closed and obstacles seen since; one call at a time.
 
     Args:
         grid: The map.
@@ -274,7 +280,7 @@ class GridPlanner:
         return self._nearest_extra(blocked[len(blocked) // 2]) + ' is in the way'
 
     def _search(self, start: tuple[int, int], goal: tuple[int, int]) -> NDArray[np.intp]:
-        search = MCP_Geometric(self._costs.cost)
+        search = self._costs.search
         search.find_costs([start], [goal])
         return np.asarray(search.traceback(goal), dtype=np.intp)
 
@@ -310,7 +316,7 @@ class GridPlanner:
         (x, y), (dx, dy) = begin, end - begin
         length = math.hypot(dx, dy)
         count = math.ceil(2 * length / self.grid.resolution) + 1
-        share = np.linspace(0.0, 1.0, count)
+        share = np.arange(count) / max(1, count - 1)
         scale = 1.0 / self.grid.resolution
         west, south = self.grid.origin
         columns = (((x - west) + share * dx) * scale).astype(np.intp)
@@ -319,7 +325,7 @@ class GridPlanner:
         # The ends are the start's and the goal's own, which may be nearer to something.
         if count > 2 and costs[1:-1].min() < 0:
             return math.inf
-        return float(np.abs(costs).mean()) * length
+        return float(np.abs(costs).sum()) / count * length
 
     def _rounded(self, path: Points) -> Points:
         """Rounds each corner by a quadratic Bezier curve, as far as that is free."""
@@ -337,7 +343,7 @@ class GridPlanner:
             leave = corner + (after - corner) * (arms[1] / math.dist(after, corner))
             # The curve is shorter than its two arms: samples are at most half a cell apart.
             count = 2 * math.ceil(sum(arms) / self.grid.resolution) + 1
-            share = np.linspace(0.0, 1.0, count)[:, None]
+            share = np.arange(count)[:, None] / (count - 1)
             curve = (1 - share) ** 2 * entry + 2 * share * (1 - share) * corner + share**2 * leave
             cells = ((curve - self.grid.origin) / self.grid.resolution).astype(np.intp)
             if self._costs.cost[cells[:, 1], cells[:, 0]].min() > 0:
