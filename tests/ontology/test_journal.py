@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import resource
 from pathlib import Path
 
 import pytest
@@ -110,3 +111,57 @@ def test_a_directory_that_cannot_be_used(tmp_path: Path) -> None:
     (tmp_path / 'file').write_text('')
     with pytest.raises(JournalError, match='file'):
         Journal(tmp_path / 'file' / 'store')
+
+
+def test_a_record_that_fits_in_part_is_refused_and_leaves_nothing(tmp_path: Path) -> None:
+    journal = Journal(tmp_path)
+    journal.append(['first'])
+    end = (tmp_path / 'journal-0.log').stat().st_size
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    # A file at its size limit takes what fits, as a disk does that is almost full.
+    resource.setrlimit(resource.RLIMIT_FSIZE, (end + 20, before[1]))
+    try:
+        with pytest.raises(JournalError, match='too large'):
+            journal.append(['x' * 200])
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    journal.append(['second'])
+    journal.close()
+    assert reopened(tmp_path) == ['first', 'second']
+
+
+def test_what_a_failed_write_left_is_removed_before_the_next(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    journal = Journal(tmp_path)
+    journal.append([1])
+
+    def broken(*_: object) -> None:
+        raise OSError(5, 'Input/output error')
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, 'fdatasync', broken)
+        patch.setattr(os, 'ftruncate', broken)
+        for record in (2, 3):
+            with pytest.raises(JournalError, match='Input/output error'):
+                journal.append([record])
+    journal.append([4])
+    journal.close()
+    assert reopened(tmp_path) == [1, 4]
+
+
+@pytest.mark.parametrize('lost', ['snapshot-1.log', 'journal-1.log'])
+def test_a_part_that_is_missing_is_reported(tmp_path: Path, lost: str) -> None:
+    journal = Journal(tmp_path)
+    journal.append([1])
+    number = journal.begin_snapshot()
+    journal.append([2])
+    if lost.startswith('snapshot'):
+        journal.finish_snapshot(number, ['state'])
+    else:
+        journal.begin_snapshot()
+        journal.append([3])
+    journal.close()
+    (tmp_path / lost).unlink()
+    with pytest.raises(JournalError, match='is missing'):
+        Journal(tmp_path)

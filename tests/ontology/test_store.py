@@ -7,12 +7,14 @@ import random
 import signal
 import subprocess
 import sys
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 import pytest
 
 from surveillance_ontology.armor.journal import Journal, JournalError
 from surveillance_ontology.armor.protocol import DirectiveRequest
+from surveillance_ontology.armor.reference import Reference
 from surveillance_ontology.armor.service import ArmorService
 from surveillance_ontology.armor.settings import Settings
 from surveillance_ontology.armor.store import Store
@@ -143,6 +145,32 @@ def test_snapshots_keep_the_journal_short(tmp_path: Path) -> None:
     assert names(server.ask('QUERY IND CLASS', 'DOOR')) == ['X']
     assert '"200"^^xsd:long' in server.ask('QUERY DATAPROP IND', 'now', 'Robot1').queried_objects
     assert server.notes == []
+
+
+def test_references_that_come_and_go_while_a_snapshot_begins_are_not_mistaken(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    server = Server(tmp_path / 'store', compact_from=1)
+    server.ask(*LOAD, 'false', '', 'true')
+    server.ask(*LOAD, 'false', '', 'true', reference='early')
+    registry = server.service.references
+    held = registry.held
+
+    def held_late(found: list[str]) -> AbstractContextManager[list[Reference]]:
+        server.ask(*LOAD, 'false', '', 'true', reference='late')
+        server.ask('DROP', reference='early')
+        return held(found)
+
+    monkeypatch.setattr(registry, 'held', held_late)
+    server.ask('ADD IND CLASS', 'X', 'DOOR')
+    server.restart()
+    assert server.ask('GET ALL REFS').queried_objects == ['late', 'map']
+    assert names(server.ask('QUERY IND CLASS', 'DOOR')) == ['X']
+    server.ask('ADD IND CLASS', 'Y', 'DOOR')
+    server.restart()
+    assert list((tmp_path / 'store').glob('snapshot-*')), 'the next change tries again'
+    assert server.ask('GET ALL REFS').queried_objects == ['late', 'map']
+    assert names(server.ask('QUERY IND CLASS', 'DOOR')) == ['X', 'Y']
 
 
 def test_a_store_that_cannot_be_read_is_reported(tmp_path: Path) -> None:

@@ -13,8 +13,10 @@ import fcntl
 import json
 import os
 import re
+import threading
 import zlib
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -41,6 +43,7 @@ class Journal:
 
     def __init__(self, directory: Path) -> None:
         self._directory = directory
+        self._parts_lock = threading.Lock()
         try:
             directory.mkdir(parents=True, exist_ok=True)
             self._lock = (directory / 'lock').open('w')
@@ -64,6 +67,9 @@ class Journal:
                 numbers[match[1]].append(int(match[2]))
         start = max(numbers['snapshot'], default=0)
         segments = sorted(n for n in numbers['journal'] if n >= start) or [start]
+        for number in range(start, segments[-1]):
+            if number not in segments:
+                raise JournalError(f'{self._path("journal", number)}: is missing')
         self._parts = [self._path('snapshot', start)] if start else []
         self._parts += [self._path('journal', number) for number in segments]
         for _ in self.records():
@@ -73,6 +79,7 @@ class Journal:
         self.size = sum(sizes) - self.snapshot_size
         self._number = segments[-1]
         self._file = self._segment(self._number)
+        self._end = self._file.tell()
         self._remove_before(start)
 
     def records(self) -> Iterator[Any]:
@@ -81,8 +88,9 @@ class Journal:
         Raises:
             JournalError: Not readable, or damaged.
         """
-        for path in self._parts:
-            yield from self._read(path, last=path == self._parts[-1])
+        with self._parts_lock:
+            for path in self._parts:
+                yield from self._read(path, last=path == self._parts[-1])
 
     def append(self, records: Iterable[Any]) -> None:
         """Write records as one: after a crash all of them are there or none.
@@ -93,14 +101,18 @@ class Journal:
         if self._file.closed:
             raise JournalError(f'{self._directory}: closed')
         line = _line(list(records))
-        end = self._file.tell()
         try:
-            self._file.write(line)
+            self._cut()
+            rest = memoryview(line)
+            while rest:
+                # A disk that is almost full takes a part without an error.
+                rest = rest[self._file.write(rest) :]
             os.fdatasync(self._file.fileno())
         except OSError as error:
-            self._file.truncate(end)
-            self._file.seek(end)
+            with suppress(OSError):
+                self._cut()
             raise JournalError(f'{self._directory}: {error.strerror}') from None
+        self._end += len(line)
         self.size += len(line)
 
     def begin_snapshot(self) -> int:
@@ -115,7 +127,7 @@ class Journal:
         except OSError as error:
             raise JournalError(f'{self._directory}: {error.strerror}') from None
         self._file.close()
-        self._file, self._number, self.size = file, number, 0
+        self._file, self._number, self.size, self._end = file, number, 0, 0
         self._parts.append(self._path('journal', number))
         return number
 
@@ -134,11 +146,12 @@ class Journal:
                 file.flush()
                 os.fsync(file.fileno())
                 self.snapshot_size = file.tell()
-            temporary.rename(path)
-            self._sync_directory()
-            current = self._parts.index(self._path('journal', number))
-            self._parts = [path, *self._parts[current:]]
-            self._remove_before(number)
+            with self._parts_lock:
+                temporary.rename(path)
+                self._sync_directory()
+                current = self._parts.index(self._path('journal', number))
+                self._parts = [path, *self._parts[current:]]
+                self._remove_before(number)
         except OSError as error:
             raise JournalError(f'{self._directory}: {error.strerror}') from None
 
@@ -146,6 +159,10 @@ class Journal:
         """Let another process open the journal."""
         self._file.close()
         self._lock.close()
+
+    def _cut(self) -> None:
+        """Remove what a write that failed may have left behind the records."""
+        os.ftruncate(self._file.fileno(), self._end)
 
     def _path(self, kind: str, number: int) -> Path:
         return self._directory / f'{kind}-{number}.log'

@@ -43,6 +43,7 @@ class Store:
         self._lock = threading.Lock()
         self._batch = threading.local()
         self._snapshot: threading.Thread | None = None
+        self._names: set[str] = set()
 
     def recover(self) -> list[Reference]:
         """Make the references as they were answered for; their derived facts are up to date.
@@ -57,6 +58,7 @@ class Store:
                     recovery.take(record)
                 except (KeyError, IndexError, TypeError, ValueError) as error:
                     raise JournalError(f'record {record!r:.80} cannot be read: {error}') from None
+            self._names = set(recovery.references)
         for ref in recovery.references.values():
             with suppress(JavaReasonerError):
                 ref.kb.reason()
@@ -100,8 +102,7 @@ class Store:
         finally:
             self._batch.records = None
             if records:
-                with self._lock:
-                    self._journal.append(records)
+                self._append(records)
 
     def compact_if_large(
         self,
@@ -123,8 +124,11 @@ class Store:
         def write() -> None:
             try:
                 with hold_all() as references, self._lock:
+                    kept = [ref for ref in references if not ref.dropped]
+                    if {ref.name for ref in kept} != self._names:
+                        return  # One came or went meanwhile; the next change tries again.
                     number = journal.begin_snapshot()
-                    states = [_state(ref) for ref in references]
+                    states = [_state(ref) for ref in kept]
                 journal.finish_snapshot(number, (_record(*state) for state in states))
             except JournalError as error:
                 failed(str(error))
@@ -143,8 +147,16 @@ class Store:
         if pending is not None:
             pending.append(record)
             return
+        self._append([record])
+
+    def _append(self, records: list[Record]) -> None:
         with self._lock:
-            self._journal.append([record])
+            self._journal.append(records)
+            for what, name, *_ in records:
+                if what == 'load':
+                    self._names.add(name)
+                elif what == 'drop':
+                    self._names.discard(name)
 
 
 _State = tuple[str, dict[str, Any], list[Axiom], list[Change]]
