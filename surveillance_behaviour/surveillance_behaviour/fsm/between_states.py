@@ -44,12 +44,14 @@ class BetweenStates(ActiveContainer):
         """
         run = frame.strand.run
         ended = left
+        passed: list[tuple[Node | None, Any, Node | Exit, str]] | None = None
         with run.condition:
             if frame.stale:
                 raise LeftBehind
             frame.strand.heeded()
             frame.attention = False
             kind = 'start' if left is None else 'transition'
+            moves = left is not None
             while True:
                 if frame.cut is not None and frame.cut is not ended:
                     # It was asked to make way before it began.
@@ -59,18 +61,26 @@ class BetweenStates(ActiveContainer):
                     frame.cut = None
                 if frame.forced is not None and frame.forced[0] is ended:
                     outcome, kind = frame.forced[1], 'forced'
-                    target = self._target(frame.forced[0], outcome)
+                    target, moves = self._target(frame.forced[0], outcome), True
                     self._drop_requests(frame, frame.forced[0])
                 elif ended is not None:
-                    target = self._sort_requests(frame, ended, outcome, target)
+                    target, moves = self._sort_requests(frame, ended, outcome, target)
                 if ended is not None and ended.priority > LOWEST and target is not ended:
                     target, kind = self._leave_branch(frame, target, kind)
+                if frame.forced is not None and frame.forced[0] is target:
+                    # Forced before it began.
+                    passed = [*(passed or ()), (left, outcome, target, kind)]
+                    left = ended = frame.forced[0]
+                    continue
                 ended = None
                 if self._preempt_requested and isinstance(target, Node):
                     self._preempt_next(frame, target)
                 elif frame.suspending and isinstance(target, Node):
                     self._fsm_history = frame.history(target)
-                    return ASIDE
+                    if moves:
+                        passed = [*(passed or ()), (left, outcome, target, kind)]
+                    target = ASIDE
+                    break
                 elif self._fsm_raised and not self._preempt_requested:
                     target, kind = self._branch_off(frame, target, kind)
                 if shutdown.is_shutdown():
@@ -81,23 +91,24 @@ class BetweenStates(ActiveContainer):
                 run.condition.wait()
                 if frame.stale:
                     raise LeftBehind
-                if frame.forced is not None and frame.forced[0] is target:
-                    left = ended = frame.forced[0]
             frame.attention = self._wants_attention(frame, target)
             frame.trace = run.trace
-        if target is SHUTDOWN:
-            pass
-        elif left is not None:
+        for transition in passed or ():
+            self._tell(frame, *transition)
+        if target is not SHUTDOWN and target is not ASIDE:
             self._tell(frame, left, outcome, target, kind)
-        elif frame.trace is not None:
-            frame.trace((frame.path, '', '', target.label, frame.now(), {}, 'start'))
         return target
 
     def _sort_requests(
         self, frame: Frame, left: Node, outcome: Any, target: Node | Exit
-    ) -> Node | Exit:
-        """Settle what was asked of the state that ended: a preempt, or to make way."""
+    ) -> tuple[Node | Exit, bool]:
+        """Settle what was asked of the state that ended: a preempt, or to make way.
+
+        Returns:
+            Where to go, and whether that is a transition; a state that made way is not left.
+        """
         state, cut, made_way = left.state, frame.cut, False
+        forced_next = frame.forced is not None and frame.forced[0] is target
         asked = frame.preempted is left
         gone = frame.gone is left
         # A state that was left behind keeps the request, and has not ignored it any longer.
@@ -107,7 +118,8 @@ class BetweenStates(ActiveContainer):
             frame.preempted = None
         if cut is left and outcome is not SUSPENDED and (pending or not asked):
             # With both asked and one still pending, what it served was to make way.
-            made_way = not pending or outcome == 'preempted'
+            # Whoever forces the next state's outcome has seen this one end.
+            made_way = (not pending or outcome == 'preempted') and not forced_next
             if not gone:
                 state.recall_preempt()
         elif asked and pending:
@@ -116,11 +128,12 @@ class BetweenStates(ActiveContainer):
             self.service_preempt()
         if made_way:
             target = left
-        if made_way or outcome is SUSPENDED:
+        stays = made_way or outcome is SUSPENDED
+        if stays:
             frame.repeat = True
         if not made_way and getattr(state, '_fsm_progress', None) is not None:
             state._fsm_progress = None
-        return target
+        return target, not stays
 
     def _drop_requests(self, frame: Frame, left: Node) -> None:
         left.state.recall_preempt()
@@ -141,7 +154,7 @@ class BetweenStates(ActiveContainer):
         run = frame.strand.run
         if not run.paused or not isinstance(target, Node) or isinstance(target.state, Container):
             return False
-        if frame.forced is not None or frame.suspending:
+        if frame.suspending:
             return False
         if any(other.container._preempt_requested for other in frame.strand.stack):
             return False
@@ -166,11 +179,18 @@ class BetweenStates(ActiveContainer):
             or (isinstance(target, Node) and getattr(target.state, '_fsm_progress', None))
         )
 
-    def _tell(self, frame: Frame, left: Node, outcome: Any, target: Node | Exit, kind: str) -> None:
-        if frame.trace is not None:
+    def _tell(
+        self, frame: Frame, left: Node | None, outcome: Any, target: Node | Exit, kind: str
+    ) -> None:
+        trace = frame.trace
+        if left is None:
+            if trace is not None:
+                trace((frame.path, '', '', target.label, frame.now(), {}, 'start'))
+            return
+        if trace is not None:
             kind = target.kind if target.is_exit else kind
             data = self.userdata._data.copy()
-            frame.trace((frame.path, left.label, outcome, target.label, frame.now(), data, kind))
+            trace((frame.path, left.label, outcome, target.label, frame.now(), data, kind))
         if log.chatty():
             verb = 'ends' if target.is_exit else 'goes on'
             log.loginfo(f"'{frame.path}' {verb}: '{left.label}' : '{outcome}' --> '{target.label}'")

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from surveillance_behaviour.fsm import log
-from surveillance_behaviour.fsm.active import stop_for_now
+from surveillance_behaviour.fsm.active import forget, stop_for_now
 from surveillance_behaviour.fsm.engine import SUSPENDED, Frame, Node
 from surveillance_behaviour.fsm.exceptions import SmachError
 from surveillance_behaviour.fsm.outcome_policy import Outcomes
@@ -101,6 +101,7 @@ class Children:
     def _stop(self, strands: Mapping[str, Strand], ask: Callable[[State], object]) -> None:
         for label, strand in strands.items():
             if not strand.done:
+                strand.wanted = True
                 strand.asked()
                 ask(self._states[label])
 
@@ -140,8 +141,8 @@ class Children:
                     continue
                 with run.condition:
                     ended = self._note_end(label, strand)
-                if ended:
-                    tell_end(label, strand.outcome)
+                if ended is not None:
+                    tell_end(label, ended)
                 if first_error is None:
                     try:
                         stop = to_stop()
@@ -154,25 +155,32 @@ class Children:
             self._strands = {}
         return first_error
 
-    def _note_end(self, label: str, strand: Strand) -> bool:
-        """Note what a strand ended with; whether its state has ended, and not made way."""
-        state = self._states[label]
+    def _note_end(self, label: str, strand: Strand) -> str | None:
+        """Note what a state ended with; None when it only made way."""
+        state, outcome = self._states[label], strand.outcome
         if strand.without_leaf:
             self._gone.add(label)
-        if strand.outcome is SUSPENDED:
-            return False
-        if label in self._making_way:
-            made_way = not state.preempt_requested() or strand.outcome == 'preempted'
+        if strand.forced is not None:
+            # A preempt that it was asked for, too, is not served by that.
+            outcome = strand.forced[1]
+            self._preempted.discard(label)
+            forget(state)
+            if label not in self._gone:
+                state.recall_preempt()
+        elif outcome is SUSPENDED:
+            return None
+        elif label in self._making_way:
+            made_way = not state.preempt_requested() or outcome == 'preempted'
             if label not in self._gone:
                 state.recall_preempt()
             if made_way:
-                return False
-            # It ended by itself: a preempt that it was asked for, too, is not served by that.
+                return None
+            # Nor by ending by itself.
             self._preempted.discard(label)
         if getattr(state, '_fsm_progress', None) is not None:
             state._fsm_progress = None
-        self.outcomes[label] = strand.outcome
-        return True
+        self.outcomes[label] = outcome
+        return str(outcome)
 
     def _abandon(self, running: Mapping[str, Strand]) -> None:
         self._stop(running, _preempt)

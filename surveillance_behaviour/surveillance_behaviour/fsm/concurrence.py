@@ -321,15 +321,18 @@ class Concurrence(ActiveContainer):
             frame.current = _TOGETHER
             pending = branch.state.preempt_requested()
             served = not pending or outcome == 'preempted'
+            forced, frame.forced = frame.forced, None
+            if forced is not None:
+                outcome = forced[1]
             branch.state.recall_preempt()
-            if outcome is SUSPENDED or (frame.cut is node and served):
+            if forced is None and (outcome is SUSPENDED or (frame.cut is node and served)):
                 self._fsm_raised.append(branch)
                 if frame.suspending:
                     self._fsm_history = History(outcomes=self._children.ended())
                     return SUSPENDED
                 return None
             forget(branch.state)
-            if self._preempt_requested and not pending:
+            if forced is None and self._preempt_requested and not pending:
                 self.service_preempt()
         target = branch.transitions.get(outcome, RESUME)
         if target == RESUME:

@@ -7,11 +7,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from surveillance_behaviour.fsm.engine import Node, Trace
+from surveillance_behaviour.fsm.engine import Frame, Node, Trace
 from surveillance_behaviour.fsm.exceptions import InvalidStateError, InvalidTransitionError
 
 if TYPE_CHECKING:
-    from surveillance_behaviour.fsm.run import Run
+    from surveillance_behaviour.fsm.run import Run, Strand
 
 
 class Control:
@@ -103,38 +103,46 @@ class Control:
             # Attention first, then a look: what is current now is held until this is done.
             for each in frames:
                 each.attention = True
-            active = {
-                f'{frame.path}/{frame.current.label}': frame
-                for frame in frames
-                if isinstance(frame.current, Node)
-            }
-            frame = active.get(path)
-            if frame is None:
+            active = self._active()
+            if path not in active:
                 raise InvalidStateError(
                     f"State '{path}' is not active; the active ones are {sorted(active)}"
                 )
-            node = frame.current
-            assert isinstance(node, Node)
+            place, node = active[path]
             if outcome not in node.state.get_registered_outcomes():
                 raise InvalidTransitionError(
                     f"State '{path}' cannot be forced to '{outcome}': its outcomes are "
                     f'{sorted(node.state.get_registered_outcomes())}'
                 )
-            frame.forced = (node, outcome)
-            frame.attention = True
-            frame.strand.asked()
+            if place.forced is not None and place.forced[0] is not node:
+                raise InvalidStateError(
+                    f"State '{path}' cannot be forced yet: '{place.forced[0].label}' has not ended "
+                    f"with '{place.forced[1]}', as it was forced to"
+                )
+            place.forced = (node, outcome)
+            if isinstance(place, Frame):
+                place.strand.asked()
+            else:
+                place.wanted = True
+                place.asked()
             node.state.request_preempt()
             self.condition.notify_all()
 
     def active_paths(self) -> list[str]:
         """Paths of all states that are active, containers included, outermost first."""
         with self.condition:
-            frames = self._run.frames() if self._run is not None else []
-            return [
-                f'{frame.path}/{frame.current.label}'
-                for frame in frames
-                if isinstance(frame.current, Node)
-            ]
+            return list(self._active())
+
+    def _active(self) -> dict[str, tuple[Frame | Strand, Node]]:
+        """The active states by path: where an outcome is forced, and their nodes."""
+        active: dict[str, tuple[Frame | Strand, Node]] = {}
+        for strand in self._run.strands if self._run is not None else ():
+            if strand.leaf is not None:
+                active[strand.path] = strand, strand.leaf
+            for frame in strand.stack:
+                if isinstance(frame.current, Node):
+                    active[f'{frame.path}/{frame.current.label}'] = frame, frame.current
+        return active
 
     def left_behind(self) -> list[str]:
         """Paths of states that the last run went on without and that are still running."""

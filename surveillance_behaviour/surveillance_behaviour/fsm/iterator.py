@@ -189,14 +189,14 @@ class Iterator(DrivenContainer):
 
     def _sort_requests(
         self, frame: Frame, left: Node, outcome: Any, target: Node | Exit
-    ) -> Node | Exit:
+    ) -> tuple[Node | Exit, bool]:
         preempted = self._preempt_requested
-        target = super()._sort_requests(frame, left, outcome, target)
+        target, moves = super()._sort_requests(frame, left, outcome, target)
         if preempted and target is left and outcome is not SUSPENDED:
             # A preempt ends the loop whatever the outcome, as in SMACH.
             self.service_preempt()
-            return self._ending(outcome)
-        return target
+            return self._ending(outcome), True
+        return target, moves
 
     # The container's interface.
 

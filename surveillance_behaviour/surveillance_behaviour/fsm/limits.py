@@ -9,7 +9,7 @@ from typing import Any
 from surveillance_behaviour.fsm.engine import SUSPENDED, Frame, Node
 from surveillance_behaviour.fsm.exceptions import InvalidTransitionError
 from surveillance_behaviour.fsm.log import logwarn
-from surveillance_behaviour.fsm.run import Watch
+from surveillance_behaviour.fsm.run import Strand, Watch
 from surveillance_behaviour.fsm.state import State
 from surveillance_behaviour.fsm.this_thread import this_thread
 
@@ -102,10 +102,11 @@ def limited(path: str, node: Node, limits: Limits) -> Callable[[Any], Any]:
                 if watch is not None and strand is not None:
                     strand.unwatch(watch)
             frame = strand.stack[-1] if strand is not None and strand.stack else None
-            outcome = settle(path, node, frame, watch, outcome)
+            place = strand if frame is None else frame
+            outcome = settle(path, node, place, watch, outcome)
             if outcome not in limits.failures or attempt == limits.retry:
                 return outcome
-            if node.state.preempt_requested() or (frame is not None and frame.wanted):
+            if node.state.preempt_requested() or (place is not None and place.wanted):
                 return outcome
             logwarn(
                 f"State '{path}' ended with '{outcome}': attempt {attempt + 2} of "
@@ -116,20 +117,22 @@ def limited(path: str, node: Node, limits: Limits) -> Callable[[Any], Any]:
     return run
 
 
-def settle(path: str, node: Node, frame: Frame | None, watch: Watch | None, outcome: Any) -> Any:
+def settle(
+    path: str, node: Node, place: Frame | Strand | None, watch: Watch | None, outcome: Any
+) -> Any:
     """Turn what a state returned after running out of time into the outcome for that.
 
     Args:
         path: The state's path.
         node: Its node.
-        frame: The frame it ran in; None below a concurrence.
+        place: The frame that it ran in; below a concurrence the strand.
         watch: Its limits at work.
         outcome: What it returned.
     """
     limits = node.limits
     if watch is None or not watch.asked or limits is None or outcome is SUSPENDED:
         return outcome
-    if frame is not None and frame.wanted:
+    if place is not None and place.wanted:
         return outcome  # Whoever wants it to end too sorts the request out.
     ignored = node.state.preempt_requested()
     if ignored:

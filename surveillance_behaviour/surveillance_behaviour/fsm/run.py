@@ -109,6 +109,8 @@ class Strand:
         thread_ended: Raised when that thread has ended.
         token: Which of its threads is the present one.
         leaf: The state that it executes outside any container, a concurrence's child.
+        wanted: Somebody wants that to end.
+        forced: That, and the outcome to take in place of the one that it returns.
     """
 
     def __init__(self, run: Run, path: str, wakeup: Interrupt) -> None:
@@ -126,6 +128,8 @@ class Strand:
         self.thread: threading.Thread | None = None
         self.thread_ended = threading.Event()
         self.leaf: Node | None = None
+        self.wanted = False
+        self.forced: tuple[Node, str] | None = None
         self._root: object = None
         run.strands.append(self)
 

@@ -84,11 +84,12 @@ def go_on_past(strand: Strand) -> None:
         if outcome is not None:
             take_over(strand, depth, node, outcome, reason, culprit)
             return
-    outcome = stopped_outcome(strand.leaf) if strand.leaf is not None else None
-    if outcome is not None:
-        assert strand.leaf is not None
-        take_over(strand, -1, strand.leaf, outcome, reason, culprit)
-        return
+    leaf, forced = strand.leaf, strand.forced
+    if leaf is not None:
+        outcome = forced[1] if forced is not None else stopped_outcome(leaf)
+        if outcome is not None:
+            take_over(strand, -1, leaf, outcome, reason, culprit)
+            return
     root = strand.stack[0].container if strand.stack else None
     outcomes = root.get_registered_outcomes() if root is not None else ()
     for ending in STOPPED:

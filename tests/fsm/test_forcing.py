@@ -1,0 +1,201 @@
+"""A forced outcome is taken, whatever else is asked in the same instant, and every step is told."""
+
+from __future__ import annotations
+
+import threading
+
+import pytest
+
+from surveillance_behaviour import fsm
+from surveillance_behaviour.fsm.testing import watching
+
+from .states import Answer, Background, Waiter, began
+
+
+class Gate(fsm.State):
+    """Ends when it is let through, whatever is asked of it."""
+
+    def __init__(self, outcome: str = 'done') -> None:
+        super().__init__(['done', 'preempted'])
+        self.outcome = outcome
+        self.begun = threading.Semaphore(0)
+        self.open = threading.Event()
+
+    def execute(self, ud):
+        self.begun.release()
+        self.open.wait(10.0)
+        return self.outcome
+
+
+class Line:
+    """GATE leads to WAIT, that to LAST; ALARM interrupts. Transitions wait for the condition."""
+
+    def __init__(self, gate_outcome: str = 'done') -> None:
+        self.gate, self.wait, self.last = Gate(gate_outcome), Waiter(60.0), Answer('done')
+        self.alarm = Answer('done')
+        self.root = fsm.StateMachine(['done', 'preempted'])
+        self.root.set_name('ROOT')
+        with self.root:
+            fsm.StateMachine.add('GATE', self.gate, {'done': 'WAIT', 'preempted': 'WAIT'})
+            fsm.StateMachine.add('WAIT', self.wait, {'done': 'LAST', 'preempted': 'preempted'})
+            fsm.StateMachine.add('LAST', self.last)
+        self.root.add_interrupt('ALARM', self.alarm, priority=1)
+        self.condition = self.root.control.condition
+
+    def pass_the_gate(self) -> None:
+        """Let the machine out of GATE; under the condition it stops right before WAIT."""
+        self.gate.open.set()
+        for _ in range(10_000_000):
+            if self.root.get_active_states() == ['WAIT']:
+                return
+        raise AssertionError('it did not leave GATE')
+
+
+@pytest.fixture
+def line():
+    return Line()
+
+
+def test_a_state_forced_before_it_begins_and_an_interrupt_in_the_same_instant(line):
+    with watching(line.root) as watched:
+        run = Background(line.root)
+        began(line.gate)
+        with line.condition:
+            line.root.control.pause()
+            line.root.control.resume()
+            line.pass_the_gate()
+            line.root.raise_interrupt('ALARM')
+            line.root.control.force_outcome('ROOT/WAIT', 'done')
+        assert run.result() == 'done'
+    watched.assert_path('GATE', 'WAIT', 'ALARM', 'LAST')
+    assert (line.wait.runs, line.alarm.runs, line.last.runs) == (0, 1, 1)
+
+
+def test_a_state_that_made_way_for_an_interrupt_is_left_when_the_next_one_is_forced():
+    line = Line('preempted')
+    with watching(line.root) as watched:
+        run = Background(line.root)
+        began(line.gate)
+        with line.condition:
+            line.root.raise_interrupt('ALARM')
+            line.pass_the_gate()
+            line.root.control.force_outcome('ROOT/WAIT', 'done')
+        assert run.result() == 'done'
+    watched.assert_path('GATE', 'WAIT', 'ALARM', 'LAST')
+
+
+def test_a_running_state_that_is_forced_and_interrupted_is_not_resumed(line):
+    line.gate.open.set()
+    with watching(line.root) as watched:
+        run = Background(line.root)
+        began(line.wait)
+        with line.condition:
+            line.root.control.force_outcome('ROOT/WAIT', 'done')
+            line.root.raise_interrupt('ALARM')
+        assert run.result() == 'done'
+    watched.assert_path('GATE', 'WAIT', 'ALARM', 'LAST')
+    assert line.wait.runs == 1
+
+
+def test_a_preempt_in_the_same_instant_is_not_lost(line):
+    line.last = Waiter(60.0)
+    root = fsm.StateMachine(['done', 'preempted'])
+    root.set_name('ROOT')
+    with root:
+        fsm.StateMachine.add('WAIT', line.wait, {'done': 'LAST', 'preempted': 'preempted'})
+        fsm.StateMachine.add('LAST', line.last)
+    run = Background(root)
+    began(line.wait)
+    with root.control.condition:
+        root.control.force_outcome('ROOT/WAIT', 'done')
+        root.request_preempt()
+    assert run.result() == 'preempted'
+    assert line.last.runs == 1
+
+
+def test_a_state_forced_in_a_pause_is_told_to_have_been_entered(line):
+    with watching(line.root) as watched:
+        run = Background(line.root)
+        began(line.gate)
+        line.root.control.pause()
+        line.pass_the_gate()
+        line.root.control.force_outcome('ROOT/WAIT', 'done')
+        line.root.control.resume()
+        assert run.result() == 'done'
+    watched.assert_path('GATE', 'WAIT', 'LAST')
+
+
+def test_another_state_is_not_forced_before_the_first_has_ended(line):
+    line.gate.outcome = 'preempted'
+    run = Background(line.root)
+    began(line.gate)
+    with line.condition:
+        line.root.control.force_outcome('ROOT/GATE', 'done')
+        line.pass_the_gate()
+        with pytest.raises(fsm.InvalidStateError, match="'GATE' has not ended with 'done'"):
+            line.root.control.force_outcome('ROOT/WAIT', 'done')
+    began(line.wait)
+    line.root.request_preempt()
+    assert run.result() == 'preempted'
+
+
+@pytest.fixture
+def together():
+    both = fsm.Concurrence(['both', 'preempted'], 'preempted', outcome_map={'both': {'A': 'done'}})
+    children = {'A': Waiter(60.0), 'B': Waiter(60.0)}
+    with both:
+        for label, state in children.items():
+            fsm.Concurrence.add(label, state, retry=1, retry_on=['preempted'])
+    both.set_name('BOTH')
+    return both, children
+
+
+def test_a_child_of_a_concurrence_is_active_and_can_be_forced(together):
+    both, children = together
+    run = Background(both)
+    for state in children.values():
+        began(state)
+    assert both.control.active_paths() == ['BOTH/A', 'BOTH/B']
+    both.control.force_outcome('BOTH/A', 'done')
+    both.control.force_outcome('BOTH/B', 'preempted')
+    assert run.result() == 'both'
+    assert [state.runs for state in children.values()] == [1, 1]
+
+
+def test_an_interrupt_of_a_concurrence_can_be_forced(together):
+    both, children = together
+    alarm = fsm.StateMachine(['over', 'on', 'preempted'])
+    inside = Waiter(60.0)
+    with alarm:
+        fsm.StateMachine.add('INSIDE', inside, {'done': 'on'})
+    both.register_outcomes(['over'])
+    both.add_interrupt('ALARM', alarm, priority=1, transitions={'over': 'over'})
+    run = Background(both)
+    for state in children.values():
+        began(state)
+    both.raise_interrupt('ALARM')
+    began(inside)
+    both.control.force_outcome('BOTH/ALARM', 'over')
+    assert run.result() == 'over'
+
+
+def test_a_transition_is_told_although_the_machine_is_put_aside_in_that_instant():
+    gate, last, alarm = Gate(), Waiter(60.0), Answer('done')
+    inner, root = (fsm.StateMachine(['done', 'preempted']) for _ in range(2))
+    root.set_name('ROOT')
+    with root:
+        fsm.StateMachine.add('INNER', inner)
+        with inner:
+            fsm.StateMachine.add('GATE', gate, {'done': 'LAST', 'preempted': 'preempted'})
+            fsm.StateMachine.add('LAST', last)
+    root.add_interrupt('ALARM', alarm, priority=1)
+    with watching(root) as watched:
+        run = Background(root)
+        began(gate)
+        root.raise_interrupt('ALARM')
+        gate.open.set()  # it ignores that it shall make way
+        began(last)
+        root.control.force_outcome('ROOT/INNER/LAST', 'done')
+        assert run.result() == 'done'
+    watched.assert_path('GATE', 'LAST', container='ROOT/INNER')
+    assert watched.path() == ['INNER', 'ALARM', 'INNER']
