@@ -61,6 +61,38 @@ def test_it_follows_the_ontology(built: ArmorClient) -> None:
     assert found == ['CORRIDOR', 'ROOM', 'URGENT']
 
 
+def test_values_come_back_as_they_were_written(service: ArmorService, built: ArmorClient) -> None:
+    ask = asker(service)
+    for prop, ind, kind, value in (
+        ('size', 'R1', 'INTEGER', '7'),
+        ('size', 'R2', 'FLOAT', '7'),
+        ('seats', 'R1', 'LONG', '7'),
+        ('seats', 'R2', 'INTEGER', '2'),
+        ('open', 'R1', 'BOOLEAN', 'true'),
+    ):
+        ask('ADD DATAPROP IND', prop, ind, kind, value)
+
+    def shown(query: str) -> str:
+        text = ask('QUERY SPARQL', PREFIX + query).queried_objects[0]
+        return text.replace('http://www.w3.org/2001/XMLSchema#', '').replace(f'{IRI}#', '')
+
+    assert shown('SELECT ?v { :R1 :size ?v }') == '{v=7^^integer}'
+    assert shown('SELECT ?v { :R1 :seats ?v }') == '{v=7^^long}'
+    assert shown('SELECT ?v { :R2 :size ?v }') == '{v=7.0^^float}'
+    assert shown('SELECT ?v { ?r :seats ?v FILTER(?v < 3) }') == '{v=2^^integer}', 'not as in min 2'
+    both = f'SELECT ?a ?b {{ :R1 :size ?a ; <{IRI}#seats> ?b }}'
+    assert shown(both) == '{a=7^^integer, b=7^^long}'
+    by_row = 'SELECT ?p ?v { :R1 ?p ?v FILTER(?p IN (:size, :seats)) } ORDER BY DESC(?p)'
+    assert shown(by_row) == '{p=size, v=7^^integer}, {p=seats, v=7^^long}'
+    assert shown('SELECT (?v + 0 AS ?n) { :R1 :seats ?v }') == '{n=7^^integer}', 'computed'
+
+
+def test_the_time_asked_for_is_the_querys_own(service: ArmorService, built: ArmorClient) -> None:
+    """Starting the process and handing over the graph, which alone take longer, do not count."""
+    answer = asker(service)('QUERY SPARQL', PREFIX + 'SELECT ?x { :Robot1 :isIn ?x }', '15')
+    assert answer.queried_objects == [f'{{x={IRI}#E}}']
+
+
 def test_derived_facts_can_be_left_out() -> None:
     service = ArmorService(Settings(sparql_derived=False))
     client = ArmorClient('c', 'map', InProcessTransport(service))

@@ -23,6 +23,8 @@ MEMORY = 2 * 1024**3
 """Bytes that a query's process may use."""
 GRACE = 1.0
 """Seconds that a process outlives its time limit when nobody kills it."""
+OUT_OF_MEMORY = 3
+"""Exit code of a process that needed more memory."""
 IDLE = 2
 """Processes that are kept for the next query."""
 
@@ -65,7 +67,13 @@ class SparqlEngine:
         self._closed = False
 
     def select(
-        self, version: Version, graph: Callable[[], Graph], query: str, seconds: float, rows: int
+        self,
+        version: Version,
+        graph: Callable[[], Graph],
+        query: str,
+        seconds: float,
+        limit: float,
+        rows: int,
     ) -> list[list[Binding]]:
         """Run a query.
 
@@ -74,17 +82,19 @@ class SparqlEngine:
             graph: Makes the graph as N-Triples, of this version or a newer one, which it names;
                 called only when no process has this version.
             query: A SELECT query.
-            seconds: Time limit, the transfer of the graph included.
+            seconds: Time limit of the query itself.
+            limit: Time limit of all, starting a process and the transfer of the graph included.
             rows: Most rows.
 
         Raises:
             SparqlTimeoutError: Stopped at the time limit.
             SparqlError: Not a valid SELECT query, too many rows, too much memory.
         """
-        deadline = time.monotonic() + seconds
+        deadline = time.monotonic() + limit
         worker = self._take(version)
         try:
-            answer = worker.ask(version, graph, query, deadline, rows)
+            worker.prepare(version, graph, deadline)
+            answer = worker.ask(query, min(deadline, time.monotonic() + seconds), rows)
         except BaseException:
             with self._lock:
                 self._busy.discard(worker)
@@ -149,27 +159,23 @@ class _Worker:
         self._out = self._process.stdout.fileno()
         os.set_blocking(self._in, False)
 
-    def ask(
-        self,
-        version: Version,
-        graph: Callable[[], Graph],
-        query: str,
-        deadline: float,
-        rows: int,
-    ) -> Any:
-        known = version == self.version
-        version, payload = (version, b'') if known else graph()
+    def prepare(self, version: Version, graph: Callable[[], Graph], deadline: float) -> None:
+        """Have the process hold a graph of this version or a newer one."""
+        if version == self.version:
+            return
         self.version = None
-        request = {
-            'graph': None if known else len(payload),
-            'query': query,
-            'rows': rows,
-            'seconds': max(deadline - time.monotonic(), 0.0) + GRACE,
-        }
-        self._send(json.dumps(request).encode() + b'\n' + payload, deadline)
-        answer = json.loads(self._receive(deadline))
+        version, payload = graph()
+        self._exchange({'graph': len(payload)}, deadline, payload)
         self.version = version
-        return answer
+
+    def ask(self, query: str, deadline: float, rows: int) -> Any:
+        """The process's answer to a query on the graph that it holds."""
+        seconds = max(deadline - time.monotonic(), 0.0) + GRACE
+        return self._exchange({'query': query, 'rows': rows, 'seconds': seconds}, deadline)
+
+    def _exchange(self, request: dict[str, Any], deadline: float, payload: bytes = b'') -> Any:
+        self._send(json.dumps(request).encode() + b'\n' + payload, deadline)
+        return json.loads(self._receive(deadline))
 
     def interrupt(self) -> None:
         """End the process; whoever waits for it finds out."""
@@ -205,7 +211,7 @@ class _Worker:
 
     def _why_ended(self) -> str:
         code = self._process.wait()
-        if code > 0:
+        if code > 0 and code != OUT_OF_MEMORY:
             return 'the query process could not start; pyoxigraph is needed'
         return 'the query needs too much memory'
 

@@ -29,7 +29,8 @@ _SUMMARY = (
 _DIFFERS = (
     'Derived facts are seen too, unless the parameter sparql_derived is off. A query that cannot '
     'be run is no success and says why; one that is stopped has timeout set. Without a time the '
-    'parameter sparql_timeout holds, which no query exceeds.'
+    'parameter sparql_timeout holds, which no query exceeds. Two values of one property of one '
+    'individual that are equal and written differently are one row.'
 )
 
 
@@ -83,6 +84,7 @@ def _select(service: ArmorService, ref: Reference, parts: tuple[str, ...]) -> li
             lambda: _graph(ref, derived),
             ''.join(texts),
             seconds,
+            limit,
             service.settings.sparql_rows,
         )
     except SparqlTimeoutError:

@@ -1,17 +1,13 @@
 """The process that runs SPARQL queries, so that one that takes too long can be killed.
 
-It reads requests from standard input and writes answers to standard output, each a line of JSON;
-the graph follows a request as N-Triples, when the request says how many bytes of it there are.
-
-Oxigraph keeps numbers and times by value and forgets how they were written: ``"7"^^xsd:long`` comes
-back as ``"7"^^xsd:integer``. Answers have to show what was asserted, so the original forms are kept
-beside the store. Values that a query computes (``AS ?n``) are left as they are.
+It reads requests from standard input and writes answers to standard output, each a line of JSON. A
+request has a graph, which follows it as N-Triples and is kept for the queries that come next, or a
+query.
 """
 
 from __future__ import annotations
 
 import json
-import re
 import resource
 import signal
 import sys
@@ -19,10 +15,9 @@ from typing import Any, BinaryIO
 
 import pyoxigraph
 
-Originals = dict[Any, Any]
-"""Literals as they were written, by the form in which the store gives them."""
-_COMPUTED = re.compile(r'\bAS\s+[?$](\w+)', re.IGNORECASE)
-_XSD = 'http://www.w3.org/2001/XMLSchema#'
+from surveillance_ontology.armor.sparql import OUT_OF_MEMORY
+from surveillance_ontology.armor.written_forms import WrittenForms
+
 MOST_SHOWN = 160
 """Characters of the engine's own words about a query."""
 NO_FURTHER_FILES = 3
@@ -31,66 +26,42 @@ NO_FURTHER_FILES = 3
 
 def serve(requests: BinaryIO, answers: BinaryIO) -> None:
     """Answer requests until the end of input."""
-    store, originals = pyoxigraph.Store(), Originals()
+    store, forms = _load(b'')
     for line in requests:
         request = json.loads(line)
-        size = request['graph']
-        if size is not None:
-            store, originals = _load(requests.read(size))
-        # The kernel ends this process if the one that asked is not there to do it.
-        signal.setitimer(signal.ITIMER_REAL, request['seconds'])
-        answer = _answer(store, originals, request['query'], request['rows'])
-        signal.setitimer(signal.ITIMER_REAL, 0)
+        if 'graph' in request:
+            store, forms = _load(requests.read(request['graph']))
+            answer: dict[str, Any] = {}
+        else:
+            # The kernel ends this process if the one that asked is not there to do it.
+            signal.setitimer(signal.ITIMER_REAL, request['seconds'])
+            answer = _answer(store, forms, request['query'], request['rows'])
+            signal.setitimer(signal.ITIMER_REAL, 0)
         answers.write(json.dumps(answer).encode() + b'\n')
         answers.flush()
 
 
-def _load(graph: bytes) -> tuple[pyoxigraph.Store, Originals]:
-    store, written = pyoxigraph.Store(), pyoxigraph.Store()
+def _load(graph: bytes) -> tuple[pyoxigraph.Store, WrittenForms]:
+    store = pyoxigraph.Store()
     quads = list(pyoxigraph.parse(graph, format=pyoxigraph.RdfFormat.N_TRIPLES))
     store.bulk_extend(quads)
-    literals = list({quad.object for quad in quads if _may_be_rewritten(quad.object)})
-    mark = pyoxigraph.NamedNode('urn:mark')
-    written.bulk_extend(
-        pyoxigraph.Quad(pyoxigraph.NamedNode(f'urn:number:{number}'), mark, literal)
-        for number, literal in enumerate(literals)
-    )
-    originals = Originals()
-    for quad in written:
-        original = literals[int(quad.subject.value.rpartition(':')[2])]
-        if original != quad.object:
-            originals[quad.object] = original
-    return store, originals
+    return store, WrittenForms(quads)
 
 
-def _may_be_rewritten(term: Any) -> bool:
-    return (
-        isinstance(term, pyoxigraph.Literal)
-        and not term.language
-        and term.datatype.value.startswith(_XSD)
-        and term.datatype.value != _XSD + 'string'
-    )
-
-
-def _answer(store: pyoxigraph.Store, originals: Originals, query: str, most: int) -> dict[str, Any]:
-    computed = set(_COMPUTED.findall(query))
+def _answer(store: pyoxigraph.Store, forms: WrittenForms, query: str, most: int) -> dict[str, Any]:
     try:
         found = store.query(query)
         if not isinstance(found, pyoxigraph.QuerySolutions):
             return {'error': 'expected a SELECT query'}
         names = [variable.value for variable in found.variables]
+        reader = forms.reader(query)
         rows: list[list[list[str]]] = []
         for solution in found:
             if len(rows) == most:
                 return {'error': f'more than {most} rows'}
             bound = zip(names, solution, strict=True)
-            rows.append(
-                [
-                    [name, *_term(term if name in computed else originals.get(term, term))]
-                    for name, term in bound
-                    if term is not None
-                ]
-            )
+            row = {name: term for name, term in bound if term is not None}
+            rows.append([[name, *_term(reader.written(name, row))] for name in row])
     except SyntaxError as error:
         return {'error': f'not valid SPARQL: {str(error)[:MOST_SHOWN]}'}
     except (ValueError, RuntimeError, OSError) as error:
@@ -116,7 +87,10 @@ def main() -> None:
     resource.setrlimit(resource.RLIMIT_NOFILE, (NO_FURTHER_FILES, NO_FURTHER_FILES))
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
-    serve(sys.stdin.buffer, sys.stdout.buffer)
+    try:
+        serve(sys.stdin.buffer, sys.stdout.buffer)
+    except MemoryError:
+        sys.exit(OUT_OF_MEMORY)
 
 
 if __name__ == '__main__':
