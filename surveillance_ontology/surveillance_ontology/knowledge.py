@@ -73,6 +73,10 @@ class Knowledge:
         """The asserted axioms that mention an entity in any role."""
         return iter(tuple(self._told.about.get(entity, ())))
 
+    def asserted_values(self, prop: str, individual: str) -> Iterable[Literal]:
+        """The values asserted now for a data property of an individual, as they are written."""
+        return tuple(self._told.literals.get((prop, individual), ()))
+
     def is_known(self, kind: str, iri: str) -> bool:
         """Whether an asserted axiom declares or uses the entity as this kind."""
         return any((kind, iri) in entities_of(axiom) for axiom in self._told.about.get(iri, ()))

@@ -159,6 +159,23 @@ def test_data_properties(ask: Ask) -> None:
     assert ask('QUERY IND DATAPROP', 'X').queried_objects == [iri('size')]
 
 
+def test_a_value_is_retracted_however_it_is_written(ask: Ask) -> None:
+    """Files write 0.50 and 1 where directives write 0.5 and true; the type has to be the same."""
+    for kind, written, value in (
+        ('FLOAT', '"0.50"^^xsd:float', '0.5'),
+        ('BOOL', '"1"^^xsd:boolean', 'true'),
+        ('LONG', '"+7"^^xsd:long', '7'),
+    ):
+        ask('ADD DATAPROP IND', 'p', 'X', kind, written)
+        assert ask('QUERY DATAPROP IND', 'p', 'X').queried_objects == [written]
+        ask('REMOVE DATAPROP IND', 'p', 'X', kind, value)
+        assert ask('QUERY DATAPROP IND', 'p', 'X').queried_objects == []
+    ask('ADD DATAPROP IND', 'p', 'X', 'LONG', '"+7"^^xsd:long')
+    ask('REMOVE DATAPROP IND', 'p', 'X', 'INTEGER', '7')
+    ask('REPLACE DATAPROP IND', 'p', 'X', 'LONG', '8', '7')
+    assert ask('QUERY DATAPROP IND', 'p', 'X').queried_objects == ['"8"^^xsd:long']
+
+
 def test_object_properties(ask: Ask) -> None:
     ask('ADD OBJECTPROP IND', 'near', 'A', 'B')
     ask('ADD OBJECTPROP IND', 'near', 'A', iri('C'))

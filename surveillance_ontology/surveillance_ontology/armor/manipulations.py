@@ -42,6 +42,7 @@ from surveillance_ontology.expressions import (
     ObjectIntersectionOf,
     ObjectMinCardinality,
 )
+from surveillance_ontology.reasoner.datatypes import value_of
 from surveillance_ontology.vocabulary import NOTHING, THING
 
 MOST_CLASSES = 500
@@ -229,8 +230,8 @@ def _remove_class_class(_: Reference, cls: str, above: str) -> list[Change]:
     'nothing happens.',
     verb='removed from',
 )
-def _remove_dataprop(_: Reference, prop: str, ind: str, value: Literal) -> list[Change]:
-    return [RemoveAxiom(DataPropertyAssertion(prop, ind, value))]
+def _remove_dataprop(ref: Reference, prop: str, ind: str, value: Literal) -> list[Change]:
+    return _retracted(ref, prop, ind, value)
 
 
 @manipulation(
@@ -250,12 +251,24 @@ def _remove_objectprop(_: Reference, prop: str, ind: str, other: str) -> list[Ch
     verb='replaced from',
 )
 def _replace_dataprop(
-    _: Reference, prop: str, ind: str, new: Literal, old: Literal
+    ref: Reference, prop: str, ind: str, new: Literal, old: Literal
 ) -> list[Change]:
     return [
-        RemoveAxiom(DataPropertyAssertion(prop, ind, old)),
+        *_retracted(ref, prop, ind, old),
         AddAxiom(DataPropertyAssertion(prop, ind, new)),
     ]
+
+
+def _retracted(ref: Reference, prop: str, ind: str, value: Literal) -> list[Change]:
+    """Retract a value, also where it is written differently in the same type."""
+    written = [
+        other
+        for other in ref.kb.asserted_values(prop, ind)
+        if other != value
+        and other.datatype == value.datatype
+        and value_of(other) == value_of(value)
+    ]
+    return [RemoveAxiom(DataPropertyAssertion(prop, ind, one)) for one in (value, *written)]
 
 
 @manipulation(
