@@ -32,7 +32,7 @@ class PaceModel:
     step: float = 0.1
     idle_step: float = 0.5
     window: float = 0.15
-    estimate_window: float = 0.35
+    estimate_window: float = 0.45
     patience: float = 0.2
 
     @property

@@ -46,7 +46,7 @@ def test_time_waits_for_the_next_command_of_a_controller_at_work() -> None:
 
 
 def test_time_waits_for_a_robot_that_works_out_where_it_is() -> None:
-    pace = Pace(PaceModel(speed=0.0, estimate_window=0.35), 0.0)
+    pace = Pace(PaceModel(speed=0.0, estimate_window=0.45), 0.0)
     assert pace.due(0.5, 0.01, moving=False) > 0.0  # Nobody has told a pose yet.
     pace.estimate(0.5)
     assert pace.due(0.5, 0.02, moving=False) > 0.0
