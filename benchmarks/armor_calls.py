@@ -147,8 +147,7 @@ def servers() -> Any:
     ]
     quiet = subprocess.DEVNULL
     processes = [
-        subprocess.Popen([sys.executable, *each], stdout=quiet, stderr=quiet)
-        for each in arguments
+        subprocess.Popen([sys.executable, *each], stdout=quiet, stderr=quiet) for each in arguments
     ]
     try:
         yield

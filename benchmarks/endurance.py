@@ -103,7 +103,9 @@ class Watch:
                 before = self.now
                 # Each pose that arrives notifies, so a wait that times out saw none.
                 if not self._changed.wait(patience) and self.now == before:
-                    raise TimeoutError(f'time stands still at {before:.1f} s')
+                    raise TimeoutError(
+                        f'time stands still at {before:.1f} s'
+                    ) from self._stack.error
 
     def close(self) -> None:
         """Count the time since each place was left last."""

@@ -71,6 +71,11 @@ class Stack:
         self._spinner.executor.add_node(node)
         return node
 
+    @property
+    def error(self) -> BaseException | None:
+        """What ended the executor early, from a callback."""
+        return self._spinner.error
+
     def start(self) -> None:
         """Let the nodes run."""
         self._spinner.start()
