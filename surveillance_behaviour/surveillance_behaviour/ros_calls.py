@@ -16,8 +16,8 @@ from surveillance_runtime.calls import (
     Unavailable,
 )
 
-LOOK_SECONDS = 0.02
-"""Time between two looks for a server; rclpy offers no event for its appearance."""
+ASK_AGAIN = 10.0
+"""How long one question to a service that takes long waits for its answer, seconds."""
 
 
 def call(
@@ -41,19 +41,32 @@ def call(
         PeerError: No server, or no answer in time.
         InterruptedWaitError: The interrupt was raised.
     """
-    if discovery is not None and discovery < deadline:
-        late = time.monotonic() + discovery
-        while not caller.is_ready() and time.monotonic() < late:
-            if interrupt.wait(LOOK_SECONDS):
-                raise InterruptedWaitError
-        if not caller.is_ready():
-            raise AwayError(caller.name, 'no server')
     try:
-        return caller.call(request, deadline, interrupt)
+        return caller.call(request, deadline, interrupt, discovery=discovery)
     except Interrupted:
         raise InterruptedWaitError from None
     except CallFailed as error:
         raise _peer_error(caller.name, error) from None
+
+
+def ask(
+    caller: ServiceCaller, request: Any, deadline: float, interrupt: Interrupt, discovery: float
+) -> Any:
+    """Calls a service whose answer takes long and that may be asked twice; else as `call`.
+
+    It is asked anew now and then: a server that has just taken the place of another one may have
+    been found before its end of the line was there, and does not know that anybody waits.
+    """
+    late = time.monotonic() + deadline
+    while True:
+        patience = min(ASK_AGAIN, max(discovery, late - time.monotonic()))
+        try:
+            return call(caller, request, patience, interrupt, discovery)
+        except AwayError:
+            raise
+        except PeerError:
+            if time.monotonic() >= late:
+                raise
 
 
 def run(

@@ -7,7 +7,6 @@ clock (a move, a charge) has none but that its server lives and gets on.
 from __future__ import annotations
 
 import threading
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -18,13 +17,12 @@ from surveillance_behaviour.armor_knowledge import ArmorKnowledge
 from surveillance_behaviour.battery_gauge import BatteryGauge
 from surveillance_behaviour.fsm import Interrupt
 from surveillance_behaviour.ports import (
-    AwayError,
     InterruptedWaitError,
     PeerError,
     Point,
     UnknownPlaceError,
 )
-from surveillance_behaviour.ros_calls import call, run
+from surveillance_behaviour.ros_calls import ask, call, run
 from surveillance_interfaces.action import ComputePath, Control, FollowPath, Plan
 from surveillance_interfaces.srv import Reason, ReferenceName, RoomPosition
 from surveillance_ontology.armor_client import RosTransport
@@ -58,21 +56,11 @@ def ros_knowledge(node: PatrolNode, deadlines: Deadlines) -> ArmorKnowledge:
     wake = waiting.Interrupt()
 
     def reference(interrupt: Interrupt) -> str:
-        # Asked again and again: a builder that was killed does not know who waits for it.
-        late = time.monotonic() + deadlines.build
-        while True:
-            patience = min(ASK_AGAIN, max(deadlines.answer, late - time.monotonic()))
-            try:
-                answer = call(names, ReferenceName.Request(), patience, interrupt, deadlines.answer)
-            except AwayError:
-                raise
-            except PeerError:
-                if time.monotonic() < late:
-                    continue
-                raise
-            if not answer.name:
-                raise PeerError(names.name, 'the reference name is empty')
-            return str(answer.name)
+        request = ReferenceName.Request()
+        answer = ask(names, request, deadlines.build, interrupt, deadlines.answer)
+        if not answer.name:
+            raise PeerError(names.name, 'the reference name is empty')
+        return str(answer.name)
 
     transport = RosTransport(
         node, 'armor_interface_srv', 'armor_interface_serialized_srv', deadlines.answer, wake
@@ -146,7 +134,7 @@ class RosRoutine:
     def start(self, interrupt: Interrupt) -> None:
         """Has the robot look around and build the ontology."""
         limits = self._deadlines
-        call(self._start, Empty.Request(), limits.build, interrupt, limits.answer)
+        ask(self._start, Empty.Request(), limits.build, interrupt, limits.answer)
 
     def reason(self, interrupt: Interrupt) -> str:
         """The reasoner's choice."""
@@ -200,8 +188,6 @@ class RosRoutine:
             watchdog.stop()
 
 
-ASK_AGAIN = 10.0
-"""How long one question for the ontology's name waits for its answer, seconds."""
 LONGEST_CHARGE = 24 * 3600.0
 """The longest time a charge may take even when it gets on, seconds."""
 

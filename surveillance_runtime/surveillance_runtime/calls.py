@@ -31,6 +31,10 @@ DISCOVERY_PERIOD = 0.02
 """Seconds between two looks for a server; rclpy offers no event for its appearance."""
 
 
+SERVER_PERIOD = 0.1
+"""Seconds between two looks whether the server that owes an answer is still there."""
+
+
 PROBE_PERIOD = 0.5
 """Seconds between two questions to a server that came or went while a goal runs."""
 
@@ -72,30 +76,65 @@ class ServiceCaller:
         """Tell whether the server is there now."""
         return bool(self._client.service_is_ready())
 
-    def call(self, request: Any, timeout: float, interrupt: Interrupt | None = None) -> Any:
+    def call(
+        self,
+        request: Any,
+        timeout: float,
+        interrupt: Interrupt | None = None,
+        *,
+        discovery: float | None = None,
+    ) -> Any:
         """Call and block until the answer; from a worker thread only.
+
+        A server that was stopped is noticed at once. One that was killed is known to be gone only
+        when another takes its place, or after the middleware's own deadline (20 s by default).
 
         Args:
             request: The request message.
             timeout: Seconds for finding the server and for its answer together.
             interrupt: Ends the wait early.
+            discovery: Seconds for finding the server, where an answer may take much longer;
+                default: `timeout`.
 
         Returns:
             The response message.
 
         Raises:
-            Unavailable: No server within the time.
+            Unavailable: No server within the time, or it went away before it answered.
             TimedOut: No answer within the time.
             Interrupted: The interrupt was raised.
         """
         deadline = time.monotonic() + timeout
-        _await_ready(self.is_ready, deadline, interrupt, f'service {self.name}')
+        found_by = deadline if discovery is None else time.monotonic() + min(discovery, timeout)
+        what = f'service {self.name}'
+        _await_ready(self.is_ready, found_by, interrupt, what)
         future = self._client.call_async(request)
         try:
-            return _block_on(future, deadline, interrupt, f'service {self.name}')
+            return _block_on(future, deadline, interrupt, what, self._look_for_loss())
         except CallFailed:
             self._client.remove_pending_request(future)
             raise
+
+    def _look_for_loss(self) -> Callable[[], None]:
+        """Return a look at the server that raises `Unavailable` once it owes an answer for ever."""
+        servers, lost = self._count_servers(), ''
+
+        def look() -> None:
+            nonlocal servers, lost
+            if lost:
+                raise Unavailable(f'service {self.name}: {lost}')
+            before, servers = servers, self._count_servers()
+            # Not before the next look: an answer may be under way.
+            if not self.is_ready():
+                lost = 'the server went away before it answered'
+            elif servers > before:
+                lost = 'another server took the place of the one that was asked'
+
+        return look
+
+    def _count_servers(self) -> int:
+        # One that answers to `is_ready` may not be counted yet.
+        return max(1, int(self._node.count_services(self._client.service_name)))
 
     async def call_async(self, request: Any, timeout: float) -> Any:
         """Call from a callback with `await`; otherwise as `call`.
@@ -337,12 +376,21 @@ def _await_ready(
             raise Interrupted(f'{what}: interrupted')
 
 
-def _block_on(future: Future, deadline: float, interrupt: Interrupt | None, what: str) -> Any:
+def _block_on(
+    future: Future,
+    deadline: float,
+    interrupt: Interrupt | None,
+    what: str,
+    look: Callable[[], None] = lambda: None,
+) -> Any:
     woken = threading.Event()
     future.add_done_callback(lambda _future: woken.set())
     remove = interrupt.subscribe(woken.set) if interrupt is not None else None
     try:
-        woken.wait(max(0.0, deadline - time.monotonic()))
+        while not woken.wait(max(0.0, min(SERVER_PERIOD, deadline - time.monotonic()))):
+            if time.monotonic() >= deadline:
+                break
+            look()
     finally:
         if remove is not None:
             remove()

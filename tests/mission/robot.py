@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 import yaml
 from rclpy.parameter import Parameter
-from std_srvs.srv import Empty
 
+from surveillance_behaviour.initial_state_node import InitialState
 from surveillance_behaviour.mission_record import Event, Summary, read, summarize
 from surveillance_behaviour.reasoner_node import Reasoner
 from surveillance_behaviour.robot_behavior_node import RobotBehavior
@@ -31,6 +31,7 @@ NODES: dict[str, Callable[..., Any]] = {
     'planner_controller': PlannerController,
     'motion_controller': MotionController,
     'reasoner': Reasoner,
+    'initial_state': InitialState,
     'robot_behavior': RobotBehavior,
 }
 BEHAVIOUR = {
@@ -97,13 +98,13 @@ class Robot:
                 'peer_timeout': 0.5,
             },
             'reasoner': {'urgency_threshold': 60},
+            'initial_state': {'map_source': 'configuration', **place_parameters()},
             'robot_behavior': {**BEHAVIOUR, 'behaviour': behaviour, 'record': str(record)},
         }
         if behaviour == 'surveillance':
-            del self._parameters['reasoner']
+            del self._parameters['reasoner'], self._parameters['initial_state']
         else:
-            # `start` takes the map from the configuration: there are no markers here.
-            graph.node.create_service(Empty, 'start', lambda _request, response: response)
+            self._parameters['ontology_map_builder'] = {}
 
     def configure(self, name: str, **parameters: Any) -> None:
         """Changes parameters of a node that is not there yet."""

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+from rclpy.task import Future
+from std_srvs.srv import Empty
 
 from surveillance_behaviour.fsm import Interrupt
 from surveillance_behaviour.ros_ports import Deadlines, ros_knowledge
 from surveillance_interfaces.msg import Decision, MissionStatus
+from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import STATE_QOS
 
 from .robot import IMPATIENT, Robot, mission, place_parameters
@@ -59,15 +63,36 @@ def test_every_node_may_leave_and_come_back(robot: Robot, graph: Any) -> None:
     robot.configure('battery_controller', random_battery_time=[5000.0, 6000.0])
     robot.begin()
     moment = 40.0
-    names = [*robot.nodes] if 'reasoner' not in robot.nodes else ['reasoner', 'motion_controller']
-    for name in names:
+    for name in [*robot.nodes]:
         robot.time.at(moment, lambda name=name: robot.leave(name))
         robot.time.at(moment + 8.0, lambda name=name: robot.arrive(name))
         moment += 50.0
     robot.until(moment + 180.0, timeout=110.0)
     assert robot.visited(since=moment) == PLACES
     assert any(message.waiting_for_help for message in status)
-    assert robot.summary().restarts == ('robot_behavior' in names)
+    assert robot.summary().restarts == 1
+
+
+def test_an_initial_state_that_dies_while_it_looks_around_is_missed_at_once(
+    graph: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    asked = threading.Event()
+
+    async def look_around(_request: Any, _response: Any) -> Any:
+        asked.set()
+        await Future()
+
+    first = graph.add(PatrolNode, name='initial_state')
+    first.create_service(Empty, 'start', look_around)
+    with mission(graph, monkeypatch, 'patrol', tmp_path / 'mission.jsonl') as robot:
+        robot.begin('initial_state')
+        graph.until(asked.is_set)
+        graph.drop(first)
+        graph.until(lambda: any(event.name == 'failure' for event in robot.events()), 5.0)
+        assert 'start: the server went away' in robot.events()[0].text('reason')
+        robot.arrive('initial_state')
+        robot.until(80.0)
+        assert robot.visited()
 
 
 def test_whatever_planner_and_controller_answer_the_mission_goes_on(

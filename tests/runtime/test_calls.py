@@ -60,25 +60,59 @@ def test_service_call_ends_without_a_server(graph):
         ServiceCaller(graph.node, Trigger, 'nowhere').call(Trigger.Request(), timeout=0.05)
 
 
-def test_service_call_ends_by_interrupt_and_by_deadline(graph, server):
-    reached = threading.Event()
+def never_answers(server):
+    """Have the server take a question and keep the answer; raised when it was asked."""
+    asked = threading.Event()
 
     async def never(_request, _response):
         from rclpy.task import Future
 
-        reached.set()
+        asked.set()
         await Future()
 
     server.create_service(Trigger, 'ask', never)
+    return asked
+
+
+def test_service_call_ends_by_interrupt_and_by_deadline(graph, server):
+    asked = never_answers(server)
     caller = ServiceCaller(graph.node, Trigger, 'ask')
     interrupt = Interrupt()
     end = in_thread(lambda: caller.call(Trigger.Request(), 20.0, interrupt))
-    assert reached.wait(5)
+    assert asked.wait(5)
     interrupt.set()
     with pytest.raises(Interrupted):
         end()
     with pytest.raises(TimedOut):
         caller.call(Trigger.Request(), timeout=0.2)
+
+
+def test_service_call_notices_that_its_server_went_away(graph, server):
+    asked = never_answers(server)
+    caller = ServiceCaller(graph.node, Trigger, 'ask')
+    end = in_thread(lambda: caller.call(Trigger.Request(), 60.0))
+    assert asked.wait(5)
+    graph.drop(server)
+    with pytest.raises(Unavailable, match='service ask: the server went away before it answered'):
+        end()
+
+
+def test_service_call_notices_that_another_server_took_the_place_of_one_that_was_killed(
+    graph, server
+):
+    asked = never_answers(server)  # as one that was killed: the middleware still counts it
+    caller = ServiceCaller(graph.node, Trigger, 'ask')
+    end = in_thread(lambda: caller.call(Trigger.Request(), 60.0))
+    assert asked.wait(5)
+    never_answers(graph.add(PatrolNode, name='restarted'))
+    with pytest.raises(Unavailable, match='service ask: another server took the place'):
+        end()
+
+
+def test_service_call_has_a_patience_of_its_own_for_finding_the_server(graph):
+    caller = ServiceCaller(graph.node, Trigger, 'nowhere')
+    with pytest.raises(Unavailable, match='service nowhere: no server'):
+        caller.call(Trigger.Request(), timeout=60.0, discovery=0.05)
 
 
 def test_service_call_in_a_callback_is_awaited(graph, server):
