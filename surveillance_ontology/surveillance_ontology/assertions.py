@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from surveillance_ontology.axioms import (
+    Annotation,
     Assertion,
     Axiom,
+    AxiomAnnotation,
     DataPropertyAssertion,
     Declaration,
     DifferentIndividuals,
@@ -37,6 +39,7 @@ class Assertions:
         self.added: dict[Axiom, None] = {}
         self.removed: dict[Axiom, None] = {}
         self.schema_changed = True
+        self._notes: dict[Axiom, dict[AxiomAnnotation, None]] = {}
 
     def settle(self) -> tuple[tuple[Axiom, ...], tuple[Axiom, ...]]:
         """Takes what was added and removed; from here on, nothing changed."""
@@ -68,14 +71,19 @@ class Assertions:
                 del self.removed[axiom]
             else:
                 self.added[axiom] = None
+        elif isinstance(axiom, AxiomAnnotation):
+            self._notes.setdefault(axiom.axiom, {})[axiom] = None
         elif _is_schema(axiom):
             self.schema_changed = True
         return True
 
     def discard(self, axiom: Axiom) -> bool:
-        """Retracts an axiom; False when it was not asserted."""
+        """Retracts an axiom and what annotates it; False when it was not asserted."""
         if axiom not in self.axioms:
             return False
+        if self._notes:
+            for note in tuple(self._notes.get(axiom, ())):
+                self.discard(note)
         del self.axioms[axiom]
         for entity in _mentioned(axiom):
             mentions = self.about.get(entity)
@@ -93,6 +101,11 @@ class Assertions:
                 del self.added[axiom]
             else:
                 self.removed[axiom] = None
+        elif isinstance(axiom, AxiomAnnotation):
+            notes = self._notes[axiom.axiom]
+            del notes[axiom]
+            if not notes:
+                del self._notes[axiom.axiom]
         elif _is_schema(axiom):
             self.schema_changed = True
         return True
@@ -119,4 +132,4 @@ def is_assertion(axiom: Axiom) -> bool:
 def _is_schema(axiom: Axiom) -> bool:
     if isinstance(axiom, SubClassOf):
         return axiom.sup != THING
-    return not isinstance(axiom, Declaration)
+    return not isinstance(axiom, Declaration | Annotation)

@@ -54,13 +54,27 @@ class Import(Axiom):
     iri: str
 
 
+class Annotation(Axiom):
+    """What an ontology says of its own parts; without meaning to a reasoner."""
+
+    __slots__ = ()
+
+
 @dataclass(frozen=True, slots=True)
-class AnnotationAssertion(Axiom):
-    """`subject` is an IRI; `value` an IRI or a literal. No meaning to the reasoner."""
+class AnnotationAssertion(Annotation):
+    """`subject` is an IRI; `value` an IRI or a literal."""
 
     prop: str
     subject: str
     value: str | Literal
+
+
+@dataclass(frozen=True, slots=True)
+class AxiomAnnotation(Annotation):
+    """What is said of another axiom, as pairs of property and value (an IRI or a literal)."""
+
+    axiom: Axiom
+    annotations: tuple[tuple[str, str | Literal], ...]
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ silence.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from surveillance_ontology import axioms as ax
 from surveillance_ontology import expressions as ex
@@ -47,6 +47,7 @@ class Mapping(NodeReader):
     def __init__(self, graph: Graph) -> None:
         super().__init__(graph)
         self.axioms: dict[Axiom, None] = {}
+        self._added: list[Axiom] = []
         for subject, properties in self._nodes.items():
             self._subject(subject, properties)
 
@@ -54,27 +55,38 @@ class Mapping(NodeReader):
 
     def _add(self, axiom: Axiom) -> None:
         self.axioms[axiom] = None
+        self._added.append(axiom)
 
     def _subject(self, subject: str, properties: dict[str, list[Node]]) -> None:
         self._subject_read = subject
+        self._added = []
         types = [value for value in properties.get(_TYPE, ()) if isinstance(value, str)]
         special = next((_SPECIAL[name] for name in types if name in _SPECIAL), None)
         if special is not None:
             special(self, subject, properties)
             return
         for name in types:
-            self._type(subject, name, properties)
+            self._type(subject, name)
         for predicate, values in properties.items():
             if predicate == _TYPE or predicate in _STRUCTURE:
                 continue
-            handler = _PREDICATES.get(predicate)
             for value in values:
-                if handler is not None:
-                    handler(self, subject, value)
-                else:
-                    self._statement(subject, predicate, value)
+                self._triple(subject, predicate, value)
 
-    def _type(self, subject: str, name: str, properties: dict[str, list[Node]]) -> None:
+    def _triple(self, subject: str, predicate: str, value: Node) -> None:
+        handler = _PREDICATES.get(predicate)
+        if handler is None:
+            self._statement(subject, predicate, value)
+        elif isinstance(value, str):
+            handler(self, subject, value)
+        else:
+            raise self._fail(
+                subject,
+                f'{local_name(predicate)} of {local_name(subject)} has the literal'
+                f' {value.lexical!r}, expected a resource',
+            )
+
+    def _type(self, subject: str, name: str) -> None:
         kind = DECLARATIONS.get(name)
         if kind is not None:
             if not subject.startswith('_:'):
@@ -123,26 +135,26 @@ class Mapping(NodeReader):
         else:
             self._add(ax.ObjectPropertyAssertion(predicate, subject, value))
 
-    def _imports(self, subject: str, value: Node) -> None:
-        self._add(ax.Import(str(value)))
+    def _imports(self, subject: str, value: str) -> None:
+        self._add(ax.Import(value))
         self._report(subject, f'owl:imports <{value}> is not followed')
 
-    def _sub_class(self, subject: str, value: Node) -> None:
+    def _sub_class(self, subject: str, value: str) -> None:
         self._add(ax.SubClassOf(self.expression(subject), self.expression(value)))
 
-    def _equivalent_class(self, subject: str, value: Node) -> None:
+    def _equivalent_class(self, subject: str, value: str) -> None:
         if self._is_data_range(subject):
             self._add(ax.DatatypeDefinition(subject, self.data_range(value)))
         else:
             self._add(ax.EquivalentClasses((self.expression(subject), self.expression(value))))
 
-    def _disjoint_classes(self, subject: str, value: Node) -> None:
+    def _disjoint_classes(self, subject: str, value: str) -> None:
         self._add(ax.DisjointClasses((self.expression(subject), self.expression(value))))
 
-    def _disjoint_union(self, subject: str, value: Node) -> None:
+    def _disjoint_union(self, subject: str, value: str) -> None:
         self._add(ax.DisjointUnion(subject, tuple(map(self.expression, self._list(value)))))
 
-    def _defined(self, subject: str, predicate: str, value: Node) -> None:
+    def _defined(self, subject: str, predicate: str, value: str) -> None:
         """A named class directly carries the expression (OWL 1 style): an equivalence."""
         if subject.startswith('_:'):
             return
@@ -161,61 +173,62 @@ class Mapping(NodeReader):
             other = ex.ObjectIntersectionOf(tuple(map(self.expression, operands)))
         self._add(ax.EquivalentClasses((subject, other)))
 
-    def _sub_property(self, subject: str, value: Node) -> None:
-        assert isinstance(value, str)
+    def _sub_property(self, subject: str, value: str) -> None:
         if self._is_data(subject) or self._is_data(value):
             self._add(ax.SubDataPropertyOf(subject, value))
-        elif 'annotation_property' not in self._kinds.get(subject, ()):
-            self._add(ax.SubObjectPropertyOf(self._property(subject), self._property(value)))
+        elif self._is_annotation(subject):
+            self._add(ax.AnnotationAssertion(RDFS + 'subPropertyOf', subject, value))
         else:
-            self._report(
-                subject, f'annotation property {subject} below {value} has no meaning here'
-            )
+            self._add(ax.SubObjectPropertyOf(self._property(subject), self._property(value)))
 
-    def _chain(self, subject: str, value: Node) -> None:
+    def _chain(self, subject: str, value: str) -> None:
         chain = tuple(self._property(item) for item in self._resources(value))
         self._add(ax.SubPropertyChainOf(chain, self._property(subject)))
 
-    def _equivalent_property(self, subject: str, value: Node) -> None:
-        assert isinstance(value, str)
+    def _equivalent_property(self, subject: str, value: str) -> None:
         if self._is_data(subject) or self._is_data(value):
             self._add(ax.EquivalentDataProperties((subject, value)))
         else:
             pair = (self._property(subject), self._property(value))
             self._add(ax.EquivalentObjectProperties(pair))
 
-    def _disjoint_property(self, subject: str, value: Node) -> None:
-        assert isinstance(value, str)
+    def _disjoint_property(self, subject: str, value: str) -> None:
         if self._is_data(subject) or self._is_data(value):
             self._add(ax.DisjointDataProperties((subject, value)))
         else:
             pair = (self._property(subject), self._property(value))
             self._add(ax.DisjointObjectProperties(pair))
 
-    def _inverse(self, subject: str, value: Node) -> None:
-        assert isinstance(value, str)
+    def _inverse(self, subject: str, value: str) -> None:
         if not subject.startswith('_:'):
             self._add(ax.InverseObjectProperties(subject, self._property(value)))
 
-    def _domain(self, subject: str, value: Node) -> None:
+    def _domain(self, subject: str, value: str) -> None:
         if self._is_data(subject):
             self._add(ax.DataPropertyDomain(subject, self.expression(value)))
-        elif 'annotation_property' not in self._kinds.get(subject, ()):
+        elif self._is_annotation(subject):
+            self._add(ax.AnnotationAssertion(RDFS + 'domain', subject, value))
+        else:
             self._add(ax.ObjectPropertyDomain(self._property(subject), self.expression(value)))
 
-    def _range(self, subject: str, value: Node) -> None:
-        if self._is_data(subject, value):
+    def _range(self, subject: str, value: str) -> None:
+        if self._is_annotation(subject):
+            self._add(ax.AnnotationAssertion(RDFS + 'range', subject, value))
+        elif self._is_data(subject, value):
             self._add(ax.DataPropertyRange(subject, self.data_range(value)))
-        elif 'annotation_property' not in self._kinds.get(subject, ()):
+        else:
             self._add(ax.ObjectPropertyRange(self._property(subject), self.expression(value)))
 
-    def _same(self, subject: str, value: Node) -> None:
-        self._add(ax.SameIndividual(frozenset((subject, str(value)))))
+    def _is_annotation(self, prop: str) -> bool:
+        return self._kinds.get(prop) == {'annotation_property'}
 
-    def _different(self, subject: str, value: Node) -> None:
-        self._add(ax.DifferentIndividuals(frozenset((subject, str(value)))))
+    def _same(self, subject: str, value: str) -> None:
+        self._add(ax.SameIndividual(frozenset((subject, value))))
 
-    def _key(self, subject: str, value: Node) -> None:
+    def _different(self, subject: str, value: str) -> None:
+        self._add(ax.DifferentIndividuals(frozenset((subject, value))))
+
+    def _key(self, subject: str, value: str) -> None:
         props = self._resources(value)
         data = tuple(prop for prop in props if self._is_data(prop))
         objects = tuple(self._property(prop) for prop in props if not self._is_data(prop))
@@ -229,10 +242,12 @@ class Mapping(NodeReader):
                 members = frozenset(self._resources(head))
                 if len(members) > 1:
                     self._add(ax.DifferentIndividuals(members))
+        self._note(tuple(self._added), node, properties)
 
     def _all_disjoint_classes(self, node: str, properties: dict[str, list[Node]]) -> None:
         for head in properties.get(OWL + 'members', ()):
             self._add(ax.DisjointClasses(tuple(map(self.expression, self._list(head)))))
+        self._note(tuple(self._added), node, properties)
 
     def _all_disjoint_properties(self, node: str, properties: dict[str, list[Node]]) -> None:
         for head in properties.get(OWL + 'members', ()):
@@ -241,6 +256,7 @@ class Mapping(NodeReader):
                 self._add(ax.DisjointDataProperties(tuple(props)))
             else:
                 self._add(ax.DisjointObjectProperties(tuple(map(self._property, props))))
+        self._note(tuple(self._added), node, properties)
 
     def _negative(self, node: str, properties: dict[str, list[Node]]) -> None:
         source = self._resource(node, OWL + 'sourceIndividual')
@@ -248,15 +264,48 @@ class Mapping(NodeReader):
         value = self._one(node, OWL + 'targetValue')
         if isinstance(value, Literal):
             self._add(ax.NegativeDataPropertyAssertion(prop, source, value))
-            return
-        target = self._resource(node, OWL + 'targetIndividual')
-        expression = self._property(prop)
-        if isinstance(expression, ex.ObjectInverseOf):
-            source, target, prop = target, source, expression.prop
-        self._add(ax.NegativeObjectPropertyAssertion(prop, source, target))
+        else:
+            target = self._resource(node, OWL + 'targetIndividual')
+            expression = self._property(prop)
+            if isinstance(expression, ex.ObjectInverseOf):
+                source, target, prop = target, source, expression.prop
+            self._add(ax.NegativeObjectPropertyAssertion(prop, source, target))
+        self._note(tuple(self._added), node, properties)
 
     def _annotated(self, node: str, properties: dict[str, list[Node]]) -> None:
-        self._report(node, 'an annotation on an axiom is not kept')
+        source, predicate, target = (
+            self._one(node, OWL + name)
+            for name in ('annotatedSource', 'annotatedProperty', 'annotatedTarget')
+        )
+        if not isinstance(source, str) or not isinstance(predicate, str) or target is None:
+            self._report(node, 'an annotation names no axiom')
+            return
+        found: list[Axiom] = []
+        self._added = found
+        if predicate == _TYPE and isinstance(target, str):
+            self._type(source, target)
+        else:
+            self._triple(source, predicate, target)
+        self._note(found[-1:], node, properties)
+
+    def _note(self, axioms: Sequence[Axiom], node: str, properties: dict[str, list[Node]]) -> None:
+        """Keeps what a node says besides the axioms that it stands for."""
+        notes = tuple(
+            (predicate, value)
+            for predicate, values in properties.items()
+            if predicate != _TYPE and predicate not in _STRUCTURE
+            for value in values
+        )
+        if not notes:
+            return
+        if not axioms or any(isinstance(value, str) and value[:2] == '_:' for _, value in notes):
+            self._report(node, 'an annotation on an axiom is not kept')
+            return
+        for axiom in axioms:
+            self._add(ax.AxiomAnnotation(axiom, notes))
+
+    def _annotated_annotation(self, node: str, properties: dict[str, list[Node]]) -> None:
+        self._report(node, 'an annotation on an annotation is not kept')
 
     def _rule(self, node: str, properties: dict[str, list[Node]]) -> None:
         body = tuple(
@@ -308,7 +357,7 @@ class Mapping(NodeReader):
         raise self._fail(node, f'rule atom of type {kind} is not understood')
 
 
-_PREDICATES: dict[str, Callable[[Mapping, str, Node], None]] = {
+_PREDICATES: dict[str, Callable[[Mapping, str, str], None]] = {
     OWL + 'imports': Mapping._imports,
     RDFS + 'subClassOf': Mapping._sub_class,
     OWL + 'equivalentClass': Mapping._equivalent_class,
@@ -337,6 +386,6 @@ _SPECIAL: dict[str, Callable[[Mapping, str, dict[str, list[Node]]], None]] = {
     OWL + 'AllDisjointProperties': Mapping._all_disjoint_properties,
     OWL + 'NegativePropertyAssertion': Mapping._negative,
     OWL + 'Axiom': Mapping._annotated,
-    OWL + 'Annotation': Mapping._annotated,
+    OWL + 'Annotation': Mapping._annotated_annotation,
     SWRL + 'Imp': Mapping._rule,
 }

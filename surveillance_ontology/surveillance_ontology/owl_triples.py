@@ -22,6 +22,16 @@ _KIND_TYPES = {
     'individual': OWL + 'NamedIndividual',
     'datatype': RDFS + 'Datatype',
 }
+_GROUPS = {
+    OWL + name
+    for name in (
+        'AllDifferent',
+        'AllDisjointClasses',
+        'AllDisjointProperties',
+        'NegativePropertyAssertion',
+    )
+}
+"""Types of the nodes that stand for one axiom."""
 _CARDINALITIES = {
     'MinCardinality': ('minCardinality', 'minQualifiedCardinality'),
     'MaxCardinality': ('maxCardinality', 'maxQualifiedCardinality'),
@@ -253,6 +263,29 @@ class _Mapping:
         else:
             self.add(self.blank(OWL + group), OWL + 'members', self.sequence(nodes))
 
+    def annotated(self, axiom: Axiom, notes: Sequence[ax.AxiomAnnotation]) -> None:
+        """An axiom with what is said of it: on its node, where it has one, else on its triples."""
+        start = len(self.triples)
+        self.axiom(axiom)
+        written = self.triples[start:]
+        node, predicate, value = written[0]
+        if predicate == _TYPE and value in _GROUPS:
+            nodes = [node]
+        else:
+            main = [triple for triple in written if triple[:2] == written[-1][:2]]
+            nodes = [self.reified(*triple) for triple in main]
+        for node in nodes:
+            for note in notes:
+                for prop, what in note.annotations:
+                    self.add(node, prop, what)
+
+    def reified(self, subject: str, predicate: str, value: Node) -> str:
+        node = self.blank(OWL + 'Axiom')
+        self.add(node, OWL + 'annotatedSource', subject)
+        self.add(node, OWL + 'annotatedProperty', predicate)
+        self.add(node, OWL + 'annotatedTarget', value)
+        return node
+
     # --- rules ---
 
     def variable(self, variable: ex.Variable) -> str:
@@ -314,8 +347,18 @@ def triples_of(axioms: Iterable[Axiom], iri: str) -> Iterator[Triple]:
     mapping.add(iri, _TYPE, OWL + 'Ontology')
     declared: set[tuple[str, str]] = set()
     used: dict[tuple[str, str], None] = {}
+    axioms = tuple(axioms)
+    notes: dict[Axiom, list[ax.AxiomAnnotation]] = {}
     for axiom in axioms:
-        mapping.axiom(axiom)
+        if isinstance(axiom, ax.AxiomAnnotation):
+            notes.setdefault(axiom.axiom, []).append(axiom)
+    for axiom in axioms:
+        if axiom in notes:
+            mapping.annotated(axiom, notes[axiom])
+        elif isinstance(axiom, ax.AxiomAnnotation):
+            used.update((('annotation_property', prop), None) for prop, _ in axiom.annotations)
+        else:
+            mapping.axiom(axiom)
         if isinstance(axiom, ax.Declaration):
             declared.add((axiom.kind, axiom.iri))
         elif not isinstance(axiom, (ax.SameIndividual, ax.DifferentIndividuals)):

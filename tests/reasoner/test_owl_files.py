@@ -10,11 +10,14 @@ import pytest
 
 from surveillance_ontology.axioms import (
     Axiom,
+    AxiomAnnotation,
+    ClassAssertion,
     DataPropertyAssertion,
     Declaration,
     DifferentIndividuals,
     Import,
     Rule,
+    SubClassOf,
 )
 from surveillance_ontology.expressions import Literal
 from surveillance_ontology.knowledge_base import KnowledgeBase
@@ -94,6 +97,19 @@ def test_datatypes_are_kept_exactly() -> None:
         ),
         (document('<owl:Class rdf:ID="A"/>\n<owl:Class rdf:ID="A"/>'), 3, 'stands twice'),
         (
+            document('\n<owl:Thing rdf:about="#a"><owl:sameAs>b</owl:sameAs></owl:Thing>'),
+            3,
+            "sameAs of a has the literal 'b', expected a resource",
+        ),
+        (
+            document(
+                '<owl:ObjectProperty rdf:about="#p"><owl:inverseOf>q</owl:inverseOf>\n'
+                '</owl:ObjectProperty>'
+            ),
+            2,
+            "inverseOf of p has the literal 'q', expected a resource",
+        ),
+        (
             document('<owl:Class rdf:about="#A"><owl:unionOf rdf:nodeID="x"/></owl:Class>'),
             2,
             'rdf:first',
@@ -150,6 +166,62 @@ def test_what_is_not_understood_is_reported_with_its_line() -> None:
     assert Import('http://x/y') in read.axioms
     (sentence,) = read.unsupported
     assert sentence.startswith('line 2: owl:imports <http://x/y>')
+
+
+ANNOTATED = """
+<owl:AnnotationProperty rdf:about="#why">
+  <rdfs:domain rdf:resource="#ROOM"/></owl:AnnotationProperty>
+<owl:AnnotationProperty rdf:about="#source">
+  <rdfs:subPropertyOf rdf:resource="#why"/></owl:AnnotationProperty>
+<owl:Class rdf:about="#ROOM"><rdfs:subClassOf rdf:resource="#LOCATION"/>
+  <rdfs:subClassOf rdf:nodeID="two"/></owl:Class>
+<owl:Restriction rdf:nodeID="two"><owl:onProperty rdf:resource="#hasDoor"/>
+  <owl:minCardinality rdf:datatype="http://www.w3.org/2001/XMLSchema#nonNegativeInteger"
+  >1</owl:minCardinality></owl:Restriction>
+<ROOM rdf:about="#R1"><hasDoor rdf:resource="#D1"/><size>9</size></ROOM>
+<owl:Axiom><owl:annotatedSource rdf:resource="#ROOM"/>
+  <owl:annotatedProperty rdf:resource="http://www.w3.org/2000/01/rdf-schema#subClassOf"/>
+  <owl:annotatedTarget rdf:resource="#LOCATION"/>
+  <rdfs:comment>one</rdfs:comment><source rdf:resource="#plan"/></owl:Axiom>
+<owl:Axiom><owl:annotatedSource rdf:resource="#ROOM"/>
+  <owl:annotatedProperty rdf:resource="http://www.w3.org/2000/01/rdf-schema#subClassOf"/>
+  <owl:annotatedTarget rdf:nodeID="two"/><rdfs:comment>two</rdfs:comment></owl:Axiom>
+<owl:Axiom><owl:annotatedSource rdf:resource="#R1"/>
+  <owl:annotatedProperty rdf:resource="#size"/><owl:annotatedTarget>9</owl:annotatedTarget>
+  <rdfs:comment>three</rdfs:comment></owl:Axiom>
+<owl:Axiom><owl:annotatedSource rdf:resource="#R1"/>
+  <owl:annotatedProperty rdf:resource="http://www.w3.org/1999/02/22-rdf-syntax-ns#type"/>
+  <owl:annotatedTarget rdf:resource="#ROOM"/><rdfs:comment>four</rdfs:comment></owl:Axiom>
+<owl:AllDifferent><rdfs:comment>five</rdfs:comment><owl:members rdf:parseType="Collection">
+  <rdf:Description rdf:about="#D1"/><rdf:Description rdf:about="#D2"/>
+  <rdf:Description rdf:about="#D3"/></owl:members></owl:AllDifferent>
+"""
+
+
+@pytest.mark.parametrize('form', ['rdfxml', 'ntriples'])
+def test_what_is_said_of_axioms_is_kept(form: str) -> None:
+    read = read_ontology(document(ANNOTATED), IRI)
+    assert read.unsupported == []
+    notes = {a.axiom: a.annotations for a in read.axioms if isinstance(a, AxiomAnnotation)}
+    comment = 'http://www.w3.org/2000/01/rdf-schema#comment'
+    below = SubClassOf(n('ROOM'), n('LOCATION'))
+    size = DataPropertyAssertion(n('size'), n('R1'), Literal('9'))
+    assert notes[below] == ((comment, Literal('one')), (n('source'), n('plan')))
+    assert notes[size] == ((comment, Literal('three')),)
+    assert notes[ClassAssertion(n('ROOM'), n('R1'))] == ((comment, Literal('four')),)
+    assert len(notes) == 5
+    again = read_ontology(ontology_bytes(read.axioms, IRI, form), IRI)
+    assert set(again.axioms) >= set(read.axioms)
+    assert again.unsupported == []
+    kb = KnowledgeBase(IRI, read.axioms)
+    assert kb.reason()
+    assert kb.unsupported == ()
+    assert kb.rename('individual', n('R1'), n('R2'))
+    renamed = DataPropertyAssertion(n('size'), n('R2'), Literal('9'))
+    assert AxiomAnnotation(renamed, notes[size]) in kb
+    kb.remove(renamed)
+    assert not any(isinstance(a, AxiomAnnotation) and a.axiom == renamed for a in kb.axioms())
+    assert kb.reason()
 
 
 @pytest.mark.parametrize('form', ['rdfxml', 'ntriples'])

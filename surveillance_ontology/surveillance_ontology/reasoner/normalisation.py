@@ -48,11 +48,7 @@ class Normaliser(RightSides):
         negated: Iterable[tuple[str, str]] = (),
         abstract: bool = False,
     ) -> None:
-        tbox = [
-            axiom
-            for axiom in axioms
-            if not isinstance(axiom, (ax.Assertion, ax.AnnotationAssertion))
-        ]
+        tbox = [axiom for axiom in axioms if not isinstance(axiom, (ax.Assertion, ax.Annotation))]
         super().__init__(tbox, abstract)
         for axiom in tbox:
             self._origin = axiom
