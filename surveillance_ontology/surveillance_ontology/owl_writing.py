@@ -170,7 +170,7 @@ class _RdfXml:
             local = found.group() if found else ''
         namespace = iri[: len(iri) - len(local)]
         if not local or not namespace:
-            raise OntologyWriteError(f'RDF/XML cannot name <{iri}>; save as ntriples instead')
+            raise OntologyWriteError(f'RDF/XML cannot name <{iri}>; save it as N-Triples (.nt)')
         prefix = self._namespaces.get(namespace)
         if prefix is None:
             prefix = self._namespaces[namespace] = f'ns{len(self._namespaces)}'
@@ -261,6 +261,6 @@ def _checked(text: str) -> str:
     if found:
         raise OntologyWriteError(
             f'RDF/XML cannot hold the character {found.group()!r} in {text[:40]!r};'
-            ' save as ntriples instead'
+            ' save it as N-Triples (.nt)'
         )
     return text

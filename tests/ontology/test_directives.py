@@ -108,6 +108,8 @@ def test_unsupported_types_are_101(ask: Ask) -> None:
     replaced = ask('REPLACE DATAPROP IND', 'p', 'i', 'DATE', 'x', 'y')
     assert (replaced.success, replaced.exit_code) == (False, 101)
     assert replaced.error_description == 'Value type DATE not supported. pnot replaced from i.'
+    torn = ask('ADD DATAPROP IND', 'p', 'i', 'A\nB', 'x')
+    assert torn.error_description == "Value type 'A\\nB' not supported. pnot added to i."
     assert ask('QUERY DATAPROP IND', 'p', 'i').queried_objects == []
 
 

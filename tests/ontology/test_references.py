@@ -122,6 +122,7 @@ def test_what_cannot_be_loaded_leaves_no_reference(service: ArmorService, tmp_pa
         (f'{tmp_path}/../../../etc/passwd', 'may not be read'),
         ('', 'path is empty'),
         ('a\nb', 'is not a path'),
+        ('x' * 300, 'File name too long'),
     ):
         answer = ask('LOAD FILE', path, IRI, 'false', 'PELLET', 'false')
         assert (answer.success, answer.exit_code) == (False, 205), path
@@ -176,6 +177,19 @@ def test_saving_and_loading_again(ask: Ask, tmp_path: Path) -> None:
         ask('REMOVE DATAPROP IND', 'visitedAt', 'R3', 'LONG', '1', reference=name)
         assert names(ask('QUERY IND CLASS', 'URGENT', reference=name)) == urgent
         assert ask('SAVE', '', reference=name).success, 'an empty path is the file it came from'
+
+
+def test_names_that_rdf_xml_cannot_hold_are_saved_as_ntriples(ask: Ask) -> None:
+    ask('ADD DATAPROP IND', '2nd', 'R1', 'LONG', '1')
+    refused = ask('SAVE', 'map.owl')
+    assert (refused.success, refused.exit_code) == (False, 205)
+    assert refused.error_description == (
+        f'SAVE: RDF/XML cannot name <{IRI}#2nd>; save it as N-Triples (.nt)'
+    )
+    assert ask('SAVE', 'map.nt').success
+    assert ask('LOAD FILE', 'map.nt', IRI, 'false', '', 'false', reference='again').success
+    values = ask('QUERY DATAPROP IND', '2nd', 'R1', reference='again').queried_objects
+    assert values == ['"1"^^xsd:long']
 
 
 def test_a_turtle_document_is_saved_as_one(service: ArmorService, tmp_path: Path) -> None:

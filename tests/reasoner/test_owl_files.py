@@ -256,7 +256,7 @@ def test_any_text_survives(text: str, form: str) -> None:
 
 
 def test_rdf_xml_says_what_it_cannot_hold() -> None:
-    with pytest.raises(OntologyWriteError, match='save as ntriples'):
+    with pytest.raises(OntologyWriteError, match='save it as N-Triples'):
         ontology_bytes([value('now', 'x', Literal('\x01'))], IRI)
     with pytest.raises(OntologyWriteError, match='cannot name'):
         ontology_bytes([link('42', 'x', 'y')], IRI)

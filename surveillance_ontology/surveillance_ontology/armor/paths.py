@@ -63,7 +63,10 @@ class SafePaths:
         base = self._writable[0] if self._writable else Path.cwd()
         try:
             path = (base / Path(text).expanduser()).resolve()
-        except (OSError, RuntimeError, ValueError) as error:
+            path.exists()
+        except OSError as error:
+            raise DirectiveError(f'path {shown(text)}: {error.strerror}') from None
+        except (RuntimeError, ValueError) as error:
             raise DirectiveError(f'path {shown(text)}: {error}') from None
         if not any(path.is_relative_to(directory) for directory in allowed):
             where = ', '.join(map(str, allowed)) or 'no directory'

@@ -223,6 +223,7 @@ def shown(text: str, limit: int = 80) -> str:
 
 def unsupported_type(word: str, prop: str, verb: str, ind: str, *, success: bool) -> DirectiveError:
     """ARMOR's answer to a value type outside `TYPES`, with its own words (and missing space)."""
+    word, prop, ind = (text if text.isprintable() else shown(text) for text in (word, prop, ind))
     return DirectiveError(
         f'Value type {word} not supported. {prop}not {verb} {ind}.',
         ExitCode.UNSUPPORTED_TYPE,

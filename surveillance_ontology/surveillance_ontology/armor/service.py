@@ -305,10 +305,9 @@ class ArmorService:
             if inferences:
                 axioms = list(dict.fromkeys([*axioms, *ref.kb.facts()]))
             origin = ref.origin
+        form = 'ntriples' if target.endswith('.nt') else origin.format
         try:
-            write_ontology(
-                axioms, ref.kb.iri, self.paths.to_write(target), origin.format, origin.prefixes
-            )
+            write_ontology(axioms, ref.kb.iri, self.paths.to_write(target), form, origin.prefixes)
         except OntologyWriteError as error:
             raise DirectiveError(f'SAVE: {error}') from None
 

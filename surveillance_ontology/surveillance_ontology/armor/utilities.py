@@ -92,7 +92,8 @@ def _drop(service: ArmorService, request: DirectiveRequest) -> DirectiveResponse
     summary='Writes the asserted axioms in the format that was loaded; an empty path stands for '
     'the file that was loaded.',
     differs='Written beside the file and renamed, so that a crash leaves the old file whole. '
-    'Turtle is written as N-Triples, OWL/XML as RDF/XML.',
+    'Turtle is written as N-Triples, OWL/XML as RDF/XML; a path that ends in .nt gets N-Triples, '
+    'which hold names that RDF/XML cannot.',
     slow=True,
 )
 def _save(service: ArmorService, request: DirectiveRequest, path: str) -> DirectiveResponse:
