@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from launcher.mission import Run
 
 CONFIG = CHECKOUT / 'config'
+RUNS = CHECKOUT / 'runs'
 EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
 
@@ -179,7 +180,9 @@ def main(argv: Sequence[str]) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except KeyboardInterrupt:
-        print('\nlaunch.py: interrupted; the next start goes on from here', file=sys.stderr)
+        ready = Environment(CHECKOUT).ready()
+        more = '' if ready else '; the next start goes on with the set-up'
+        print(f'\nlaunch.py: interrupted{more}', file=sys.stderr)
         return EXIT_INTERRUPTED
 
 
@@ -208,9 +211,7 @@ def _run(argv: list[str]) -> int:
     _enter(['run', *argv])
     from launcher.mission import run_mission
 
-    # From here on the supervisor takes signals; one that comes after its end changes nothing.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    return run_mission(wanted_run(options), CONFIG, CHECKOUT / 'runs')
+    return run_mission(wanted_run(options), CONFIG, RUNS)
 
 
 def wanted_run(options: argparse.Namespace) -> Run:

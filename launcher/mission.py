@@ -267,9 +267,11 @@ def run_mission(run: Run, config: Path, runs: Path) -> int:
         reader = COMPOSED if run.one_console else None
         console = OperatorConsole(supervisor, [n for n in nodes if n.console], log, reader)
         console.start()
-    code = supervisor.run(run.seconds)
-    if console is not None:
-        console.stop()
+    try:
+        code = supervisor.run(run.seconds)
+    finally:
+        if console is not None:
+            console.stop()
     if any(node.name == BEHAVIOUR_NODE for node in nodes):
         log.plain(summary(folder / RECORD))
     log.close()

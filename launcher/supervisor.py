@@ -279,7 +279,10 @@ class Supervisor:
 
     @contextlib.contextmanager
     def _signals(self) -> Iterator[None]:
-        """Turns stop signals and deaths of children into events of the loop."""
+        """Turns stop signals and deaths of children into events of the loop.
+
+        Afterwards stop signals are ignored: what was running has ended, the rest is soon said.
+        """
         reader, writer = socket.socketpair()
         reader.setblocking(False)
         writer.setblocking(False)
@@ -293,15 +296,18 @@ class Supervisor:
         def nothing(_number: int, _frame: object) -> None:
             pass
 
-        before = {s: signal.signal(s, nothing) for s in (*_STOP_SIGNALS, signal.SIGCHLD)}
+        before = signal.signal(signal.SIGCHLD, nothing)
+        for number in _STOP_SIGNALS:
+            signal.signal(number, nothing)
         wakeup = signal.set_wakeup_fd(writer.fileno(), warn_on_full_buffer=False)
         self._selector.register(reader, selectors.EVENT_READ, on_signal)
         try:
             yield
         finally:
             signal.set_wakeup_fd(wakeup)
-            for number, handler in before.items():
-                signal.signal(number, handler)
+            for number in _STOP_SIGNALS:
+                signal.signal(number, signal.SIG_IGN)
+            signal.signal(signal.SIGCHLD, before)
             reader.close()
             writer.close()
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import os
+import re
 import signal
 from collections.abc import Callable
 from pathlib import Path
@@ -76,6 +77,18 @@ def test_ctrl_c_ends_a_mission_with_its_summary_and_leaves_nothing_behind(launch
     assert 'killed' not in output
     (folder,) = (tmp_path / 'runs').iterdir()
     assert {'mission.jsonl', 'launch.log', 'launch.yaml'} <= {p.name for p in folder.iterdir()}
+
+
+@pytest.mark.parametrize('moment', ['surveillance in mode', 'started armor_server'])
+def test_ctrl_c_in_the_middle_of_the_start_ends_it(launch, moment):
+    mission = launch('--mode', 'RANDOM')
+    mission.until(moment)
+    code, seconds = mission.end(signal.SIGINT)
+    assert code in (0, 130)
+    assert seconds < 3.5
+    assert 'Traceback' not in '\n'.join(mission.lines)
+    started = re.findall(r'\(process (\d+)\)', '\n'.join(mission.lines))
+    assert gone([int(process) for process in started], 0)
 
 
 @pytest.mark.timeout(300)  # six deaths, each with two arrivals after it
