@@ -33,7 +33,7 @@ class PaceModel:
     idle_step: float = 0.5
     window: float = 0.15
     estimate_window: float = 0.45
-    patience: float = 0.2
+    patience: float = 1.0
 
     @property
     def period(self) -> float:
