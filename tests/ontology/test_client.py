@@ -119,7 +119,7 @@ def test_every_method_sends_what_armor_expects() -> None:
         'QUERY CLASS RESTRICTIONS': (lambda: ask.restrictions('A'), ('A',)),
         'QUERY IND DATAPROP': (lambda: ask.dataprops_of_ind('a'), ('a',)),
         'QUERY IND OBJECTPROP': (lambda: ask.objectprops_of_ind('a'), ('a',)),
-        'QUERY SPARQL FORMATTED': (lambda: ask.sparql('SELECT', 5), ('SELECT', '5')),
+        'QUERY SPARQL ROWS': (lambda: ask.sparql('SELECT', 5), ('SELECT', '5')),
         'QUERY FACT': (lambda: ask.facts('A(?)'), ('A(?)',)),
         'QUERY EXPLAIN INCONSISTENCY': (lambda: ask.explain_inconsistency(), ()),
         'APPLY': (lambda: use.apply_buffered_changes(), ()),

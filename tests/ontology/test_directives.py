@@ -306,11 +306,30 @@ def test_facts_by_pattern(ask: Ask) -> None:
     assert ask('QUERY FACT', 'ROBOT(Robot1)').queried_objects == ['ROBOT(Robot1)']
     assert ask('QUERY FACT', 'URGENT(R4)').queried_objects == []
     assert ask('QUERY FACT', 'URGENT(?)', 'true').queried_objects == []
+    assert ask('QUERY FACT', f'isIn(<{IRI}#Robot1>, ?)').queried_objects == ['isIn(Robot1, R3)']
+    assert ask('QUERY FACT', f'<{IRI}#isIn>(?, {IRI}#R3)').queried_objects == ['isIn(Robot1, R3)']
+    for pattern in ('owl:Thing(R3)', 'owl:Thing(?)'):
+        assert 'owl:Thing(R3)' in ask('QUERY FACT', pattern).queried_objects
+    wrong = ask('QUERY FACT', 'ROOM(a#b)')
+    assert (wrong.success, wrong.exit_code) == (False, 205)
+    assert wrong.error_description.startswith(
+        "QUERY FACT: argument pattern 'a#b' has the character"
+    )
     assert ask('QUERY FACT', '?(Robot1, ?)', 'true').queried_objects == [
         'isIn(Robot1, R3)',
         'now(Robot1, "1665579740"^^xsd:long)',
         'urgencyThreshold(Robot1, "7"^^xsd:long)',
     ]
+
+
+def test_names_that_a_fact_could_be_misread_by_stand_in_brackets(ask: Ask) -> None:
+    for name in ('A,B', 'C(1)'):
+        ask('ADD IND CLASS', name, 'KIND')
+    found = ask('QUERY FACT', 'KIND(?)').queried_objects
+    assert found == ['KIND(<A,B>)', 'KIND(<C(1)>)']
+    for fact in found:
+        assert ask('QUERY FACT', fact).queried_objects == [fact]
+        assert ask('QUERY EXPLAIN', fact).success
 
 
 # --- buffering and consistency ---

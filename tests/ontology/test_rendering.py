@@ -119,6 +119,10 @@ def test_facts_and_patterns() -> None:
     assert parse_fact('visitedAt(R3, ?)').matches(fact)
     assert not parse_fact('visitedAt(R4, ?)').matches(fact)
     assert not parse_fact('visitedAt(?)').matches(fact)
+    assert parse_fact(f'<{BASE}#visitedAt>({BASE}#R3, ?)').matches(fact)
+    for names in (('A,B', 'C(1)'), ('?x', 'y')):
+        odd = ShortFact('near', names)
+        assert parse_fact(str(odd)) == odd
 
 
 @pytest.mark.parametrize('text', ['', 'URGENT', 'URGENT()', 'a(b', 'a(b,)', 'a(b,c,d)', 'a(b c)'])

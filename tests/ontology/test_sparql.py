@@ -61,6 +61,15 @@ def test_it_follows_the_ontology(built: ArmorClient) -> None:
     assert found == ['CORRIDOR', 'ROOM', 'URGENT']
 
 
+def test_rows_keep_apart_what_they_leave_unbound(built: ArmorClient) -> None:
+    query = PREFIX + (
+        'SELECT ?place ?door { { :Robot1 :isIn ?place } UNION { :R1 :hasDoor ?door } '
+        'UNION { :R2 :hasDoor ?other } }'
+    )
+    rows = sorted(built.query.sparql(query), key=str)
+    assert rows == [{'door': f'{IRI}#D1'}, {'place': f'{IRI}#E'}, {}]
+
+
 def test_values_come_back_as_they_were_written(service: ArmorService, built: ArmorClient) -> None:
     ask = asker(service)
     for prop, ind, kind, value in (

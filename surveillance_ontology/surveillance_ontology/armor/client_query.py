@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 
 from surveillance_ontology.armor.facts import ShortFact, parse_fact
@@ -110,17 +111,10 @@ class Query(ClientPart):
             timeout_ms: Longest time in milliseconds; 0 leaves it to the server.
 
         Returns:
-            One dictionary of variable and value for each row; rows without any value are left out.
+            One dictionary of variable and value for each row, without the unbound variables.
         """
-        response: DirectiveResponse = checked(
-            (yield self.request('QUERY SPARQL FORMATTED', query, str(timeout_ms)))
-        )
-        rows: list[dict[str, str]] = []
-        for key, value in response.sparql_queried_objects:
-            if not rows or key in rows[-1]:
-                rows.append({})
-            rows[-1][key] = value
-        return rows
+        objects = yield from self._objects('QUERY SPARQL ROWS', query, str(timeout_ms))
+        return [json.loads(row) for row in objects]
 
     @operation
     def facts(self, pattern: str) -> Steps[list[ShortFact]]:

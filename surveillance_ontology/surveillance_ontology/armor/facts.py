@@ -1,6 +1,7 @@
 """Facts in short form, as people write them: ``URGENT(R3)``, ``visitedAt(R3, "5"^^xsd:long)``.
 
-The same form with ``?`` for any argument is a pattern: ``URGENT(?)``, ``canReach(Robot1, ?)``.
+The same form with ``?`` for any argument is a pattern: ``URGENT(?)``, ``canReach(Robot1, ?)``. A
+name may stand as ``<iri>``; one that would be misread otherwise does: ``ROOM(<A,B>)``.
 """
 
 from __future__ import annotations
@@ -21,8 +22,9 @@ from surveillance_ontology.vocabulary import local_name
 
 SAME_AS = 'owl:sameAs'
 ANY = '?'
-_FORM = re.compile(r'\s*([^\s(),"]+)\s*\((.*)\)\s*\Z', re.DOTALL)
-_PART = re.compile(r'\s*("(?:[^"\\]|\\.)*"[^\s,]*|[^\s,"]+)\s*', re.DOTALL)
+_FORM = re.compile(r'\s*(<[^<>]+>|[^\s(),"<>]+)\s*\((.*)\)\s*\Z', re.DOTALL)
+_PART = re.compile(r'\s*("(?:[^"\\]|\\.)*"[^\s,]*|<[^<>]+>|[^\s,"]+)\s*', re.DOTALL)
+_PLAIN = re.compile(r'[^\s(),"<>?]+')
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +40,7 @@ class ShortFact:
     arguments: tuple[str, ...]
 
     def __str__(self) -> str:
-        return f'{self.predicate}({", ".join(self.arguments)})'
+        return f'{_shown(self.predicate)}({", ".join(map(_shown, self.arguments))})'
 
     def matches(self, fact: ShortFact) -> bool:
         """Tell whether a fact fits this pattern."""
@@ -58,6 +60,12 @@ def parse_fact(text: str) -> ShortFact:
     Raises:
         ValueError: The text has another form.
     """
+    written = parse_names(text)
+    return ShortFact(short_name(written.predicate), tuple(map(short_name, written.arguments)))
+
+
+def parse_names(text: str) -> ShortFact:
+    """Read as `parse_fact` does, and leave the names as they are written, ``<iri>`` or not."""
     expected = f'{text[:80]!r}: expected CLASS(individual) or property(individual, value)'
     match = _FORM.match(text)
     if match is None:
@@ -78,6 +86,19 @@ def parse_fact(text: str) -> ShortFact:
     if len(arguments) > 2:
         raise ValueError(expected)
     return ShortFact(match[1], tuple(arguments))
+
+
+def short_name(name: str) -> str:
+    """The local name of an entity that is written ``<iri>`` or as a full IRI; else as it is."""
+    bracketed = name[0] == '<' and name[-1] == '>'
+    if name[0] == '"' or not (bracketed or '://' in name):
+        return name
+    return local_name(name[1:-1] if bracketed else name)
+
+
+def _shown(name: str) -> str:
+    plain = name == ANY or name[:1] == '"' or _PLAIN.fullmatch(name)
+    return name if plain else f'<{name}>'
 
 
 def short_facts(axiom: Axiom) -> Sequence[ShortFact]:

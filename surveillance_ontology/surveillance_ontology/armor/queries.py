@@ -7,8 +7,17 @@ ontology is named in the description of an otherwise empty answer.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from functools import partial
 
-from surveillance_ontology.armor.facts import ANY, SAME_AS, ShortFact, parse_fact, short_facts
+from surveillance_ontology.armor.facts import (
+    ANY,
+    SAME_AS,
+    ShortFact,
+    parse_fact,
+    parse_names,
+    short_facts,
+    short_name,
+)
 from surveillance_ontology.armor.protocol import DirectiveError, DirectiveResponse
 from surveillance_ontology.armor.reference import Reference
 from surveillance_ontology.armor.rendering import parse_entity, parse_rendered, render_entity
@@ -23,7 +32,7 @@ from surveillance_ontology.axioms import (
     SameIndividual,
 )
 from surveillance_ontology.knowledge import Fact
-from surveillance_ontology.vocabulary import NOTHING, local_name
+from surveillance_ontology.vocabulary import NOTHING, THING, local_name
 
 
 def _entities(iris: Iterable[str]) -> list[str]:
@@ -174,10 +183,10 @@ def _unsupported(ref: Reference) -> DirectiveResponse:
 )
 def _facts(ref: Reference, pattern: str, asserted: bool) -> DirectiveResponse:
     try:
-        wanted = parse_fact(pattern)
+        wanted, written = parse_fact(pattern), parse_names(pattern)
+        candidates = _asserted(ref, written) if asserted else _candidates(ref, written)
     except ValueError as error:
         raise DirectiveError(f'QUERY FACT: argument pattern {error}') from None
-    candidates = _asserted(ref, wanted) if asserted else _candidates(ref, wanted)
     found = {str(fact) for fact in candidates if wanted.matches(fact)}
     return DirectiveResponse(queried_objects=sorted(found))
 
@@ -187,7 +196,7 @@ def _asserted(ref: Reference, wanted: ShortFact) -> Iterable[ShortFact]:
     kb = ref.kb
     axioms: Iterable[Axiom] = kb.facts(derived=False)
     if wanted.predicate not in (ANY, SAME_AS):
-        axioms = kb.axioms_about(parse_entity(wanted.predicate, kb.iri))
+        axioms = kb.axioms_about(_entity(ref, wanted.predicate))
     return (short for axiom in axioms for short in short_facts(axiom))
 
 
@@ -195,23 +204,31 @@ def _candidates(ref: Reference, wanted: ShortFact) -> Iterable[ShortFact]:
     """Facts among which those that match a pattern are, without going through all if possible."""
     name, arguments, kb = wanted.predicate, wanted.arguments, ref.kb
     if ANY not in (name, arguments[0]) and name != SAME_AS:
-        predicate = parse_entity(name, kb.iri)
-        ind = parse_entity(arguments[0], kb.iri)
+        predicate, ind = _entity(ref, name), _entity(ref, arguments[0])
+        short, who = short_name(name), short_name(arguments[0])
         if len(arguments) == 1:
-            return (ShortFact(name, (local_name(ind),)),) if predicate in kb.types(ind) else ()
+            anything = predicate == THING and kb.is_known('individual', ind)
+            holds = anything or predicate in kb.types(ind)
+            return (ShortFact(short, (who,)),) if holds else ()
         values = [local_name(other) for other in kb.object_values(predicate, ind)]
         values += map(_literal, kb.data_values(predicate, ind))
-        return (ShortFact(name, (local_name(ind), value)) for value in values)
+        return (ShortFact(short, (who, value)) for value in values)
     if name != ANY and len(arguments) == 1:
-        members = kb.instances(parse_entity(name, kb.iri))
-        return (ShortFact(name, (local_name(ind),)) for ind in members)
+        members = kb.instances(_entity(ref, name))
+        return (ShortFact(short_name(name), (local_name(ind),)) for ind in members)
     return (short for fact in kb.facts() for short in short_facts(fact))
+
+
+def _entity(ref: Reference, name: str) -> str:
+    """The entity of a name in a fact; ``<A,B>`` is the local name A,B."""
+    bracketed = name[0] == '<' and ':' not in name
+    return f'{ref.kb.iri}#{name[1:-1]}' if bracketed else parse_entity(name, ref.kb.iri)
 
 
 def _full_fact(ref: Reference, text: str) -> Fact:
     try:
-        short = parse_fact(text)
-        read: Callable[[str], str] = lambda name: parse_entity(name, ref.kb.iri)  # noqa: E731
+        short = parse_names(text)
+        read: Callable[[str], str] = partial(_entity, ref)
         if len(short.arguments) == 1:
             return ClassAssertion(read(short.predicate), read(short.arguments[0]))
         subject, value = short.arguments

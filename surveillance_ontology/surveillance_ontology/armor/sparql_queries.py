@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import TYPE_CHECKING
 
 from surveillance_ontology.armor.protocol import DirectiveError, DirectiveResponse
@@ -60,6 +61,21 @@ def _sparql_formatted(service: ArmorService, ref: Reference, *parts: str) -> Dir
     rows = _select(service, ref, parts)
     pairs = [(bound.variable, _value(bound)) for row in rows for bound in row]
     return DirectiveResponse(sparql_queried_objects=pairs)
+
+
+@query(
+    'QUERY SPARQL ROWS',
+    text('query'),
+    rest=1,
+    slow=True,
+    native=False,
+    summary=_SUMMARY + 'One JSON object for each row, variable to value; a variable that the row '
+    'leaves unbound is left out, which the other two forms cannot show.',
+)
+def _sparql_rows(service: ArmorService, ref: Reference, *parts: str) -> DirectiveResponse:
+    rows = _select(service, ref, parts)
+    objects = [json.dumps({b.variable: _value(b) for b in row}, ensure_ascii=False) for row in rows]
+    return DirectiveResponse(queried_objects=objects)
 
 
 def _value(bound: Binding) -> str:
