@@ -10,12 +10,13 @@ from surveillance_behaviour.fsm import Interrupt
 
 
 class BatteryGauge:
-    """The last level and the last warning that came in. Safe to use from several threads."""
+    """What came in last of the battery. Safe to use from several threads."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._level: float | None = None
         self._low = False
+        self._charging: bool | None = None
         self._watchers: list[Callable[[], object]] = []
 
     @property
@@ -28,6 +29,11 @@ class BatteryGauge:
         """Whether the battery's own warning is up."""
         return self._low
 
+    @property
+    def charging(self) -> bool | None:
+        """Whether the battery is being charged; None: nobody said."""
+        return self._charging
+
     def set_level(self, percent: float) -> None:
         """A level came in."""
         with self._lock:
@@ -39,6 +45,13 @@ class BatteryGauge:
         with self._lock:
             self._low = low
         self._tell()
+
+    def set_charging(self, charging: bool | None) -> None:
+        """It was said whether the battery is being charged; None: that is not known."""
+        with self._lock:
+            changed, self._charging = charging != self._charging, charging
+        if changed:
+            self._tell()
 
     def watch(self, callback: Callable[[], object]) -> Callable[[], None]:
         """Calls back on each message; the function returned ends that."""

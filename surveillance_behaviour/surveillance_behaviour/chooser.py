@@ -72,6 +72,7 @@ class Chooser:
         self._generator = generator or random.Random()
         self._positions: dict[str, Point] = {}
         self._graph = PatrolGraph({})
+        self._all: frozenset[str] = frozenset()
         self._graph_key: object = None
         self._since: float | None = None
         self._target: str | None = None
@@ -82,6 +83,11 @@ class Chooser:
     def graph(self) -> PatrolGraph:
         """The part of the map that could be reached when it was last looked at."""
         return self._graph
+
+    @property
+    def places(self) -> frozenset[str]:
+        """All places of the map when it was last looked at, within reach or not."""
+        return self._all
 
     def look(
         self, now: float, interrupt: Interrupt, avoided: frozenset[str] = frozenset()
@@ -141,6 +147,7 @@ class Chooser:
                 positions[place] = self._position(place, interrupt)
             except UnknownPlaceError:
                 continue  # It was removed from the map a moment ago; the ontology will follow.
+        self._all = frozenset(positions)
         if beliefs.place not in positions:
             raise PeerError('ontology', f'the robot is in {beliefs.place}, which is not on the map')
         dwell, speed = self.settings.exploration_seconds, self.settings.speed

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from geometry_msgs.msg import Point as PointMessage
+from sensor_msgs.msg import BatteryState
 
 from surveillance_behaviour.fsm.active import ActiveContainer
 from surveillance_behaviour.fsm.export import to_mermaid
@@ -77,6 +78,17 @@ def decision_from(message: DecisionMessage) -> Decision:
         reason=message.reason,
         scores=dict(zip(message.candidates, message.scores, strict=True)),
     )
+
+
+def charging_from(message: BatteryState) -> bool | None:
+    """Whether a battery is being charged, or is full at its charger; None: it does not say."""
+    status = message.power_supply_status
+    if status in (
+        BatteryState.POWER_SUPPLY_STATUS_CHARGING,
+        BatteryState.POWER_SUPPLY_STATUS_FULL,
+    ):
+        return True
+    return None if status == BatteryState.POWER_SUPPLY_STATUS_UNKNOWN else False
 
 
 def place_note_from(response: Any) -> PlaceNote | None:

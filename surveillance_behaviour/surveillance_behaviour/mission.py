@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
-import math
 import random
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -11,10 +9,12 @@ from dataclasses import dataclass, field
 from surveillance_behaviour.battery_gauge import BatteryGauge
 from surveillance_behaviour.chooser import ChoiceSettings, Chooser
 from surveillance_behaviour.fsm import Clock, Interrupt
-from surveillance_behaviour.mission_record import MissionRecord
+from surveillance_behaviour.mission_record import MissionRecord, RecordError
+from surveillance_behaviour.mission_resumption import CutOff
 from surveillance_behaviour.policy.situation import Decision, Situation
 from surveillance_behaviour.ports import (
     Announcer,
+    InterruptedWaitError,
     Knowledge,
     LostRobotError,
     Motion,
@@ -24,6 +24,9 @@ from surveillance_behaviour.ports import (
     Routine,
 )
 from surveillance_behaviour.recovery import Failure, Recovery, RecoveryLimits, Step
+
+NOTE_SECONDS = 1.0
+"""The shortest time between two notes of how far a place is explored, seconds."""
 
 
 @dataclass
@@ -37,8 +40,8 @@ class MissionSettings:
         goal_tolerance: How far from the goal a planner's path may end, m.
         charge_stall_seconds: How long a level may stay the same while charging before the robot
             drives to the station again; 0: for ever.
-        settle_seconds: How long the battery's topics may lag behind its `recharge` service,
-            seconds of real time.
+        settle_seconds: How long the battery's topics may lag behind the robot and behind the
+            `recharge` service, seconds of real time.
     """
 
     choice: ChoiceSettings = field(default_factory=ChoiceSettings)
@@ -71,6 +74,7 @@ class Mission:
         clock: The mission's clock, in seconds; also the machine's.
         record: Where it is written down; None: nowhere.
         generator: Chance, for the policies that need it.
+        cut_off: Where a process that was killed left the mission; None: nothing is known of one.
     """
 
     def __init__(
@@ -82,6 +86,7 @@ class Mission:
         clock: Clock,
         record: MissionRecord | None = None,
         generator: random.Random | None = None,
+        cut_off: CutOff | None = None,
     ) -> None:
         self.machine = machine
         self.settings = settings
@@ -94,8 +99,12 @@ class Mission:
         self.heading_to = ''
         self.failure: Failure | None = None
         self._record = record
+        self._cut_off = cut_off
+        self._explored = 0.0
         self.astray = False
         self._started: float | None = None
+        self._noted_places: frozenset[str] = frozenset()
+        self._record_complaint = ''
         self._told_threshold: float | None = None
         self._warned = ''
         self._sent_to_charge = ''
@@ -114,10 +123,22 @@ class Mission:
         self.warn_about_threshold()
         if self._started is None:
             self._started = self.now()
-            self._write('start', machine=self.machine, place=self.place, places=self._places())
+            self._noted_places = self.chooser.places
+            places = sorted(self._noted_places)
+            self._write('start', machine=self.machine, place=self.place, places=places)
+            self._resume()
 
-    def _places(self) -> list[str]:
-        return list(self.chooser.graph.places)
+    def _resume(self) -> None:
+        """Takes up what a process that was killed had begun."""
+        before, self._cut_off = self._cut_off, None
+        if before is None or before.time > self.now():
+            return
+        self.astray = before.left
+        if before.charging and not self.charged_enough():
+            self._sent_to_charge = before.charging
+        if before.place == self.place:
+            self._explored = before.explored
+        self.say(f'going on: {before}')
 
     def look(self, interrupt: Interrupt) -> Situation:
         """What the ontology says now; an ontology that lost the robot is told where it is.
@@ -144,6 +165,9 @@ class Mission:
             self._told_threshold = None
             raise
         self.place = situation.place
+        if self._started is not None and self.chooser.places != self._noted_places:
+            self._noted_places = self.chooser.places
+            self._write('map', places=sorted(self._noted_places))
         return situation
 
     def warn_about_threshold(self) -> None:
@@ -167,14 +191,11 @@ class Mission:
             self._sent_to_charge = why
         else:
             decision = self.chooser.choose(situation)
-        self.heading_to = decision.place
         self.warn_about_threshold()
-        self.ports.announcer.decision(decision)
-        self.note_decision(decision)
-        return decision
+        return self._decided(decision)
 
     def choose_station(self, interrupt: Interrupt, why: str) -> Decision:
-        """The charging place to go to; announced, and recorded by whoever hears of it.
+        """The charging place to go to; announces and records the decision.
 
         Raises:
             PeerError: The ontology cannot be asked.
@@ -182,8 +203,12 @@ class Mission:
         """
         decision = self.chooser.choose_station(self.look(interrupt), why)
         self._sent_to_charge = why
+        return self._decided(decision)
+
+    def _decided(self, decision: Decision) -> Decision:
         self.heading_to = decision.place
         self.ports.announcer.decision(decision)
+        self.note_decision(decision)
         return decision
 
     def note_decision(self, decision: Decision) -> None:
@@ -193,6 +218,21 @@ class Mission:
                 'decision', place=decision.place, rule=decision.rule, reason=decision.reason
             )
 
+    def explore(self, interrupt: Interrupt) -> bool:
+        """Looks around in the place for its time, or what is left of that after a restart.
+
+        Returns:
+            False when the interrupt ended it early.
+        """
+        seconds = self.settings.choice.exploration_seconds
+        begin = self.now() - min(self._explored, seconds)
+        self._explored = 0.0
+        while (left := begin + seconds - self.now()) > 0.0:
+            if not self.clock.sleep(min(left, max(NOTE_SECONDS, seconds / 20.0)), interrupt):
+                return False
+            self._write('exploring', place=self.place, seconds=round(self.now() - begin, 3))
+        return True
+
     def departs(self) -> None:
         """The robot leaves the place it is in; until it arrives it may be anywhere."""
         self.astray = True
@@ -201,6 +241,7 @@ class Mission:
         """The robot is in ``place``, after ``distance`` metres along ``path``."""
         self.place = place
         self.astray = False
+        self._explored = 0.0
         self.chooser.saw(place, self.now())
         self.recovery.arrived(place)
         self.failure = None
@@ -264,6 +305,27 @@ class Mission:
         enough = level is None or level >= self.settings.choice.battery.stop_recharge
         return enough and not self.gauge.low
 
+    def await_contact(self, interrupt: Interrupt) -> None:
+        """Gives a battery that says it is not being charged a moment to think better of it.
+
+        Raises:
+            PeerError: It says so for good: the robot is not where it can charge.
+            InterruptedWaitError: The interrupt was raised.
+        """
+
+        def contact() -> bool:
+            return self.gauge.charging is not False or self.charged_enough()
+
+        with self.gauge.interrupting(interrupt, contact) as told:
+            told.wait(self.settings.settle_seconds)
+        if interrupt.is_set():
+            raise InterruptedWaitError
+        if not contact():
+            raise PeerError(
+                'battery',
+                f'it is not charged ({self.level_text()}): the robot is not at a station',
+            )
+
     def level_text(self) -> str:
         """The charge in words."""
         return 'level unknown' if self.gauge.level is None else f'{self.gauge.level:g} %'
@@ -298,41 +360,12 @@ class Mission:
         self.ports.announcer.say(text, warning=warning)
 
     def _write(self, name: str, **fields: object) -> None:
-        if self._record is not None:
+        if self._record is None:
+            return
+        try:
             self._record.write(name, self.now(), **fields)
-
-
-def path_length(path: list[Point]) -> float:
-    """Length of a path, metres."""
-    return sum(math.dist(start, end) for start, end in itertools.pairwise(path))
-
-
-def check_path(path: list[Point], goal: Point | None, tolerance: float, peer: str) -> None:
-    """Refuses a path that leads nowhere, or elsewhere.
-
-    Raises:
-        PeerError: It is empty, not finite, or ends too far from ``goal``.
-    """
-    if not path:
-        raise PeerError(peer, 'the path has no points')
-    if not all(math.isfinite(value) for point in path for value in point):
-        raise PeerError(peer, 'the path has a point that is not finite')
-    if goal is not None and math.dist(path[-1][:2], goal[:2]) > tolerance:
-        raise PeerError(
-            peer,
-            f'the path ends {math.dist(path[-1][:2], goal[:2]):.2f} m from the goal, expected '
-            f'at most {tolerance:g} m',
-        )
-
-
-def check_arrival(end: Point, goal: Point, tolerance: float, peer: str) -> None:
-    """Refuses an arrival that is none.
-
-    Raises:
-        PeerError: The robot stopped too far from ``goal``.
-    """
-    away = math.dist(end[:2], goal[:2])
-    if not away <= tolerance:
-        raise PeerError(
-            peer, f'the robot stopped {away:.2f} m short, expected at most {tolerance:g} m'
-        )
+        except RecordError as error:
+            # A full disk is no reason to stop patrolling; once is enough to say so.
+            if str(error) != self._record_complaint:
+                self._record_complaint = str(error)
+                self.say(str(error), warning=True)

@@ -9,12 +9,14 @@ Each line holds ``event`` (one of :data:`EVENTS`), ``time`` (seconds on the miss
 and the event's own fields::
 
     {"event": "start", "time": 0.0, "machine": "surveillance", "place": "E", "places": ["C1", "E"]}
+    {"event": "exploring", "time": 1.0, "place": "E", "seconds": 1.0}
     {"event": "decision", "time": 2.0, "place": "C1", "rule": "URGENT", "reason": "..."}
     {"event": "visit", "time": 9.4, "place": "C1", "distance": 5.4, "path": [[5, 10], ...]}
 """
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 from collections import Counter
@@ -25,6 +27,8 @@ from types import TracebackType
 
 EVENTS: Mapping[str, tuple[str, ...]] = {
     'start': ('machine', 'place', 'places'),
+    'map': ('places',),
+    'exploring': ('place', 'seconds'),
     'visit': ('place', 'distance'),
     'decision': ('place', 'rule', 'reason'),
     'recharge': ('place', 'seconds'),
@@ -102,11 +106,21 @@ class MissionRecord:
             fields: The event's own fields; those of :data:`EVENTS` are required.
 
         Raises:
-            RecordError: Unknown event, or a required field is missing.
+            RecordError: Unknown event, a required field is missing, or the file takes no more.
         """
         _check(name, fields, f'{self.path}')
         line = json.dumps({'event': name, 'time': round(time, 3), **fields}) + '\n'
-        os.write(self._file, line.encode())
+        data = line.encode()
+        try:
+            written = os.write(self._file, data)
+            if written != len(data):
+                # No line may begin behind half of one.
+                os.ftruncate(self._file, os.fstat(self._file).st_size - written)
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        except OSError as error:
+            raise RecordError(
+                f'cannot write the mission record {self.path}: {error.strerror}'
+            ) from None
 
     def start(self, time: float, machine: str, place: str, places: Sequence[str]) -> None:
         """A machine starts, or starts again, in ``place``; ``places`` are all to be patrolled."""
@@ -261,9 +275,9 @@ def _count(summary: Summary, event: Event, last_seen: dict[str, float]) -> None:
     match event.name:
         case 'start':
             summary.restarts += bool(summary.visits)
-            for place in (*event.names('places'), event.text('place')):
-                summary.visits.setdefault(place, 0)
-                last_seen.setdefault(place, event.time)
+            _count_places(summary, {*event.names('places'), event.text('place')}, event, last_seen)
+        case 'map':
+            _count_places(summary, set(event.names('places')), event, last_seen)
         case 'visit':
             place = event.text('place')
             gap = event.time - last_seen.get(place, event.time)
@@ -278,6 +292,20 @@ def _count(summary: Summary, event: Event, last_seen: dict[str, float]) -> None:
             summary.rules[event.text('rule')] += 1
         case 'failure':
             summary.failures[event.text('what')] += 1
+
+
+def _count_places(
+    summary: Summary, places: set[str], event: Event, last_seen: dict[str, float]
+) -> None:
+    """Count the places that there are from now on; nobody waits for those that went."""
+    for place in [place for place in last_seen if place not in places]:
+        gap = event.time - last_seen.pop(place)
+        summary.unvisited[place] = max(gap, summary.unvisited.get(place, 0.0))
+        if not summary.visits[place]:
+            del summary.visits[place], summary.unvisited[place]
+    for place in sorted(places):
+        summary.visits.setdefault(place, 0)
+        last_seen.setdefault(place, event.time)
 
 
 def _close_gaps(summary: Summary, last_seen: Mapping[str, float], now: float | None) -> None:

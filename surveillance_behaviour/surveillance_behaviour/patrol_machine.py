@@ -10,12 +10,7 @@ from __future__ import annotations
 from typing import Any
 
 from surveillance_behaviour import fsm
-from surveillance_behaviour.mission import (
-    Mission,
-    check_arrival,
-    check_path,
-    path_length,
-)
+from surveillance_behaviour.mission import Mission
 from surveillance_behaviour.mission_states import (
     FAILED,
     PREEMPTED,
@@ -24,7 +19,8 @@ from surveillance_behaviour.mission_states import (
     WaitForHelp,
     add,
 )
-from surveillance_behaviour.ports import PeerError, Point, Routine
+from surveillance_behaviour.path_checks import check_arrival, check_path, path_length
+from surveillance_behaviour.ports import InterruptedWaitError, PeerError, Point, Routine
 from surveillance_behaviour.recovery import Step
 
 BATTERY_LOW = 'battery_low'
@@ -200,13 +196,29 @@ class Recharge(RoutineState):
         ud.target = mission.place
         began = mission.now()
         mission.say(f'charging in {mission.place} ({mission.level_text()})')
-        self.routine.recharge(interrupt)
+        self._charge(interrupt)
         with mission.gauge.interrupting(interrupt, mission.charged_enough) as told:
             told.wait(mission.settings.settle_seconds)
         if not mission.charged_enough():
             raise PeerError('recharge', f'it ended at {mission.level_text()}')
         mission.charged(mission.place, mission.now() - began)
         return 'battery_full'
+
+    def _charge(self, interrupt: fsm.Interrupt) -> None:
+        """Has the battery charged until the peer says it is done.
+
+        Raises:
+            PeerError: It does not charge, or the robot was moved off the station.
+        """
+        gauge = self.mission.gauge
+        while True:
+            self.mission.await_contact(interrupt)
+            with gauge.interrupting(interrupt, lambda: gauge.charging is False) as off:
+                try:
+                    return self.routine.recharge(off)
+                except InterruptedWaitError:
+                    if interrupt.is_set():
+                        raise
 
     def goal(self, ud: Any) -> str | None:
         return self.mission.place if self.charging else None

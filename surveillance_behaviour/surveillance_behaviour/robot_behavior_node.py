@@ -1,16 +1,18 @@
 """The node `robot_behavior`: runs one of the machines until it is told to stop.
 
-Subscribes `battery_level` and `state/battery_low`, publishes `decision` and `mission_status`, and
-calls the services and actions of the machine that `behaviour` names. Below `robot_behavior/fsm` the
-machine can be watched, paused and stepped.
+Subscribes `battery_level`, `state/battery_low` and `battery_state`, publishes `decision` and
+`mission_status`, and calls the services and actions of the machine that `behaviour` names. Below
+`robot_behavior/fsm` the machine can be watched, paused and stepped.
 """
 
 from __future__ import annotations
 
+import os
 import random
 from collections.abc import Sequence
 from typing import Any, cast
 
+from sensor_msgs.msg import BatteryState
 from std_msgs.msg import Bool, UInt8
 
 from surveillance_behaviour import behaviour_parameters, conversions, fsm
@@ -19,11 +21,13 @@ from surveillance_behaviour.battery_gauge import BatteryGauge
 from surveillance_behaviour.fsm_ros import IntrospectionServer
 from surveillance_behaviour.machines import MACHINES
 from surveillance_behaviour.mission import Mission, Ports
-from surveillance_behaviour.mission_record import MissionRecord, RecordError
+from surveillance_behaviour.mission_record import MissionRecord, RecordError, read
+from surveillance_behaviour.mission_resumption import CutOff, cut_off
+from surveillance_behaviour.policy.rules import RECHARGE
 from surveillance_behaviour.ros_ports import RosMotion, RosPlaces, RosRoutine, ros_knowledge
 from surveillance_interfaces.msg import Decision as DecisionMessage
 from surveillance_runtime.node import PatrolNode, StartError, run_node
-from surveillance_runtime.qos import STATE_QOS
+from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 from surveillance_runtime.waiting import ClockWait
 
 
@@ -46,6 +50,7 @@ class RobotBehavior(PatrolNode):
         path: str = self.parameter(
             'record', '', 'File that the mission is recorded in; empty: none.', read_only=True
         )
+        left_at = self._where_it_was_cut_off(path)
         self._record = _open_record(path)
         patrols = self._behaviour == 'patrol'
         gauge = BatteryGauge()
@@ -66,6 +71,7 @@ class RobotBehavior(PatrolNode):
             cast(fsm.Clock, self._wait),
             self._record,
             random.Random(seed if seed >= 0 else None),
+            left_at,
         )
         self.machine = MACHINES[self._behaviour](self.mission)
         self._announcer.attach(self.mission, self.machine)
@@ -76,6 +82,12 @@ class RobotBehavior(PatrolNode):
         )
         self.create_subscription(
             Bool, 'state/battery_low', lambda m: gauge.set_low(m.data), STATE_QOS
+        )
+        self.create_subscription(
+            BatteryState,
+            'battery_state',
+            lambda m: gauge.set_charging(conversions.charging_from(m)),
+            SENSOR_QOS,
         )
         if patrols:
             self.create_subscription(DecisionMessage, 'decision', self._on_decision, STATE_QOS)
@@ -102,8 +114,20 @@ class RobotBehavior(PatrolNode):
             if self._record is not None:
                 self._record.close()
 
+    def _where_it_was_cut_off(self, path: str) -> CutOff | None:
+        if not path or not os.path.isfile(path):
+            return None
+        try:
+            return cut_off(read(path))
+        except RecordError as error:
+            self.get_logger().warn(f'what was begun before is begun anew: {error}')
+            return None
+
     def _on_decision(self, message: DecisionMessage) -> None:
-        self.mission.note_decision(conversions.decision_from(message))
+        decision = conversions.decision_from(message)
+        # Charging is this node's own decision, which the mission knows of.
+        if decision.rule != RECHARGE:
+            self.mission.note_decision(decision)
 
 
 def _open_record(path: str) -> MissionRecord | None:

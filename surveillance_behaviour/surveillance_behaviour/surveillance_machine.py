@@ -10,12 +10,7 @@ from collections.abc import Callable
 from typing import Any
 
 from surveillance_behaviour import fsm
-from surveillance_behaviour.mission import (
-    Mission,
-    check_arrival,
-    check_path,
-    path_length,
-)
+from surveillance_behaviour.mission import Mission
 from surveillance_behaviour.mission_states import (
     FAILED,
     PREEMPTED,
@@ -24,6 +19,7 @@ from surveillance_behaviour.mission_states import (
     WaitForHelp,
     add,
 )
+from surveillance_behaviour.path_checks import check_arrival, check_path, path_length
 from surveillance_behaviour.policy.graph import GraphError
 from surveillance_behaviour.ports import InterruptedWaitError, PeerError, Point
 
@@ -69,9 +65,8 @@ class ExploreTask(fsm.State):
 
     def execute(self, ud: Any) -> str:
         mission = self.mission
-        seconds = mission.settings.choice.exploration_seconds
         with mission.gauge.interrupting(self.interrupt, lambda: bool(mission.why_charge())) as wake:
-            whole = mission.clock.sleep(seconds, wake)
+            whole = mission.explore(wake)
         if self.preempt_requested():
             self.service_preempt()
             return PREEMPTED
@@ -95,24 +90,27 @@ class RechargeTask(MissionState):
         mission.say(f'charging in {place} ({mission.level_text()}, {mission.why_charge()})')
         while not mission.charged_enough():
             limit = mission.settings.charge_stall_seconds
-            with mission.gauge.interrupting(interrupt, self._rise()) as wake:
+            with mission.gauge.interrupting(interrupt, self._news()) as wake:
                 late = mission.clock.sleep(limit if limit > 0.0 else LONG, wake)
             if interrupt.is_set():
                 raise InterruptedWaitError
-            if late and limit > 0.0:
+            if mission.gauge.charging is False:
+                mission.await_contact(interrupt)
+            elif late and limit > 0.0:
                 raise PeerError('battery', f'still at {mission.level_text()} after {limit:g} s')
         mission.charged(place, mission.now() - began)
         return 'recharged'
 
-    def _rise(self) -> Callable[[], bool]:
+    def _news(self) -> Callable[[], bool]:
+        """Whether the level has risen, or the battery is not being charged."""
         mission, before = self.mission, self.mission.gauge.level
 
-        def rose() -> bool:
+        def news() -> bool:
             level = mission.gauge.level
             risen = level is not None and (before is None or level > before)
-            return risen or mission.charged_enough()
+            return risen or mission.gauge.charging is False or mission.charged_enough()
 
-        return rose
+        return news
 
     def goal(self, ud: Any) -> str | None:
         return self.mission.place

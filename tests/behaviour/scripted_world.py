@@ -16,6 +16,7 @@ from surveillance_behaviour.chooser import Chooser
 from surveillance_behaviour.fsm import Interrupt
 from surveillance_behaviour.mission import Mission, MissionSettings, Ports
 from surveillance_behaviour.mission_record import MissionRecord
+from surveillance_behaviour.mission_resumption import CutOff
 from surveillance_behaviour.policy.rules import NowhereToGoError
 from surveillance_behaviour.policy.situation import Decision
 from surveillance_behaviour.ports import (
@@ -123,12 +124,14 @@ class World:
         self.arrivals: list[tuple[float, str]] = []
         self.calls: list[str] = []
         self.avoided: Callable[[], frozenset[str]] = frozenset
+        self.hear_of: Callable[[Decision], None] = lambda decision: None
         self._tick()
 
     # The battery.
 
     def _tick(self) -> None:
         self.clock.after(1.0, self._tick)
+        self.gauge.set_charging(self.docked())
         self.set_level(self.level + (self.charge if self.docked() else -self.draw))
 
     def set_level(self, level: float) -> None:
@@ -209,6 +212,10 @@ class World:
             raise UnknownPlaceError('ontology_map/room_position', f'there is no place {place}')
         return self.positions[place]
 
+    def push(self, place: str) -> None:
+        """Moves the robot by hand; the battery notices within a second."""
+        self.at, self.place = self.positions[place], place
+
     def docked(self) -> bool:
         """Whether the robot stands at a station."""
         return any(math.dist(self.at, self.positions[place]) < 1.0 for place in self.stations)
@@ -229,6 +236,7 @@ class World:
             if not self.clock.sleep(seconds, interrupt):
                 raise InterruptedWaitError
             self.at = point
+        self.gauge.set_charging(self.docked())
         self.place = min(self.rooms, key=lambda room: math.dist(self.positions[room], self.at))
         self.arrivals.append((self.clock.time, self.place))
         return self.at
@@ -248,6 +256,7 @@ class World:
             raise PeerError('reason', str(error)) from None
         self.chooser.saw(situation.place, now)
         self.decisions.append(decision)
+        self.hear_of(decision)
         return decision.place
 
     def control(self, via_points: Sequence[Point], interrupt: Interrupt) -> Point:
@@ -277,7 +286,10 @@ class World:
     # The mission.
 
     def mission(
-        self, settings: MissionSettings | None = None, record: MissionRecord | None = None
+        self,
+        settings: MissionSettings | None = None,
+        record: MissionRecord | None = None,
+        cut_off: CutOff | None = None,
     ) -> Mission:
         """A mission in this world."""
         settings = settings or MissionSettings(settle_seconds=0.0)
@@ -289,8 +301,11 @@ class World:
             motion=ScriptedMotion(self),
             routine=ScriptedRoutine(self),
         )
-        mission = Mission('scripted', settings, ports, self.gauge, self.clock, record)
+        mission = Mission(
+            'scripted', settings, ports, self.gauge, self.clock, record, cut_off=cut_off
+        )
         self.avoided = lambda: mission.recovery.avoided(mission.now())
+        self.hear_of = mission.note_decision
         return mission
 
 

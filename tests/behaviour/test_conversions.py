@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import pytest
 from builtin_interfaces.msg import Time
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from sensor_msgs.msg import BatteryState
 
 from surveillance_behaviour import conversions
 from surveillance_behaviour.policy.situation import Decision
@@ -34,3 +36,14 @@ def test_decisions_come_back(
 def test_a_point_without_height_lies_on_the_floor() -> None:
     message = conversions.point_message((1, 2))
     assert (message.x, message.y, message.z) == (1.0, 2.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ('status', 'charging'),
+    [('CHARGING', True), ('FULL', True), ('DISCHARGING', False), ('NOT_CHARGING', False)],
+)
+def test_a_battery_says_whether_it_is_charged(status: str, charging: bool) -> None:
+    message = BatteryState()
+    assert conversions.charging_from(message) is None
+    message.power_supply_status = getattr(BatteryState, f'POWER_SUPPLY_STATUS_{status}')
+    assert conversions.charging_from(message) is charging

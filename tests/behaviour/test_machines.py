@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import resource
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from surveillance_behaviour.fsm.testing import watching
 from surveillance_behaviour.machines import MACHINES
 from surveillance_behaviour.mission import Mission, MissionSettings
 from surveillance_behaviour.mission_record import MissionRecord, read, summarize
+from surveillance_behaviour.mission_resumption import CutOff, cut_off
 from surveillance_behaviour.ports import AwayError, LostRobotError, PeerError, Point
 
 from .scripted_world import POSITIONS, SEVEN_ROOMS, World, fails
@@ -64,9 +66,10 @@ class Run:
         world: World,
         mission_settings: MissionSettings | None = None,
         record: MissionRecord | None = None,
+        cut_off: CutOff | None = None,
     ) -> None:
         self.world = world
-        self.mission: Mission = world.mission(mission_settings or settings(), record)
+        self.mission: Mission = world.mission(mission_settings or settings(), record, cut_off)
         self.machine = MACHINES[machine](self.mission)
         self.untaken: set[tuple[str, str, str]] = set()
         self.transitions: list[tuple[str, str, str, str]] = []
@@ -396,6 +399,118 @@ def test_the_record_holds_what_happened(machine: str, tmp_path: Path) -> None:
     assert [event.text('place') for event in events if event.name == 'visit'] == [
         place for _, place in world.arrivals
     ]
+
+
+def test_a_robot_pushed_off_its_station_goes_back_to_it_at_once(machine: str) -> None:
+    world = World(draw=0.5, charge=0.5)
+    pushed: list[float] = []
+    run = Run(machine, world, settings(policy='tour'))
+    charging = {'surveillance': 'PERFORM_ROOM_TASKS', 'patrol': 'RechargeRoutine'}[machine]
+
+    def push() -> None:
+        states = run.machine[charging].get_active_states()
+        if not pushed and states in (['RECHARGE_TASK'], ['Recharge']) and world.level > 50.0:
+            pushed.append(world.clock.time)
+            world.push('C1')
+        world.clock.after(1.0, push)
+
+    push()
+    run.until(900.0)
+    assert pushed
+    back = [place for time, place in world.arrivals if 0.0 < time - pushed[0] < 10.0]
+    assert back == ['E']
+    assert not world.cries
+
+
+class Killed:
+    """A mission that was killed and started again with what its record says."""
+
+    def __init__(self, machine: str, world: World, path: Path, **choice: object) -> None:
+        self.machine, self.world, self.path, self.choice = machine, world, path, choice
+
+    def run(self, until: float) -> Run:
+        left_at = cut_off(read(self.path)) if self.path.exists() else None
+        with MissionRecord(self.path) as record:
+            return Run(self.machine, self.world, settings(**self.choice), record, left_at).until(
+                until
+            )
+
+
+@pytest.mark.parametrize(('killed', 'again'), [(20.0, 25.0), (29.9, 29.9), (30.0, 80.0)])
+def test_a_half_finished_exploration_goes_on_after_a_kill(
+    killed: float, again: float, tmp_path: Path
+) -> None:
+    world = World()
+    mission = Killed('surveillance', world, tmp_path / 'record', exploration_seconds=30.0)
+    mission.run(killed)
+    world.clock.time += 100.0  # somebody starts it again
+    mission.run(killed + 100.0 + 2.0)
+    world.clock.time += 100.0
+    mission.run(300.0)
+    first = world.decisions[0]
+    assert first.from_place == 'E'
+    # Of each stretch at most the second since the last note is explored anew.
+    lost = 0.0 if killed == 30.0 else 2.0
+    assert first.time <= 200.0 + 30.0 + lost + 1.0
+
+
+def test_a_place_whose_exploration_was_done_is_not_explored_again(tmp_path: Path) -> None:
+    world = World()
+    mission = Killed('surveillance', world, tmp_path / 'record', exploration_seconds=30.0)
+    mission.run(32.0)
+    assert len(world.decisions) == 1
+    assert not world.arrivals
+    mission.run(33.0)
+    assert world.decisions[1].time == 32.0
+
+
+def test_a_robot_killed_on_its_way_to_charge_still_goes_to_charge(
+    machine: str, tmp_path: Path
+) -> None:
+    world = World()
+    mission = Killed(machine, world, tmp_path / 'record')
+    mission.run(100.0)
+    world.set_level(15.0)
+    mission.run(103.0)
+    assert world.decisions[-1].rule == 'recharge'
+    world.set_level(50.0)  # more than it must have, less than what it was sent to charge for
+    mission.run(160.0)
+    assert summarize(read(tmp_path / 'record')).recharges == 1
+
+
+def test_places_that_come_and_go_on_the_way_are_counted(machine: str, tmp_path: Path) -> None:
+    world = World()
+    late = {room: world.rooms.pop(room) for room in ('R3', 'R4')}
+    world.clock.after(60.0, lambda: world.rooms.update(R3=late['R3']))
+    world.closed.add('D3')
+    path = tmp_path / 'record'
+    with MissionRecord(path) as record:
+        Run(machine, world, settings(), record).until(200.0)
+    summary = summarize(read(path))
+    assert set(summary.visits) == set(SEVEN_ROOMS) - {'R4'}
+    assert '5 of 6 places visited' in str(summary)
+    assert summary.unvisited['R3'] < 140.0
+
+
+def test_a_record_that_cannot_be_written_does_not_end_the_mission(
+    machine: str, tmp_path: Path
+) -> None:
+    path = tmp_path / 'record'
+    world = World()
+    with MissionRecord(path) as record:
+        run = Run(machine, world, settings(), record)
+        run.until(100.0)
+        limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (path.stat().st_size + 10, limits[1]))
+        try:
+            run.until(200.0)
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+        run.until(300.0)
+    assert sum('cannot write the mission record' in text for text in world.said) == 1
+    times = [event.time for event in read(path)]
+    assert not [time for time in times if 100.0 < time < 200.0]
+    assert [time for time in times if time > 200.0]
 
 
 def test_settings_changed_on_the_way_count_from_the_next_choice(machine: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import subprocess
 import sys
@@ -12,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from surveillance_behaviour.mission_record import MissionRecord, RecordError, read, summarize
+from surveillance_behaviour.mission_resumption import CutOff, cut_off
 
 
 @pytest.fixture
@@ -116,6 +118,47 @@ def test_a_restart_goes_on_and_another_clock_starts_anew(path: Path) -> None:
         record.visit(5.0, 'C1')
     assert summarize(read(path)).unvisited == {'E': 40.0, 'C1': 30.0}
     assert summarize(read(path)).seconds == 45.0
+
+
+START = ('start', {'machine': 'surveillance', 'place': 'E', 'places': ['E', 'C1']})
+DECISION = ('decision', {'place': 'C1', 'rule': 'URGENT', 'reason': 'why'})
+TO_CHARGE = ('decision', {'place': 'E', 'rule': 'recharge', 'reason': 'it is low'})
+VISIT = ('visit', {'place': 'C1', 'distance': 5.0})
+EXPLORING = ('exploring', {'place': 'C1', 'seconds': 3.5})
+RECHARGE = ('recharge', {'place': 'E', 'seconds': 9.0})
+
+
+@pytest.mark.parametrize(
+    ('events', 'expected'),
+    [
+        ([], None),
+        ([START], CutOff(0.0, 'E')),
+        ([START, VISIT, EXPLORING], CutOff(2.0, 'C1', 3.5)),
+        ([START, DECISION], CutOff(1.0, 'E', math.inf, left=True)),
+        ([START, DECISION, VISIT], CutOff(2.0, 'C1')),
+        ([START, TO_CHARGE], CutOff(1.0, 'E', math.inf, left=True, charging='it is low')),
+        ([START, TO_CHARGE, VISIT], CutOff(2.0, 'C1', charging='it is low')),
+        ([START, TO_CHARGE, RECHARGE], CutOff(2.0, 'E', math.inf)),
+        ([START, DECISION, START], CutOff(2.0, 'E', math.inf, left=True)),
+        ([START, DECISION, ('end', {})], None),
+    ],
+)
+def test_a_record_tells_where_its_mission_was_cut_off(
+    path: Path, events: list[tuple[str, dict[str, object]]], expected: CutOff | None
+) -> None:
+    with MissionRecord(path) as record:
+        for time, (name, fields) in enumerate(events):
+            record.write(name, float(time), **fields)
+    assert cut_off(read(path)) == expected
+
+
+def test_what_another_simulation_wrote_says_nothing(path: Path) -> None:
+    with MissionRecord(path) as record:
+        record.decision(50.0, 'C1', 'URGENT', 'why')
+        record.start(60.0, 'surveillance', 'E', ['E'])
+        record.decision(61.0, 'C1', 'URGENT', 'why')
+        record.start(1.0, 'surveillance', 'C1', ['E', 'C1'])
+    assert cut_off(read(path)) == CutOff(1.0, 'C1')
 
 
 def test_an_empty_record_says_so(path: Path) -> None:
