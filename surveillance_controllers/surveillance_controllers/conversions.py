@@ -10,7 +10,7 @@ import numpy as np
 from geometry_msgs.msg import Point, PoseWithCovarianceStamped, Quaternion, Twist
 from geometry_msgs.msg import Pose as PoseMessage
 from nav_msgs.msg import OccupancyGrid
-from sensor_msgs.msg import BatteryState, LaserScan, PointCloud2, PointField
+from sensor_msgs.msg import BatteryState, LaserScan
 
 from surveillance_controllers.battery_model import Battery
 from surveillance_controllers.polyline import Points
@@ -128,45 +128,3 @@ def scan_from(message: LaserScan) -> Scan:
     # The lidar gives what is nearer than it can measure as its least range, or below it.
     good = (ranges > 0) & (ranges < message.range_max)
     return Scan(angles, np.where(good, ranges, np.inf), float(message.range_max))
-
-
-def cloud_from_points(points: Points) -> PointCloud2:
-    """Points of shape (n, 2), metres, as a cloud in the map's frame; the caller stamps it."""
-    message = PointCloud2()
-    message.header.frame_id = 'map'
-    message.height, message.width = 1, len(points)
-    message.fields = [
-        PointField(name=name, offset=4 * index, datatype=PointField.FLOAT32, count=1)
-        for index, name in enumerate('xyz')
-    ]
-    message.point_step, message.row_step = 12, 12 * len(points)
-    message.is_dense = True
-    xyz = np.zeros((len(points), 3), dtype='<f4')
-    xyz[:, :2] = points
-    message.data.frombytes(xyz.tobytes())
-    return message
-
-
-def points_from_cloud(message: PointCloud2) -> Points:
-    """The x and y of a cloud's points, shape (n, 2), metres.
-
-    Raises:
-        ValueError: The cloud has no x and y of 32 bits.
-    """
-    offsets = {
-        field.name: field.offset for field in message.fields if field.datatype == PointField.FLOAT32
-    }
-    if not {'x', 'y'} <= offsets.keys():
-        raise ValueError('a cloud without x and y: expected fields of type FLOAT32')
-    count = message.width * message.height
-    order = '>f4' if message.is_bigendian else '<f4'
-    kind = np.dtype(
-        {
-            'names': ['x', 'y'],
-            'formats': [order, order],
-            'offsets': [offsets['x'], offsets['y']],
-            'itemsize': message.point_step,
-        }
-    )
-    points = np.frombuffer(bytes(message.data), dtype=kind, count=count)
-    return np.stack([points['x'], points['y']], axis=1).astype(float)

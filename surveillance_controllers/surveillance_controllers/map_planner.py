@@ -18,6 +18,7 @@ from surveillance_controllers.grid_planning import GridPlanner, NoPath, Planning
 from surveillance_controllers.polyline import Points
 from surveillance_controllers.poses import Pose
 from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.point_clouds import points_from_cloud
 from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.waiting import Interrupt
 
@@ -83,7 +84,7 @@ class MapPlanner:
 
     def _on_obstacles(self, message: PointCloud2) -> None:
         try:
-            self._obstacles = conversions.points_from_cloud(message)
+            self._obstacles = points_from_cloud(message)
         except ValueError as error:
             self._node.get_logger().error(f'obstacles: {error}')
 

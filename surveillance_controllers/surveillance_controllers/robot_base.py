@@ -26,6 +26,7 @@ from surveillance_controllers.poses import Pose
 from surveillance_controllers.tf_correction import TfCorrection
 from surveillance_interfaces.msg import DoorStates
 from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.point_clouds import cloud_from_points
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 from surveillance_runtime.waiting import ClockWait, Interrupt
 
@@ -279,7 +280,7 @@ class RobotBase:
             self._node.get_logger().info(f'found itself at ({x:.2f}, {y:.2f})')
         if pilot.obstacles_changed:
             pilot.obstacles_changed = False
-            cloud = conversions.cloud_from_points(pilot.obstacles)
+            cloud = cloud_from_points(pilot.obstacles)
             cloud.header.stamp = stamp
             self._obstacles.publish(cloud)
         if pilot.odometry is not None:

@@ -14,6 +14,7 @@ from sensor_msgs.msg import BatteryState, LaserScan, PointCloud2
 from surveillance_controllers import conversions
 from surveillance_controllers.battery_model import Battery, BatteryParameters
 from surveillance_controllers.path_following import Velocity
+from surveillance_runtime.point_clouds import cloud_from_points, points_from_cloud
 
 NUMBER = st.floats(-1e4, 1e4)
 YAW = st.floats(-3.1, 3.1)
@@ -46,14 +47,14 @@ def test_poses_come_back(x: float, y: float, yaw: float) -> None:
 @settings(max_examples=40, deadline=None)
 def test_clouds_come_back(points: list[tuple[float, float]]) -> None:
     array = np.array(points).reshape(-1, 2)
-    cloud = conversions.cloud_from_points(array)
+    cloud = cloud_from_points(array)
     assert cloud.width == len(points)
-    assert conversions.points_from_cloud(cloud) == pytest.approx(array, abs=1e-4)
+    assert points_from_cloud(cloud) == pytest.approx(array, abs=1e-4)
 
 
 def test_a_cloud_without_coordinates_is_refused() -> None:
     with pytest.raises(ValueError, match='a cloud without x and y'):
-        conversions.points_from_cloud(PointCloud2(width=1, height=1, point_step=4))
+        points_from_cloud(PointCloud2(width=1, height=1, point_step=4))
 
 
 def grid_message(width: int, height: int, cells: int) -> OccupancyGrid:

@@ -1,0 +1,49 @@
+"""Points in the plane as sensor_msgs/PointCloud2 and back."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from sensor_msgs.msg import PointCloud2, PointField
+
+
+def cloud_from_points(points: NDArray[np.float64]) -> PointCloud2:
+    """Points of shape (n, 2), metres, as a cloud in the map's frame; the caller stamps it."""
+    message = PointCloud2()
+    message.header.frame_id = 'map'
+    message.height, message.width = 1, len(points)
+    message.fields = [
+        PointField(name=name, offset=4 * index, datatype=PointField.FLOAT32, count=1)
+        for index, name in enumerate('xyz')
+    ]
+    message.point_step, message.row_step = 12, 12 * len(points)
+    message.is_dense = True
+    xyz = np.zeros((len(points), 3), dtype='<f4')
+    xyz[:, :2] = points
+    message.data.frombytes(xyz.tobytes())
+    return message
+
+
+def points_from_cloud(message: PointCloud2) -> NDArray[np.float64]:
+    """The x and y of a cloud's points, shape (n, 2), metres.
+
+    Raises:
+        ValueError: The cloud has no x and y of 32 bits.
+    """
+    offsets = {
+        field.name: field.offset for field in message.fields if field.datatype == PointField.FLOAT32
+    }
+    if not {'x', 'y'} <= offsets.keys():
+        raise ValueError('a cloud without x and y: expected fields of type FLOAT32')
+    count = message.width * message.height
+    order = '>f4' if message.is_bigendian else '<f4'
+    kind = np.dtype(
+        {
+            'names': ['x', 'y'],
+            'formats': [order, order],
+            'offsets': [offsets['x'], offsets['y']],
+            'itemsize': message.point_step,
+        }
+    )
+    points = np.frombuffer(bytes(message.data), dtype=kind, count=count)
+    return np.stack([points['x'], points['y']], axis=1).astype(float)
