@@ -84,7 +84,12 @@ class ArmorServer(PatrolNode):
 
     def _soon(self) -> None:
         if self.executor is not None:
-            self.executor.create_task(self._pause.reset)
+            self.executor.create_task(self._begin_pause)
+
+    def _begin_pause(self) -> None:
+        # Not anew with each change: an unbroken series of changes would never be told.
+        if self._pause.is_canceled():
+            self._pause.reset()
 
     def _on_pause(self) -> None:
         # Cancelled nowhere else: rclpy fails on a timer that was due when it was cancelled.
