@@ -21,8 +21,8 @@ from launcher import graph
 from launcher.log import ROS_FORMAT, MergedLog
 from launcher.supervisor import Program, Supervisor
 from surveillance_behaviour import mission_record
-from surveillance_runtime.parameter_file import ParameterFileError
 from surveillance_runtime.place import read_place
+from surveillance_runtime.yaml_file import YamlFileError
 
 CHILD = Path(__file__).with_name('child.py')
 PLACES = {'surveillance': 'seven_rooms.yaml', 'patrol': 'patrol_world.yaml'}
@@ -82,7 +82,7 @@ class Run:
         if self.place is not None:
             try:
                 read_place(self.place)
-            except ParameterFileError as error:
+            except YamlFileError as error:
                 raise RunError(f'--map {error}') from None
         if self.parameters is not None:
             check_parameter_file(self.parameters)

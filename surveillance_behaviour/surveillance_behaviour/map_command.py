@@ -11,8 +11,8 @@ from typing import NoReturn
 
 from surveillance_behaviour import mission_record
 from surveillance_behaviour.policy.graph import PatrolGraph
-from surveillance_runtime.parameter_file import ParameterFileError
 from surveillance_runtime.place import Place
+from surveillance_runtime.yaml_file import YamlFileError
 from surveillance_simulation.floor_plan import FloorPlan
 from surveillance_simulation.place_file import read_world
 from surveillance_simulation.place_picture import Run, draw_place
@@ -151,7 +151,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Check a place, draw it, and say what was found; the exit code is 2 for bad input."""
     try:
         lines = _draw(_parse(sys.argv[1:] if argv is None else argv))
-    except (CommandError, ParameterFileError, TextureError, mission_record.RecordError) as error:
+    except (CommandError, YamlFileError, TextureError, mission_record.RecordError) as error:
         print(f'map: {error}', file=sys.stderr)
         return EXIT_BAD_INPUT
     print('\n'.join(lines))

@@ -8,8 +8,9 @@ from typing import Any
 
 from surveillance_interfaces.srv import RoomInformation
 from surveillance_perception.conversions import marked_place_to_ros
-from surveillance_perception.marker_registry import MarkedPlace, RegistryError, read_registry
+from surveillance_perception.marker_registry import MarkedPlace, read_registry
 from surveillance_runtime.node import PatrolNode, StartError, run_node
+from surveillance_runtime.yaml_file import YamlFileError
 
 UNKNOWN = 'no room associated with this marker id'
 
@@ -34,7 +35,7 @@ class MarkerServer(PatrolNode):
         self._markers: dict[int, MarkedPlace] = {}
         try:
             self._read(path)
-        except RegistryError as error:
+        except YamlFileError as error:
             raise StartError(f'{self.get_name()}: {error}') from None
         self.create_service(RoomInformation, 'room_info', self._on_room_info)
 
@@ -60,7 +61,7 @@ def _file(path: str) -> Path:
 def _problem_in(path: str) -> str | None:
     try:
         read_registry(_file(path))
-    except RegistryError as error:
+    except YamlFileError as error:
         return f'a file of markers ({error})'
     return None
 

@@ -15,7 +15,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from surveillance_runtime.parameter_file import KeyPath, read_parameter_file
+from surveillance_runtime.parameter_file import read_parameter_file
+from surveillance_runtime.yaml_file import KeyPath
 
 PLACE_KEYS = ('map', 'room_positions', 'robot_room', 'recharge_rooms')
 GEOMETRY_KEYS = ('walls', 'doors', 'markers', 'marker_size', 'marker_dictionary', 'station')
@@ -205,7 +206,7 @@ def read_place(path: str | Path) -> Place:
     """Read a place from its parameter file.
 
     Raises:
-        ParameterFileError: The file cannot be read, or what it describes is not a place; one line
+        YamlFileError: The file cannot be read, or what it describes is not a place; one line
             with file and line number.
     """
     file = read_parameter_file(path)
@@ -297,13 +298,18 @@ def _member(where: KeyPath, room: Any, rooms: Mapping[str, Any]) -> str:
     return room
 
 
+def problem_in_name(kind: str, name: Any) -> str:
+    """What keeps a value from being the name of a room or a door; empty when nothing does."""
+    if isinstance(name, str) and _NAME.match(name):
+        return ''
+    hint = '' if isinstance(name, str) else '; quote it'
+    expected = 'expected letters, digits, _ and -, not a digit first'
+    return f'{kind} name {_shown(name)}: {expected}{hint}'
+
+
 def _check_name(where: KeyPath, kind: str, name: Any) -> None:
-    if not isinstance(name, str) or not _NAME.match(name):
-        raise PlaceError(
-            where,
-            f'{kind} name {_shown(name)}: expected letters, digits, _ and -, not a digit first'
-            + ('' if isinstance(name, str) else '; quote it'),
-        )
+    if problem := problem_in_name(kind, name):
+        raise PlaceError(where, problem)
 
 
 def _first_duplicate(names: Sequence[str]) -> str | None:

@@ -13,7 +13,7 @@ def read_world(path: str | Path) -> World:
     """Return the world that a place's file describes.
 
     Raises:
-        ParameterFileError: The file cannot be read, or describes no sound place; one line.
+        YamlFileError: The file cannot be read, or describes no sound place; one line.
     """
     file = read_parameter_file(path)
     try:

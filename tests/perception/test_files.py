@@ -12,10 +12,11 @@ import pytest
 from surveillance_perception.camera_model import CameraModel
 from surveillance_perception.detect_command import main
 from surveillance_perception.dictionaries import dictionary_named
-from surveillance_perception.marker_registry import RegistryError, read_registry
+from surveillance_perception.marker_registry import read_registry
 from surveillance_perception.marker_scene import Degradation, Panel, backdrop_of, picture_of
 from surveillance_perception.picture_files import PictureError, decode_picture
 from surveillance_perception.video_frames import open_source
+from surveillance_runtime.yaml_file import YamlFileError
 
 CONFIG = Path(__file__).parents[2] / 'config'
 
@@ -129,30 +130,46 @@ def test_registry_holds_the_seven_markers():
 @pytest.mark.parametrize(
     ('text', 'reason'),
     [
-        ('', "expected a mapping 'markers'"),
-        ('markers: []', "expected a mapping 'markers'"),
+        ('', ':1: expected a mapping, got nothing'),
+        ('markers: []', ":1: expected a mapping 'markers'"),
         ('markers: {}', "'markers' is empty"),
-        ('markers: {1: {room: A, x: 0, y: 0, connections: {D: B}}', 'line 1'),
-        ('markers: {a: {room: A, x: 0, y: 0, connections: {D: B}}}', 'marker a: an id must be'),
-        ('markers: {-1: {room: A, x: 0, y: 0, connections: {D: B}}}', 'marker -1: an id must be'),
-        ('markers: {1: E}', "marker 1: expected 'room', 'x', 'y' and 'connections'"),
-        ('markers: {1: {room: 3, x: 0, y: 0, connections: {D: B}}}', "marker 1: 'room' must be"),
-        ('markers: {1: {room: A, x: no, y: 0, connections: {D: B}}}', "'x' must be a number"),
-        ('markers: {1: {room: A, x: .nan, y: 0, connections: {D: B}}}', "'x' must be finite"),
-        ('markers: {1: {room: A, x: 0, y: 0, connections: {}}}', "'connections' must be"),
-        ('markers: {1: {room: A, x: 0, y: 0, connections: {D: A}}}', 'D leads from A to itself'),
-        ('markers: {1: {room: A, z: 0, x: 0, y: 0, connections: {D: B}}}', "unknown 'z'"),
+        ('markers: {1: {room: A, x: 0, y: 0, connections: {D: B}}', ':1: not valid YAML'),
+        ('markers: {a: {room: A, x: 0, y: 0, connections: {D: B}}}', 'markers.a: an id must be'),
+        ('markers: {-1: {room: A, x: 0, y: 0, connections: {D: B}}}', 'markers.-1: an id must be'),
+        ('markers: {[1]: E}', ':1: expected a name as key'),
+        ('markers:\n  1: E', ":2: markers.1: expected 'room', 'x', 'y' and 'connections'"),
+        (
+            'markers: {1: {room: 3, x: 0, y: 0, connections: {D: B}}}',
+            '1.room: place name 3:',
+        ),
+        ('markers: {1: {room: A, x: no, y: 0, connections: {D: B}}}', '1.x: expected a number in'),
+        ('markers: {1: {room: A, x: .nan, y: 0, connections: {D: B}}}', 'got nan'),
+        (
+            'markers: {1: {room: A, x: 0, y: 0, connections: {}}}',
+            '1.connections: expected',
+        ),
+        ('markers: {1: {room: A, x: 0, y: 0, connections: {D: A}}}', 'D: leads from A to itself'),
+        (
+            'markers: {1: {room: A, z: 0, x: 0, y: 0, connections: {D: B}}}',
+            '1.z: unknown, exp',
+        ),
         (
             'markers:\n  1: {room: A, x: 0, y: 0, connections: {D: B}}\n'
             '  1: {room: B, x: 0, y: 0, connections: {D: A}}\n',
-            '1 is given twice',
+            ":3: duplicate key '1', first given in line 2",
         ),
+        (
+            'markers:\n  1: {room: A, x: 0, y: 0, connections: {D: B}}\n'
+            '  01: {room: B, x: 0, y: 0, connections: {D: A}}\n',
+            ':3: markers.01: the id is given twice',
+        ),
+        ('markers: {1: &a {room: A, x: 0, y: 0, connections: {D: *a}}}', 'an alias'),
     ],
 )
 def test_wrong_registry_is_refused_in_one_line_that_names_the_file(tmp_path, text, reason):
     path = tmp_path / 'markers.yaml'
     path.write_text(text)
-    with pytest.raises(RegistryError) as error:
+    with pytest.raises(YamlFileError) as error:
         read_registry(path)
     assert str(error.value).startswith(str(path))
     assert reason in str(error.value)
@@ -160,5 +177,5 @@ def test_wrong_registry_is_refused_in_one_line_that_names_the_file(tmp_path, tex
 
 
 def test_registry_that_is_not_there_is_named(tmp_path):
-    with pytest.raises(RegistryError, match='No such file'):
+    with pytest.raises(YamlFileError, match='No such file'):
         read_registry(tmp_path / 'none.yaml')

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from surveillance_runtime.parameter_file import ParameterFileError
 from surveillance_runtime.place import Place, PlaceError, make_place, read_place
+from surveillance_runtime.yaml_file import YamlFileError
 
 ROOMS = {
     'R1': ['D1'],
@@ -151,7 +151,7 @@ def test_errors_of_a_file_name_the_line(tmp_path: Path, old: str, new: str, word
     path = tmp_path / 'place.yaml'
     assert old in GOOD
     path.write_text(GOOD.replace(old, new, 1))
-    with pytest.raises(ParameterFileError) as refusal:
+    with pytest.raises(YamlFileError) as refusal:
         read_place(path)
     assert str(refusal.value).startswith(str(path))
     assert words in str(refusal.value)
@@ -159,11 +159,11 @@ def test_errors_of_a_file_name_the_line(tmp_path: Path, old: str, new: str, word
 
 
 def test_files_that_are_not_there_or_not_text(tmp_path: Path) -> None:
-    with pytest.raises(ParameterFileError, match='No such file'):
+    with pytest.raises(YamlFileError, match='No such file'):
         read_place(tmp_path / 'none.yaml')
     binary = tmp_path / 'binary.yaml'
     binary.write_bytes(b'\xff\xfe\x00')
-    with pytest.raises(ParameterFileError, match='not UTF-8'):
+    with pytest.raises(YamlFileError, match='not UTF-8'):
         read_place(binary)
 
 
@@ -178,7 +178,7 @@ def problem_of(path: Path) -> str:
     """What is wrong with a place's file; empty when nothing is."""
     try:
         read_place(path)
-    except ParameterFileError as error:
+    except YamlFileError as error:
         return str(error)
     return ''
 

@@ -8,7 +8,7 @@ import random
 import numpy as np
 import pytest
 
-from surveillance_runtime.parameter_file import ParameterFileError
+from surveillance_runtime.yaml_file import YamlFileError
 from surveillance_simulation import occupancy_grid, place_generation
 from surveillance_simulation.floor_plan import Marker, WorldError
 from surveillance_simulation.place_file import read_world
@@ -155,7 +155,7 @@ def test_an_error_in_a_file_names_file_and_line(tmp_path) -> None:
     path = tmp_path / 'broken.yaml'
     path.write_text(text.replace('D5: [12.5, 10.0,', 'D5: [12.5, 11.0,'))
     line = 1 + text[: text.index('D5: [12.5')].count('\n')
-    with pytest.raises(ParameterFileError) as caught:
+    with pytest.raises(YamlFileError) as caught:
         read_world(path)
     assert str(caught.value).startswith(f'{path}:{line}: doors.D5: (12.5, 11)')
 

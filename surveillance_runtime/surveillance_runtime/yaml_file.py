@@ -1,0 +1,153 @@
+"""Strict reading of YAML that people write: every value keeps the line it came from.
+
+YAML's own readers take the last of two equal keys in silence, expand aliases without bound, and
+know no line once a value is read. Here the first two are errors, and every error names file and
+line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+MAX_BYTES = 4_000_000
+KeyPath = tuple[str, ...]
+
+
+class YamlFileError(ValueError):
+    """A file that cannot be used; the message is one line ``file:line: what``."""
+
+
+@dataclass(frozen=True)
+class YamlFile:
+    """What a file holds, with the line of each key.
+
+    Attributes:
+        path: The file as the caller named it.
+        values: Nested dictionaries by the keys' text; what is no mapping as YAML reads it.
+        lines: Line number (from 1) of each key path; of ``()`` the line where it all begins.
+    """
+
+    path: Path
+    values: Mapping[str, Any]
+    lines: Mapping[KeyPath, int]
+
+    def error(self, where: KeyPath, problem: str) -> YamlFileError:
+        """Make the error that says ``problem`` at the line of ``where`` or its nearest parent."""
+        prefix = '.'.join(where) + ': ' if where else ''
+        return self.error_at(where, prefix + problem)
+
+    def error_at(self, where: KeyPath, problem: str) -> YamlFileError:
+        """As `error`, without the key's name in the message."""
+        line = 1
+        for depth in range(len(where), -1, -1):
+            if where[:depth] in self.lines:
+                line = self.lines[where[:depth]]
+                break
+        return YamlFileError(f'{self.path}:{line}: {problem}')
+
+
+def read_yaml_file(path: str | Path) -> YamlFile:
+    """Read a file whose document is a mapping.
+
+    Raises:
+        YamlFileError: The file is missing, too large, not YAML, no mapping, holds a key twice, uses
+            an alias, or has a mapping inside a list.
+    """
+    path = Path(path)
+    root = _compose(path)
+    reader = _Reader(path)
+    if not isinstance(root, yaml.MappingNode):
+        raise YamlFileError(f'{path}:1: expected a mapping, got {_kind(root)}')
+    reader.lines[()] = root.start_mark.line + 1
+    return YamlFile(path, reader.mapping(root, ()), reader.lines)
+
+
+def _compose(path: Path) -> yaml.Node | None:
+    try:
+        size = path.stat().st_size
+        if size > MAX_BYTES:
+            raise YamlFileError(f'{path}: {size} bytes, at most {MAX_BYTES} are read')
+        text = path.read_text(encoding='utf-8')
+    except OSError as error:
+        raise YamlFileError(f'{path}: {error.strerror or error}') from None
+    except UnicodeDecodeError as error:
+        raise YamlFileError(f'{path}: not UTF-8 text (byte {error.start})') from None
+    try:
+        loader = _NoAliasLoader(text)
+        try:
+            node: yaml.Node | None = loader.get_single_node()
+        finally:
+            loader.dispose()
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        line = mark.line + 1 if mark else 1
+        raise YamlFileError(f'{path}:{line}: not valid YAML: {error.problem}') from None
+    except yaml.YAMLError as error:
+        first_line = str(error).splitlines()[0]
+        raise YamlFileError(f'{path}: not valid YAML: {first_line}') from None
+    return node
+
+
+class _NoAliasLoader(yaml.SafeLoader):
+    """Refuses aliases: they make small files expand without bound, and ROS does not know them."""
+
+    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
+        if self.check_event(yaml.AliasEvent):
+            mark = self.peek_event().start_mark  # type: ignore[no-untyped-call]
+            raise yaml.MarkedYAMLError(None, None, 'an alias (*name) cannot be used here', mark)
+        node: yaml.Node | None = super().compose_node(parent, index)
+        return node
+
+
+class _Reader:
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.lines: dict[KeyPath, int] = {}
+        self._scalars = yaml.SafeLoader('')
+
+    def mapping(self, node: yaml.MappingNode, prefix: KeyPath) -> dict[str, Any]:
+        found: dict[str, Any] = {}
+        for key, value in node.value:
+            line = key.start_mark.line + 1
+            if not isinstance(key, yaml.ScalarNode):
+                raise YamlFileError(f'{self.path}:{line}: expected a name as key')
+            where = (*prefix, key.value)
+            if key.value in found:
+                raise twice(self.path, (key.value,), line, self.lines[where])
+            self.lines[where] = line
+            if isinstance(value, yaml.MappingNode):
+                found[key.value] = self.mapping(value, where)
+            else:
+                found[key.value] = self._value(value)
+        return found
+
+    def _value(self, node: yaml.Node) -> Any:
+        if isinstance(node, yaml.SequenceNode):
+            return [self._value(item) for item in node.value]
+        if isinstance(node, yaml.MappingNode):
+            line = node.start_mark.line + 1
+            raise YamlFileError(f'{self.path}:{line}: a list cannot hold a mapping')
+        try:
+            return self._scalars.construct_object(node)
+        except (yaml.YAMLError, ValueError):
+            line = node.start_mark.line + 1
+            raise YamlFileError(
+                f"{self.path}:{line}: '{node.value}' cannot be read as a value; quote it"
+            ) from None
+
+
+def twice(path: Path, where: KeyPath, line: int, first: int) -> YamlFileError:
+    """Make the error that a key is given again in ``line``, first in ``first``."""
+    name = '.'.join(where)
+    return YamlFileError(f"{path}:{line}: duplicate key '{name}', first given in line {first}")
+
+
+def _kind(node: yaml.Node | None) -> str:
+    if node is None:
+        return 'nothing'
+    return 'a list' if isinstance(node, yaml.SequenceNode) else 'a value'
