@@ -15,14 +15,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from launcher import graph
 from launcher.log import ROS_FORMAT, MergedLog
 from launcher.supervisor import Program, Supervisor
 from surveillance_behaviour import mission_record
 from surveillance_runtime.place import read_place
-from surveillance_runtime.yaml_file import YamlFileError
+from surveillance_runtime.yaml_file import YamlFileError, read_yaml_file
 
 CHILD = Path(__file__).with_name('child.py')
 PLACES = {'surveillance': 'seven_rooms.yaml', 'patrol': 'patrol_world.yaml'}
@@ -109,29 +107,19 @@ def check_parameter_file(path: Path) -> None:
         RunError: one line with the file and what is wrong in it.
     """
     try:
-        content = yaml.safe_load(path.read_text(encoding='utf-8'))
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else 'not UTF-8 text'
-        raise RunError(f'--params {path}: {reason}') from None
-    except yaml.YAMLError as error:
-        mark = getattr(error, 'problem_mark', None)
-        where = f':{mark.line + 1}' if mark is not None else ''
-        problem = getattr(error, 'problem', None) or str(error).splitlines()[0]
-        raise RunError(f'--params {path}{where}: not valid YAML: {problem}') from None
-    if not isinstance(content, dict):
-        raise RunError(f"--params {path}: expected 'NODE: ros__parameters: ...', got no mapping")
-    for key, section in content.items():
-        name = str(key).rsplit('/', 1)[-1]
+        file = read_yaml_file(path)
+    except YamlFileError as error:
+        raise RunError(f'--params {error}') from None
+    for key, section in file.values.items():
+        name = key.rsplit('/', 1)[-1]
+        problem = ''
         if name not in graph.BY_NAME and name not in ('*', '**'):
-            raise RunError(
-                f'--params {path}: no node is called {key!r}, '
-                f'expected /** or one of {", ".join(graph.BY_NAME)}'
-            )
-        body = section.get('ros__parameters') if isinstance(section, dict) else None
-        if not isinstance(body, dict):
-            raise RunError(
-                f"--params {path}: expected 'ros__parameters:' with a mapping in {key!r}"
-            )
+            known = ', '.join(graph.BY_NAME)
+            problem = f'no node is called {key!r}, expected /** or one of {known}'
+        elif not isinstance(section, dict) or not isinstance(section.get('ros__parameters'), dict):
+            problem = f"expected 'ros__parameters:' with a mapping in {key!r}"
+        if problem:
+            raise RunError(f'--params {file.error_at((key,), problem)}')
 
 
 def parameter_files(config: Path, run: Run) -> list[Path]:

@@ -53,9 +53,10 @@ def test_a_place_that_is_none_is_named_with_file_and_line(tmp_path):
     [
         ('battery_controler: {ros__parameters: {a: 1}}', "no node is called 'battery_controler'"),
         ('battery_controller: {a: 1}', "expected 'ros__parameters:'"),
-        ('- 1', 'got no mapping'),
+        ('/**:\n  ros__parameters: {a: 1}\n/**:\n  b: 1', ":3: duplicate key '/**'"),
+        ('- 1', ':1: expected a mapping, got a list'),
         ('a: [', ':1: not valid YAML'),
-        ('', 'got no mapping'),
+        ('', 'expected a mapping, got nothing'),
     ],
 )
 def test_a_wrong_parameter_file_is_named(content, wrong, tmp_path):
