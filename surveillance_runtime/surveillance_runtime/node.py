@@ -18,7 +18,6 @@ from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
 import rclpy
-import yaml
 from rcl_interfaces.msg import (
     FloatingPointRange,
     IntegerRange,
@@ -45,6 +44,7 @@ from rclpy.subscription import Subscription
 
 from surveillance_runtime.parameters import Check, ParameterError, ParameterSpec, element_type
 from surveillance_runtime.waiting import Interrupt
+from surveillance_runtime.yaml_file import YamlFileError, read_yaml_file
 
 JOIN_SECONDS = 2.0
 """How long a stopping node waits for each of its threads, seconds."""
@@ -393,18 +393,14 @@ def _check_parameter_files(argv: Sequence[str]) -> None:
     """Look at the parameter files first: rcl names neither line nor reason.
 
     Raises:
-        StartError: A file is missing or is not YAML.
+        StartError: A file is missing, is not YAML, or gives a parameter twice.
     """
     for option, path in itertools.pairwise(argv):
-        if option != '--params-file':
-            continue
-        try:
-            with open(path, encoding='utf-8') as file:
-                yaml.safe_load(file)
-        except OSError as error:
-            raise StartError(f'parameter file {path}: {error.strerror}') from error
-        except yaml.YAMLError as error:
-            raise StartError(f'parameter file {path}: {_one_line(error)}') from error
+        if option == '--params-file':
+            try:
+                read_yaml_file(path)
+            except YamlFileError as error:
+                raise StartError(f'parameter file {error}') from error
 
 
 def _one_line(error: BaseException) -> str:

@@ -176,3 +176,17 @@ def test_process_with_a_bad_parameter_says_so_in_one_line(arguments, complaint):
     assert run.returncode == 2
     assert run.stderr.count('\n') == 1
     assert complaint in run.stderr
+
+
+def test_process_with_a_parameter_given_twice_says_where(tmp_path):
+    path = tmp_path / 'twice.yaml'
+    path.write_text('/**:\n  ros__parameters:\n    level: 1\n    level: 2\n')
+    run = subprocess.run(
+        [sys.executable, '-c', PROGRAM, '--ros-args', '--params-file', str(path)],
+        capture_output=True,
+        text=True,
+        timeout=20,
+    )
+    assert run.returncode == 2
+    complaint = f"parameter file {path}:4: duplicate key 'level', first given in line 3"
+    assert run.stderr == f'cannot start: {complaint}\n'
