@@ -33,7 +33,7 @@ from surveillance_runtime.waiting import ClockWait, Interrupt
 POSE_PERIOD = 0.19
 """Least time between two messages on amcl_pose, seconds: with every second scan at 10 Hz."""
 
-LONGEST_HOLD = 0.15
+LONGEST_HOLD = 0.25
 """How long answers are held until the ontology knows the robot's place, seconds; the drive counts
 on commands that are no older."""
 
