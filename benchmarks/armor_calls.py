@@ -27,7 +27,8 @@ IRI = 'http://bnc/exp-rob-lab/2022-23'
 PLACE = ROOT / 'config' / 'seven_rooms.yaml'
 TRIGGER = """
 from std_srvs.srv import Trigger
-from surveillance_runtime.node import PatrolNode, run_node
+from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.process import run_node
 
 class Bare(PatrolNode):
     def __init__(self, **options):
@@ -167,7 +168,8 @@ def through_ros(rounds: int) -> list[Row]:
     from surveillance_ontology.armor_client import ArmorClient
     from surveillance_runtime.calls import ServiceCaller
     from surveillance_runtime.domains import claim_domain
-    from surveillance_runtime.node import ExecutorThread, PatrolNode
+    from surveillance_runtime.node import PatrolNode
+    from surveillance_runtime.process import ExecutorThread
 
     os.environ['ROS_DOMAIN_ID'] = str(claim_domain())
     with servers():

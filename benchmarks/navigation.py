@@ -264,7 +264,8 @@ def processes(seconds: float) -> tuple[float, float, float]:
     from geometry_msgs.msg import PoseStamped
 
     from surveillance_runtime.domains import claim_domain
-    from surveillance_runtime.node import ExecutorThread, PatrolNode
+    from surveillance_runtime.node import PatrolNode
+    from surveillance_runtime.process import ExecutorThread
     from surveillance_runtime.qos import SENSOR_QOS
 
     domain = claim_domain()

@@ -32,7 +32,8 @@ from surveillance_perception.detection import DetectorSettings, MarkerDetector
 from surveillance_perception.dictionaries import dictionary_named
 from surveillance_perception.marker_scene import Degradation, Panel, backdrop_of, picture_of
 from surveillance_runtime.calls import ServiceCaller
-from surveillance_runtime.node import ExecutorThread, PatrolNode
+from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.process import ExecutorThread
 from surveillance_runtime.qos import SENSOR_QOS
 from surveillance_simulation.simulator_node import Simulator
 

@@ -35,7 +35,7 @@ def main(argv: list[str]) -> int:
     sys.argv = [parsed[0][0], *arguments]
     if len(parsed) == 1:
         return int(importlib.import_module(parsed[0][1]).main(arguments) or 0)
-    from surveillance_runtime.node import run_nodes
+    from surveillance_runtime.process import run_nodes
 
     classes = [getattr(importlib.import_module(module), name) for _, module, name in parsed]
     return run_nodes(classes, arguments)

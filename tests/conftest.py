@@ -34,7 +34,8 @@ class Graph:
     def __init__(self) -> None:
         import rclpy
 
-        from surveillance_runtime.node import ExecutorThread, PatrolNode
+        from surveillance_runtime.node import PatrolNode
+        from surveillance_runtime.process import ExecutorThread
 
         self.context = rclpy.Context()
         rclpy.init(context=self.context, domain_id=_domain)

@@ -19,8 +19,9 @@ from surveillance_behaviour.survey import PlaceNote, Survey, SurveyReport, notes
 from surveillance_interfaces.msg import OntologyMap
 from surveillance_interfaces.srv import ReferenceName
 from surveillance_runtime.calls import CallFailed, ServiceCaller
-from surveillance_runtime.node import PatrolNode, StartError, run_node
+from surveillance_runtime.node import PatrolNode, StartError
 from surveillance_runtime.place import Place, PlaceError, make_place
+from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 
 _BUILD_SECONDS = 20.0

@@ -23,7 +23,8 @@ from surveillance_behaviour.ports import InterruptedWaitError, PeerError
 from surveillance_behaviour.ros_ports import RosPlaces, ros_knowledge
 from surveillance_interfaces.msg import MissionStatus
 from surveillance_interfaces.srv import Reason
-from surveillance_runtime.node import PatrolNode, run_node
+from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.waiting import ClockWait
 

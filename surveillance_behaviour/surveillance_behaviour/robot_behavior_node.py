@@ -26,7 +26,8 @@ from surveillance_behaviour.mission_resumption import CutOff, cut_off
 from surveillance_behaviour.policy.rules import RECHARGE
 from surveillance_behaviour.ros_ports import RosMotion, RosPlaces, RosRoutine, ros_knowledge
 from surveillance_interfaces.msg import Decision as DecisionMessage
-from surveillance_runtime.node import PatrolNode, StartError, run_node
+from surveillance_runtime.node import PatrolNode, StartError
+from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 from surveillance_runtime.waiting import ClockWait
 

@@ -23,7 +23,8 @@ from surveillance_controllers.controller_parameters import battery_settings, exe
 from surveillance_controllers.operator_console import OperatorConsole
 from surveillance_controllers.robot_battery import RobotBattery
 from surveillance_runtime.awaited_work import AwaitedEvent
-from surveillance_runtime.node import PatrolNode, run_node
+from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.waiting import ClockWait
 

@@ -26,7 +26,8 @@ from surveillance_controllers.console_commands import (
 )
 from surveillance_interfaces.srv import ConsoleCommand
 from surveillance_runtime.calls import CallFailed, ServiceCaller
-from surveillance_runtime.node import PatrolNode, run_node
+from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
 
 COMMANDS = {

@@ -23,7 +23,8 @@ from surveillance_controllers.polyline import Points
 from surveillance_controllers.stimulus_motion import glide
 from surveillance_interfaces.action import Control, FollowPath
 from surveillance_runtime.goals import GoalAborted, GoalRun, GoalServer
-from surveillance_runtime.node import PatrolNode, run_node
+from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.process import run_node
 
 if TYPE_CHECKING:
     from surveillance_controllers.docking import Motion

@@ -21,7 +21,8 @@ from surveillance_controllers.operator_desk import OperatorDesk
 from surveillance_controllers.polyline import Points
 from surveillance_interfaces.action import ComputePath, Plan
 from surveillance_runtime.goals import GoalAborted, GoalRun, GoalServer
-from surveillance_runtime.node import PatrolNode, run_node
+from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.process import run_node
 
 if TYPE_CHECKING:
     from surveillance_controllers.simulated_planning import SimulatedPlanning

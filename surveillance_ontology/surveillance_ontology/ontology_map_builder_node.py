@@ -21,8 +21,9 @@ from surveillance_ontology.described_parameters import described_place
 from surveillance_ontology.map_building import ROBOT, MapBuilding
 from surveillance_ontology.map_keeper import MapKeeper, Reports
 from surveillance_runtime.awaited_work import AwaitedEvent, AwaitedWork
-from surveillance_runtime.node import PatrolNode, run_node
+from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.place import Place
+from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
 
 SECONDS_PER_ROOM = 0.005

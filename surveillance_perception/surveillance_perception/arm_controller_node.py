@@ -29,7 +29,8 @@ from surveillance_perception.surroundings_scan import scan
 from surveillance_perception.view_coverage import View
 from surveillance_runtime.awaited_work import work_aside
 from surveillance_runtime.goals import GoalAborted, GoalRun, GoalServer
-from surveillance_runtime.node import PatrolNode, run_node
+from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 from surveillance_runtime.rested_pictures import RestedPictures
 from surveillance_runtime.robot_arm import ARM

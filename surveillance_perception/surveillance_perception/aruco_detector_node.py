@@ -27,7 +27,8 @@ from surveillance_perception.detection_watch import DetectionWatch
 from surveillance_perception.detector_parameters import DetectorParameters
 from surveillance_perception.latest import Latest
 from surveillance_perception.picture_subscription import PICTURES_QOS, PictureSubscription
-from surveillance_runtime.node import PatrolNode, run_node
+from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 
 IDS_QOS = QoSProfile(depth=200, durability=DurabilityPolicy.TRANSIENT_LOCAL)

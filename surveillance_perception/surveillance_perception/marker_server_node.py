@@ -9,7 +9,8 @@ from typing import Any
 from surveillance_interfaces.srv import RoomInformation
 from surveillance_perception.conversions import marked_place_to_ros
 from surveillance_perception.marker_registry import MarkedPlace, read_registry
-from surveillance_runtime.node import PatrolNode, StartError, run_node
+from surveillance_runtime.node import PatrolNode, StartError
+from surveillance_runtime.process import run_node
 from surveillance_runtime.yaml_file import YamlFileError
 
 UNKNOWN = 'no room associated with this marker id'

@@ -1,23 +1,16 @@
-"""The node that all others derive from, and the life of a node's process.
+"""The node that all others derive from.
 
 A `PatrolNode` declares its parameters with descriptors and checks, and owns the threads that do
-its long work. `run_node` is the body of every executable: the executor spins on a thread of its
-own, so that the main thread takes SIGINT and SIGTERM at once, stops the node's work while
-messages still flow (a running goal can be cancelled), and only then takes ROS down.
+its long work. Stopping ends that work while messages still flow.
 """
 
 from __future__ import annotations
 
-import itertools
-import queue
-import signal
-import sys
 import threading
 import traceback
 from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
-import rclpy
 from rcl_interfaces.msg import (
     FloatingPointRange,
     IntegerRange,
@@ -30,28 +23,17 @@ from rclpy.event_handler import (
     SubscriptionEventCallbacks,
 )
 from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
-from rclpy.executors import (
-    ExternalShutdownException,
-    ShutdownException,
-    SingleThreadedExecutor,
-)
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
 from rclpy.qos import qos_policy_name_from_kind
-from rclpy.signals import SignalHandlerOptions
 from rclpy.subscription import Subscription
 
 from surveillance_runtime.parameters import Check, ParameterError, ParameterSpec, element_type
 from surveillance_runtime.waiting import Interrupt
-from surveillance_runtime.yaml_file import YamlFileError, read_yaml_file
 
 JOIN_SECONDS = 2.0
 """How long a stopping node waits for each of its threads, seconds."""
-
-
-EXIT_CANNOT_START = 2
-"""The exit code of a node whose configuration does not let it start."""
 
 
 class StartError(Exception):
@@ -274,135 +256,3 @@ class PatrolNode(Node):  # type: ignore[misc]
 
 def _plain(value: Any) -> Any:
     return value.tolist() if hasattr(value, 'tolist') else value
-
-
-def run_node(factory: Callable[[], PatrolNode], args: Sequence[str] | None = None) -> int:
-    """Run one node as this process until SIGINT, SIGTERM or its failure.
-
-    Args:
-        factory: Builds the node, once ROS is initialised.
-        args: Command line without the program's name; None takes `sys.argv`.
-
-    Returns:
-        The exit code: 0 for a wanted stop, 1 when the node failed, `EXIT_CANNOT_START` when its
-        configuration does not let it start, so that starting it again would not help.
-    """
-    return run_nodes([factory], args)
-
-
-def run_nodes(
-    factories: Sequence[Callable[[], PatrolNode]], args: Sequence[str] | None = None
-) -> int:
-    """Run several nodes in this process on one executor; otherwise as `run_node`."""
-    # A handler may run in the middle of the main thread's own wait, where an Event's lock is taken
-    # and would never be let go: only SimpleQueue.put may be entered anew.
-    ended: queue.SimpleQueue[None] = queue.SimpleQueue()
-
-    def end() -> None:
-        ended.put(None)
-
-    def on_signal(_number: int, _frame: Any) -> None:
-        end()
-
-    # Set by hand: background jobs of a shell inherit an ignored SIGINT.
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, on_signal)
-    argv = [sys.argv[0], *(sys.argv[1:] if args is None else args)]
-    try:
-        _check_parameter_files(argv)
-        rclpy.init(args=argv, signal_handler_options=SignalHandlerOptions.NO)
-    except Exception as error:
-        print(f'cannot start: {_one_line(error)}', file=sys.stderr)
-        return EXIT_CANNOT_START
-    nodes: list[PatrolNode] = []
-    spinner = ExecutorThread()
-    code = 0
-    try:
-        for factory in factories:
-            nodes.append(factory())
-            spinner.executor.add_node(nodes[-1])
-            nodes[-1].ended.subscribe(end)
-        spinner.start(on_end=end)
-        ended.get()
-    except (ParameterError, StartError) as error:
-        print(f'cannot start: {_one_line(error)}', file=sys.stderr)
-        code = EXIT_CANNOT_START
-    finally:
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, signal.SIG_IGN)
-        for node in reversed(nodes):
-            node.stop()
-        spinner.stop()
-        for node in reversed(nodes):
-            node.destroy_node()
-        rclpy.try_shutdown()
-    if spinner.error is not None:
-        traceback.print_exception(spinner.error)
-        code = 1
-    if any(node.failure is not None for node in nodes):
-        code = 1
-    return code
-
-
-class ExecutorThread:
-    """A single-threaded executor that spins on a thread of its own.
-
-    Args:
-        context: ROS context of the nodes; None takes the default one.
-
-    Attributes:
-        executor: Add nodes to it before `start`, or later from any thread.
-        error: What an executor's callback raised, once the thread has ended by it.
-    """
-
-    def __init__(self, context: Any = None) -> None:
-        self.executor = SingleThreadedExecutor(context=context)
-        self.error: BaseException | None = None
-        self._thread: threading.Thread | None = None
-        self._stopping = False
-
-    def start(self, on_end: Callable[[], None] | None = None) -> None:
-        """Begin to spin; `on_end` is called when spinning ends for whatever reason."""
-
-        def spin() -> None:
-            try:
-                while not self._stopping:
-                    self.executor.spin_once()
-            except (ExternalShutdownException, ShutdownException):
-                pass
-            except BaseException as error:
-                self.error = error
-            finally:
-                if on_end is not None:
-                    on_end()
-
-        self._thread = threading.Thread(target=spin, name='executor', daemon=True)
-        self._thread.start()
-
-    def stop(self) -> None:
-        """End the spinning and join the thread, so that the nodes may be destroyed."""
-        self._stopping = True
-        # The executor's own shutdown would take its guard conditions away under a running callback.
-        self.executor.create_task(lambda: None)
-        if self._thread is not None:
-            self._thread.join(JOIN_SECONDS)
-        self.executor.shutdown(timeout_sec=JOIN_SECONDS)
-
-
-def _check_parameter_files(argv: Sequence[str]) -> None:
-    """Look at the parameter files first: rcl names neither line nor reason.
-
-    Raises:
-        StartError: A file is missing, is not YAML, or gives a parameter twice.
-    """
-    for option, path in itertools.pairwise(argv):
-        if option == '--params-file':
-            try:
-                read_yaml_file(path)
-            except YamlFileError as error:
-                raise StartError(f'parameter file {error}') from error
-
-
-def _one_line(error: BaseException) -> str:
-    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
-    return ' '.join(lines) or type(error).__name__

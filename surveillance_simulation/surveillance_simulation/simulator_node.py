@@ -14,7 +14,8 @@ from rclpy.clock import Clock as RclpyClock
 from rclpy.clock import ClockType
 from trajectory_msgs.msg import JointTrajectory
 
-from surveillance_runtime.node import PatrolNode, StartError, run_node
+from surveillance_runtime.node import PatrolNode, StartError
+from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
 from surveillance_simulation import conversions, simulator_parameters
 from surveillance_simulation.arm_motion import TrajectoryError

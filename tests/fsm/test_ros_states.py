@@ -298,7 +298,7 @@ def test_a_preempt_ends_waiting_for_an_action_server(graph):
 
 def test_an_executor_that_stops_in_the_middle_aborts(graph):
     graph.add(ScriptedActionServer)
-    from surveillance_runtime.node import ExecutorThread
+    from surveillance_runtime.process import ExecutorThread
 
     context = rclpy.Context()
     rclpy.init(context=context)

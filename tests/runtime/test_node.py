@@ -105,7 +105,8 @@ def test_exception_in_a_thread_fails_the_node(graph, capsys):
 
 PROGRAM = """
 import sys
-from surveillance_runtime.node import PatrolNode, run_node
+from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.process import run_node
 class Program(PatrolNode):
     def __init__(self):
         super().__init__('program')
