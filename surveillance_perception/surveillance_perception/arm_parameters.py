@@ -8,9 +8,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from surveillance_runtime.field_parameters import Described, declare_fields
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.robot_arm import Arm, Array
 
+_SCAN = {
+    'dwell': Described('Rest at each view of a scan, seconds.', 0.0),
+    'pictures': Described(
+        'Pictures that the marker detector must have looked at before a view is left.', 0
+    ),
+    'patience': Described('Seconds after which a view is left without them.', 0.0),
+}
 _PAN = {'left': math.pi / 2, 'home': 0.0, 'right': -math.pi / 2, 'back': math.pi}
 
 
@@ -41,27 +49,11 @@ def arm_settings(node: PatrolNode, arm: Arm) -> ArmSettings:
     Raises:
         ParameterError: A value is of the wrong type or out of range.
     """
-    settings = ArmSettings({name: _pose(node, arm, name, pan) for name, pan in _PAN.items()})
-    settings.dwell = node.parameter(
-        'dwell',
-        settings.dwell,
-        'Rest at each view of a scan, seconds.',
-        minimum=0.0,
-        on_change=lambda value: setattr(settings, 'dwell', value),
-    )
-    settings.pictures = node.parameter(
-        'pictures',
-        settings.pictures,
-        'Pictures that the marker detector must have looked at before a view is left.',
-        minimum=0,
-        on_change=lambda value: setattr(settings, 'pictures', value),
-    )
-    settings.patience = node.parameter(
-        'patience',
-        settings.patience,
-        'Seconds after which a view is left without them.',
-        minimum=0.0,
-        on_change=lambda value: setattr(settings, 'patience', value),
+    settings = declare_fields(
+        node,
+        ArmSettings({name: _pose(node, arm, name, pan) for name, pan in _PAN.items()}),
+        _SCAN,
+        on_change=lambda *change: setattr(settings, *change),
     )
     for name in ('horizontal', 'vertical'):
         degrees = node.parameter(

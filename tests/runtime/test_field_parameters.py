@@ -1,0 +1,66 @@
+"""The fields of a record as parameters."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import pytest
+from rclpy.parameter import Parameter
+
+from surveillance_runtime.field_parameters import Described, declare_fields
+from surveillance_runtime.parameters import ParameterError
+
+
+@dataclass(frozen=True)
+class Drive:
+    speed: float = 0.5
+    gears: int = 3
+    names: tuple[str, ...] = ('slow', 'fast')
+    wheel: float = 0.1
+
+
+FIELDS = {
+    'speed': Described('Top speed, m/s.', 0.01, 20.0),
+    'gears': Described('Gears.', 1, name='gear_count'),
+    'names': Described('Names.', check=lambda names: None if names else 'at least one name'),
+}
+
+
+def declared(graph, parameters=None, **options):
+    node = graph.add(type(graph.node), parameters=parameters, name='driver')
+    return node, declare_fields(node, Drive(), FIELDS, prefix='drive.', **options)
+
+
+def test_defaults_are_the_records_and_given_values_take_their_place(graph):
+    _, default = declared(graph)
+    assert default == Drive()
+    given = {'drive.speed': 2, 'gear_count': 5, 'drive.names': ['one']}
+    _, drive = declared(graph, given)
+    assert drive == Drive(2.0, 5, ('one',))
+    assert isinstance(drive.speed, float)
+
+
+@pytest.mark.parametrize(
+    ('given', 'complaint'),
+    [
+        ({'drive.speed': 21.0}, 'parameter drive.speed: got 21.0, expected a number from 0.01'),
+        ({'gear_count': 0}, 'parameter gear_count: got 0, expected an integer, at least 1'),
+        ({'drive.names': []}, 'parameter drive.names: got [], expected at least one name'),
+    ],
+)
+def test_values_out_of_bounds_are_refused(graph, given, complaint):
+    with pytest.raises(ParameterError) as error:
+        declared(graph, given)
+    assert str(error.value).startswith(complaint)
+
+
+def test_they_are_read_only_unless_somebody_follows(graph):
+    fixed, _ = declared(graph)
+    (refused,) = fixed.set_parameters([Parameter('drive.speed', value=1.0)])
+    assert not refused.successful
+    heard = []
+    open_, _ = declared(graph, on_change=lambda *change: heard.append(change))
+    for name, value in (('drive.speed', 1), ('drive.names', ['a', 'b'])):
+        (result,) = open_.set_parameters([Parameter(name, value=value)])
+        assert result.successful
+    assert heard == [('speed', 1.0), ('names', ('a', 'b'))]
