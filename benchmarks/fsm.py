@@ -234,7 +234,7 @@ def main() -> int:
     rounds = 5 if options.quick else 7
 
     def traced(machine: fsm.StateMachine) -> fsm.StateMachine:
-        machine.control.set_trace(deque(maxlen=1_000).append)
+        machine.control.add_trace(deque(maxlen=1_000).append)
         return machine
 
     def feed(machine: fsm.StateMachine) -> Callable[[], object]:

@@ -8,6 +8,7 @@ import threading
 import pytest
 
 from surveillance_behaviour import fsm
+from surveillance_behaviour.fsm.engine import unfold
 from surveillance_behaviour.fsm.record import (
     Recorder,
     RecordError,
@@ -171,10 +172,37 @@ def test_tracing_can_begin_while_a_machine_runs():
         fsm.StateMachine.add('WAIT', waiter)
     run = Background(machine)
     began(waiter)
-    machine.control.set_trace(seen.append)
+    machine.control.add_trace(lambda raw: seen.append(unfold(raw)))
     machine.request_preempt()
     run.result()
-    assert len(seen) == 1
+    assert [(noted.source, noted.outcome, noted.kind) for noted in seen] == [
+        ('WAIT', 'preempted', 'exit')
+    ]
+
+
+def test_several_may_watch_a_machine_at_once(tmp_path):
+    machine, seen = patrol(), []
+    script(machine, {'PATROL/CHOOSE': ['done', 'done']})
+    feed = TransitionFeed(machine, lambda transition: seen.append(transition.from_state))
+    with Recorder(machine, tmp_path / 'record'), watching(machine) as watched:
+        machine.execute()
+    feed.flush(5.0)
+    assert seen == watched.path() == ['CHOOSE']
+    assert [t.from_state for t in read_record(tmp_path / 'record')] == ['CHOOSE']
+    machine.set_initial_state(['CHOOSE'])
+    machine.execute()
+    feed.close()
+    assert seen == ['CHOOSE', 'CHOOSE']
+
+
+def test_the_end_of_an_iterators_items_is_told_by_its_outcome():
+    each = fsm.Iterator([], [], [], it=[1, 2], it_label='number', exhausted_outcome='all')
+    with each:
+        fsm.Iterator.set_contained_state('DO', Answer('next'), loop_outcomes=['next'])
+    with watching(each) as watched:
+        assert each.execute() == 'all'
+    assert watched.transitions[-1] == ('Iterator', 'DO', 'all', 'all')
+    watched.assert_covered()
 
 
 # The test kit.

@@ -12,7 +12,16 @@ from typing import Any
 from surveillance_behaviour.fsm import log, shutdown
 from surveillance_behaviour.fsm.active import ActiveContainer, forget, let_go
 from surveillance_behaviour.fsm.container import Container
-from surveillance_behaviour.fsm.engine import LOWEST, RESUMPTION, SUSPENDED, Exit, Frame, Node
+from surveillance_behaviour.fsm.engine import (
+    LOWEST,
+    NO_USERDATA,
+    RESUMPTION,
+    SUSPENDED,
+    Exit,
+    Frame,
+    Node,
+    SpecialStep,
+)
 from surveillance_behaviour.fsm.nodes import wrong_outcome
 from surveillance_behaviour.fsm.run import LeftBehind
 
@@ -185,12 +194,13 @@ class BetweenStates(ActiveContainer):
         trace = frame.trace
         if left is None:
             if trace is not None:
-                trace((frame.path, '', '', target.label, frame.now(), {}, 'start'))
+                step = SpecialStep(frame.path, '', target.label, 'start')
+                trace((step, '', frame.now(), NO_USERDATA))
             return
         if trace is not None:
             kind = target.kind if target.is_exit else kind
-            data = self.userdata._data.copy()
-            trace((frame.path, left.label, outcome, target.label, frame.now(), data, kind))
+            step = SpecialStep(frame.path, left.label, target.label, kind)
+            trace((step, outcome, frame.now(), self.userdata._data.copy()))
         if log.chatty():
             verb = 'ends' if target.is_exit else 'goes on'
             log.loginfo(f"'{frame.path}' {verb}: '{left.label}' : '{outcome}' --> '{target.label}'")

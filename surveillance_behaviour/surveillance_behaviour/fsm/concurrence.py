@@ -11,6 +11,7 @@ from surveillance_behaviour.fsm.active import ActiveContainer, forget, stop_for_
 from surveillance_behaviour.fsm.children import Children
 from surveillance_behaviour.fsm.engine import (
     LOWEST,
+    NO_USERDATA,
     RESUME,
     SUSPENDED,
     Branch,
@@ -18,6 +19,7 @@ from surveillance_behaviour.fsm.engine import (
     Frame,
     History,
     Node,
+    SpecialStep,
 )
 from surveillance_behaviour.fsm.exceptions import (
     InvalidStateError,
@@ -157,7 +159,8 @@ class Concurrence(ActiveContainer):
             if history is None:
                 self.call_start_cbs()
             if frame.trace is not None:
-                frame.trace((self._fsm_path, '', '', '', frame.now(), {}, 'start'))
+                step = SpecialStep(self._fsm_path, '', '', 'start')
+                frame.trace((step, '', frame.now(), NO_USERDATA))
             outcome = self._run_children(frame)
             if outcome is not SUSPENDED:
                 self.call_termination_cbs(list(self._states), outcome)
@@ -244,8 +247,8 @@ class Concurrence(ActiveContainer):
 
     def _tell_end(self, frame: Frame, label: str, outcome: str) -> None:
         if frame.trace is not None:
-            data = self.userdata._data.copy()
-            frame.trace((frame.path, label, outcome, '', frame.now(), data, 'ended'))
+            step = SpecialStep(frame.path, label, '', 'ended')
+            frame.trace((step, outcome, frame.now(), self.userdata._data.copy()))
         if log.chatty():
             log.loginfo(f"'{frame.path}': '{label}' ended with '{outcome}'")
         self.call_transition_cbs()

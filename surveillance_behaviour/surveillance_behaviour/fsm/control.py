@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from surveillance_behaviour.fsm.engine import Frame, Node, Trace
+from surveillance_behaviour.fsm.engine import Frame, Node, RawTransition, Trace
 from surveillance_behaviour.fsm.exceptions import InvalidStateError, InvalidTransitionError
 
 if TYPE_CHECKING:
@@ -26,29 +26,47 @@ class Control:
         self._container = container
         self._run: Run | None = None
         self._paused = False
+        self._traces: list[Trace] = []
         self._trace: Trace | None = None
         self._left: list[tuple[str, threading.Thread]] = []
 
     @property
     def trace(self) -> Trace | None:
-        """Where transitions are reported."""
+        """Where transitions are reported, if anywhere."""
         return self._trace
 
-    def set_trace(self, trace: Trace | None) -> None:
-        """Report every transition to `trace`, in the thread that makes it; None ends that.
+    def add_trace(self, trace: Trace) -> Callable[[], None]:
+        """Report every transition to `trace`, in the thread that makes it.
 
         Args:
-            trace: Takes one tuple per transition: path of the container, label of the state left,
-                outcome, label or outcome reached, time in seconds, a shallow copy of the
-                container's userdata, and the kind: ``transition``, ``exit``, ``interrupt``,
-                ``resume``, ``forced``, ``ended`` (a child of a concurrence), or ``start``, when a
-                container is entered.
+            trace: Takes each transition as the loop notes it; `engine.unfold` says it in full.
+
+        Returns:
+            A function that ends the reports.
         """
         with self.condition:
-            self._trace = trace
-            if self._run is not None:
-                self._run.trace = trace
-                self._run.call_attention()
+            self._traces.append(trace)
+            self._set_trace()
+
+        def remove() -> None:
+            with self.condition:
+                if trace in self._traces:
+                    self._traces.remove(trace)
+                    self._set_trace()
+
+        return remove
+
+    def _set_trace(self) -> None:
+        traces = tuple(self._traces)
+
+        def tell_all(raw: RawTransition) -> None:
+            for trace in traces:
+                trace(raw)
+
+        self._trace = None if not traces else traces[0] if len(traces) == 1 else tell_all
+        if self._run is not None:
+            self._run.trace = self._trace
+            self._run.call_attention()
 
     @property
     def paused(self) -> bool:

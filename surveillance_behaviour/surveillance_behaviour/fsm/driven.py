@@ -14,7 +14,15 @@ from typing import Any
 from surveillance_behaviour.fsm import log, shutdown
 from surveillance_behaviour.fsm.active import ActiveContainer, stop_for_now
 from surveillance_behaviour.fsm.between_states import ASIDE, SHUTDOWN, BetweenStates
-from surveillance_behaviour.fsm.engine import RESUME, RESUMPTION, SUSPENDED, Exit, Frame, Node
+from surveillance_behaviour.fsm.engine import (
+    NO_USERDATA,
+    RESUME,
+    RESUMPTION,
+    SUSPENDED,
+    Exit,
+    Frame,
+    Node,
+)
 from surveillance_behaviour.fsm.exceptions import InvalidStateError, SmachError
 from surveillance_behaviour.fsm.limits import settle
 from surveillance_behaviour.fsm.nodes import make_node, user_fault, wrong_outcome
@@ -147,7 +155,7 @@ class DrivenContainer(BetweenStates):
 
     def _drive(self, frame: Frame, target: Node | Exit) -> Exit:
         data = self.userdata._data
-        path, now, trace = frame.path, frame.now, frame.trace
+        now, trace = frame.now, frame.trace
         while not target.is_exit:
             node: Node = target  # type: ignore[assignment]
             try:
@@ -165,7 +173,7 @@ class DrivenContainer(BetweenStates):
                 target = self._attend(frame, node, outcome, target)
                 trace = frame.trace
             elif trace is not None:
-                trace((path, node.label, outcome, target.label, now(), data.copy(), target.kind))
+                trace((node, outcome, now(), data.copy() if data else NO_USERDATA))
         return target  # type: ignore[return-value]
 
     def _finish(self, frame: Frame, target: Exit) -> Any:

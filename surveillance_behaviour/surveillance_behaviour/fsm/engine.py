@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from surveillance_behaviour.fsm.exceptions import InvalidStateError
 from surveillance_behaviour.fsm.state import State
@@ -52,6 +52,7 @@ class Node:
 
     Attributes:
         label: The state's label in its container.
+        path: The container's path.
         state: The state.
         enter: What runs it; the state's own `execute` as a rule.
         execute: What the loop calls: `enter`, within the state's limits if it has any.
@@ -68,6 +69,7 @@ class Node:
         'label',
         'limits',
         'make_view',
+        'path',
         'priority',
         'state',
         'targets',
@@ -78,8 +80,14 @@ class Node:
     kind = 'transition'
 
     def __init__(
-        self, label: str, state: State, make_view: Callable[[], Any], priority: float = LOWEST
+        self,
+        path: str,
+        label: str,
+        state: State,
+        make_view: Callable[[], Any],
+        priority: float = LOWEST,
     ) -> None:
+        self.path = path
         self.label = label
         self.state = state
         self.enter: Callable[[Any], Any] = state.execute
@@ -90,14 +98,74 @@ class Node:
         self.limits: Limits | None = None
         self.priority = priority
 
+    def step(self, outcome: Any) -> tuple[str, str, str, str]:
+        """What `outcome` leads to by the table: (path of the container, from, to, kind)."""
+        target = self.targets[outcome]
+        return self.path, self.label, target.label, target.kind
+
     def revoke(self) -> None:
         """Cut the view in use off the userdata, and make a new one for the next execution."""
         self.view._revoke()
         self.view = self.make_view()
 
 
-Trace = Callable[[tuple[Any, ...]], object]
-"""Takes (path, from, outcome, to, time, userdata, kind) of one transition; see `Control`."""
+class SpecialStep:
+    """A step that is not what the table says, told to a trace in place of the node that was left.
+
+    Args:
+        path: Path of the container.
+        source: Label of the state that was left; empty at the start.
+        target: Label of the state or the outcome reached.
+        kind: See `Transition`.
+    """
+
+    __slots__ = ('_step',)
+
+    def __init__(self, path: str, source: str, target: str, kind: str) -> None:
+        self._step = path, source, target, kind
+
+    def step(self, _outcome: Any) -> tuple[str, str, str, str]:
+        """As `Node.step`."""
+        return self._step
+
+
+RawTransition = tuple[Node | SpecialStep, Any, float, dict[str, Any]]
+"""(what was left, outcome, time in seconds, shallow copy of the container's userdata)."""
+
+Trace = Callable[[RawTransition], object]
+"""Takes transitions as the loop notes them, at the least cost to the machine; see `unfold`."""
+
+NO_USERDATA: dict[str, Any] = {}
+"""Stands for a copy of userdata that holds nothing; never written to."""
+
+
+class Noted(NamedTuple):
+    """A transition as it was noted.
+
+    Attributes:
+        path: Path of the container.
+        source: Label of the state that was left; empty at the start.
+        outcome: What that ended with.
+        target: Label of the state entered, or the container's outcome.
+        time: Seconds on the machine's clock.
+        userdata: Shallow copy of the container's userdata.
+        kind: See `Transition`; also ``start``, when a container is entered.
+    """
+
+    path: str
+    source: str
+    outcome: str
+    target: str
+    time: float
+    userdata: dict[str, Any]
+    kind: str
+
+
+def unfold(raw: RawTransition) -> Noted:
+    """Say in full what a trace was given."""
+    left, outcome, time, userdata = raw
+    path, source, target, kind = left.step(outcome)
+    return Noted(path, source, str(outcome), target, time, userdata, kind)
 
 
 @dataclass

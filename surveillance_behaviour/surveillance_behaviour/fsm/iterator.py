@@ -21,7 +21,15 @@ from surveillance_behaviour.fsm.user_data import UserData
 
 Items = Iterable[Any] | Callable[[], Iterable[Any]]
 
-_EXHAUSTED = object()
+
+class _Exhausted:
+    """What the loop is told when no item is left; shown as the outcome that this has."""
+
+    def __init__(self, outcome: str) -> None:
+        self._outcome = outcome
+
+    def __str__(self) -> str:
+        return self._outcome
 
 
 class Iterator(DrivenContainer):
@@ -49,6 +57,7 @@ class Iterator(DrivenContainer):
         self._items: Items = it
         self._items_label = it_label
         self._exhausted_outcome = exhausted_outcome
+        self._exhausted = _Exhausted(exhausted_outcome)
         self._state_label = ''
         self._loop_outcomes: list[str] = []
         self._break_outcomes: list[str] = []
@@ -148,7 +157,7 @@ class Iterator(DrivenContainer):
             node.targets[outcome] = node
         for outcome in self._break_outcomes:
             node.targets[outcome] = self._ending(outcome)
-        node.targets[_EXHAUSTED] = self._ending(self._exhausted_outcome)
+        node.targets[self._exhausted] = self._ending(self._exhausted_outcome)
         within_limits = node.execute if node.limits is not None else None
 
         def execute_for_item(view: Any) -> Any:
@@ -157,7 +166,7 @@ class Iterator(DrivenContainer):
             if frame.repeat:
                 frame.repeat = False
             elif not self._draw(frame):
-                return _EXHAUSTED
+                return self._exhausted
             return within_limits(view) if within_limits is not None else node.enter(view)
 
         node.execute = execute_for_item

@@ -53,7 +53,8 @@ def make_node(
             path,
         )
 
-    node = Node(path.rpartition('/')[2], state, make_view, priority)
+    within, _, label = path.rpartition('/')
+    node = Node(within, label, state, make_view, priority)
     if isinstance(state, State):
         state._fsm_clock = clock
     left = getattr(state, '_fsm_left', None)

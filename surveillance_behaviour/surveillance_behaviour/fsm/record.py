@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from surveillance_behaviour.fsm.active import ActiveContainer
+from surveillance_behaviour.fsm.engine import RawTransition, unfold
 from surveillance_behaviour.fsm.exceptions import SmachError
 from surveillance_behaviour.fsm.log import logerr
 from surveillance_behaviour.fsm.structure import Structure, structure_of
@@ -88,10 +89,9 @@ class TransitionFeed:
         consume: Callable[[Transition], object],
         show_userdata: bool = True,
     ) -> None:
-        self._machine = machine
         self._consume = consume
         self._show_userdata = show_userdata
-        self._queue: deque[tuple[int, tuple[Any, ...]]] = deque(maxlen=QUEUE_LENGTH)
+        self._queue: deque[tuple[int, RawTransition]] = deque(maxlen=QUEUE_LENGTH)
         self._visits: dict[tuple[str, str], int] = {}
         self._entered: dict[str, float] = {}
         self._expected = 1
@@ -102,12 +102,12 @@ class TransitionFeed:
         self._closing = False
         self._thread = threading.Thread(target=self._run, name='fsm transitions', daemon=True)
         self._thread.start()
-        machine.control.set_trace(self._make_sink())
+        self._end_reports = machine.control.add_trace(self._make_sink())
 
-    def _make_sink(self) -> Callable[[tuple[Any, ...]], None]:
+    def _make_sink(self) -> Callable[[RawTransition], None]:
         append, numbers, wake = self._queue.append, itertools.count(1), self._wakeup.set
 
-        def sink(raw: tuple[Any, ...]) -> None:
+        def sink(raw: RawTransition) -> None:
             append((next(numbers), raw))
             if self._asleep:
                 wake()
@@ -121,7 +121,7 @@ class TransitionFeed:
 
     def close(self, timeout: float = 5.0) -> None:
         """Stop reporting, consume what is left and end the thread."""
-        self._machine.control.set_trace(None)
+        self._end_reports()
         self._closing = True
         self._wakeup.set()
         self._thread.join(timeout)
@@ -149,31 +149,30 @@ class TransitionFeed:
                 self._wakeup.wait()
             self._asleep = False
 
-    def _transition(self, number: int, raw: tuple[Any, ...]) -> Transition | None:
-        path, left, outcome, target, time, userdata, kind = raw
+    def _transition(self, number: int, raw: RawTransition) -> Transition | None:
+        noted = unfold(raw)
         # What was lost leaves a gap.
         self._sequence += number - self._expected
         self._expected = number + 1
-        place = (path, target)
+        place = (noted.path, noted.target)
         visits = self._visits[place] = self._visits.get(place, 0) + 1
-        since = self._entered.get(path, time)
-        if kind != 'ended':
-            self._entered[path] = time
-        if kind == 'start':
+        since = self._entered.get(noted.path, noted.time)
+        if noted.kind != 'ended':
+            self._entered[noted.path] = noted.time
+        if noted.kind == 'start':
             return None
         self._sequence += 1
-        data = shown(userdata) if self._show_userdata else {}
         return Transition(
             self._sequence,
-            time,
-            path,
-            left,
-            str(outcome),
-            target,
-            kind,
-            time - since,
+            noted.time,
+            noted.path,
+            noted.source,
+            noted.outcome,
+            noted.target,
+            noted.kind,
+            noted.time - since,
             visits,
-            data,
+            shown(noted.userdata) if self._show_userdata else {},
         )
 
 

@@ -20,6 +20,7 @@ from typing import Any
 
 from surveillance_behaviour.fsm.active import ActiveContainer
 from surveillance_behaviour.fsm.container import Container
+from surveillance_behaviour.fsm.engine import RawTransition, unfold
 from surveillance_behaviour.fsm.exceptions import InvalidStateError, InvalidTransitionError
 from surveillance_behaviour.fsm.state import State
 from surveillance_behaviour.fsm.structure import state_at, structure_of
@@ -152,10 +153,10 @@ class Watched:
         self._structure = structure_of(machine)
         self.transitions: list[tuple[str, str, str, str]] = []
 
-    def _saw(self, raw: tuple[Any, ...]) -> None:
-        path, left, outcome, target, _, _, kind = raw
-        if kind != 'start':
-            self.transitions.append((path, left, str(outcome), target))
+    def _saw(self, raw: RawTransition) -> None:
+        noted = unfold(raw)
+        if noted.kind != 'start':
+            self.transitions.append((noted.path, noted.source, noted.outcome, noted.target))
 
     def path(self, container: str | None = None) -> list[str]:
         """Labels of the states that were executed in a container, in order; default: the root."""
@@ -214,9 +215,8 @@ class Watched:
 def watching(machine: ActiveContainer) -> Iterator[Watched]:
     """Note the transitions of a root while the block runs, over any number of executions."""
     watched = Watched(machine)
-    before = machine.control.trace
-    machine.control.set_trace(watched._saw)
+    remove = machine.control.add_trace(watched._saw)
     try:
         yield watched
     finally:
-        machine.control.set_trace(before)
+        remove()
