@@ -24,6 +24,13 @@ def end_with_parent(parent: int) -> None:
             sys.exit(1)
 
 
+def say_up() -> None:
+    """Tells the launcher that the imports, most of the start, are done: the next one may begin."""
+    descriptor = os.environ.pop('LAUNCH_UP', None)
+    if descriptor is not None:
+        os.close(int(descriptor))
+
+
 def main(argv: list[str]) -> int:
     parent, targets, *arguments = argv
     end_with_parent(int(parent))
@@ -33,11 +40,13 @@ def main(argv: list[str]) -> int:
         module, _, class_name = place.partition(':')
         parsed.append((name, module, class_name))
     sys.argv = [parsed[0][0], *arguments]
+    modules = [importlib.import_module(module) for _, module, _ in parsed]
+    say_up()
     if len(parsed) == 1:
-        return int(importlib.import_module(parsed[0][1]).main(arguments) or 0)
+        return int(modules[0].main(arguments) or 0)
     from surveillance_runtime.process import run_nodes
 
-    classes = [getattr(importlib.import_module(module), name) for _, module, name in parsed]
+    classes = [getattr(module, parsed[i][2]) for i, module in enumerate(modules)]
     return run_nodes(classes, arguments)
 
 

@@ -42,12 +42,6 @@ class Node:
 # In start order: what the first decision waits for comes first, so that it is ready first.
 NODES = (
     Node(
-        'robot_behavior',
-        'surveillance_behaviour',
-        'RobotBehavior',
-        'the state machine that patrols',
-    ),
-    Node(
         'armor_server',
         'surveillance_ontology',
         'ArmorServer',
@@ -58,6 +52,12 @@ NODES = (
         'surveillance_ontology',
         'OntologyMapBuilder',
         'loads the ontology and builds the map in it',
+    ),
+    Node(
+        'robot_behavior',
+        'surveillance_behaviour',
+        'RobotBehavior',
+        'the state machine that patrols',
     ),
     Node(
         'battery_controller',

@@ -23,6 +23,7 @@ from surveillance_runtime.place import read_place
 from surveillance_runtime.yaml_file import YamlFileError, read_yaml_file
 
 CHILD = Path(__file__).with_name('child.py')
+DISCOVERY = Path(__file__).with_name('discovery.xml')
 PLACES = {'surveillance': 'seven_rooms.yaml', 'patrol': 'patrol_world.yaml'}
 RECORD = 'mission.jsonl'
 COMPOSED = 'composed'
@@ -153,6 +154,7 @@ def node_environ(run: Run, logs: Path | None = None) -> dict[str, str]:
         environ['ROS_DOMAIN_ID'] = str(run.domain)
     # Shared memory that a killed process leaves behind hides later nodes of the same domain.
     environ.setdefault('FASTDDS_BUILTIN_TRANSPORTS', 'UDPv4')
+    environ.setdefault('FASTRTPS_DEFAULT_PROFILES_FILE', str(DISCOVERY))
     if logs is not None:
         environ['PYTHONUNBUFFERED'] = '1'
         environ['RCUTILS_CONSOLE_OUTPUT_FORMAT'] = ROS_FORMAT
@@ -237,6 +239,7 @@ def run_mission(run: Run, config: Path, runs: Path) -> int:
                 environ,
                 takes_input=manual and bool(node.console),
                 leads=node.name == BEHAVIOUR_NODE,
+                says_up=True,
             )
             for node in nodes
         ]

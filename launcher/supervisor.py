@@ -20,6 +20,10 @@ from launcher.log import MergedLog
 
 PAUSES = (0.5, 1.0, 2.0, 4.0, 8.0, 15.0, 30.0)
 """Seconds before the first, second, ... restart in a row; the last one is kept."""
+START_WITHIN = 1.5
+"""Seconds after which a process that did not say that it is up no longer holds the next one up."""
+UP = 'LAUNCH_UP'
+"""The environment variable with the descriptor that a process closes to say that it is up."""
 STEADY_AFTER = 20.0
 """A process that ran this long, in seconds, starts again from the first pause."""
 STOP_LEADERS_WITHIN = 1.2
@@ -41,6 +45,7 @@ class Program:
         command, environ: as for `subprocess`.
         takes_input: whether it reads lines, see `Supervisor.send`.
         leads: whether it uses the others, and so is stopped before them.
+        says_up: whether it closes the descriptor in `UP` when the bulk of its start is done.
     """
 
     name: str
@@ -48,6 +53,7 @@ class Program:
     environ: Mapping[str, str]
     takes_input: bool = False
     leads: bool = False
+    says_up: bool = False
 
 
 @dataclass
@@ -61,6 +67,7 @@ class Child:
     deaths: int = 0
     told_to_stop: bool = False
     killed: bool = False
+    coming_up: bool = False
     rest: bytes = field(default=b'', repr=False)
 
     @property
@@ -71,16 +78,26 @@ class Child:
 class Supervisor:
     """Runs programs until told to stop.
 
+    No more of them come up at once than the machine has processors: so the first are not slowed
+    down by the last.
+
     Args:
         programs: in start order.
         log: where their output goes.
         pauses: seconds before a restart, see `PAUSES`.
+        at_once: how many may come up at the same time; default: the number of processors.
     """
 
     def __init__(
-        self, programs: Sequence[Program], log: MergedLog, pauses: Sequence[float] = PAUSES
+        self,
+        programs: Sequence[Program],
+        log: MergedLog,
+        pauses: Sequence[float] = PAUSES,
+        at_once: int | None = None,
     ) -> None:
         self.children = {program.name: Child(program) for program in programs}
+        self._to_start: list[Child] = []
+        self._at_once = at_once or os.cpu_count() or 1
         self._log = log
         self._pauses = tuple(pauses)
         self._selector = selectors.DefaultSelector()
@@ -123,6 +140,7 @@ class Supervisor:
         if self._stopping_since is None:
             self._stopping_since = time.monotonic()
             self._code = code
+            self._to_start.clear()
             for child in self.children.values():
                 child.restart_at = None
             self._tell_to_stop(leaders_only=True)
@@ -136,9 +154,11 @@ class Supervisor:
         """
         end = None if seconds is None else time.monotonic() + seconds
         with self._signals():
-            for child in self.children.values():
-                self._start(child)
-            while any(child.running or child.restart_at for child in self.children.values()):
+            self._to_start = list(self.children.values())
+            self._start_next()
+            while self._to_start or any(
+                child.running or child.restart_at for child in self.children.values()
+            ):
                 for key, _ in self._selector.select(self._timeout(end)):
                     key.data()
                 self._reap()
@@ -147,18 +167,19 @@ class Supervisor:
         self._selector.close()
         return self._code
 
+    def _start_next(self) -> None:
+        late = time.monotonic() - START_WITHIN
+        while self._to_start and self._at_once > sum(
+            child.coming_up and child.started > late for child in self.children.values()
+        ):
+            self._start(self._to_start.pop(0))
+
     def _start(self, child: Child) -> None:
         child.restart_at = None
         child.rest = b''
-        child.process = process = subprocess.Popen(
-            child.program.command,
-            env=child.program.environ,
-            stdin=subprocess.PIPE if child.program.takes_input else subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            # Ctrl-C in the terminal reaches the launcher alone, which then ends each child once.
-            start_new_session=True,
-        )
+        with self._awaited(child) as descriptors:
+            process = self._spawn(child, descriptors)
+        child.process = process
         child.started = time.monotonic()
         assert process.stdout is not None
         os.set_blocking(process.stdout.fileno(), False)
@@ -168,6 +189,42 @@ class Supervisor:
             process.stdout, selectors.EVENT_READ, lambda: self._read(child, process)
         )
         self._log.say(f'started {child.program.name} (process {process.pid})')
+
+    @contextlib.contextmanager
+    def _awaited(self, child: Child) -> Iterator[tuple[int, ...]]:
+        """Gives what a process closes when it is up, or lets go of when it dies before that."""
+        if not child.program.says_up:
+            yield ()
+            return
+        reader, writer = os.pipe()
+
+        def up() -> None:
+            self._selector.unregister(reader)
+            os.close(reader)
+            child.coming_up = False
+            self._start_next()
+
+        self._selector.register(reader, selectors.EVENT_READ, up)
+        child.coming_up = True
+        try:
+            yield (writer,)
+        finally:
+            os.close(writer)
+
+    def _spawn(self, child: Child, descriptors: tuple[int, ...]) -> subprocess.Popen[bytes]:
+        environ = dict(child.program.environ)
+        if descriptors:
+            environ[UP] = str(descriptors[0])
+        return subprocess.Popen(
+            child.program.command,
+            env=environ,
+            pass_fds=descriptors,
+            stdin=subprocess.PIPE if child.program.takes_input else subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            # Ctrl-C in the terminal reaches the launcher alone, which then ends each child once.
+            start_new_session=True,
+        )
 
     def _read(self, child: Child, process: subprocess.Popen[bytes]) -> bool:
         """Takes what a process printed; whether there may be more."""
@@ -240,6 +297,9 @@ class Supervisor:
                 times.append(self._stopping_since + STOP_WITHIN)
         elif end is not None:
             times.append(end)
+        if self._to_start:
+            coming = [child.started for child in self.children.values() if child.coming_up]
+            times += [started + START_WITHIN for started in coming]
         return max(0.0, min(times) - time.monotonic()) if times else None
 
     def _tell_to_stop(self, *, leaders_only: bool) -> None:
@@ -275,6 +335,7 @@ class Supervisor:
         for child in self.children.values():
             if child.restart_at is not None and now >= child.restart_at:
                 self._start(child)
+        self._start_next()
         self._keep_stopping(now)
 
     @contextlib.contextmanager

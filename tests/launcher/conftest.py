@@ -60,6 +60,16 @@ class Started:
                 assert more, f'no {pattern!r} in:\n' + '\n'.join(self.lines)
                 self._changed.wait(remaining)
 
+    def answer(self, pattern: str, answers: Mapping[str, str], after: int = 0) -> None:
+        """Writes the answer to each line that asks for one, until a line has the pattern."""
+        seen = after
+        while True:
+            found = self.until('|'.join((pattern, *answers)), after=seen)
+            seen = self.lines.index(found.string, seen) + 1
+            if re.search(pattern, found.string):
+                return
+            self.write(next(word for ask, word in answers.items() if re.search(ask, found.string)))
+
     def write(self, line: str) -> None:
         assert self.process.stdin is not None
         self.process.stdin.write(line + '\n')

@@ -9,15 +9,17 @@ from launcher.log import MergedLog
 from launcher.supervisor import Program, Supervisor
 
 seconds = float(os.environ['SECONDS_TO_RUN']) if 'SECONDS_TO_RUN' in os.environ else None
+at_once = int(os.environ.get('AT_ONCE', '0'))
 programs = []
 for argument in sys.argv[1:]:
     name, _, script = argument.partition('=')
     command = [sys.executable, '-u', '-c', script]
     leads = name.startswith('lead')
-    programs.append(Program(name, command, os.environ, takes_input=True, leads=leads))
-supervisor = Supervisor(
-    programs, MergedLog(None, [p.name for p in programs], colour=False), pauses=(0.01, 0.02)
-)
+    programs.append(
+        Program(name, command, os.environ, takes_input=True, leads=leads, says_up=at_once > 0)
+    )
+log = MergedLog(None, [p.name for p in programs], colour=False)
+supervisor = Supervisor(programs, log, pauses=(0.01, 0.02), at_once=at_once or None)
 supervisor.read_from(
     0, lambda line: print('sent', supervisor.send(*line.split(' ', 1)), flush=True)
 )

@@ -72,6 +72,30 @@ def test_what_uses_the_others_is_stopped_before_them(start):
     assert leaving == ['lead', 'last']
 
 
+def test_no_more_processes_come_up_at_once_than_allowed(start):
+    slow = (
+        'import os, signal\n'
+        'print("coming", flush=True); input(); print("up", flush=True)\n'
+        'os.close(int(os.environ["LAUNCH_UP"])); signal.pause()'
+    )
+    mortal = 'raise SystemExit(0)'
+    programs = (f'one={slow}', f'two={mortal}', f'three={WAIT}')
+    launch = start(DRIVER, *programs, environ={**ENVIRON, 'AT_ONCE': '1'})
+    launch.until(r'one +\| coming')
+    launch.write('one go')
+    launch.until(r'three +\| up')
+    assert launch.end(signal.SIGINT)[0] == 0
+    events = [line.split(' ', 1)[1] for line in launch.lines if ' | ' in line]
+    ups = [re.sub(r' +\| ', ' ', e) for e in events if re.search(r'started|\| up', e)]
+    assert [re.sub(r'^launch (started )?| \(.*', '', event) for event in ups] == [
+        'one',
+        'one up',
+        'two',
+        'three',
+        'three up',
+    ]
+
+
 def test_a_child_that_dies_comes_back_and_the_rest_goes_on(start):
     launch = start(DRIVER, f'one={WAIT}', f'two={WAIT}', environ=ENVIRON)
     first = int(launch.until(r'started one \(process (\d+)\)')[1])
