@@ -37,10 +37,10 @@ from surveillance_ontology.axioms import (  # noqa: E402
     DifferentIndividuals,
     ObjectPropertyAssertion,
 )
+from surveillance_ontology.documents.reading import read_ontology  # noqa: E402
+from surveillance_ontology.documents.writing import write_ontology  # noqa: E402
 from surveillance_ontology.expressions import Literal  # noqa: E402
 from surveillance_ontology.knowledge_base import KnowledgeBase  # noqa: E402
-from surveillance_ontology.owl_reading import read_ontology  # noqa: E402
-from surveillance_ontology.owl_writing import write_ontology  # noqa: E402
 from surveillance_ontology.vocabulary import XSD  # noqa: E402
 
 IRI = 'http://bnc/exp-rob-lab/2022-23'

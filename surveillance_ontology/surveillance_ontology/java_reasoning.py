@@ -23,12 +23,12 @@ from surveillance_ontology.axioms import (
     ObjectPropertyAssertion,
     SubClassOf,
 )
+from surveillance_ontology.documents.writing import ontology_bytes
 from surveillance_ontology.explanation import Explanation
 from surveillance_ontology.expressions import Literal
 from surveillance_ontology.knowledge import Fact
 from surveillance_ontology.knowledge_base import KnowledgeBase
 from surveillance_ontology.knowledge_changes import Changes
-from surveillance_ontology.owl_writing import ontology_bytes
 from surveillance_ontology.reasoner.datatypes import value_of
 from surveillance_ontology.vocabulary import OWL, RDF, RDFS, THING
 

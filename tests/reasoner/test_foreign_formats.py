@@ -6,7 +6,7 @@ import pytest
 
 from surveillance_ontology import axioms as ax
 from surveillance_ontology import expressions as ex
-from surveillance_ontology.owl_reading import OntologyFileError, read_ontology
+from surveillance_ontology.documents.reading import OntologyFileError, read_ontology
 
 IRI = 'http://example.org/place'
 XSD = 'http://www.w3.org/2001/XMLSchema#'

@@ -22,8 +22,8 @@ from surveillance_ontology.axioms import (
     SubClassOf,
     SubPropertyChainOf,
 )
+from surveillance_ontology.documents.writing import write_ontology
 from surveillance_ontology.knowledge_base import KnowledgeBase
-from surveillance_ontology.owl_writing import write_ontology
 from tests.reasoner.patrol_map import DOORS, IRI, SEVEN_ROOMS, n, seven_rooms
 from tests.reasoner.random_ontologies import CLASSES, INDIVIDUALS, OBJECTS, RandomOntology
 

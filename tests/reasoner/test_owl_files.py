@@ -19,14 +19,14 @@ from surveillance_ontology.axioms import (
     Rule,
     SubClassOf,
 )
-from surveillance_ontology.expressions import Literal
-from surveillance_ontology.knowledge_base import KnowledgeBase
-from surveillance_ontology.owl_reading import OntologyFileError, read_ontology
-from surveillance_ontology.owl_writing import (
+from surveillance_ontology.documents.reading import OntologyFileError, read_ontology
+from surveillance_ontology.documents.writing import (
     OntologyWriteError,
     ontology_bytes,
     write_ontology,
 )
+from surveillance_ontology.expressions import Literal
+from surveillance_ontology.knowledge_base import KnowledgeBase
 from surveillance_ontology.vocabulary import OWL, RDF, XSD
 from tests.reasoner.patrol_map import IRI, SCHEMA, VISITS, link, n, names, seven_rooms, value
 from tests.reasoner.random_ontologies import RandomOntology

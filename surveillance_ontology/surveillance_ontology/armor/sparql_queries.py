@@ -16,8 +16,8 @@ from surveillance_ontology.axioms import (
     EquivalentClasses,
     SubClassOf,
 )
+from surveillance_ontology.documents.writing import ontology_bytes
 from surveillance_ontology.entities import entities_of
-from surveillance_ontology.owl_writing import ontology_bytes
 from surveillance_ontology.vocabulary import XSD
 
 if TYPE_CHECKING:

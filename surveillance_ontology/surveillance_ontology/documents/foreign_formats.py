@@ -11,7 +11,7 @@ import io
 import re
 import threading
 
-from surveillance_ontology.rdf_xml import RdfSyntaxError
+from surveillance_ontology.documents.rdf_xml import RdfSyntaxError
 
 _OWL_XML = re.compile(rb'<(?:\w+:)?Ontology\b[^>]*\bhttp://www\.w3\.org/2002/07/owl#', re.DOTALL)
 _TURTLE = re.compile(rb'\s*(?:@prefix|@base|prefix|base)\s', re.IGNORECASE)

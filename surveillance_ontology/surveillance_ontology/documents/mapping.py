@@ -12,15 +12,15 @@ from collections.abc import Callable, Sequence
 from surveillance_ontology import axioms as ax
 from surveillance_ontology import expressions as ex
 from surveillance_ontology.axioms import Axiom
-from surveillance_ontology.expressions import Literal
-from surveillance_ontology.owl_nodes import (
+from surveillance_ontology.documents.nodes import (
     ANNOTATIONS,
     BUILT_IN,
     CHARACTERISTICS,
     DECLARATIONS,
     NodeReader,
 )
-from surveillance_ontology.rdf_xml import Graph, Node
+from surveillance_ontology.documents.rdf_xml import Graph, Node
+from surveillance_ontology.expressions import Literal
 from surveillance_ontology.vocabulary import NOTHING, OWL, RDF, RDFS, SWRL, THING, XSD, local_name
 
 _TYPE = RDF + 'type'

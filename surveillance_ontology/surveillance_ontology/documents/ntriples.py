@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 
+from surveillance_ontology.documents.rdf_xml import Graph, Node, RdfSyntaxError
 from surveillance_ontology.expressions import Literal
-from surveillance_ontology.rdf_xml import Graph, Node, RdfSyntaxError
 from surveillance_ontology.vocabulary import RDF, XSD
 
 _IRI = r'<((?:[^\x00-\x20<>"{}|^`\\]|\\u[0-9A-Fa-f]{4}|\\U[0-9A-Fa-f]{8})*)>'

@@ -8,9 +8,9 @@ from itertools import count
 from surveillance_ontology import axioms as ax
 from surveillance_ontology import expressions as ex
 from surveillance_ontology.axioms import Axiom
+from surveillance_ontology.documents.rdf_xml import Node, Triple
 from surveillance_ontology.entities import entities_of
 from surveillance_ontology.expressions import Literal
-from surveillance_ontology.rdf_xml import Node, Triple
 from surveillance_ontology.vocabulary import OWL, RDF, RDFS, SWRL, THING, TOP_LITERAL, XSD
 
 _TYPE = RDF + 'type'

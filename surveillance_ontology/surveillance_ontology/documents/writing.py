@@ -10,9 +10,9 @@ from pathlib import Path
 from xml.sax.saxutils import escape, quoteattr
 
 from surveillance_ontology.axioms import Axiom
+from surveillance_ontology.documents.rdf_xml import Node, Triple
+from surveillance_ontology.documents.triples import triples_of
 from surveillance_ontology.expressions import Literal
-from surveillance_ontology.owl_triples import triples_of
-from surveillance_ontology.rdf_xml import Node, Triple
 from surveillance_ontology.vocabulary import OWL, RDF, RDFS, SWRL, XSD
 
 FORMATS = ('rdfxml', 'ntriples')

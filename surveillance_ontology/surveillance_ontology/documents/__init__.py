@@ -1,0 +1,1 @@
+"""Ontology documents: reading them into axioms and writing axioms as documents."""
