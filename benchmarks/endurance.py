@@ -42,9 +42,6 @@ from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 LONGEST_WRONG = 2.0
 """Simulated seconds that the ontology may be wrong about the robot's place."""
 
-TOP_SPEED = 60.0
-"""Simulated seconds per real second at most: what a node thinks costs the robot that much time."""
-
 
 class Watch:
     """Looks on from outside and notes what went wrong.
@@ -288,8 +285,7 @@ def run(
     The seconds count from when the robot first drives.
     """
     rng = random.Random(seed)
-    simulator = {'random_seed': seed, 'top_speed': TOP_SPEED}
-    stack = Stack(place, {'simulator': simulator}, log_level=log_level)
+    stack = Stack(place, {'simulator': {'random_seed': seed}}, log_level=log_level)
     watch = Watch(stack)
     trouble = Trouble(stack, watch, rng)
     stack.start()
