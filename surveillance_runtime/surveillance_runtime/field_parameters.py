@@ -15,7 +15,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.parameters import Check
+from surveillance_runtime.parameters import Check, ParameterError
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -68,7 +68,8 @@ def declare_fields(
         The record with the parameters' values.
 
     Raises:
-        ParameterError: A value given at the start is not allowed.
+        ParameterError: A value given at the start is not allowed, alone or beside the others: then
+            the record raised a ValueError that begins with the field's name.
     """
     values: dict[str, Any] = {}
     for field, how in described.items():
@@ -87,7 +88,10 @@ def declare_fields(
             on_change=None if on_change is None else partial(_tell, on_change, field, kind),
         )
         values[field] = kind(value) if kind else value
-    return replace(record, **values)
+    try:
+        return replace(record, **values)
+    except ValueError as error:
+        raise ParameterError(f'parameter {prefix}{error}') from None
 
 
 def _tell(

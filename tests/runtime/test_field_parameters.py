@@ -18,6 +18,10 @@ class Drive:
     names: tuple[str, ...] = ('slow', 'fast')
     wheel: float = 0.1
 
+    def __post_init__(self) -> None:
+        if self.speed > 2 * self.gears:
+            raise ValueError(f'speed is {self.speed}: expected at most twice the gears')
+
 
 FIELDS = {
     'speed': Described('Top speed, m/s.', 0.01, 20.0),
@@ -45,6 +49,7 @@ def test_defaults_are_the_records_and_given_values_take_their_place(graph):
     [
         ({'drive.speed': 21.0}, 'parameter drive.speed: got 21.0, expected a number from 0.01'),
         ({'gear_count': 0}, 'parameter gear_count: got 0, expected an integer, at least 1'),
+        ({'drive.speed': 9.0}, 'parameter drive.speed is 9.0: expected at most twice the gears'),
         ({'drive.names': []}, 'parameter drive.names: got [], expected at least one name'),
     ],
 )
