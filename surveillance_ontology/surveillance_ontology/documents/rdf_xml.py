@@ -80,7 +80,10 @@ def resolve(base: str, reference: str) -> str:
         return stem
     if reference[0] == '#':
         return stem + reference
-    return urljoin(stem, reference)
+    try:
+        return urljoin(stem, reference)
+    except ValueError as error:
+        raise RdfSyntaxError(f'IRI {reference!r} with base {stem!r}: {error}') from None
 
 
 class _Reader:
@@ -311,6 +314,10 @@ def parse_rdf_xml(data: bytes, base: str) -> Graph:
         raise RdfSyntaxError(
             f'not well-formed XML: {expat.ErrorString(error.code)}', error.lineno, error.offset + 1
         ) from None
+    except RdfSyntaxError:
+        raise
+    except (LookupError, ValueError) as error:
+        raise RdfSyntaxError(f'its encoding cannot be read: {error}', 1, 1) from None
     if not reader.seen_root:
         raise RdfSyntaxError('the document holds no element', 1, 1)
     return reader.graph
