@@ -55,8 +55,9 @@ def test_axioms_are_read_with_exact_datatypes(text, form):
         (TURTLE.replace('"5"', ';;'), 7, 'not Turtle'),
     ],
 )
-def test_broken_document_names_its_place(text, line, complaint):
+def test_broken_document_names_its_place(text, line, complaint, capfd):
     with pytest.raises(OntologyFileError, match=complaint) as error:
         read_ontology(text.encode(), IRI)
     assert error.value.line == line
     assert '\n' not in str(error.value)
+    assert capfd.readouterr().err == ''

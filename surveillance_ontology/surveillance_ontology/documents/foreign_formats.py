@@ -9,7 +9,10 @@ from __future__ import annotations
 
 import io
 import re
+import sys
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 from surveillance_ontology.documents.rdf_xml import RdfSyntaxError
 
@@ -47,7 +50,7 @@ def owl_xml_to_ntriples(data: bytes, iri: str) -> bytes:
     if entity >= 0:
         line = data.count(b'\n', 0, entity) + 1
         raise RdfSyntaxError('entities are not read in OWL/XML; write the IRIs out', line, 1)
-    with _one_at_a_time:
+    with _one_at_a_time, _untold():
         world = owlready2.World()
         try:
             ontology = world.get_ontology(iri)
@@ -68,6 +71,17 @@ def owl_xml_to_ntriples(data: bytes, iri: str) -> bytes:
         finally:
             world.close()
     return triples.getvalue()
+
+
+@contextmanager
+def _untold() -> Iterator[None]:
+    """Keeps owlready2 from printing a traceback of what it raises besides."""
+    hook = sys.excepthook
+    sys.excepthook = lambda *_: None
+    try:
+        yield
+    finally:
+        sys.excepthook = hook
 
 
 def turtle_to_ntriples(data: bytes, iri: str) -> bytes:
