@@ -53,6 +53,7 @@ def test_axioms_are_read_with_exact_datatypes(text, form):
         ),
         (OWL_XML.replace('<Decl', '<Import>http://example.org/no</Import><Decl', 1), 0, 'not read'),
         (TURTLE.replace('"5"', ';;'), 7, 'not Turtle'),
+        ('@prefix : <a\nb> .\n', 1, 'not Turtle: Invalid IRI'),
     ],
 )
 def test_broken_document_names_its_place(text, line, complaint, capfd):

@@ -23,6 +23,7 @@ class OntologyFileError(ValueError):
     """
 
     def __init__(self, path: str, line: int, column: int, message: str) -> None:
+        message = ' '.join(message.split())
         place = f':{line}:{column}' if line else ''
         super().__init__(f'{path}{place}: {message}')
         self.path, self.line, self.column, self.message = path, line, column, message
