@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
 from launcher import graph, system
+from launcher.claims import claim
 from launcher.environment import CHECKOUT, Environment, SetupError, clean_environ
 
 if TYPE_CHECKING:
@@ -243,7 +244,7 @@ def _node(argv: list[str]) -> int:
     options = parser.parse_args(argv)
     node = graph.find(options.name)
     _enter(['node', *argv])
-    from launcher.mission import command, node_environ, parameter_files, ros_arguments
+    from launcher.mission import command, node_environ, parameter_files, ros_arguments, ros_domain
 
     run = wanted_run(options)
     run.check()
@@ -251,6 +252,10 @@ def _node(argv: list[str]) -> int:
     if node.console:
         arguments += ['-p', f'execution_mode:={run.mode or graph.DEFAULT_MODE}']
     arguments += ['--', *options.rest]
+    renamed = any('__ns:=' in word or '__node:=' in word for word in options.rest)
+    if not renamed:
+        for descriptor in claim([node], ros_domain(run), run.namespace):
+            os.set_inheritable(descriptor, True)
     words = command([node], arguments, 0)
     os.execve(words[0], words, node_environ(run))
 

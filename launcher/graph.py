@@ -147,6 +147,8 @@ _OF_PATROL = (
     'marker_server',
     'arm_controller',
 )
+RUN_NODES = frozenset((*_ALWAYS, *_OF_PATROL))
+"""The nodes of which a robot has one each."""
 
 
 def find(name: str) -> Node:

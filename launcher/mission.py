@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from launcher import graph
+from launcher.claims import claim
 from launcher.log import ROS_FORMAT, MergedLog
 from launcher.supervisor import Program, Supervisor
 from surveillance_behaviour import mission_record
@@ -147,6 +148,23 @@ def ros_arguments(files: Sequence[Path], run: Run) -> list[str]:
     return arguments
 
 
+def ros_domain(run: Run) -> str:
+    """The ROS domain of a run: as asked for, else as the environment says.
+
+    Raises:
+        RunError: what the environment says is no domain.
+    """
+    if run.domain is not None:
+        return str(run.domain)
+    given = os.environ.get('ROS_DOMAIN_ID') or '0'
+    if not given.isdecimal() or int(given) > MAX_DOMAIN:
+        raise RunError(
+            f'environment variable ROS_DOMAIN_ID: got {given!r}, '
+            f'expected a number from 0 to {MAX_DOMAIN}'
+        )
+    return str(int(given))
+
+
 def node_environ(run: Run, logs: Path | None = None) -> dict[str, str]:
     """The environment of a node's process."""
     environ = dict(os.environ)
@@ -219,10 +237,11 @@ def run_mission(run: Run, config: Path, runs: Path) -> int:
         runs: where the run gets a folder of its own for its log, parameters and record.
 
     Raises:
-        RunError, graph.SelectionError: what was asked for cannot be run.
+        RunError, graph.SelectionError, ClaimError: what was asked for cannot be run.
     """
     run.check()
     nodes = run.nodes()
+    claims = claim(nodes, ros_domain(run), run.namespace)
     folder = make_folder(runs)
     files = [*parameter_files(config, run), write_own_parameters(folder, run)]
     arguments = ros_arguments(files, run)
@@ -248,7 +267,7 @@ def run_mission(run: Run, config: Path, runs: Path) -> int:
     log.say(
         f'{run.behaviour} in mode {run.mode or graph.DEFAULT_MODE}, '
         f'place {files[1].name}, '
-        f'ROS domain {environ.get("ROS_DOMAIN_ID", "0")}, files in {_short(folder)}'
+        f'ROS domain {ros_domain(run)}, files in {_short(folder)}'
     )
     supervisor = Supervisor(programs, log)
     console = None
@@ -266,6 +285,8 @@ def run_mission(run: Run, config: Path, runs: Path) -> int:
     if any(node.name == BEHAVIOUR_NODE for node in nodes):
         log.plain(summary(folder / RECORD))
     log.close()
+    for descriptor in claims:
+        os.close(descriptor)
     return code
 
 

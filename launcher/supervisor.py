@@ -78,14 +78,15 @@ class Child:
 class Supervisor:
     """Runs programs until told to stop.
 
-    No more of them come up at once than the machine has processors: so the first are not slowed
-    down by the last.
+    Only so many come up at once as the machine has processors for: the first are not slowed down by
+    the last.
 
     Args:
         programs: in start order.
         log: where their output goes.
         pauses: seconds before a restart, see `PAUSES`.
-        at_once: how many may come up at the same time; default: the number of processors.
+        at_once: how many may come up at the same time; default: one more than there are
+            processors, for each waits at times.
     """
 
     def __init__(
@@ -97,7 +98,7 @@ class Supervisor:
     ) -> None:
         self.children = {program.name: Child(program) for program in programs}
         self._to_start: list[Child] = []
-        self._at_once = at_once or os.cpu_count() or 1
+        self._at_once = at_once or (os.cpu_count() or 1) + 1
         self._log = log
         self._pauses = tuple(pauses)
         self._selector = selectors.DefaultSelector()

@@ -1,0 +1,81 @@
+"""Which nodes run on this machine, so that a second launch does not start the same ones again.
+
+Two nodes of one name in one ROS domain answer each other's calls. A claim is a locked file in the
+system's temporary folder, so it ends with the process that holds it, however that ends.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import os
+import tempfile
+from collections.abc import Iterable
+from pathlib import Path
+
+from launcher.graph import RUN_NODES, Node
+
+
+class ClaimError(ValueError):
+    """Somebody else runs these nodes: one line that says who and where."""
+
+
+def claim(
+    nodes: Iterable[Node], domain: str, namespace: str | None, folder: Path | None = None
+) -> list[int]:
+    """Claims nodes for this process.
+
+    Args:
+        nodes: what shall run; of a viewer there may be several, so it is not claimed.
+        domain: the ROS domain they run in.
+        namespace: the namespace they run in, None for none.
+        folder: where the claims lie; default: in the system's temporary folder.
+
+    Returns:
+        Descriptors that hold the claims as long as they are open.
+
+    Raises:
+        ClaimError: some of them are claimed already; then none is claimed.
+    """
+    folder = folder or Path(tempfile.gettempdir(), 'surveillance-nodes')
+    held: list[int] = []
+    taken: list[str] = []
+    holder = ''
+    for node in (node.name for node in nodes if node.name in RUN_NODES):
+        place = '.'.join([domain, *(namespace or '').strip('/').split('/'), node])
+        descriptor = _open(folder, place)
+        if descriptor is None:
+            continue
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            taken.append(node)
+            holder = holder or os.read(descriptor, 20).decode('ascii', 'replace').strip()
+            os.close(descriptor)
+            continue
+        held.append(descriptor)
+        # Others may read who holds it; where the disk is full they do not learn it.
+        with contextlib.suppress(OSError):
+            os.ftruncate(descriptor, 0)
+            os.write(descriptor, str(os.getpid()).encode())
+    if not taken:
+        return held
+    for descriptor in held:
+        os.close(descriptor)
+    who = f' (process {holder})' if holder else ''
+    where = f'ROS domain {domain}' + (f', namespace {namespace}' if namespace else '')
+    raise ClaimError(
+        f'already running in {where}{who}: {", ".join(taken)}; '
+        'expected another --domain or --namespace, or --without these'
+    )
+
+
+def _open(folder: Path, name: str) -> int | None:
+    """The file of a claim; None where it cannot be had, and nothing is claimed then."""
+    try:
+        folder.mkdir(exist_ok=True)
+        with contextlib.suppress(OSError):
+            folder.chmod(0o1777)  # for every user of the machine
+        return os.open(folder / name, os.O_RDWR | os.O_CREAT, 0o666)
+    except OSError:
+        return None
