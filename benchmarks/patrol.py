@@ -114,6 +114,7 @@ def ring(count: int) -> Map:
 def maps(quick: bool) -> Iterator[Map]:
     """The maps of the benchmark."""
     yield place_map('seven rooms', ROOT / 'config' / 'seven_rooms.yaml')
+    yield place_map('patrol world', ROOT / 'config' / 'patrol_world.yaml')
     yield place_map('office, 40 rooms', ROOT / 'config' / 'office.yaml')
     yield grid(5, 5)
     yield grid(10, 10)
@@ -207,6 +208,30 @@ def thresholds(place: Map, hours: float) -> None:
             run = patrol(place, policy, hours, factor * length)
             late.append(f'{run.settled - max(1.0, factor) * length:.1f}')
         rows.append([policy, *late])
+    print(table(rows), flush=True)
+
+
+def configured(places: Sequence[Map], hours: float) -> None:
+    """What the threshold of config/parameters.yaml comes to, with the default policy."""
+    text = (ROOT / 'config' / 'parameters.yaml').read_text(encoding='utf-8')
+    nodes = yaml.safe_load(text)
+    threshold = nodes['/**/robot_behavior']['ros__parameters']['urgency_threshold']
+    print(f'\nurgency_threshold {threshold} s, {DEFAULT_POLICY}, {hours:g} h, once settled')
+    rows = [['place', 'tour s', 'longest s', 'late s', 'mean s', 'moves that are URGENT']]
+    for place in places:
+        run, tour = patrol(place, DEFAULT_POLICY, hours, threshold), place.graph.tour.length
+        urgent = run.rules.get('URGENT', 0) / run.moves
+        late = run.settled - max(threshold, tour)
+        rows.append(
+            [
+                place.name,
+                f'{tour:.1f}',
+                f'{run.settled:.1f}',
+                f'{late:.1f}',
+                f'{run.mean:.1f}',
+                f'{100.0 * urgent:.0f} %',
+            ]
+        )
     print(table(rows), flush=True)
 
 
@@ -324,6 +349,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if len(place.graph.places) <= LARGE:
             thresholds(place, min(hours, 6.0))
             strandings(place, hours)
+    if not options.graph:
+        small = [place for place in chosen if len(place.graph.places) <= LARGE]
+        configured(small, min(hours, 6.0))
     if options.plot:
         plot(options.plot, results)
     return 0

@@ -159,5 +159,5 @@ def tour_warning(graph_tour: float, threshold: float) -> str:
         return ''
     return (
         f'urgency_threshold is {threshold:g} s, but the shortest tour of all places takes '
-        f'{graph_tour:.1f} s: most places will be URGENT all the time'
+        f'{graph_tour:.1f} s: no robot can keep them from becoming URGENT'
     )
