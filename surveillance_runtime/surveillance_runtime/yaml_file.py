@@ -15,6 +15,7 @@ from typing import Any
 import yaml
 
 MAX_BYTES = 4_000_000
+_INT64 = 2**63
 KeyPath = tuple[str, ...]
 
 
@@ -132,13 +133,16 @@ class _Reader:
         if isinstance(node, yaml.MappingNode):
             line = node.start_mark.line + 1
             raise YamlFileError(f'{self.path}:{line}: a list cannot hold a mapping')
+        line = node.start_mark.line + 1
         try:
-            return self._scalars.construct_object(node)
+            value = self._scalars.construct_object(node)
         except (yaml.YAMLError, ValueError):
-            line = node.start_mark.line + 1
             raise YamlFileError(
                 f"{self.path}:{line}: '{node.value}' cannot be read as a value; quote it"
             ) from None
+        if isinstance(value, int) and not -_INT64 <= value < _INT64:
+            raise YamlFileError(f'{self.path}:{line}: {node.value:.40}: expected a 64-bit number')
+        return value
 
 
 def twice(path: Path, where: KeyPath, line: int, first: int) -> YamlFileError:

@@ -21,6 +21,10 @@ Pose = tuple[float, float, float]
 
 WALL_THICKNESS = 0.1
 WALL_HEIGHT = 2.5
+FURTHEST = 1000.0
+"""How far from the origin a wall may reach, metres."""
+LARGEST = 100_000.0
+"""Area of the largest place, square metres: its map is held in memory cell by cell."""
 _ON_WALL = 0.03
 
 
@@ -154,6 +158,12 @@ class FloorPlan:
 
     def _check(self) -> None:
         for wall in self.walls.values():
+            if (furthest := max(map(abs, (*wall.start, *wall.end)))) > FURTHEST:
+                raise WorldError(
+                    f'reaches to {furthest:g} m: expected at most {FURTHEST:g} m',
+                    'walls',
+                    wall.name,
+                )
             if wall.length < WALL_THICKNESS:
                 raise WorldError(
                     f'length {wall.length:g} m: expected at least the thickness of a wall, '
@@ -161,6 +171,13 @@ class FloorPlan:
                     'walls',
                     wall.name,
                 )
+        west, south, east, north = self.bounds
+        if (east - west) * (north - south) > LARGEST:
+            raise WorldError(
+                f'the place is {east - west:g} m by {north - south:g} m: expected at most '
+                f'{LARGEST:g} square metres',
+                'walls',
+            )
         for door in self.doors.values():
             if not 0.3 <= door.width <= 20.0:
                 raise WorldError(

@@ -138,6 +138,7 @@ GOOD = """\
         ('      B: [D1]', '      B: [D1, D2]', ":5: map.B: door 'D2' is in only one place"),
         ('robot_room: A', 'robot_room: C', ":7: robot_room: no room 'C'"),
         ('[2.0, 3.0]', '[2.0, x]', ':6: room_positions.B: expected [x, y]'),
+        ('[2.0, 3.0]', f'[2.0, {"9" * 400}]', ':6: 9999999999'),
         ('    robot_room: A\n', '', "parameter 'robot_room' is missing"),
         ('robot_room', 'robot_rom', ':7: robot_rom: unknown parameter'),
         ('/**', '/other', "expected the top-level key '/**'"),

@@ -139,6 +139,14 @@ def test_a_wrong_change_is_refused_in_one_line(change, message: str) -> None:
         (changed(markers__m2=[1.0, 1.0, 1.0, 1.0, 0.0]), 'markers.m2: id 1 is that of m1 already'),
         (changed(markers__m1=[1.5, 1.0, 1.0, 1.0, 0.0]), 'markers.m1: id 1.5: expected a whole'),
         (changed(markers__m1=[1.0, 1.0, 1.0, 9.0, 0.0]), 'markers.m1: height 9 m: expected 0 to'),
+        (
+            changed(walls__far=[0.0, 0.0, 0.0, 20000.0]),
+            'walls.far: reaches to 20000 m: expected at most 1000 m',
+        ),
+        (
+            changed(walls__far=[-900.0, 0.0, 0.0, 900.0]),
+            'walls: the place is 906 m by 900 m: expected at most 100000 square metres',
+        ),
         (changed(marker_size=0.0), 'marker_size: 0 m: expected more than 0'),
         (changed(map={'A': ['D'], 'B': ['X']}), "map.A: door 'D' is in only one place"),
     ],
