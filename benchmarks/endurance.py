@@ -38,6 +38,7 @@ from surveillance_interfaces.srv import (
 from surveillance_ontology.armor_client import CHANGES_QOS, CHANGES_TOPIC
 from surveillance_runtime.calls import ServiceCaller
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
+from surveillance_runtime.stamps import seconds_of
 
 LONGEST_WRONG = 2.0
 """Simulated seconds that the ontology may be wrong about the robot's place."""
@@ -111,7 +112,7 @@ class Watch:
                 self.waits[place] = max(self.waits[place], self.now - left)
 
     def _on_pose(self, message: PoseStamped) -> None:
-        now = message.header.stamp.sec + message.header.stamp.nanosec / 1e9
+        now = seconds_of(message.header.stamp)
         place = self._world.place_at(message.pose.position.x, message.pose.position.y)
         if place is not None and place != self._place:
             if self._place is not None:

@@ -267,6 +267,7 @@ def processes(seconds: float) -> tuple[float, float, float]:
     from surveillance_runtime.node import PatrolNode
     from surveillance_runtime.process import ExecutorThread
     from surveillance_runtime.qos import SENSOR_QOS
+    from surveillance_runtime.stamps import seconds_of
 
     domain = claim_domain()
     poses: list[tuple[float, float, float]] = []
@@ -275,9 +276,8 @@ def processes(seconds: float) -> tuple[float, float, float]:
     node = PatrolNode('observer', context=context, use_global_arguments=False)
 
     def heard(message: PoseStamped) -> None:
-        stamp = message.header.stamp
         position = message.pose.position
-        poses.append((stamp.sec + stamp.nanosec / 1e9, position.x, position.y))
+        poses.append((seconds_of(message.header.stamp), position.x, position.y))
 
     node.create_subscription(PoseStamped, 'ground_truth', heard, SENSOR_QOS)
     spinner = ExecutorThread(context)

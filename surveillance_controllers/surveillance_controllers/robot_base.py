@@ -6,6 +6,7 @@ the robot is (`amcl_pose`) and what stands about that the map does not have (`ob
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -28,7 +29,8 @@ from surveillance_interfaces.msg import DoorStates
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.point_clouds import cloud_from_points
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
-from surveillance_runtime.waiting import ClockWait, Interrupt
+from surveillance_runtime.stamps import seconds_of
+from surveillance_runtime.waiting import Interrupt
 
 POSE_PERIOD = 0.19
 """Least time between two messages on amcl_pose, seconds: with every second scan at 10 Hz."""
@@ -47,12 +49,12 @@ class Answer:
     """What a scan leads to.
 
     Attributes:
-        at: When the scan came, seconds.
+        measured: When the scan was made, seconds.
         velocity: The velocity to command; None when there is no task.
         estimate: Where the robot is; None when that was told a moment ago, or is not known yet.
     """
 
-    at: float
+    measured: float
     velocity: Velocity | None
     estimate: PoseWithCovarianceStamped | None
 
@@ -79,7 +81,6 @@ class RobotBase:
         self._pilot = pilot
         self._sensor_timeout = sensor_timeout
         self._on_place = on_place
-        self._wait = ClockWait(node)
         self._lock = threading.RLock()
         self._stepped = threading.Condition(self._lock)
         self._steps = 0
@@ -235,16 +236,17 @@ class RobotBase:
             self._pilot.believe(pose)
 
     def _on_scan(self, message: LaserScan) -> None:
-        now = self._wait.now()
+        measured = seconds_of(message.header.stamp)
         with self._stepped:
             place = self.place
-            velocity = self._pilot.see(conversions.scan_from(message), now)
-            answer = Answer(now, velocity, self._estimate(now, message.header.stamp))
+            velocity = self._pilot.see(conversions.scan_from(message), measured)
+            answer = Answer(measured, velocity, self._estimate(measured, message.header.stamp))
             if self.place != place and self._on_place():
                 # In another place now: the ontology shall know before anybody goes on.
-                self._holding_since = now
+                self._holding_since = measured
             self._held = answer
-            if self._holding_since is None or not 0 <= now - self._holding_since < LONGEST_HOLD:
+            held_for = measured - (self._holding_since or -math.inf)
+            if not 0 <= held_for < LONGEST_HOLD:
                 self._release()
             self._steps += 1
             self._stepped.notify_all()
@@ -254,12 +256,12 @@ class RobotBase:
         if answer.velocity is not None and self._pilot.task is not None:
             self._commands.publish(conversions.twist_from(answer.velocity))
         if answer.estimate is not None:
-            self._pose_sent = answer.at
+            self._pose_sent = answer.measured
             self._poses.publish(answer.estimate)
 
-    def _estimate(self, now: float, stamp: Any) -> PoseWithCovarianceStamped | None:
+    def _estimate(self, measured: float, stamp: Any) -> PoseWithCovarianceStamped | None:
         pilot = self._pilot
-        if pilot.pose is None or 0 <= now - self._pose_sent < POSE_PERIOD:
+        if pilot.pose is None or 0 <= measured - self._pose_sent < POSE_PERIOD:
             return None
         deviation = (5.0, 3.0) if pilot.lost else (0.03, 0.02)
         estimate = conversions.pose_estimate(pilot.pose, *deviation)

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 import numpy.typing as npt
-from builtin_interfaces.msg import Duration, Time
+from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Pose, PoseStamped, PoseWithCovarianceStamped, TransformStamped
 from nav_msgs.msg import OccupancyGrid, Odometry
 from sensor_msgs.msg import CameraInfo, Image, JointState, LaserScan
@@ -15,6 +15,7 @@ from trajectory_msgs.msg import JointTrajectory
 
 from surveillance_interfaces.msg import DoorStates
 from surveillance_interfaces.srv import SetMarker
+from surveillance_runtime.stamps import seconds_of
 from surveillance_simulation.arm_motion import TrajectoryPoint
 from surveillance_simulation.camera import Camera, Picture
 from surveillance_simulation.floor_plan import Marker
@@ -28,16 +29,6 @@ def time_to_ros(seconds: float) -> Time:
     """Convert seconds since the clock's start to a time message."""
     nanoseconds = round(seconds * 1e9)
     return Time(sec=nanoseconds // 10**9, nanosec=nanoseconds % 10**9)
-
-
-def seconds_from(stamp: Time) -> float:
-    """Convert a time message to seconds since the clock's start."""
-    return float(stamp.sec + stamp.nanosec / 1e9)
-
-
-def duration_from_ros(duration: Duration) -> float:
-    """Convert a duration message to seconds."""
-    return float(duration.sec) + float(duration.nanosec) / 1e9
 
 
 def pose_to_ros(pose: PlanePose) -> Pose:
@@ -155,7 +146,7 @@ def trajectory_from_ros(message: JointTrajectory) -> tuple[list[str], list[Traje
     """Convert a message to joint names and the points of their trajectory."""
     points = [
         TrajectoryPoint(
-            duration_from_ros(point.time_from_start),
+            seconds_of(point.time_from_start),
             tuple(point.positions),
             tuple(point.velocities),
         )

@@ -17,6 +17,7 @@ from trajectory_msgs.msg import JointTrajectory
 from surveillance_runtime.node import PatrolNode, StartError
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
+from surveillance_runtime.stamps import seconds_of
 from surveillance_simulation import conversions, simulator_parameters
 from surveillance_simulation.arm_motion import TrajectoryError
 from surveillance_simulation.camera_feed import CameraFeed
@@ -101,7 +102,7 @@ class Simulator(PatrolNode):
 
     def _on_estimate(self, message: PoseWithCovarianceStamped) -> None:
         if self._drives_clock:
-            measured = conversions.seconds_from(message.header.stamp)
+            measured = seconds_of(message.header.stamp)
             self._pace.estimate(measured)
             self._go_on()
 

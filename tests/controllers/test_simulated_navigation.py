@@ -33,7 +33,7 @@ class World:
     def __init__(self, graph: Any, place: dict[str, Any]) -> None:
         self.graph = graph
         timed = {**place, 'use_sim_time': True, 'execution_mode': 'SIMULATED'}
-        graph.add(ArmorServer)
+        self.armor_server = graph.add(ArmorServer)
         graph.add(OntologyMapBuilder, place)
         graph.add(Simulator, {**place, 'use_sim_time': True, 'speed': 0.0})
         self.planner = graph.add(PlannerController, {**timed, 'via_point_delay': 0.1})
@@ -163,6 +163,14 @@ def test_a_robot_pushed_off_its_way_finds_itself_and_arrives(world: World) -> No
     assert (reached.x, reached.y) == pytest.approx(world.position, abs=0.08)
     assert world.position == pytest.approx((10, 8), abs=0.15)
     world.ask_until(lambda: world.robot_place() == ['C1'])
+
+
+def test_the_robot_drives_on_without_the_ontology(world: World) -> None:
+    world.ask_until(lambda: world.robot_place() == ['E'])
+    path = world.compute((10.0, 8.0)).result.path
+    world.graph.remove(world.armor_server)
+    assert world.follow(path).status == 'succeeded'
+    assert world.position == pytest.approx((10, 8), abs=0.15)
 
 
 def test_a_drive_that_is_cancelled_leaves_the_robot_standing(world: World) -> None:

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from surveillance_interfaces.srv import SetMarker
+from surveillance_runtime.stamps import seconds_of
 from surveillance_simulation import conversions, occupancy_grid
 from surveillance_simulation.camera import Camera
 from surveillance_simulation.lidar import LidarModel
@@ -37,7 +38,7 @@ def test_a_time_comes_back_to_the_millisecond(milliseconds: int) -> None:
 
 
 def test_a_duration_is_its_seconds() -> None:
-    assert conversions.duration_from_ros(Duration(sec=2, nanosec=500_000_000)) == 2.5
+    assert seconds_of(Duration(sec=2, nanosec=500_000_000)) == 2.5
 
 
 def test_a_scan_comes_back_with_its_infinities() -> None:
