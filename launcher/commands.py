@@ -236,12 +236,14 @@ def _node(argv: list[str]) -> int:
     )
     parser.add_argument('name', metavar='NAME', help='see launch.py list')
     parser.add_argument(
-        'rest',
+        '--ros-args',
+        dest='rest',
         nargs=argparse.REMAINDER,
-        metavar='--ros-args ...',
-        help='as with ros2 run: -p PARAMETER:=VALUE, -r FROM:=TO, --params-file FILE',
+        help='to the end of the line, as with ros2 run: -p PARAMETER:=VALUE, -r FROM:=TO, '
+        '--params-file FILE',
     )
-    options = parser.parse_args(argv)
+    own, rest = _split(argv, '--ros-args')
+    options = parser.parse_args(own)
     node = graph.find(options.name)
     _enter(['node', *argv])
     from launcher.mission import command, node_environ, parameter_files, ros_arguments, ros_domain
@@ -251,13 +253,18 @@ def _node(argv: list[str]) -> int:
     arguments = ros_arguments(parameter_files(CONFIG, run), run)
     if node.console:
         arguments += ['-p', f'execution_mode:={run.mode or graph.DEFAULT_MODE}']
-    arguments += ['--', *options.rest]
-    renamed = any('__ns:=' in word or '__node:=' in word for word in options.rest)
+    arguments += ['--', *rest]
+    renamed = any('__ns:=' in word or '__node:=' in word for word in rest)
     if not renamed:
         for descriptor in claim([node], ros_domain(run), run.namespace):
             os.set_inheritable(descriptor, True)
     words = command([node], arguments, 0)
     os.execve(words[0], words, node_environ(run))
+
+
+def _split(argv: list[str], word: str) -> tuple[list[str], list[str]]:
+    at = argv.index(word) if word in argv else len(argv)
+    return argv[:at], argv[at:]
 
 
 def _list(argv: list[str]) -> int:

@@ -16,7 +16,6 @@ from surveillance_controllers.console import Console
 from surveillance_controllers.console_commands import BATTERY, MOTION, PLANNER, Grammar
 
 _GRAMMAR = Grammar((*BATTERY, *PLANNER, *MOTION))
-_NOTES = '  exit NODE     Stop one controller.\n  exit          Stop the whole run.'
 
 
 @dataclass(frozen=True)
@@ -42,8 +41,11 @@ def route(line: str, controllers: Sequence[Node]) -> Routed:
     if first == 'status':
         return Routed(tuple(names), line)
     if first == 'help':
-        own = [c for c in _GRAMMAR.help().splitlines() if not c.strip().startswith('exit')]
-        return Routed(message='\n'.join([*own, _NOTES]))
+        *own, exit_line = _GRAMMAR.help().splitlines()
+        width = len(exit_line) - len(exit_line.removeprefix('  exit').lstrip())
+        notes = (('exit NODE', 'Stop one controller.'), ('exit', 'Stop the whole run.'))
+        lines = [f'  {usage}'.ljust(width) + text for usage, text in notes]
+        return Routed(message='\n'.join([*own, *lines]))
     if first == 'exit' and len(words) == 1:
         return Routed(ends=True)
     if first == 'exit':

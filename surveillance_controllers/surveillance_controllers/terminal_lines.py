@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import os
+import sys
 import termios
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 
 from prompt_toolkit import PromptSession
@@ -13,6 +14,7 @@ from prompt_toolkit.completion import CompleteEvent, Completer, Completion
 from prompt_toolkit.document import Document
 from prompt_toolkit.history import FileHistory, History, InMemoryHistory
 from prompt_toolkit.input import Input
+from prompt_toolkit.input.vt100 import Vt100Input
 from prompt_toolkit.output import Output
 from prompt_toolkit.patch_stdout import patch_stdout
 
@@ -34,7 +36,7 @@ class TerminalLines:
         ends: tuple[Input, Output] | None = None,
     ) -> None:
         self._stopped = False
-        given_input, given_output = ends or (None, None)
+        given_input, given_output = ends or (_SilentInput(sys.stdin), None)
         self._session: PromptSession[str] = PromptSession(
             f'{name}> ',
             completer=WordCompleter(completions),
@@ -90,6 +92,13 @@ def _silent(keyboard: Input) -> Iterator[None]:
         yield
     finally:
         termios.tcsetattr(keyboard.fileno(), termios.TCSANOW, before)
+
+
+class _SilentInput(Vt100Input):
+    """Does not echo either while something is printed above the prompt."""
+
+    def cooked_mode(self) -> AbstractContextManager[None]:
+        return _silent(self)
 
 
 class WordCompleter(Completer):

@@ -14,6 +14,8 @@ from launcher.graph import NODES
         (['--only', 'armor'], "unknown node 'armor'"),
         (['--without', 'armor_server,nobody'], "unknown node 'nobody'"),
         (['node', 'nobody'], "unknown node 'nobody'"),
+        (['node', 'motion_controller', '--mode', 'fast'], "invalid choice: 'FAST'"),
+        (['node', 'motion_controller', '-p', 'navigator:=own'], 'unrecognized arguments: -p'),
         (['--for', 'ever'], "'ever' is not a positive number of seconds"),
         (['--for', '-3'], '-3'),
         (['--domain', 'x'], 'domain'),
