@@ -120,7 +120,6 @@ class Mission:
         """
         situation = self.look(interrupt)
         self.say(f'{len(situation.graph.places)} places to patrol, starting in {self.place}')
-        self.warn_about_threshold()
         if self._started is None:
             self._started = self.now()
             self._noted_places = self.chooser.places
@@ -168,10 +167,11 @@ class Mission:
         if self._started is not None and self.chooser.places != self._noted_places:
             self._noted_places = self.chooser.places
             self._write('map', places=sorted(self._noted_places))
+        self._warn_about_threshold()
         return situation
 
-    def warn_about_threshold(self) -> None:
-        """Says once when no robot can keep to the threshold on this map."""
+    def _warn_about_threshold(self) -> None:
+        """Says once when no robot can keep to this threshold on this map."""
         warning = self.chooser.warning()
         if warning and warning != self._warned:
             self.say(warning, warning=True)
@@ -191,7 +191,6 @@ class Mission:
             self._sent_to_charge = why
         else:
             decision = self.chooser.choose(situation)
-        self.warn_about_threshold()
         return self._decided(decision)
 
     def choose_station(self, interrupt: Interrupt, why: str) -> Decision:

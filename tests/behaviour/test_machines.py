@@ -529,6 +529,26 @@ def test_settings_changed_on_the_way_count_from_the_next_choice(machine: str) ->
     assert {place for time, place in world.arrivals if time > 220.0} == {'C1', 'C2', 'E'}
 
 
+def test_a_threshold_that_nobody_can_keep_to_is_warned_of_once(machine: str) -> None:
+    world = World()
+    late = world.rooms.pop('R4')
+    mission_settings = settings(urgency_threshold=65.0)
+    run = Run(machine, world, mission_settings)
+
+    def lower() -> None:
+        mission_settings.choice.urgency_threshold = 40.0
+
+    world.clock.after(100.0, lambda: world.rooms.update(R4=late))
+    world.clock.after(200.0, lower)
+    run.until(300.0)
+    warnings = [text for text in world.said if 'urgency_threshold' in text]
+    assert [text.split(',')[0] for text in warnings] == [
+        'urgency_threshold is 65 s',
+        'urgency_threshold is 40 s',
+    ]
+    assert 'shortest tour of all places takes 69.6 s' in warnings[0]
+
+
 @pytest.mark.parametrize('name', list(MACHINES))
 def test_the_same_world_gives_the_same_mission(name: str) -> None:
     runs = [Run(name, World(draw=0.4)).until(900.0) for _ in range(2)]

@@ -230,3 +230,30 @@ def test_a_file_that_is_no_checkpoint_is_named(tmp_path, text):
         checkpoint.load(World().root, path)
     with pytest.raises(checkpoint.CheckpointError, match=r'absent\.json'):
         checkpoint.load(World().root, tmp_path / 'absent.json')
+
+
+def test_a_reader_never_finds_half_a_checkpoint_whoever_saves(tmp_path):
+    world, path = World(), tmp_path / 'checkpoint'
+    world.root.userdata.much = 'x' * 100_000
+    checkpoint.save(world.root, path)
+    stop, faults = threading.Event(), []
+
+    def save_again_and_again():
+        try:
+            while not stop.is_set():
+                checkpoint.save(world.root, path)
+        except OSError as error:
+            faults.append(error)
+
+    savers = [threading.Thread(target=save_again_and_again) for _ in range(3)]
+    for saver in savers:
+        saver.start()
+    try:
+        for _ in range(100):
+            checkpoint.load(World().root, path)
+    finally:
+        stop.set()
+        for saver in savers:
+            saver.join(10.0)
+    assert not faults
+    assert [each.name for each in tmp_path.iterdir()] == ['checkpoint']

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import sys
 import threading
 
 import pytest
 
 from surveillance_behaviour import fsm
+from surveillance_behaviour.fsm import record
 from surveillance_behaviour.fsm.engine import unfold
 from surveillance_behaviour.fsm.record import (
     Recorder,
@@ -178,6 +180,77 @@ def test_tracing_can_begin_while_a_machine_runs():
     assert [(noted.source, noted.outcome, noted.kind) for noted in seen] == [
         ('WAIT', 'preempted', 'exit')
     ]
+
+
+class Changing(dict):
+    """A value that somebody changes while it is looked at."""
+
+    def items(self):
+        raise RuntimeError('dictionary changed size during iteration')
+
+
+def test_userdata_that_changes_while_it_is_read_does_not_end_the_reports():
+    machine, seen = patrol(), []
+    machine.userdata.calm, machine.userdata.changing = 1, Changing(x=1)
+    feed = TransitionFeed(machine, seen.append)
+    machine.execute()
+    assert feed.flush(5.0)
+    feed.close()
+    assert len(seen) == 9
+    assert seen[0].userdata == {'calm': 1}
+
+
+class CountDown(fsm.State):
+    def __init__(self, count):
+        super().__init__(['next', 'done'])
+        self.left = count
+
+    def execute(self, ud):
+        self.left -= 1
+        return 'next' if self.left else 'done'
+
+
+def test_transitions_of_several_threads_are_numbered_in_the_order_they_come_in():
+    together = fsm.Concurrence(['done'], 'done')
+    with together:
+        for label in 'ABC':
+            inner = fsm.StateMachine(['done'])
+            with inner:
+                fsm.StateMachine.add('COUNT', CountDown(3000), {'next': 'COUNT'})
+            fsm.Concurrence.add(label, inner)
+    seen, switching = [], sys.getswitchinterval()
+    feed = TransitionFeed(together, lambda transition: seen.append(transition.sequence))
+    sys.setswitchinterval(1e-6)
+    try:
+        together.execute()
+    finally:
+        sys.setswitchinterval(switching)
+    assert feed.flush(20.0)
+    feed.close()
+    assert seen == list(range(1, 3 * 3000 + 3 + 1))
+
+
+def test_transitions_that_nobody_could_take_in_leave_a_gap_in_the_numbers(monkeypatch):
+    monkeypatch.setattr(record, 'QUEUE_LENGTH', 10)
+    seen, busy, go_on = [], threading.Event(), threading.Event()
+    wait = fsm.CBState(lambda ud: 'done' if busy.wait(5.0) else None, outcomes=['done'])
+    machine = fsm.StateMachine(['done'])
+    with machine:
+        fsm.StateMachine.add('HELLO', Answer('done'), {'done': 'WAIT'})
+        fsm.StateMachine.add('WAIT', wait, {'done': 'COUNT'})
+        fsm.StateMachine.add('COUNT', CountDown(100), {'next': 'COUNT'})
+
+    def consume(transition):
+        busy.set()
+        go_on.wait(10.0)
+        seen.append(transition.sequence)
+
+    feed = TransitionFeed(machine, consume)
+    machine.execute()
+    go_on.set()
+    assert feed.flush(5.0)
+    feed.close()
+    assert seen == [1, *range(93, 103)]
 
 
 def test_several_may_watch_a_machine_at_once(tmp_path):

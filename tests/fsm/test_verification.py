@@ -271,3 +271,11 @@ def test_drawings_of_concurrences_show_states_side_by_side():
     assert '--\n' in to_mermaid(concurrence)
     assert '"Concurrence/A"' in to_graphviz(concurrence)
     assert 'B' in to_ascii(concurrence)
+
+
+def test_names_with_quotes_are_drawn():
+    machine = fsm.StateMachine(['done'])
+    with machine:
+        fsm.StateMachine.add('SAY "HELLO"', Answer('done'))
+    assert '[label="SAY \\"HELLO\\""' in to_graphviz(machine)
+    assert 'state "SAY #quot;HELLO#quot;" as' in to_mermaid(machine)

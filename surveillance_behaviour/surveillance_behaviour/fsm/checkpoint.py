@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import os
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -171,7 +172,7 @@ def _restore(state: State, entry: dict[str, Any]) -> None:
 def save(machine: ActiveContainer, path: str | Path) -> None:
     """Write a checkpoint; a reader finds the old one or the new one, never half of one."""
     target = Path(path)
-    draft = target.with_name(f'.{target.name}.{os.getpid()}')
+    draft = target.with_name(f'.{target.name}.{os.getpid()}.{threading.get_ident()}')
     draft.write_text(json.dumps(capture(machine), ensure_ascii=False), encoding='utf-8')
     os.replace(draft, target)
 
@@ -207,6 +208,8 @@ class Checkpointer:
     def __init__(self, machine: ActiveContainer, path: str | Path) -> None:
         self._machine = machine
         self._path = Path(path)
+        # A concurrence's children change places in threads of their own: the last word is kept.
+        self._turn = threading.Lock()
         for container in _containers(machine):
             container.register_start_cb(self._changed)
             container.register_transition_cb(self._changed)
@@ -214,7 +217,8 @@ class Checkpointer:
 
     def _changed(self, *_: Any) -> None:
         try:
-            save(self._machine, self._path)
+            with self._turn:
+                save(self._machine, self._path)
         except OSError as error:
             logwarn(f'Checkpoint {self._path} cannot be written: {error.strerror}')
 

@@ -23,9 +23,9 @@ def _mermaid(structure: Structure, lines: list[str], indent: str) -> None:
         name = _id(f'{structure.path}/{label}')
         inner = structure.inner.get(label)
         if inner is None:
-            lines.append(f'{indent}state "{label}" as {name}')
+            lines.append(f'{indent}state "{_spelled(label)}" as {name}')
         else:
-            lines.append(f'{indent}state "{label}" as {name} {{')
+            lines.append(f'{indent}state "{_spelled(label)}" as {name} {{')
             _mermaid(inner, lines, indent + '    ')
             lines.append(f'{indent}}}')
     if structure.together:
@@ -56,7 +56,7 @@ def to_graphviz(container: Container) -> str:
     """Draw as a Graphviz digraph in which containers are clusters."""
     structure = structure_of(container)
     lines = [
-        f'digraph "{structure.path}" {{',
+        f'digraph {_quoted(structure.path)} {{',
         '    compound=true; rankdir=TB; fontname="Helvetica";',
         '    node [shape=box, style=rounded, fontname="Helvetica"];',
         '    edge [fontname="Helvetica", fontsize=10];',
@@ -68,13 +68,12 @@ def to_graphviz(container: Container) -> str:
 
 def _graphviz(structure: Structure, lines: list[str], indent: str) -> None:
     inside = indent + '    '
-    lines.append(f'{indent}subgraph "cluster_{structure.path}" {{')
-    lines.append(f'{inside}label="{structure.label} ({structure.kind})";')
+    lines.append(f'{indent}subgraph {_quoted(f"cluster_{structure.path}")} {{')
+    lines.append(f'{inside}label={_quoted(f"{structure.label} ({structure.kind})")};')
     for outcome in structure.outcomes:
-        lines.append(
-            f'{inside}"{structure.path}:{outcome}" [label="{outcome}", shape=oval, '
-            'style=filled, fillcolor=lightgrey];'
-        )
+        name = _quoted(f'{structure.path}:{outcome}')
+        look = 'shape=oval, style=filled, fillcolor=lightgrey'
+        lines.append(f'{inside}{name} [label={_quoted(outcome)}, {look}];')
     for label in structure.all_states():
         inner = structure.inner.get(label)
         if inner is not None:
@@ -82,19 +81,21 @@ def _graphviz(structure: Structure, lines: list[str], indent: str) -> None:
             continue
         bold = ', penwidth=2' if label in structure.initial else ''
         dashed = ', style="rounded,dashed"' if label in structure.interrupts else ''
-        lines.append(f'{inside}"{structure.path}/{label}" [label="{label}"{bold}{dashed}];')
+        name = _quoted(f'{structure.path}/{label}')
+        lines.append(f'{inside}{name} [label={_quoted(label)}{bold}{dashed}];')
     lines.append(f'{indent}}}')
     for edge in structure.edges:
         if edge.target == RESUME and not edge.leaving:
             continue
         tail, tail_box = _entry(structure, edge.source)
-        ltail = f', ltail="{tail_box}"' if tail_box else ''
+        ltail = f', ltail={_quoted(tail_box)}' if tail_box else ''
         if edge.leaving:
             head, lhead = f'{structure.path}:{edge.target}', ''
         else:
             head, head_box = _entry(structure, edge.target)
-            lhead = f', lhead="{head_box}"' if head_box else ''
-        lines.append(f'{indent}"{tail}" -> "{head}" [label="{edge.outcome}"{ltail}{lhead}];')
+            lhead = f', lhead={_quoted(head_box)}' if head_box else ''
+        ends = f'{_quoted(tail)} -> {_quoted(head)}'
+        lines.append(f'{indent}{ends} [label={_quoted(edge.outcome)}{ltail}{lhead}];')
 
 
 def _entry(structure: Structure, label: str) -> tuple[str, str]:
@@ -160,3 +161,14 @@ def _bundles(edges: Iterable[Edge]) -> list[tuple[str, str, bool, list[str]]]:
 def _id(path: str) -> str:
     """An identifier that Mermaid accepts; different paths keep different ones."""
     return re.sub(r'[^A-Za-z0-9]', lambda match: f'_{ord(match.group()):x}_', path)
+
+
+def _quoted(text: str) -> str:
+    """A string as Graphviz has it."""
+    escaped = text.replace('\\', '\\\\').replace('"', '\\"')
+    return f'"{escaped}"'
+
+
+def _spelled(text: str) -> str:
+    """Text between double quotes in Mermaid, which has no escapes but entities."""
+    return text.replace('"', '#quot;')

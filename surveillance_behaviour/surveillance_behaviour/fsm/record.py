@@ -6,11 +6,11 @@ happen where the queue is emptied.
 
 from __future__ import annotations
 
-import itertools
 import json
 import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import IO, Any
@@ -68,7 +68,8 @@ def shown(userdata: dict[str, Any]) -> dict[str, Any]:
     for key, value in userdata.items():
         try:
             json.dumps(value, allow_nan=False)
-        except (TypeError, ValueError, RecursionError):
+        except Exception:
+            # Whatever it is that its class, or a thread that changes it meanwhile, raises.
             continue
         part[key] = value
     return part
@@ -91,10 +92,10 @@ class TransitionFeed:
     ) -> None:
         self._consume = consume
         self._show_userdata = show_userdata
-        self._queue: deque[tuple[int, RawTransition]] = deque(maxlen=QUEUE_LENGTH)
+        self._queue: deque[RawTransition] = deque()
+        self._lost: deque[None] = deque()
         self._visits: dict[tuple[str, str], int] = {}
         self._entered: dict[str, float] = {}
-        self._expected = 1
         self._sequence = 0
         self._wakeup = threading.Event()
         self._drained = threading.Condition()
@@ -105,12 +106,17 @@ class TransitionFeed:
         self._end_reports = machine.control.add_trace(self._make_sink())
 
     def _make_sink(self) -> Callable[[RawTransition], None]:
-        append, numbers, wake = self._queue.append, itertools.count(1), self._wakeup.set
+        # Several threads may come here at once: each of these is one step.
+        queue, append, wake = self._queue, self._queue.append, self._wakeup.set
 
         def sink(raw: RawTransition) -> None:
-            append((next(numbers), raw))
+            append(raw)
             if self._asleep:
                 wake()
+            if len(queue) > QUEUE_LENGTH:
+                with suppress(IndexError):
+                    queue.popleft()
+                    self._lost.append(None)
 
         return sink
 
@@ -130,12 +136,10 @@ class TransitionFeed:
         queue = self._queue
         while True:
             while queue:
-                sequence, raw = queue.popleft()
-                transition = self._transition(sequence, raw)
-                if transition is None:
-                    continue
                 try:
-                    self._consume(transition)
+                    transition = self._transition(queue.popleft())
+                    if transition is not None:
+                        self._consume(transition)
                 except Exception as error:
                     logerr(f'Reporting a transition raised {type(error).__name__}: {error}')
             if self._closing:
@@ -149,11 +153,12 @@ class TransitionFeed:
                 self._wakeup.wait()
             self._asleep = False
 
-    def _transition(self, number: int, raw: RawTransition) -> Transition | None:
+    def _transition(self, raw: RawTransition) -> Transition | None:
         noted = unfold(raw)
-        # What was lost leaves a gap.
-        self._sequence += number - self._expected
-        self._expected = number + 1
+        while self._lost:
+            # What was lost leaves a gap.
+            self._lost.pop()
+            self._sequence += 1
         place = (noted.path, noted.target)
         visits = self._visits[place] = self._visits.get(place, 0) + 1
         since = self._entered.get(noted.path, noted.time)
