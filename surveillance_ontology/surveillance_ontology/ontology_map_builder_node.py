@@ -14,15 +14,15 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 
 from surveillance_interfaces.msg import OntologyMap
 from surveillance_interfaces.srv import AddRoom, ReferenceName, RemoveRoom, RoomPosition, SetDoor
-from surveillance_ontology.armor.settings import DATA
 from surveillance_ontology.armor_client import ArmorClient, FactSubscription
 from surveillance_ontology.conversions import point_to_ros, position_from_ros, room_note_from_ros
-from surveillance_ontology.described_parameters import described_place
 from surveillance_ontology.map_building import ROBOT, MapBuilding
 from surveillance_ontology.map_keeper import MapKeeper, Reports
+from surveillance_ontology.ontology_parameters import builder_settings
 from surveillance_runtime.awaited_work import AwaitedEvent, AwaitedWork
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.place import Place
+from surveillance_runtime.place_parameters import described_place
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
 
@@ -35,28 +35,18 @@ class OntologyMapBuilder(PatrolNode):
 
     def __init__(self, **node_options: Any) -> None:
         super().__init__('ontology_map_builder', **node_options)
-        self._reference = self.parameter(
-            'ontology_reference', 'surveillance', 'Reference name of the ontology in the server.'
-        )
-        path = self.parameter(
-            'ontology_path', str(DATA / 'surveillance.owl'), 'The ontology to start from.'
-        )
-        uri = self.parameter(
-            'ontology_uri', 'http://bnc/exp-rob-lab/2022-23', 'IRI of the ontology.'
-        )
-        timeout = self.parameter(
-            'armor_timeout', 5.0, 'Longest wait for an answer of the server, seconds.', minimum=0.1
-        )
+        settings = builder_settings(self)
+        self._reference = settings.ontology_reference
         place = described_place(self)
         # The first reasoning over thousands of places takes its time.
-        timeout = max(timeout, SECONDS_PER_ROOM * len(place.rooms if place else ()))
+        timeout = max(settings.armor_timeout, SECONDS_PER_ROOM * len(place.rooms if place else ()))
         armor = ArmorClient(
             self, self.get_name(), self._reference, timeout=timeout, interrupt=self.stopping
         )
         self._built = AwaitedEvent(self)
         log = self.get_logger()
         self._keeper = MapKeeper(
-            MapBuilding(armor, path, uri),
+            MapBuilding(armor, settings.ontology_path, settings.ontology_uri),
             place,
             lambda: int(self.get_clock().now().nanoseconds // 1_000_000_000),
             self.stopping.is_set,

@@ -1,0 +1,78 @@
+"""The parameters of this package's nodes: a directive service, and a builder of maps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from surveillance_ontology.armor.journal import JournalError
+from surveillance_ontology.armor.service import ArmorService
+from surveillance_ontology.armor.settings import DATA, Settings
+from surveillance_ontology.armor.store import Store
+from surveillance_runtime.field_parameters import Described, declare_fields
+from surveillance_runtime.node import PatrolNode, StartError
+
+_SERVICE = {
+    'directories': Described(
+        'Directories inside which LOAD, SAVE and LOG may read and write files.',
+        check=lambda value: None if value and all(value) else 'names of directories',
+    ),
+    'sparql_timeout': Described('Longest time a SPARQL query may take, seconds.', 0.01, 3600.0),
+    'enforce_mount': Described(
+        'Refuse changes by others while a client is mounted; ARMOR 2.2 does not.'
+    ),
+    'narrow_doubles': Described('Store values of type DOUBLE as xsd:float, as ARMOR 2.2 does.'),
+    'allow_web': Described('Let LOAD WEB fetch documents from the web.'),
+    'sparql_derived': Described(
+        'Let SPARQL see derived facts; ARMOR 2.2 shows it the asserted ones only.'
+    ),
+}
+
+
+def described_service(node: PatrolNode) -> ArmorService:
+    """Make the service that a node's parameters describe; it logs through the node.
+
+    Raises:
+        ParameterError: A parameter is of the wrong type or out of range.
+        StartError: The store cannot be used.
+    """
+    settings = declare_fields(node, Settings(), _SERVICE)
+    stored = node.parameter(
+        'store',
+        '',
+        'Directory in which references and their changes are kept over a restart; empty: none.',
+        read_only=True,
+    )
+    log = node.get_logger()
+    try:
+        store = Store(Path(stored).expanduser()) if stored else None
+        return ArmorService(settings, log.info, log.warn, store)
+    except JournalError as error:
+        raise StartError(f'{node.get_name()}: parameter store: {error}') from None
+
+
+@dataclass(frozen=True)
+class BuilderSettings:
+    """What `ontology_map_builder` is told by its parameters beside the place."""
+
+    ontology_reference: str = 'surveillance'
+    ontology_path: str = str(DATA / 'surveillance.owl')
+    ontology_uri: str = 'http://bnc/exp-rob-lab/2022-23'
+    armor_timeout: float = 5.0
+
+
+_BUILDER = {
+    'ontology_reference': Described('Reference name of the ontology in the server.'),
+    'ontology_path': Described('The ontology to start from.'),
+    'ontology_uri': Described('IRI of the ontology.'),
+    'armor_timeout': Described('Longest wait for an answer of the server, seconds.', 0.1),
+}
+
+
+def builder_settings(node: PatrolNode) -> BuilderSettings:
+    """Declare what `ontology_map_builder` is told beside the place.
+
+    Raises:
+        ParameterError: A parameter is of the wrong type or out of range.
+    """
+    return declare_fields(node, BuilderSettings(), _BUILDER)

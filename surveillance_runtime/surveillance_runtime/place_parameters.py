@@ -1,0 +1,51 @@
+"""A place from a node's parameters, in the form of a place's file."""
+
+from __future__ import annotations
+
+from surveillance_runtime.node import PatrolNode, StartError
+from surveillance_runtime.place import Place, PlaceError, make_place
+
+
+def described_place(node: PatrolNode, source: str = 'configuration') -> Place | None:
+    """Declare where the map comes from, and make the place that the parameters describe.
+
+    Args:
+        node: The node.
+        source: Default of the parameter `map_source`.
+
+    Returns:
+        None when the map comes from markers, or when no map is described.
+
+    Raises:
+        ParameterError: A parameter is of the wrong type.
+        StartError: What is described is not a place.
+    """
+    chosen = node.parameter(
+        'map_source',
+        source,
+        'Where the map comes from: the parameters, or the markers that the robot finds.',
+        choices=('configuration', 'markers'),
+        read_only=True,
+    )
+    robot_room = node.parameter(
+        'robot_room',
+        '',
+        'Room in which the robot starts; empty with markers: the one nearest to it.',
+        read_only=True,
+    )
+    stations = node.parameter(
+        'recharge_rooms',
+        [],
+        'Rooms with a charging station; they are never removed.',
+        of=str,
+        read_only=True,
+    )
+    if chosen == 'markers':
+        return None
+    rooms, positions = node.parameters_under('map'), node.parameters_under('room_positions')
+    if not rooms and not positions:
+        return None
+    try:
+        return make_place(rooms, positions, robot_room, stations)
+    except PlaceError as error:
+        raise StartError(f'{node.get_name()}: parameter {error}') from None
