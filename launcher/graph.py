@@ -99,6 +99,12 @@ NODES = (
         'looks around for markers and builds the ontology from them',
     ),
     Node(
+        'mission_view',
+        'surveillance_behaviour',
+        'MissionViewNode',
+        'shows a running mission in the terminal',
+    ),
+    Node(
         'simulator',
         'surveillance_simulation',
         'Simulator',

@@ -22,6 +22,7 @@ setup(
     license='Apache-2.0',
     entry_points={
         'console_scripts': [
+            'mission_view = surveillance_behaviour.mission_view_node:main',
             'initial_state = surveillance_behaviour.initial_state_node:main',
             'reasoner = surveillance_behaviour.reasoner_node:main',
             'robot_behavior = surveillance_behaviour.robot_behavior_node:main',

@@ -3,30 +3,39 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+import numpy as np
 from geometry_msgs.msg import Point as PointMessage
+from geometry_msgs.msg import Pose as PoseMessage
+from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import BatteryState
 
 from surveillance_behaviour.fsm.active import ActiveContainer
 from surveillance_behaviour.fsm.export import to_mermaid
 from surveillance_behaviour.fsm.record import Transition
 from surveillance_behaviour.fsm.structure import structure_of
+from surveillance_behaviour.map_raster import Grid, Pose
+from surveillance_behaviour.mission_snapshot import Status
 from surveillance_behaviour.policy.situation import Decision
 from surveillance_behaviour.ports import Point
 from surveillance_behaviour.survey import PlaceNote
 from surveillance_interfaces.msg import Decision as DecisionMessage
 from surveillance_interfaces.msg import (
+    DoorStates,
     FsmContainer,
     FsmEdge,
     FsmStatus,
     FsmStructure,
     FsmTransition,
+    MissionStatus,
     OntologyMap,
     OntologyPlace,
     RoomConnection,
 )
+from surveillance_runtime.stamps import seconds_of
 
 
 def point_from(message: PointMessage) -> Point:
@@ -69,7 +78,7 @@ def decision_message(decision: Decision, sequence: int, stamp: Any) -> DecisionM
 def decision_from(message: DecisionMessage) -> Decision:
     """A decision as it was published."""
     return Decision(
-        time=_seconds(message.stamp),
+        time=seconds_of(message.stamp),
         from_place=message.from_place,
         place=message.place,
         target=message.target,
@@ -89,6 +98,50 @@ def charging_from(message: BatteryState) -> bool | None:
     ):
         return True
     return None if status == BatteryState.POWER_SUPPLY_STATUS_UNKNOWN else False
+
+
+def status_from(message: MissionStatus) -> Status:
+    """What the machine does, as it was published."""
+    return Status(
+        since=seconds_of(message.stamp),
+        machine=message.machine,
+        state=message.state,
+        place=message.place,
+        heading_to=message.heading_to,
+        waiting_for_help=message.waiting_for_help,
+        text=message.text,
+        avoided=tuple(message.avoided),
+    )
+
+
+def doors_from(message: DoorStates) -> dict[str, bool]:
+    """Whether each door is open, by name."""
+    states = {**dict.fromkeys(message.open, True), **dict.fromkeys(message.closed, False)}
+    return dict(sorted(states.items()))
+
+
+def pose_from(message: PoseMessage) -> Pose:
+    """x, y in metres and yaw in radians of a pose."""
+    q = message.orientation
+    yaw = math.atan2(2 * (q.w * q.z + q.x * q.y), 1 - 2 * (q.y * q.y + q.z * q.z))
+    return message.position.x, message.position.y, yaw
+
+
+def grid_from(message: OccupancyGrid) -> Grid:
+    """A map.
+
+    Raises:
+        ValueError: It has no cells, not as many as it says, or is turned.
+    """
+    info = message.info
+    cells = np.array(message.data, dtype=np.int8)
+    if not cells.size or cells.size != info.width * info.height or info.resolution <= 0:
+        size = f'{info.width} x {info.height} of {info.resolution:g} m'
+        raise ValueError(f'{cells.size} cells came where it says {size}')
+    x, y, yaw = pose_from(info.origin)
+    if abs(yaw) > 1e-6:
+        raise ValueError(f'it is turned by {yaw:.3f} rad, which is not drawn')
+    return Grid(cells.reshape(info.height, info.width), float(info.resolution), (x, y))
 
 
 def place_note_from(response: Any) -> PlaceNote | None:
@@ -139,7 +192,7 @@ def transition_from(message: FsmTransition) -> Transition:
     """The transition of a message; its time is the time of publishing, in seconds."""
     return Transition(
         sequence=message.sequence,
-        time=_seconds(message.stamp),
+        time=seconds_of(message.stamp),
         path=message.path,
         from_state=message.from_state,
         outcome=message.outcome,
@@ -189,7 +242,3 @@ def structure_message(root: ActiveContainer, stamp: Any) -> FsmStructure:
         ],
         mermaid=to_mermaid(root),
     )
-
-
-def _seconds(stamp: Any) -> float:
-    return float(stamp.sec + stamp.nanosec / 1e9)
