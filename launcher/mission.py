@@ -269,6 +269,7 @@ def run_mission(run: Run, config: Path, runs: Path) -> int:
         f'place {files[1].name}, '
         f'ROS domain {ros_domain(run)}, files in {_short(folder)}'
     )
+    log.say(f'watch it in a second terminal: {watch_command(run)}')
     supervisor = Supervisor(programs, log)
     console = None
     if manual:
@@ -288,6 +289,16 @@ def run_mission(run: Run, config: Path, runs: Path) -> int:
     for descriptor in claims:
         os.close(descriptor)
     return code
+
+
+def watch_command(run: Run) -> str:
+    """What to type in another terminal to see this run."""
+    words = ['python3', 'launch.py', 'watch']
+    if ros_domain(run) != '0':
+        words += ['--domain', ros_domain(run)]
+    if run.namespace is not None:
+        words += ['--namespace', run.namespace]
+    return ' '.join(words)
 
 
 def summary(record: Path) -> str:

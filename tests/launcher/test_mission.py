@@ -16,6 +16,7 @@ from launcher.mission import (
     parameter_files,
     ros_arguments,
     summary,
+    watch_command,
     write_own_parameters,
 )
 from surveillance_behaviour.mission_record import MissionRecord
@@ -162,3 +163,12 @@ def test_the_options_of_the_command_line_become_a_run():
         without=[],
         seconds=3.0,
     )
+
+
+def test_the_hint_to_watch_leads_to_this_run(monkeypatch):
+    monkeypatch.delenv('ROS_DOMAIN_ID', raising=False)
+    assert watch_command(Run()) == 'python3 launch.py watch'
+    named = Run(domain=7, namespace='robot2')
+    assert watch_command(named) == 'python3 launch.py watch --domain 7 --namespace robot2'
+    monkeypatch.setenv('ROS_DOMAIN_ID', '3')
+    assert watch_command(Run()) == 'python3 launch.py watch --domain 3'
