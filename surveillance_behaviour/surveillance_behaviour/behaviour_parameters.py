@@ -7,33 +7,66 @@ choice on.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import fields, replace
-from typing import Any
+from dataclasses import replace
 
 from surveillance_behaviour.chooser import ChoiceSettings
 from surveillance_behaviour.mission import MissionSettings
 from surveillance_behaviour.policy.battery import BatteryLimits
-from surveillance_behaviour.policy.policies import DEFAULT_POLICY, POLICIES
+from surveillance_behaviour.policy.policies import POLICIES
 from surveillance_behaviour.policy.rules import DEFAULT_RULES, Rules
 from surveillance_behaviour.recovery import RecoveryLimits
 from surveillance_behaviour.ros_ports import Deadlines
+from surveillance_runtime.field_parameters import Described, declare_fields
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError
 
-_DEADLINES = {
-    'answer': "a service's answer, and for a goal to be accepted",
-    'build': 'the ontology to be built, and for looking around at the start',
-    'plan': 'a path; 0: as long as the planner lives',
-    'move': 'following a path; 0: as long as the controller lives',
-    'charge': 'the battery to get on while it is charged by `recharge`; 0: for ever',
+_DAY = 86400.0
+_CHOICE = {
+    'exploration_seconds': Described('Seconds the robot takes to explore a place.', 0.0, _DAY),
+    'speed': Described(
+        "Metres per second at which the robot drives, to tell a move's time.",
+        *(0.001, 100.0),
+        name='robot_speed',
+    ),
+    'policy': Described(
+        'How a place is chosen among those that the rules allow.', choices=tuple(POLICIES)
+    ),
+    'recharge_rooms': Described(
+        'Places with a charging station.',
+        of=str,
+        check=lambda names: None if names else 'at least one place',
+    ),
 }
 _RECOVERY = {
-    'path_tries': 'Times a place is tried before another one is chosen.',
-    'place_tries': 'Places given up in a row before the robot goes back.',
-    'avoid_seconds': 'How long a place that was given up is left alone at first, s.',
-    'longest_avoid': 'The longest time a place is left alone, s.',
-    'help_seconds': 'The first pause while waiting for help, s.',
-    'longest_help': 'The longest pause while waiting for help, s.',
+    'path_tries': Described('Times a place is tried before another one is chosen.', 1, 1000),
+    'place_tries': Described('Places given up in a row before the robot goes back.', 1, 1000),
+    'avoid_seconds': Described(
+        'How long a place that was given up is left alone at first, s.', 0.0, _DAY
+    ),
+    'longest_avoid': Described('The longest time a place is left alone, s.', 0.0, _DAY),
+    'help_seconds': Described('The first pause while waiting for help, s.', 0.0, _DAY),
+    'longest_help': Described('The longest pause while waiting for help, s.', 0.0, _DAY),
+}
+_MISSION = {
+    'arrival_tolerance': Described(
+        "How far from its path's end the robot may stop and still have arrived, m.", 0.0, 1000.0
+    ),
+    'goal_tolerance': Described("How far from the goal a planner's path may end, m.", 0.0, 1000.0),
+    'charge_stall_seconds': Described(
+        'How long the level may stay the same at the station before the robot docks anew, s; '
+        '0: for ever.',
+        *(0.0, _DAY),
+    ),
+}
+_DEADLINES = {
+    name: Described(f'Seconds of real time for {text}.', least, _DAY)
+    for name, least, text in (
+        ('answer', 0.1, "a service's answer, and for a goal to be accepted"),
+        ('build', 0.1, 'the ontology to be built, and for looking around at the start'),
+        ('plan', 0.0, 'a path; 0: as long as the planner lives'),
+        ('move', 0.0, 'following a path; 0: as long as the controller lives'),
+        ('charge', 0.0, 'the battery to get on while it is charged by `recharge`; 0: for ever'),
+    )
 }
 
 
@@ -43,42 +76,16 @@ def choice_settings(node: PatrolNode) -> ChoiceSettings:
     Raises:
         ParameterError: A value is of the wrong type or out of range.
     """
-    default = ChoiceSettings()
-    settings = ChoiceSettings()
-
-    def follow(name: str) -> Callable[[Any], None]:
-        return lambda value: setattr(settings, name, value)
-
+    settings = declare_fields(
+        node, ChoiceSettings(), _CHOICE, on_change=lambda *change: setattr(settings, *change)
+    )
     settings.urgency_threshold = node.parameter(
         'urgency_threshold',
-        int(default.urgency_threshold),
+        int(settings.urgency_threshold),
         'Seconds without a visit after which a place is URGENT.',
         minimum=0,
         maximum=10**9,
-        on_change=follow('urgency_threshold'),
-    )
-    settings.exploration_seconds = node.parameter(
-        'exploration_seconds',
-        default.exploration_seconds,
-        'Seconds the robot takes to explore a place.',
-        minimum=0.0,
-        maximum=86400.0,
-        on_change=follow('exploration_seconds'),
-    )
-    settings.speed = node.parameter(
-        'robot_speed',
-        default.speed,
-        "Metres per second at which the robot drives, to tell a move's time.",
-        minimum=0.001,
-        maximum=100.0,
-        on_change=follow('speed'),
-    )
-    settings.policy = node.parameter(
-        'policy',
-        DEFAULT_POLICY,
-        'How a place is chosen among those that the rules allow.',
-        choices=tuple(POLICIES),
-        on_change=follow('policy'),
+        on_change=lambda value: setattr(settings, 'urgency_threshold', value),
     )
     settings.rules = Rules(
         tuple(
@@ -90,16 +97,6 @@ def choice_settings(node: PatrolNode) -> ChoiceSettings:
                 check=_rules_expected,
                 on_change=lambda names: setattr(settings, 'rules', Rules(tuple(names))),
             )
-        )
-    )
-    settings.recharge_rooms = tuple(
-        node.parameter(
-            'recharge_rooms',
-            list(default.recharge_rooms),
-            'Places with a charging station.',
-            of=str,
-            check=lambda names: None if names else 'at least one place',
-            on_change=lambda names: setattr(settings, 'recharge_rooms', tuple(names)),
         )
     )
     settings.battery = _battery_limits(node, settings)
@@ -158,65 +155,15 @@ def mission_settings(node: PatrolNode) -> MissionSettings:
     Raises:
         ParameterError: A value is of the wrong type or out of range.
     """
-    default = MissionSettings()
-    recovery = {
-        field.name: node.parameter(
-            f'recovery.{field.name}',
-            getattr(default.recovery, field.name),
-            _RECOVERY[field.name],
-            minimum=1 if 'tries' in field.name else 0.0,
-            maximum=1000 if 'tries' in field.name else 86400.0,
-            read_only=True,
-        )
-        for field in fields(RecoveryLimits)
-    }
-    return MissionSettings(
-        choice=choice_settings(node),
-        recovery=RecoveryLimits(**recovery),
-        arrival_tolerance=node.parameter(
-            'arrival_tolerance',
-            default.arrival_tolerance,
-            "How far from its path's end the robot may stop and still have arrived, m.",
-            minimum=0.0,
-            maximum=1000.0,
-            read_only=True,
-        ),
-        goal_tolerance=node.parameter(
-            'goal_tolerance',
-            default.goal_tolerance,
-            "How far from the goal a planner's path may end, m.",
-            minimum=0.0,
-            maximum=1000.0,
-            read_only=True,
-        ),
-        charge_stall_seconds=node.parameter(
-            'charge_stall_seconds',
-            default.charge_stall_seconds,
-            'How long the level may stay the same at the station before the robot docks anew, s; '
-            '0: for ever.',
-            minimum=0.0,
-            maximum=86400.0,
-            read_only=True,
-        ),
-    )
+    recovery = declare_fields(node, RecoveryLimits(), _RECOVERY, prefix='recovery.')
+    settings = MissionSettings(choice=choice_settings(node), recovery=recovery)
+    return declare_fields(node, settings, _MISSION)
 
 
 def deadlines(node: PatrolNode, names: Sequence[str] = tuple(_DEADLINES)) -> Deadlines:
     """Declares the deadlines of the peers, seconds of steady time."""
-    default = Deadlines()
-    return Deadlines(
-        **{
-            name: node.parameter(
-                f'deadline.{name}',
-                getattr(default, name),
-                f'Seconds of real time for {_DEADLINES[name]}.',
-                minimum=0.1 if name in ('answer', 'build') else 0.0,
-                maximum=86400.0,
-                read_only=True,
-            )
-            for name in names
-        }
-    )
+    described = {name: _DEADLINES[name] for name in names}
+    return declare_fields(node, Deadlines(), described, prefix='deadline.')
 
 
 def random_seed(node: PatrolNode) -> int:

@@ -13,8 +13,26 @@ from surveillance_controllers.path_following import DriveParameters
 from surveillance_controllers.place_regions import Segment, door_segment
 from surveillance_controllers.polyline import Points
 from surveillance_controllers.poses import Pose
+from surveillance_runtime.field_parameters import Described, declare_fields
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError
+
+_RADIUS = 'SIMULATED: Radius of the robot, m.'
+_PLANNING = {
+    'radius': Described(_RADIUS, 0.0, 20.0, name='robot_radius'),
+    'margin': Described('SIMULATED: Kept beyond the radius, m.', 0.0, 20.0),
+    'comfort': Described('SIMULATED: Room that a path prefers, m.', 0.0, 20.0),
+    'aversion': Described('SIMULATED: How much dearer a path near obstacles is.', 0.0, 20.0),
+}
+_DRIVE = {
+    'radius': Described(_RADIUS, 0.01, 20.0, name='robot_radius'),
+    'margin': Described('SIMULATED: Kept from what the lidar sees, m.', 0.01, 20.0),
+    'speed': Described('SIMULATED: Top speed, m/s.', 0.01, 20.0),
+    'turn': Described('SIMULATED: Top turning speed, rad/s.', 0.01, 20.0),
+    'acceleration': Described('SIMULATED: Acceleration, m/s^2.', 0.01, 20.0),
+    'turn_acceleration': Described('SIMULATED: Turning acceleration, rad/s^2.', 0.01, 20.0),
+    'tolerance': Described('SIMULATED: The end is reached within this distance, m.', 0.01, 20.0),
+}
 
 
 def door_segments(node: PatrolNode) -> dict[str, Segment]:
@@ -57,22 +75,7 @@ def _are_numbers(values: object, count: int) -> bool:
 
 def planning_parameters(node: PatrolNode) -> PlanningParameters:
     """Declares how `planner_controller` plans in SIMULATED mode."""
-    default = PlanningParameters()
-
-    def length(name: str, value: float, description: str) -> float:
-        number: float = node.parameter(
-            name, value, 'SIMULATED: ' + description, minimum=0.0, maximum=20.0, read_only=True
-        )
-        return number
-
-    return PlanningParameters(
-        radius=length('robot_radius', default.radius, 'Radius of the robot, m.'),
-        margin=length('planning.margin', default.margin, 'Kept beyond the radius, m.'),
-        comfort=length('planning.comfort', default.comfort, 'Room that a path prefers, m.'),
-        aversion=length(
-            'planning.aversion', default.aversion, 'How much dearer a path near obstacles is.'
-        ),
-    )
+    return declare_fields(node, PlanningParameters(), _PLANNING, prefix='planning.')
 
 
 @dataclass(frozen=True)
@@ -96,29 +99,8 @@ def robot_settings(node: PatrolNode, motion: MotionSettings) -> RobotSettings:
     Raises:
         ParameterError: A value is of the wrong type or out of range.
     """
-    default = DriveParameters()
-
-    def positive(name: str, value: float, description: str) -> float:
-        number: float = node.parameter(
-            name, value, 'SIMULATED: ' + description, minimum=0.01, maximum=20.0, read_only=True
-        )
-        return number
-
-    drive = DriveParameters(
-        radius=positive('robot_radius', default.radius, 'Radius of the robot, m.'),
-        margin=positive('drive.margin', default.margin, 'Kept from what the lidar sees, m.'),
-        speed=positive('drive.speed', default.speed, 'Top speed, m/s.'),
-        turn=positive('drive.turn', default.turn, 'Top turning speed, rad/s.'),
-        acceleration=positive('drive.acceleration', default.acceleration, 'Acceleration, m/s^2.'),
-        turn_acceleration=positive(
-            'drive.turn_acceleration', default.turn_acceleration, 'Turning acceleration, rad/s^2.'
-        ),
-        tolerance=positive(
-            'drive.tolerance', default.tolerance, 'The end is reached within this distance, m.'
-        ),
-    )
     return RobotSettings(
-        drive=drive,
+        drive=declare_fields(node, DriveParameters(), _DRIVE, prefix='drive.'),
         station=motion.station,
         doors=door_segments(node),
         positions=place_positions(node),

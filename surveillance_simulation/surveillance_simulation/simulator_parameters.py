@@ -4,21 +4,59 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import replace
 from typing import Any
 
+from surveillance_runtime.field_parameters import Described, declare_fields
 from surveillance_runtime.node import PatrolNode
 from surveillance_simulation.base import BaseModel
 from surveillance_simulation.camera import Camera, Conditions
 from surveillance_simulation.lidar import LidarModel
 from surveillance_simulation.pace import PaceModel
 
+_PACE = {
+    'speed': Described(
+        'Simulated seconds per real second; 0: as fast as the nodes keep up.', 0.0, 1000.0
+    ),
+    'ceiling': Described(
+        'Simulated seconds per real second at most when speed is 0.',
+        *(1.0, 10_000.0),
+        name='top_speed',
+    ),
+    'step': Described(
+        'Simulated seconds between two messages on clock, odom and scan.', 0.005, 0.5
+    ),
+    'idle_step': Described('The same while nothing moves and speed is 0.', 0.005, 5.0),
+}
+_BASE = {
+    'radius': Described('Radius of the robot, metres.', 0.01, 20.0, name='robot_radius'),
+    'speed': Described('Greatest speed, m/s.', 0.01, 20.0),
+    'turn_speed': Described('Greatest turn speed, rad/s.', 0.01, 20.0),
+    'acceleration': Described('Greatest acceleration, m/s^2.', 0.01, 20.0),
+    'turn_acceleration': Described('Greatest turning acceleration, rad/s^2.', 0.01, 20.0),
+    'command_timeout': Described(
+        'Seconds without a command after which the base stops.', 0.01, 20.0
+    ),
+    'distance_error': Described(
+        "Standard deviation of the odometry's distance after one metre, metres.", 0.0, 1.0
+    ),
+    'turn_error': Described(
+        "Standard deviation of the odometry's heading after one radian, rad.", 0.0, 1.0
+    ),
+}
+_LIDAR = {
+    'rays': Described('Rays of a full turn.', 4, 7200),
+    'range_max': Described('Greatest distance measured, metres.', 0.5, 200.0),
+    'noise': Described('Standard deviation of a distance, metres.', 0.0, 1.0),
+}
 _CONDITIONS = {
-    'light': "Brightness of the camera's pictures: 1 a lit room, 0.1 a dark one.",
-    'noise': "Standard deviation of the camera's noise, grey levels.",
-    'blur': "Standard deviation of the lens's blur, pixels.",
-    'motion': 'Length of the streak that motion draws in a picture, pixels.',
-    'motion_angle': 'Direction of that streak, rad.',
+    'light': Described(
+        "Brightness of the camera's pictures: 1 a lit room, 0.1 a dark one.", 0.0, 100.0
+    ),
+    'noise': Described("Standard deviation of the camera's noise, grey levels.", 0.0, 100.0),
+    'blur': Described("Standard deviation of the lens's blur, pixels.", 0.0, 100.0),
+    'motion': Described('Length of the streak that motion draws in a picture, pixels.', 0.0, 100.0),
+    'motion_angle': Described('Direction of that streak, rad.', -math.pi, math.pi),
 }
 _PLACE_TABLES = ('map', 'room_positions', 'walls', 'doors', 'markers')
 
@@ -48,41 +86,7 @@ def place(node: PatrolNode) -> dict[str, Any]:
 
 def pace(node: PatrolNode) -> PaceModel:
     """Declare how simulated time goes."""
-    default = PaceModel()
-    return PaceModel(
-        speed=node.parameter(
-            'speed',
-            default.speed,
-            'Simulated seconds per real second; 0: as fast as the nodes keep up.',
-            minimum=0.0,
-            maximum=1000.0,
-            read_only=True,
-        ),
-        ceiling=node.parameter(
-            'top_speed',
-            default.ceiling,
-            'Simulated seconds per real second at most when speed is 0.',
-            minimum=1.0,
-            maximum=10000.0,
-            read_only=True,
-        ),
-        step=node.parameter(
-            'step',
-            default.step,
-            'Simulated seconds between two messages on clock, odom and scan.',
-            minimum=0.005,
-            maximum=0.5,
-            read_only=True,
-        ),
-        idle_step=node.parameter(
-            'idle_step',
-            default.idle_step,
-            'The same while nothing moves and speed is 0.',
-            minimum=0.005,
-            maximum=5.0,
-            read_only=True,
-        ),
-    )
+    return declare_fields(node, PaceModel(), _PACE)
 
 
 def map_resolution(node: PatrolNode) -> float:
@@ -111,75 +115,12 @@ def announces_pose(node: PatrolNode) -> bool:
 
 def base(node: PatrolNode) -> BaseModel:
     """Declare body, limits and errors of the base."""
-    default = BaseModel()
-
-    def positive(name: str, value: float, description: str) -> float:
-        number: float = node.parameter(
-            name, value, description, minimum=0.01, maximum=20.0, read_only=True
-        )
-        return number
-
-    def share(name: str, value: float, description: str) -> float:
-        number: float = node.parameter(
-            name, value, description, minimum=0.0, maximum=1.0, read_only=True
-        )
-        return number
-
-    return BaseModel(
-        radius=positive('robot_radius', default.radius, 'Radius of the robot, metres.'),
-        speed=positive('base.speed', default.speed, 'Greatest speed, m/s.'),
-        turn_speed=positive('base.turn_speed', default.turn_speed, 'Greatest turn speed, rad/s.'),
-        acceleration=positive(
-            'base.acceleration', default.acceleration, 'Greatest acceleration, m/s^2.'
-        ),
-        turn_acceleration=positive(
-            'base.turn_acceleration',
-            default.turn_acceleration,
-            'Greatest turning acceleration, rad/s^2.',
-        ),
-        command_timeout=positive(
-            'base.command_timeout',
-            default.command_timeout,
-            'Seconds without a command after which the base stops.',
-        ),
-        distance_error=share(
-            'base.distance_error',
-            default.distance_error,
-            "Standard deviation of the odometry's distance after one metre, metres.",
-        ),
-        turn_error=share(
-            'base.turn_error',
-            default.turn_error,
-            "Standard deviation of the odometry's heading after one radian, rad.",
-        ),
-    )
+    return declare_fields(node, BaseModel(), _BASE, prefix='base.')
 
 
 def lidar(node: PatrolNode) -> LidarModel:
     """Declare what the lidar can do."""
-    default = LidarModel()
-    return LidarModel(
-        rays=node.parameter(
-            'lidar.rays', default.rays, 'Rays of a full turn.', minimum=4, maximum=7200
-        ),
-        range_min=default.range_min,
-        range_max=node.parameter(
-            'lidar.range_max',
-            default.range_max,
-            'Greatest distance measured, metres.',
-            minimum=0.5,
-            maximum=200.0,
-            read_only=True,
-        ),
-        noise=node.parameter(
-            'lidar.noise',
-            default.noise,
-            'Standard deviation of a distance, metres.',
-            minimum=0.0,
-            maximum=1.0,
-            read_only=True,
-        ),
-    )
+    return declare_fields(node, LidarModel(), _LIDAR, prefix='lidar.')
 
 
 def camera(node: PatrolNode) -> Camera:
@@ -231,22 +172,12 @@ def camera_rate(node: PatrolNode) -> float:
 
 def conditions(node: PatrolNode, on_change: Callable[[Conditions], None]) -> Conditions:
     """Declare light, noise and blur, which may be changed while the node runs."""
-    values = asdict(Conditions())
+    present = Conditions()
 
-    def changed(name: str) -> Callable[[float], None]:
-        def change(value: float) -> None:
-            values[name] = value
-            on_change(Conditions(**values))
+    def changed(field: str, value: float) -> None:
+        nonlocal present
+        present = replace(present, **{field: value})
+        on_change(present)
 
-        return change
-
-    for name, description in _CONDITIONS.items():
-        values[name] = node.parameter(
-            f'camera.{name}',
-            values[name],
-            description,
-            minimum=-math.pi if name == 'motion_angle' else 0.0,
-            maximum=math.pi if name == 'motion_angle' else 100.0,
-            on_change=changed(name),
-        )
-    return Conditions(**values)
+    present = declare_fields(node, present, _CONDITIONS, prefix='camera.', on_change=changed)
+    return present
