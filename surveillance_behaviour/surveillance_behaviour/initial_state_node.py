@@ -8,7 +8,6 @@ from typing import Any
 
 from nav_msgs.msg import Odometry
 from rclpy.callback_groups import ReentrantCallbackGroup
-from rclpy.task import Future
 from std_srvs.srv import Empty
 
 from surveillance_behaviour.conversions import map_message
@@ -18,13 +17,20 @@ from surveillance_behaviour.surroundings import LookingAround
 from surveillance_behaviour.survey import PlaceNote, Survey, SurveyReport, notes_of
 from surveillance_interfaces.msg import OntologyMap
 from surveillance_interfaces.srv import ReferenceName
+from surveillance_runtime.awaited_work import AwaitedEvent
 from surveillance_runtime.calls import CallFailed, ServiceCaller
-from surveillance_runtime.node import PatrolNode, StartError
-from surveillance_runtime.place import Place, PlaceError, make_place
+from surveillance_runtime.field_parameters import Described, declare_fields
+from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.place_parameters import described_place
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 
 _BUILD_SECONDS = 20.0
+_LOOKING = {
+    'poses': Described("The arm's poses for looking around.", 1, 4),
+    'deadline': Described('Seconds after which what was found has to do.', 0.0),
+    'dwell': Described('Rest at each view of a scan, seconds.', 0.0),
+}
 
 
 class InitialState(PatrolNode):
@@ -32,37 +38,21 @@ class InitialState(PatrolNode):
 
     def __init__(self, **node_options: Any) -> None:
         super().__init__('initial_state', **node_options)
-        source = self.parameter(
-            'map_source',
-            'markers',
-            'Where the map comes from.',
-            choices=('markers', 'configuration'),
-            read_only=True,
+        self._configured = described_place(self, source='markers', required=True)
+        self._looking = declare_fields(
+            self,
+            LookingAround(),
+            _LOOKING,
+            on_change=lambda *change: setattr(self._looking, *change),
         )
-        robot_room = self.parameter(
-            'robot_room', '', 'Where the robot starts; empty: the place nearest to it.'
-        )
-        poses = self.parameter(
-            'poses', [1, 2, 3, 4], "The arm's poses for looking around.", minimum=1, maximum=4
-        )
-        deadline = self.parameter(
-            'deadline',
-            45.0,
-            'Seconds after which what was found has to do.',
-            minimum=0.0,
-            on_change=lambda value: setattr(self._looking, 'deadline', value),
-        )
-        dwell = self.parameter('dwell', 0.5, 'Rest at each view of a scan, seconds.', minimum=0.0)
         pictures = self.parameter('pictures', 6, 'Pictures to take at each pose.', minimum=1)
         patience = self.parameter(
             'patience', 2.0, 'Seconds after which a pose is left without them.', minimum=0.0
         )
-        self._looking = LookingAround(tuple(poses), deadline, dwell)
-        self._survey = Survey(robot_room, (0.0, 0.0))
-        self._configured = self._place(robot_room) if source == 'configuration' else None
+        self._survey = Survey(self.get_parameter('robot_room').value, (0.0, 0.0))
         self._sent: tuple[PlaceNote, ...] = ()
         self._finished = False
-        self._waiting: list[Future] = []
+        self._found = AwaitedEvent(self)
         self._events: queue.SimpleQueue[str] = queue.SimpleQueue()
         self._inquiry = MarkerInquiry(self, self._survey, self._events)
         self._eyes = RosEyes(self, pictures, patience)
@@ -76,21 +66,12 @@ class InitialState(PatrolNode):
         """End the worker."""
         self._events.put('stop')
 
-    def _place(self, robot_room: str) -> Place:
-        rooms, positions = self.parameters_under('map'), self.parameters_under('room_positions')
-        try:
-            return make_place(rooms, positions, robot_room)
-        except PlaceError as error:
-            raise StartError(f'{self.get_name()}: parameter {error}') from None
-
     # --- callbacks ---
 
     async def _on_start(self, _request: Any, response: Any) -> Any:
         if not self._finished:
-            future = Future(executor=self.executor)
-            self._waiting.append(future)
             self._events.put('start')
-            await future
+        await self._found.wait_for(lambda: self._finished)
         return response
 
     def _on_odometry(self, message: Odometry) -> None:
@@ -127,7 +108,8 @@ class InitialState(PatrolNode):
             self._tell(report)
             self._publish(report.places, report.robot_room)
         self._await_map()
-        self.executor.create_task(self._answer)
+        self._finished = True
+        self._found.happen()
         return True
 
     def _extend(self, report: SurveyReport) -> None:
@@ -156,12 +138,6 @@ class InitialState(PatrolNode):
         except CallFailed as error:
             if not self.stopping.is_set():
                 self.get_logger().warn(f'the map is sent, but not known to be built: {error}')
-
-    def _answer(self) -> None:
-        self._finished = True
-        waiting, self._waiting = self._waiting, []
-        for future in waiting:
-            future.set_result(None)
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from typing import Any
 
 from rclpy.callback_groups import ReentrantCallbackGroup
-from rclpy.task import Future
 
 from surveillance_behaviour import behaviour_parameters
 from surveillance_behaviour.announcing import DecisionTopic
@@ -23,6 +22,7 @@ from surveillance_behaviour.ports import InterruptedWaitError, PeerError
 from surveillance_behaviour.ros_ports import RosPlaces, ros_knowledge
 from surveillance_interfaces.msg import MissionStatus
 from surveillance_interfaces.srv import Reason
+from surveillance_runtime.awaited_work import work_aside
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
@@ -58,16 +58,11 @@ class Reasoner(PatrolNode):
         self._avoided = frozenset(status.avoided)
 
     async def _on_reason(self, _request: Any, response: Any) -> Any:
-        chosen = Future()
-
-        def work() -> None:
+        def choose() -> str:
             with self._turn:
-                chosen.set_result(self._choose())
-            # A future that is set from another thread does not wake the executor.
-            self.executor.wake()
+                return self._choose()
 
-        self.spawn(work, name='reason')
-        response.point = await chosen
+        response.point = await work_aside(self, choose, 'reason')
         return response
 
     def _choose(self) -> str:

@@ -44,8 +44,8 @@ class LookingAround:
     """
 
     poses: Sequence[int] = (1, 2, 3, 4)
-    deadline: float = 50.0
-    dwell: float = 0.4
+    deadline: float = 45.0
+    dwell: float = 0.5
 
     def run(
         self,

@@ -6,15 +6,18 @@ from surveillance_runtime.node import PatrolNode, StartError
 from surveillance_runtime.place import Place, PlaceError, make_place
 
 
-def described_place(node: PatrolNode, source: str = 'configuration') -> Place | None:
+def described_place(
+    node: PatrolNode, source: str = 'configuration', *, required: bool = False
+) -> Place | None:
     """Declare where the map comes from, and make the place that the parameters describe.
 
     Args:
         node: The node.
         source: Default of the parameter `map_source`.
+        required: Whether the parameters must describe one if that is where the map comes from.
 
     Returns:
-        None when the map comes from markers, or when no map is described.
+        None when the map comes from markers, or when none is described and none required.
 
     Raises:
         ParameterError: A parameter is of the wrong type.
@@ -43,7 +46,7 @@ def described_place(node: PatrolNode, source: str = 'configuration') -> Place | 
     if chosen == 'markers':
         return None
     rooms, positions = node.parameters_under('map'), node.parameters_under('room_positions')
-    if not rooms and not positions:
+    if not rooms and not positions and not required:
         return None
     try:
         return make_place(rooms, positions, robot_room, stations)

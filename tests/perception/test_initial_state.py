@@ -122,6 +122,8 @@ def test_map_can_come_from_the_configuration(graph: Any) -> None:
 def test_configuration_that_is_no_place_is_refused(graph: Any) -> None:
     with pytest.raises(StartError, match='robot_room'):
         graph.add(InitialState, parameters=CONFIGURED | {'robot_room': 'Z'})
+    with pytest.raises(StartError, match='initial_state: parameter map: expected rooms'):
+        graph.add(InitialState, parameters={'map_source': 'configuration'})
 
 
 def test_node_stops_while_it_waits_for_an_arm_that_is_not_there(graph: Any) -> None:
@@ -129,5 +131,5 @@ def test_node_stops_while_it_waits_for_an_arm_that_is_not_there(graph: Any) -> N
     client = graph.node.create_client(Empty, 'start')
     graph.until(client.service_is_ready)
     client.call_async(Empty.Request())
-    graph.until(lambda: node._waiting)
+    graph.until(lambda: node._found._futures)
     graph.remove(node)
