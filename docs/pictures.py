@@ -1,4 +1,5 @@
-"""Draws the pictures of the documentation anew: the places, a run, and what the camera sees.
+"""Draws the pictures of the documentation anew: the places, a run, a run as `launch.py watch` shows
+it, and what the camera sees.
 
     python docs/pictures.py
 
@@ -20,11 +21,17 @@ sys.path.insert(0, str(ROOT / 'benchmarks'))
 
 from builtin_interfaces.msg import Duration  # noqa: E402
 from PIL import Image as Picture  # noqa: E402
+from PIL import ImageDraw, ImageFont  # noqa: E402
+from rich.console import Console  # noqa: E402
+from rich.style import Style  # noqa: E402
+from rich.terminal_theme import MONOKAI  # noqa: E402
 from sensor_msgs.msg import Image, JointState  # noqa: E402
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint  # noqa: E402
 from whole_stack import Stack  # noqa: E402
 
+from launcher import graph  # noqa: E402
 from surveillance_behaviour import map_command  # noqa: E402
+from surveillance_behaviour.mission_view import MissionView  # noqa: E402
 from surveillance_interfaces.srv import PlaceObstacle, SetDoor, SetMarker  # noqa: E402
 from surveillance_runtime.calls import ServiceCaller  # noqa: E402
 from surveillance_runtime.qos import SENSOR_QOS  # noqa: E402
@@ -32,6 +39,7 @@ from surveillance_runtime.robot_arm import ARM  # noqa: E402
 
 IMAGES = ROOT / 'docs' / 'images'
 PATROL_SECONDS = 1500.0
+WATCH_SECONDS = 158.0
 
 
 def places() -> None:
@@ -57,6 +65,71 @@ def run() -> None:
             stack.close()
         arguments = [str(place), '--record', str(record), '-o', str(IMAGES / 'run.png')]
         assert map_command.main(arguments) == 0
+
+
+def watch() -> None:
+    """Patrol with a closed door and an obstacle, and draw the terminal of whoever watches."""
+    nodes = [*(node.name for node in graph.select('SIMULATED')), 'mission_view']
+    stack = Stack(
+        ROOT / 'config' / 'seven_rooms.yaml',
+        {'simulator': {'speed': 4.0}, 'battery_controller': {'battery_initial_value': 70}},
+        nodes=nodes,
+    )
+    stack.start()
+    try:
+        for kind, name, request in (
+            (SetDoor, 'set_door', SetDoor.Request(door='D5', open=False)),
+            (
+                PlaceObstacle,
+                'place_obstacle',
+                PlaceObstacle.Request(name='barrel', x=12.0, y=8.5, radius=0.25),
+            ),
+        ):
+            ServiceCaller(stack.observer, kind, f'simulation/{name}').call(request, timeout=20.0)
+        while stack.robot.time < WATCH_SECONDS:
+            threading.Event().wait(0.2)
+        view: Any = stack.nodes['mission_view']
+        screenshot(MissionView(view.see()), 110, 34).save(IMAGES / 'watch.png', optimize=True)
+    finally:
+        stack.close()
+
+
+def screenshot(view: MissionView, columns: int, rows: int) -> Picture.Image:
+    """Return a terminal's picture; blocks fill their cells, which fonts leave gaps between."""
+    console = Console(width=columns, height=rows, color_system='truecolor', force_terminal=True)
+    fonts = [ImageFont.truetype(f'DejaVuSansMono{kind}.ttf', 15) for kind in ('', '-Bold')]
+    wide, high = 9, 18
+    picture = Picture.new('RGB', (columns * wide, rows * high), MONOKAI.background_color)
+    draw = ImageDraw.Draw(picture)
+    blocks = {' ': (0, 0), '█': (0, high), '▀': (0, high // 2), '▄': (high // 2, high)}
+    texts = []
+    for row, line in enumerate(console.render_lines(view, console.options.update(height=rows))):
+        column = 0
+        for segment in line:
+            style = segment.style or Style.null()
+            ink, paper = _colours(style)
+            for character in segment.text:
+                x, y = column * wide, row * high
+                column += 1
+                draw.rectangle((x, y, x + wide - 1, y + high - 1), paper)
+                top, bottom = blocks.get(character, (0, 0))
+                if bottom:
+                    draw.rectangle((x, y + top, x + wide - 1, y + bottom - 1), ink)
+                elif character != ' ':
+                    texts.append(((x, y), character, ink, fonts[bool(style.bold)]))
+    for text in texts:
+        draw.text(*text)
+    return picture
+
+
+def _colours(style: Style) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    ink = style.color.get_truecolor(MONOKAI) if style.color else MONOKAI.foreground_color
+    paper = MONOKAI.background_color
+    if style.bgcolor:
+        paper = style.bgcolor.get_truecolor(MONOKAI, foreground=False)
+    if style.dim:
+        return tuple((2 * a + b) // 3 for a, b in zip(ink, paper, strict=True)), tuple(paper)
+    return tuple(ink), tuple(paper)
 
 
 class Photographer:
@@ -146,5 +219,5 @@ def camera() -> None:
 
 
 if __name__ == '__main__':
-    for draw in [globals()[name] for name in sys.argv[1:]] or [places, run, camera]:
+    for draw in [globals()[name] for name in sys.argv[1:]] or [places, run, watch, camera]:
         draw()

@@ -41,9 +41,16 @@ class Status:
 
 @dataclass(frozen=True)
 class Change:
-    """Something new in words; routine is what the picture itself shows anyway."""
+    """Something new in words.
+
+    Attributes:
+        text: In short.
+        detail: What a log says, too.
+        routine: Whether the picture itself shows it anyway.
+    """
 
     text: str
+    detail: str = ''
     routine: bool = False
 
 
@@ -103,7 +110,7 @@ def changes(old: Snapshot, new: Snapshot) -> Iterator[Change]:
     if new.status is not None and new.status != old.status:
         yield from _status_changes(old.status, new.status)
     if new.decision is not None and (new.decision, new.number) != (old.decision, old.number):
-        yield Change(f'{decision_line(new)} {new.decision.reason}')
+        yield Change(decision_line(new), detail=new.decision.reason)
     if new.battery is not None:
         before = None if old.battery is None else int(old.battery) // BATTERY_STEP
         if before is None or before != int(new.battery) // BATTERY_STEP:

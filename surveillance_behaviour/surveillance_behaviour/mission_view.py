@@ -23,11 +23,13 @@ SIDE_BY_SIDE = 76
 """From this many columns on the panel stands beside the map, else below."""
 LEAST_PANEL = 40
 """Columns of the panel beside the map; it gets what the map does not need, too."""
-MOST_DECISION, MOST_EVENTS = 6, 8
+MOST_DECISION, MOST_EVENTS = 6, 10
 """Lines."""
 BAR = 20
 MARGIN = 1.5
 """Around the places, where there is no map, metres."""
+HALF_WALL = 0.04
+"""Half of what a door's opening is deep, metres."""
 RECENT = 300
 """Points of the trail that are drawn brighter."""
 
@@ -78,7 +80,9 @@ class MissionView:
         else:
             picture = draw_map(self._snapshot, width, max(3, body // 2), colours=colours)
             rows = [*picture, *self._panel(console, options, width, max(0, body - len(picture)))]
-        header = _rendered(console, options, [header_line(self._snapshot)], width)
+        title = header_line(self._snapshot)
+        title.pad_right(max(0, width - len(title)))
+        header = _rendered(console, options, [title], width)
         rows = [*header, *rows][:height]
         if self._whole:
             rows += [[] for _ in range(height - len(rows))]
@@ -99,7 +103,9 @@ class MissionView:
         fixed += decision[:most]
         fixed += _wrapped(console, [doors_line(snapshot)], width)
         places = place_lines(snapshot, width)
-        events = [Text.assemble((at, DIM), ' ', text) for at, text in snapshot.events]
+        told = snapshot.events[-MOST_EVENTS:]
+        texts = [Text.assemble((at, DIM), ' ', text) for at, text in told]
+        events = _wrapped(console, texts, width)
         # The places come before all but the latest events.
         room = max(0, height - len(fixed) - 2)
         shown_events = min(len(events), max(min(3, room), room - len(places)), MOST_EVENTS)
@@ -222,7 +228,9 @@ def draw_map(snapshot: Snapshot, columns: int, rows: int, *, colours: bool) -> L
         if door in snapshot.door_lines:
             x1, y1, x2, y2 = snapshot.door_lines[door]
             kind = map_raster.OPEN_DOOR if is_open else map_raster.CLOSED_DOOR
-            canvas.line((x1, y1), (x2, y2), kind)
+            # Two lines, so that it is as thick as its wall where that takes two pixels.
+            for aside in (-HALF_WALL, HALF_WALL):
+                canvas.line((x1 + aside, y1 + aside), (x2 + aside, y2 + aside), kind)
     if snapshot.obstacles is not None:
         canvas.dots(snapshot.obstacles, map_raster.OBSTACLE)
     for place, (x, y) in snapshot.positions.items():

@@ -80,7 +80,7 @@ class MissionViewNode(PatrolNode):
         self.snapshot = replace(new, events=(*new.events, *events)[-KEPT_EVENTS:])
         if not (self._once or self._console.is_terminal):
             for each in told:
-                self._print(f'{at} {each.text}')
+                self._print(f'{at} {each.text} {each.detail}'.rstrip())
 
     def _look(self) -> None:
         old, nodes = self.snapshot, self._topics.publishers() | self._facts.servers()

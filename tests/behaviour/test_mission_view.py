@@ -159,9 +159,9 @@ def test_what_does_not_fit_is_said_to_be_left_out():
 
 def test_each_change_is_told_once_in_one_line():
     before, after = Snapshot(), whole()
-    first = [change.text for change in changes(before, after)]
-    assert 'decision 3: A → B [URGENT] B waits longest' in first
-    assert {'door D closed', 'B is URGENT', 'arrived in A', 'battery at 80 %'} <= set(first)
+    first = {change.text: change.detail for change in changes(before, after)}
+    assert first['decision 3: A → B [URGENT]'] == 'B waits longest'
+    assert {'door D closed', 'B is URGENT', 'arrived in A', 'battery at 80 %'} <= first.keys()
     assert 'something stands at (2.0, 3.5)' in first
     assert list(changes(after, after)) == []
     later = replace(
