@@ -7,8 +7,9 @@ running goal can be cancelled), and only then takes ROS down.
 
 from __future__ import annotations
 
+import contextlib
 import itertools
-import queue
+import os
 import signal
 import sys
 import threading
@@ -28,6 +29,7 @@ from surveillance_runtime.node import JOIN_SECONDS, PatrolNode, StartError
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.yaml_file import YamlFileError, read_yaml_file
 
+STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM)
 EXIT_CANNOT_START = 2
 """The exit code of a node whose configuration does not let it start."""
 
@@ -50,19 +52,7 @@ def run_nodes(
     factories: Sequence[Callable[[], PatrolNode]], args: Sequence[str] | None = None
 ) -> int:
     """Run several nodes in this process on one executor; otherwise as `run_node`."""
-    # A handler may run in the middle of the main thread's own wait, where an Event's lock is taken
-    # and would never be let go: only SimpleQueue.put may be entered anew.
-    ended: queue.SimpleQueue[None] = queue.SimpleQueue()
-
-    def end() -> None:
-        ended.put(None)
-
-    def on_signal(_number: int, _frame: Any) -> None:
-        end()
-
-    # Set by hand: background jobs of a shell inherit an ignored SIGINT.
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, on_signal)
+    ending = _Ending()
     argv = [sys.argv[0], *(sys.argv[1:] if args is None else args)]
     try:
         _check_parameter_files(argv)
@@ -77,15 +67,15 @@ def run_nodes(
         for factory in factories:
             nodes.append(factory())
             spinner.executor.add_node(nodes[-1])
-            nodes[-1].ended.subscribe(end)
-        spinner.start(on_end=end)
-        ended.get()
+            nodes[-1].ended.subscribe(ending.come)
+        spinner.start(on_end=ending.come)
+        ending.wait()
     except (ParameterError, StartError) as error:
-        print(f'cannot start: {_one_line(error)}', file=sys.stderr)
+        who = getattr(factory, '__name__', '') + ' ' if len(factories) > 1 else ''
+        print(f'{who}cannot start: {_one_line(error)}', file=sys.stderr)
         code = EXIT_CANNOT_START
     finally:
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, signal.SIG_IGN)
+        ending.ignore_signals()
         for node in reversed(nodes):
             node.stop()
         spinner.stop()
@@ -98,6 +88,39 @@ def run_nodes(
     if any(node.failure is not None for node in nodes):
         code = 1
     return code
+
+
+class _Ending:
+    """Why the main thread goes on: a stop signal, or a thread that says so.
+
+    A pipe, for nothing else is safe: a signal that comes just before a lock is waited for does not
+    end that wait, and a handler in the middle of an Event's wait finds its lock taken for good.
+    """
+
+    def __init__(self) -> None:
+        # Left open: late threads may still write.
+        self._reader, self._writer = os.pipe()
+        os.set_blocking(self._writer, False)
+        signal.set_wakeup_fd(self._writer, warn_on_full_buffer=False)
+        # Set by hand: background jobs of a shell inherit an ignored SIGINT.
+        for number in STOP_SIGNALS:
+            signal.signal(number, lambda _number, _frame: None)
+
+    def come(self) -> None:
+        """End the wait; from any thread."""
+        with contextlib.suppress(BlockingIOError):  # full of reasons to end
+            os.write(self._writer, b'\0')
+
+    def wait(self) -> None:
+        """Wait for the end."""
+        while not {0, *STOP_SIGNALS} & set(os.read(self._reader, 4096)):
+            pass
+
+    def ignore_signals(self) -> None:
+        """The process is ending: signals change nothing any more."""
+        for number in STOP_SIGNALS:
+            signal.signal(number, signal.SIG_IGN)
+        signal.set_wakeup_fd(-1)
 
 
 class ExecutorThread:

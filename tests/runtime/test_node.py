@@ -159,6 +159,30 @@ def test_signals_in_the_middle_of_any_step_of_a_wait_stop_the_process():
     assert run.stderr == ''
 
 
+SIGNAL_ELSEWHERE = """
+import signal, sys
+class Deaf(Program):
+    def __init__(self):
+        super().__init__()
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGTERM})
+sys.exit(run_node(Deaf, []))
+"""
+
+
+def test_a_signal_that_does_not_wake_the_main_thread_stops_the_process():
+    # As one does that comes just before the wait, or that the system gives to another thread.
+    program = PROGRAM.rpartition('sys.exit')[0] + SIGNAL_ELSEWHERE
+    process = subprocess.Popen([sys.executable, '-c', program], stdout=subprocess.PIPE, text=True)
+    assert process.stdout.readline() == 'spinning\n'
+    process.terminate()
+    try:
+        out, _ = process.communicate(timeout=10)
+    finally:
+        process.kill()
+    assert process.returncode == 0
+    assert 'stopping' in out
+
+
 @pytest.mark.parametrize(
     ('arguments', 'complaint'),
     [
