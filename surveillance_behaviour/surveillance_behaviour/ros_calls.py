@@ -8,13 +8,8 @@ from typing import Any
 
 from surveillance_behaviour.fsm import Interrupt
 from surveillance_behaviour.ports import AwayError, InterruptedWaitError, PeerError
-from surveillance_runtime.calls import (
-    CallFailed,
-    GoalCaller,
-    Interrupted,
-    ServiceCaller,
-    Unavailable,
-)
+from surveillance_runtime.calls import CallFailed, Interrupted, ServiceCaller, Unavailable
+from surveillance_runtime.goal_calls import GoalCaller
 
 ASK_AGAIN = 10.0
 """How long one question to a service that takes long waits for its answer, seconds."""

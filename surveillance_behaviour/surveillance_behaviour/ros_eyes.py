@@ -7,7 +7,8 @@ from typing import Any
 
 from surveillance_interfaces.action import ScanSurroundings
 from surveillance_interfaces.srv import MarkerRoutine
-from surveillance_runtime.calls import CallFailed, GoalCaller, ServiceCaller
+from surveillance_runtime.calls import CallFailed, ServiceCaller
+from surveillance_runtime.goal_calls import GoalCaller
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.rested_pictures import RestedPictures
 from surveillance_runtime.waiting import ClockWait, Interrupt

@@ -15,7 +15,8 @@ from surveillance_controllers import conversions
 from surveillance_controllers.arrival import MotionFailed
 from surveillance_controllers.polyline import Points
 from surveillance_controllers.poses import Pose
-from surveillance_runtime.calls import CallFailed, GoalCaller
+from surveillance_runtime.calls import CallFailed
+from surveillance_runtime.goal_calls import GoalCaller
 from surveillance_runtime.goals import GoalRun
 from surveillance_runtime.node import PatrolNode, StartError
 

@@ -17,7 +17,8 @@ from surveillance_controllers.arrival import MotionFailed, nearest_place
 from surveillance_controllers.controller_parameters import MotionSettings
 from surveillance_controllers.map_knowledge import MapKnowledge
 from surveillance_controllers.polyline import Points
-from surveillance_runtime.calls import CallFailed, GoalCaller
+from surveillance_runtime.calls import CallFailed
+from surveillance_runtime.goal_calls import GoalCaller
 from surveillance_runtime.goals import GoalRun
 from surveillance_runtime.node import PatrolNode, StartError
 

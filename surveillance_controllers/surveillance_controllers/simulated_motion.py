@@ -19,7 +19,8 @@ from surveillance_controllers.poses import Pose
 from surveillance_controllers.robot_base import RobotBase, RobotSilent
 from surveillance_controllers.robot_parameters import RobotSettings
 from surveillance_interfaces.action import ComputePath
-from surveillance_runtime.calls import CallFailed, GoalCaller
+from surveillance_runtime.calls import CallFailed
+from surveillance_runtime.goal_calls import GoalCaller
 from surveillance_runtime.goals import GoalRun
 from surveillance_runtime.node import PatrolNode
 

@@ -15,7 +15,8 @@ import pytest
 
 from surveillance_controllers import docking, nav2_motion
 from surveillance_controllers.arrival import MotionFailed
-from surveillance_runtime.calls import GoalEnd, Unavailable
+from surveillance_runtime.calls import Unavailable
+from surveillance_runtime.goal_calls import GoalEnd
 from surveillance_runtime.node import StartError
 from surveillance_runtime.waiting import Interrupt
 

@@ -12,7 +12,8 @@ from std_msgs.msg import String
 from surveillance_controllers.planner_controller_node import PlannerController
 from surveillance_interfaces.action import ComputePath
 from surveillance_interfaces.srv import ConsoleCommand
-from surveillance_runtime.calls import GoalCaller, Interrupted, ServiceCaller
+from surveillance_runtime.calls import Interrupted, ServiceCaller
+from surveillance_runtime.goal_calls import GoalCaller
 from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.waiting import Interrupt
 

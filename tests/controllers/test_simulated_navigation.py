@@ -21,7 +21,8 @@ from surveillance_interfaces.srv import PlaceObstacle, PushRobot, SetDoor
 from surveillance_ontology.armor_client import ArmorClient
 from surveillance_ontology.armor_server_node import ArmorServer
 from surveillance_ontology.ontology_map_builder_node import OntologyMapBuilder
-from surveillance_runtime.calls import GoalCaller, Interrupted, ServiceCaller
+from surveillance_runtime.calls import Interrupted, ServiceCaller
+from surveillance_runtime.goal_calls import GoalCaller
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 from surveillance_runtime.waiting import Interrupt
 from surveillance_simulation.simulator_node import Simulator

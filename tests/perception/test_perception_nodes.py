@@ -27,7 +27,8 @@ from surveillance_perception.dictionaries import dictionary_named
 from surveillance_perception.marker_scene import Degradation, Panel, backdrop_of, picture_of
 from surveillance_perception.marker_server_node import MarkerServer
 from surveillance_perception.video_source_node import VideoSource
-from surveillance_runtime.calls import GoalCaller, Interrupted, ServiceCaller
+from surveillance_runtime.calls import Interrupted, ServiceCaller
+from surveillance_runtime.goal_calls import GoalCaller
 from surveillance_runtime.node import StartError
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS

@@ -10,7 +10,8 @@ from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
 from surveillance_interfaces.action import FollowPath
-from surveillance_runtime.calls import GoalCaller, Interrupted, ServiceCaller, TimedOut, Unavailable
+from surveillance_runtime.calls import Interrupted, ServiceCaller, TimedOut, Unavailable
+from surveillance_runtime.goal_calls import GoalCaller
 from surveillance_runtime.goals import GoalAborted, GoalServer
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.waiting import ClockWait, Interrupt

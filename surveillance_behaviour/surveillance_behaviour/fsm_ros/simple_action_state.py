@@ -17,7 +17,8 @@ from surveillance_behaviour.fsm_ros.exchange import (
     seconds,
 )
 from surveillance_behaviour.fsm_ros.pulse import ExecutorPulse
-from surveillance_runtime.calls import CallFailed, GoalCaller, Interrupted
+from surveillance_runtime.calls import CallFailed, Interrupted
+from surveillance_runtime.goal_calls import GoalCaller
 
 _STATUS = {
     'succeeded': GoalStatus.STATUS_SUCCEEDED,
