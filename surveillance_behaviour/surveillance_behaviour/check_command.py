@@ -17,7 +17,8 @@ from surveillance_behaviour.fsm.export import to_ascii, to_graphviz, to_mermaid
 from surveillance_behaviour.fsm.verification import Finding, verify
 from surveillance_behaviour.fsm.waiting import WALL_CLOCK
 from surveillance_behaviour.machines import MACHINES
-from surveillance_behaviour.mission import Mission, MissionSettings, Ports
+from surveillance_behaviour.mission import Mission, MissionSettings
+from surveillance_behaviour.ports import Ports
 
 DRAWINGS: dict[str, Callable[[ActiveContainer], str]] = {
     'mermaid': to_mermaid,

@@ -142,6 +142,8 @@ class Chooser:
 
     def _map_of(self, beliefs: Beliefs, interrupt: Interrupt) -> PatrolGraph:
         positions = {}
+        # A place that went may come back elsewhere.
+        self._positions = {p: at for p, at in self._positions.items() if p in beliefs.connections}
         for place in beliefs.connections:
             try:
                 positions[place] = self._position(place, interrupt)
@@ -170,10 +172,6 @@ class Chooser:
         if place not in self._positions:
             self._positions[place] = self._places.position(place, interrupt)
         return self._positions[place]
-
-    def forget_positions(self) -> None:
-        """The map has changed: positions are asked for again."""
-        self._positions.clear()
 
     def saw(self, place: str, now: float) -> None:
         """The robot was in ``place``; finer than the ontology's whole seconds."""

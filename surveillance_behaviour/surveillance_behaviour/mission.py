@@ -13,15 +13,12 @@ from surveillance_behaviour.mission_record import MissionRecord, RecordError
 from surveillance_behaviour.mission_resumption import CutOff
 from surveillance_behaviour.policy.situation import Decision, Situation
 from surveillance_behaviour.ports import (
-    Announcer,
+    AwayError,
     InterruptedWaitError,
-    Knowledge,
     LostRobotError,
-    Motion,
     PeerError,
-    Places,
     Point,
-    Routine,
+    Ports,
 )
 from surveillance_behaviour.recovery import Failure, Recovery, RecoveryLimits, Step
 
@@ -50,17 +47,6 @@ class MissionSettings:
     goal_tolerance: float = 1.0
     charge_stall_seconds: float = 300.0
     settle_seconds: float = 2.0
-
-
-@dataclass
-class Ports:
-    """Whom the machines talk to; ``motion`` serves the first seed's, ``routine`` the second's."""
-
-    knowledge: Knowledge
-    places: Places
-    announcer: Announcer
-    motion: Motion | None = None
-    routine: Routine | None = None
 
 
 class Mission:
@@ -108,6 +94,7 @@ class Mission:
         self._told_threshold: float | None = None
         self._warned = ''
         self._sent_to_charge = ''
+        self._owed: tuple[str, str, float] | None = None
         gauge.watch(self._learn_draw)
 
     # The way of the mission.
@@ -147,6 +134,14 @@ class Mission:
         """
         knowledge, threshold = self.ports.knowledge, self.settings.choice.urgency_threshold
         now = self.now()
+        if self._sent_to_charge and self.charged_enough():
+            self._sent_to_charge = ''
+        try:
+            self._tell_what_is_owed(interrupt)
+        except AwayError:
+            raise
+        except PeerError as error:
+            self.say(str(error), warning=True)
         if threshold != self._told_threshold:
             knowledge.set_urgency_threshold(threshold, interrupt)
             self._told_threshold = threshold
@@ -237,16 +232,43 @@ class Mission:
         self.astray = True
 
     def arrived(self, place: str, distance: float, path: Sequence[Point] = ()) -> None:
+        """The robot is in ``place``, as the ontology knows; see `reached`."""
+        self.reached(place, distance, path)
+        self._settled(place)
+
+    def _settled(self, place: str) -> None:
+        self.recovery.arrived(place)
+        self.failure = None
+
+    def reached(self, place: str, distance: float, path: Sequence[Point] = ()) -> None:
         """The robot is in ``place``, after ``distance`` metres along ``path``."""
         self.place = place
         self.astray = False
         self._explored = 0.0
         self.chooser.saw(place, self.now())
-        self.recovery.arrived(place)
-        self.failure = None
         way = {'path': [[round(x, 2), round(y, 2)] for x, y, *_ in path]} if path else {}
         self._write('visit', place=place, distance=distance, **way)
         self.say(f'arrived in {place}')
+
+    def tell_arrival(self, before: str, place: str, interrupt: Interrupt) -> None:
+        """Tells the ontology that the robot came from ``before`` to ``place``.
+
+        Raises:
+            PeerError: It cannot be told now; it will be when it is next asked for anything.
+        """
+        if not self.owes_arrival(place):
+            self._owed = before, place, self.now()
+        self._tell_what_is_owed(interrupt)
+        self._settled(place)
+
+    def owes_arrival(self, place: str) -> bool:
+        """Whether the ontology has yet to be told that the robot has come to ``place``."""
+        return self._owed is not None and self._owed[1] == place
+
+    def _tell_what_is_owed(self, interrupt: Interrupt) -> None:
+        if self._owed is not None:
+            self.ports.knowledge.note_arrival(*self._owed, interrupt)
+            self._owed = None
 
     def came_back(self, distance: float) -> None:
         """The robot is again where it was last known to be, after ``distance`` metres."""
@@ -279,7 +301,6 @@ class Mission:
         level = self.gauge.level
         if self._sent_to_charge and not self.charged_enough():
             return self._sent_to_charge
-        self._sent_to_charge = ''
         if self.gauge.low:
             return f'the battery is low ({self.level_text()})'
         if level is None:

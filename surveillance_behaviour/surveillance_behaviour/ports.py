@@ -140,3 +140,14 @@ class Announcer(Protocol):
 
     def waiting_for_help(self, reason: str) -> None:
         """The robot waits for help because of ``reason``; an empty reason: it goes on."""
+
+
+@dataclass
+class Ports:
+    """Whom the machines talk to; ``motion`` serves the first seed's, ``routine`` the second's."""
+
+    knowledge: Knowledge
+    places: Places
+    announcer: Announcer
+    motion: Motion | None = None
+    routine: Routine | None = None

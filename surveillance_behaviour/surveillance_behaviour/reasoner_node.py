@@ -7,11 +7,11 @@ same rules and policies as the surveillance machine. The decision is published w
 from __future__ import annotations
 
 import random
-import threading
 from collections.abc import Sequence
 from typing import Any
 
 from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.task import Future
 
 from surveillance_behaviour import behaviour_parameters
 from surveillance_behaviour.announcing import DecisionTopic
@@ -22,7 +22,7 @@ from surveillance_behaviour.ports import InterruptedWaitError, PeerError
 from surveillance_behaviour.ros_ports import RosPlaces, ros_knowledge
 from surveillance_interfaces.msg import MissionStatus
 from surveillance_interfaces.srv import Reason
-from surveillance_runtime.awaited_work import work_aside
+from surveillance_runtime.awaited_work import AwaitedWork
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
@@ -46,7 +46,8 @@ class Reasoner(PatrolNode):
         self._wait = ClockWait(self)
         self._decisions = DecisionTopic(self)
         self._avoided: frozenset[str] = frozenset()
-        self._turn = threading.Lock()
+        self._work = AwaitedWork(self, 1)
+        self._next: Future | None = None
         self._interrupt = Interrupt()
         self.stopping.subscribe(self._interrupt.set)
         self.create_subscription(MissionStatus, 'mission_status', self._on_status, STATE_QOS)
@@ -58,15 +59,20 @@ class Reasoner(PatrolNode):
         self._avoided = frozenset(status.avoided)
 
     async def _on_reason(self, _request: Any, response: Any) -> Any:
-        def choose() -> str:
-            with self._turn:
-                return self._choose()
-
-        response.point = await work_aside(self, choose, 'reason')
+        # Who asks before a choice is begun shares it: one client that gave up and asks again must
+        # not have to wait until all that it asked before has been chosen.
+        if self._next is None:
+            self._next = self._work.run(self._choose)
+        response.point = await self._next
         return response
+
+    def on_stop(self) -> None:
+        """Ends the worker."""
+        self._work.stop()
 
     def _choose(self) -> str:
         """The next place; empty when there is none, and the log says why."""
+        self._next = None
         try:
             situation = self._chooser.look(self._wait.now(), self._interrupt, self._avoided)
             decision = self._chooser.choose(situation)

@@ -116,7 +116,10 @@ class Recovery:
 
     def avoided(self, now: float) -> frozenset[str]:
         """Places that are left alone at present."""
-        return frozenset(place for place, until in self._avoided_until.items() if until > now)
+        # Later than the longest time from now: the clock has begun anew.
+        latest = now + self.limits.longest_avoid
+        until = self._avoided_until
+        return frozenset(place for place in tuple(until) if now < until.get(place, now) <= latest)
 
     def arrived(self, place: str) -> None:
         """A place was reached."""

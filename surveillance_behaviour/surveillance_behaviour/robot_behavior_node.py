@@ -20,13 +20,14 @@ from surveillance_behaviour.announcing import DecisionTopic, RosAnnouncer
 from surveillance_behaviour.battery_gauge import BatteryGauge
 from surveillance_behaviour.fsm_ros import IntrospectionServer
 from surveillance_behaviour.machines import MACHINES
-from surveillance_behaviour.mission import Mission, Ports
+from surveillance_behaviour.mission import Mission
 from surveillance_behaviour.mission_record import MissionRecord, RecordError, read
 from surveillance_behaviour.mission_resumption import CutOff, cut_off
 from surveillance_behaviour.policy.rules import RECHARGE
+from surveillance_behaviour.ports import Ports
 from surveillance_behaviour.ros_ports import RosMotion, RosPlaces, RosRoutine, ros_knowledge
 from surveillance_interfaces.msg import Decision as DecisionMessage
-from surveillance_runtime.node import PatrolNode, StartError
+from surveillance_runtime.node import JOIN_SECONDS, PatrolNode, StartError
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 from surveillance_runtime.waiting import ClockWait
@@ -92,11 +93,13 @@ class RobotBehavior(PatrolNode):
         )
         if patrols:
             self.create_subscription(DecisionMessage, 'decision', self._on_decision, STATE_QOS)
-        self.spawn(self._run, name='machine')
+        self._machine_thread = self.spawn(self._run, name='machine')
 
     def on_stop(self) -> None:
         """Preempts the machine, so that what it started is cancelled while messages flow."""
         self.machine.request_preempt()
+        # What it does last is reported, too.
+        self._machine_thread.join(JOIN_SECONDS)
         self._introspection.stop()
 
     def _run(self) -> None:
@@ -110,6 +113,7 @@ class RobotBehavior(PatrolNode):
                 except fsm.SmachError as error:
                     self._announcer.waiting_for_help(f'the machine broke: {error}')
                     self._wait.sleep(self.mission.recovery.pause(), self.stopping)
+                    self._announcer.waiting_for_help('')
         finally:
             self.mission.ended()
             if self._record is not None:

@@ -47,7 +47,7 @@ class RosEyes:
         """Look all around the horizon; `done` is asked after each view and ends the scan."""
         goal = ScanSurroundings.Goal(overlap=overlap, lowest=-reach, highest=reach, dwell=dwell)
         view_changed, ended = Interrupt(), Interrupt()
-        self._node.stopping.subscribe(ended.set)
+        forget = self._node.stopping.subscribe(ended.set)
 
         def told(feedback: Any) -> None:
             if not feedback.resting and feedback.view > 1:
@@ -61,6 +61,7 @@ class RosEyes:
             if not ended.is_set():
                 self._complain(str(error))
         finally:
+            forget()
             ended.set()
             view_changed.set()
             watcher.join()

@@ -143,12 +143,15 @@ class Move(MissionState):
             PeerError: It did not get there.
         """
         mission = self.mission
-        knowledge, before = mission.ports.knowledge, mission.place
-        knowledge.note_visit(before, mission.now(), interrupt)
+        before = mission.place
+        if mission.owes_arrival(place):
+            mission.tell_arrival(before, place, interrupt)
+            return self._outcome
+        mission.ports.knowledge.note_visit(before, mission.now(), interrupt)
         mission.chooser.saw(before, mission.now())
         path = self._drive(before, place, interrupt)
-        knowledge.note_arrival(before, place, mission.now(), interrupt)
-        mission.arrived(place, path_length(path), path)
+        mission.reached(place, path_length(path), path)
+        mission.tell_arrival(before, place, interrupt)
         return self._outcome
 
     def _drive(self, before: str, place: str, interrupt: fsm.Interrupt) -> list[Point]:

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from surveillance_behaviour.battery_gauge import BatteryGauge
 from surveillance_behaviour.chooser import Chooser
 from surveillance_behaviour.fsm import Interrupt
-from surveillance_behaviour.mission import Mission, MissionSettings, Ports
+from surveillance_behaviour.mission import Mission, MissionSettings
 from surveillance_behaviour.mission_record import MissionRecord
 from surveillance_behaviour.mission_resumption import CutOff
 from surveillance_behaviour.policy.rules import NowhereToGoError
@@ -24,6 +24,7 @@ from surveillance_behaviour.ports import (
     InterruptedWaitError,
     PeerError,
     Point,
+    Ports,
     UnknownPlaceError,
 )
 

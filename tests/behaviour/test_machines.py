@@ -351,6 +351,32 @@ def test_an_ontology_that_lost_the_robot_is_told_where_it_is(machine: str) -> No
     assert visited(world, since=200.0) == set(SEVEN_ROOMS)
 
 
+@pytest.mark.parametrize('kind', [PeerError, AwayError])
+def test_an_arrival_that_could_not_be_told_is_told_later(
+    kind: type[PeerError], tmp_path: Path
+) -> None:
+    world = World()
+    untold: list[tuple[float, str]] = []
+    told: list[tuple[float, str]] = []
+    note = world.note_arrival
+
+    def note_arrival(before: str, place: str, now: float, interrupt: fsm.Interrupt) -> None:
+        if world.clock.time > 60.0 and len(untold) < 7:
+            untold.append((now, place))
+            raise kind('armor', 'scripted fault')
+        told.append((now, place))
+        note(before, place, now, interrupt)
+
+    world.note_arrival = note_arrival  # type: ignore[method-assign, assignment]
+    with MissionRecord(tmp_path / 'record') as record:
+        Run('surveillance', world, settings(), record).until(300.0)
+    assert len(untold) == 7
+    if kind is AwayError:
+        assert untold[0] in told
+    visits = [event.text('place') for event in read(tmp_path / 'record') if event.name == 'visit']
+    assert visits == [place for _, place in world.arrivals]
+
+
 def test_an_ontology_built_anew_is_told_of_the_visits(machine: str) -> None:
     world = World()
 

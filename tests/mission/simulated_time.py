@@ -20,7 +20,7 @@ from rosgraph_msgs.msg import Clock
 
 from surveillance_runtime.waiting import ClockWait
 
-CARRIES_ON = ('surveillance', 'patrol', ' goal', '_recharge')
+CARRIES_ON = ('surveillance', 'patrol', 'machine', ' goal', '_recharge')
 """Ends of the names of threads whose sleep means that nothing else is under way."""
 
 STEP = 0.5

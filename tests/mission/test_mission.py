@@ -8,12 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.task import Future
 from std_srvs.srv import Empty
 
 from surveillance_behaviour.fsm import Interrupt
 from surveillance_behaviour.ros_ports import Deadlines, ros_knowledge
-from surveillance_interfaces.msg import Decision, MissionStatus
+from surveillance_interfaces.msg import Decision, FsmTransition, MissionStatus
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import STATE_QOS
 
@@ -170,8 +171,43 @@ def test_parameters_may_change_while_the_mission_runs(robot: Robot) -> None:
     assert set(rules) == {'CORRIDOR'}
 
 
-def test_a_stopped_node_ends_its_mission_cleanly(robot: Robot) -> None:
+def test_a_stopped_node_ends_its_mission_cleanly(robot: Robot, graph: Any) -> None:
+    latched = QoSProfile(
+        depth=1000,
+        reliability=ReliabilityPolicy.RELIABLE,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL,
+    )
+    transitions = graph.listen(FsmTransition, 'robot_behavior/fsm/transition', latched)
     robot.begin()
     robot.until(20.0)
+    root = robot.nodes['robot_behavior'].machine.get_name()
     robot.leave('robot_behavior')
     assert robot.events()[-1].name == 'end'
+    graph.until(lambda: (transitions[-1].path, transitions[-1].kind) == (root, 'exit'))
+    assert transitions[-1].to_state == 'preempted'
+
+
+def test_a_machine_that_breaks_is_started_again_and_does_not_cry_on(
+    robot: Robot, graph: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    status = graph.listen(MissionStatus, 'mission_status', STATE_QOS)
+    robot.configure('battery_controller', random_battery_time=[5000.0, 6000.0])
+    robot.begin()
+    robot.until(20.0)
+    places = robot.nodes['robot_behavior'].mission.ports.places
+    right, broken = places.position, threading.Event()
+
+    def position(*arguments: Any) -> Any:
+        if not broken.is_set():
+            broken.set()
+            raise RuntimeError('a mistake')
+        return right(*arguments)
+
+    monkeypatch.setattr(places, 'position', position)
+    robot.until(120.0)
+    assert broken.is_set()
+    cries = [message.waiting_for_help for message in status]
+    assert any('a mistake' in message.text for message in status)
+    assert cries.count(True) < len(cries) / 2
+    assert not cries[-1]
+    assert len(robot.visited(since=60.0)) > 2

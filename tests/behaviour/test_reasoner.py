@@ -1,0 +1,40 @@
+"""The node `reasoner` answers whoever asks, however slow its ontology is."""
+
+from __future__ import annotations
+
+import threading
+from typing import Any
+
+from surveillance_behaviour.ports import PeerError
+from surveillance_behaviour.reasoner_node import Reasoner
+from surveillance_interfaces.srv import Reason
+
+
+def test_requests_that_come_while_a_choice_is_made_share_the_next_one(
+    graph: Any, monkeypatch: Any
+) -> None:
+    reasoner = graph.add(Reasoner)
+    looks: list[threading.Event] = []
+
+    def look(*_: Any) -> None:
+        done = threading.Event()
+        looks.append(done)
+        assert done.wait(10.0)
+        raise PeerError('armor', 'away')
+
+    monkeypatch.setattr(reasoner._chooser, 'look', look)
+    client = graph.node.create_client(Reason, 'reason')
+    graph.until(client.service_is_ready)
+    answers = [client.call_async(Reason.Request())]
+    graph.until(lambda: len(looks) == 1)
+    answers += [client.call_async(Reason.Request()) for _ in range(3)]
+    taken = client.call_async(Reason.Request())
+    graph.until(lambda: reasoner._next is not None)
+    looks[0].set()
+    graph.until(lambda: len(looks) == 2)
+    looks[1].set()
+    graph.until(lambda: all(answer.done() for answer in [*answers, taken]))
+    assert {answer.result().point for answer in answers} == {''}
+    assert len(looks) <= 3, 'one choice for each request'
+    for look_ended in looks:
+        look_ended.set()
