@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import io
 import os
 import signal
 import sys
@@ -173,6 +174,7 @@ def main(argv: Sequence[str]) -> int:
     # A set-up that is told to end has to take its compilers along.
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.default_int_handler)
+    _make_streams_safe()
     try:
         return _dispatch(list(argv))
     except (system.MissingError, SetupError, ValueError) as error:
@@ -181,11 +183,25 @@ def main(argv: Sequence[str]) -> int:
     except BrokenPipeError:  # as when the output goes to `head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
+    except OSError as error:  # a full disk, a folder that is not ours
+        what = f'{error.filename}: ' if error.filename else ''
+        print(f'launch.py: {what}{error.strerror or error}', file=sys.stderr)
+        return EXIT_BAD_INPUT
     except KeyboardInterrupt:
         ready = Environment(CHECKOUT).ready()
         more = '' if ready else '; the next start goes on with the set-up'
         print(f'\nlaunch.py: interrupted{more}', file=sys.stderr)
         return EXIT_INTERRUPTED
+
+
+def _make_streams_safe() -> None:
+    """Lets output be closed, and the terminal's encoding lack a character."""
+    for name in ('stdout', 'stderr'):
+        stream = getattr(sys, name)
+        if stream is None:
+            setattr(sys, name, open(os.devnull, 'w'))  # noqa: SIM115 - for the process's life
+        elif isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors='replace')
 
 
 def _dispatch(argv: list[str]) -> int:
@@ -252,8 +268,8 @@ def _node(argv: list[str]) -> int:
     run = wanted_run(options)
     run.check()
     arguments = ros_arguments(parameter_files(CONFIG, run), run)
-    if node.console:
-        arguments += ['-p', f'execution_mode:={run.mode or graph.DEFAULT_MODE}']
+    if node.console and run.mode:
+        arguments += ['-p', f'execution_mode:={run.mode}']
     arguments += ['--', *rest]
     renamed = any('__ns:=' in word or '__node:=' in word for word in rest)
     if not renamed:

@@ -120,15 +120,21 @@ class MergedLog:
 
     def _emit(self, shown: str, plain: str) -> None:
         if self._file is not None:
-            self._file.write(plain + '\n')
-            self._file.flush()
+            try:
+                self._file.write(plain + '\n')
+                self._file.flush()
+            except OSError as error:
+                full, self._file = self._file, None
+                with contextlib.suppress(OSError):
+                    full.close()
+                self.warn(f'{full.name}: {error.strerror}: the log goes on here only')
         if self.broken:
             return
         stream = self._stream or sys.stdout
         try:
             stream.write(shown + '\n')
             stream.flush()
-        except (BrokenPipeError, ValueError):
+        except (OSError, ValueError):
             self.broken = True
             _discard(stream)
 

@@ -175,6 +175,7 @@ def node_environ(run: Run, logs: Path | None = None) -> dict[str, str]:
     environ.setdefault('FASTRTPS_DEFAULT_PROFILES_FILE', str(DISCOVERY))
     if logs is not None:
         environ['PYTHONUNBUFFERED'] = '1'
+        environ['PYTHONIOENCODING'] = 'utf-8'
         environ['RCUTILS_CONSOLE_OUTPUT_FORMAT'] = ROS_FORMAT
         environ['RCUTILS_COLORIZED_OUTPUT'] = '0'
         environ.setdefault('ROS_LOG_DIR', str(logs))
@@ -210,21 +211,21 @@ def write_own_parameters(folder: Path, run: Run) -> Path:
     own: dict[str, dict[str, Any]] = {
         BEHAVIOUR_NODE: {'behaviour': run.behaviour, 'record': str(folder / RECORD)}
     }
-    # A mode that was asked for counts more than one in the user's file, the default one less.
-    if run.mode or 'execution_mode' not in (run.parameters or Path(os.devnull)).read_text():
+    # Without one that was asked for, the mode is what the parameter files say.
+    if run.mode:
         for node in graph.NODES:
             if node.console:
-                own[node.name] = {
-                    'execution_mode': run.mode or graph.DEFAULT_MODE,
-                    'console': not run.one_console,
-                }
+                own[node.name] = {'execution_mode': run.mode, 'console': not run.one_console}
     return _write_parameters(folder / 'launch.yaml', own)
 
 
 def _write_parameters(path: Path, of_nodes: Mapping[str, Mapping[str, Any]]) -> Path:
     # `/**/name` is the node in any namespace. JSON is YAML too, and quotes safely.
     content = {f'/**/{name}': {'ros__parameters': of_nodes[name]} for name in of_nodes}
-    path.write_text(json.dumps(content, indent=1) + '\n', encoding='utf-8')
+    try:
+        path.write_text(json.dumps(content, indent=1) + '\n', encoding='utf-8')
+    except OSError as error:
+        raise RunError(f'{path}: cannot be written: {error.strerror}') from None
     return path
 
 

@@ -10,6 +10,7 @@ import argparse
 import importlib
 import sys
 from collections.abc import Callable, Sequence
+from typing import NoReturn
 
 from surveillance_behaviour.battery_gauge import BatteryGauge
 from surveillance_behaviour.fsm.active import ActiveContainer
@@ -77,9 +78,14 @@ def report(name: str, findings: Sequence[Finding]) -> str:
     return '\n'.join([f'{name}: {verdict}', *(f'  {finding}' for finding in findings)])
 
 
+class _Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> NoReturn:
+        self.exit(2, f'check-behaviour: {message} (see {self.prog} --help)\n')
+
+
 def main(args: Sequence[str] | None = None) -> int:
     """Check machines; returns the exit code."""
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog='launch.py check-behaviour', description='Check state machines without running them.'
     )
     parser.add_argument(

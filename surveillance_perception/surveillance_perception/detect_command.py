@@ -6,6 +6,7 @@ import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import NoReturn
 
 import cv2
 
@@ -14,13 +15,18 @@ from surveillance_perception.detection import DetectorSettings, MarkerDetector
 from surveillance_perception.picture_files import PictureError, read_picture
 
 
+class _Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> NoReturn:
+        self.exit(2, f'detect: {message} (see {self.prog} --help)\n')
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command.
 
     Returns:
         0 when every picture could be read, 1 when one could not, 2 for a wrong command line.
     """
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog='launch.py detect',
         description='Find ArUco markers in pictures and write annotated copies.',
     )

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import io
 import re
+from pathlib import Path
 
 import pytest
 
@@ -61,6 +62,15 @@ def test_on_a_terminal_a_long_line_is_broken_at_words(monkeypatch, tmp_path, col
     assert all(line.startswith(' ' * 19 + ' | ') for line in lines[1:])
     assert shown == 1 or all(len(line) <= columns for line in lines)
     assert body((tmp_path / 'log').read_text()) == [f'one    | {text}']
+
+
+def test_a_log_file_that_cannot_be_written_any_more_costs_one_warning(stream):
+    log = MergedLog(stream, ['one'], path=Path('/dev/full'))
+    log.line('one', 'first')
+    log.line('one', 'second')
+    log.close()
+    warning = 'launch | WARN: /dev/full: No space left on device: the log goes on here only'
+    assert body(stream.getvalue()) == [warning, 'one    | first', 'one    | second']
 
 
 def test_a_redrawn_line_shows_what_it_ended_with(stream):

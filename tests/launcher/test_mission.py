@@ -7,6 +7,7 @@ import pytest
 import yaml
 
 from launcher.commands import CONFIG, make_parser, wanted_run
+from launcher.graph import DEFAULT_MODE
 from launcher.mission import (
     Run,
     RunError,
@@ -100,7 +101,18 @@ def test_a_mode_on_the_command_line_counts_more_than_one_in_the_users_file(tmp_p
     asked = own_parameters(tmp_path, Run(mode='RANDOM', parameters=file))
     assert asked['/**/battery_controller']['execution_mode'] == 'RANDOM'
     assert '/**/battery_controller' not in own_parameters(tmp_path, Run(parameters=file))
-    assert '/**/motion_controller' in own_parameters(tmp_path, Run())
+
+
+def test_the_default_mode_stands_in_the_first_file_and_for_all_nodes():
+    first = parameter_files(CONFIG, Run())[0]
+    every = yaml.safe_load(first.read_text())['/**']['ros__parameters']
+    assert every == {'execution_mode': DEFAULT_MODE}
+
+
+def test_a_run_folder_on_a_full_disk_is_named(tmp_path):
+    (tmp_path / 'launch.yaml').symlink_to('/dev/full')
+    with pytest.raises(RunError, match=r'launch.yaml: cannot be written: No space left'):
+        write_own_parameters(tmp_path, Run())
 
 
 def test_in_one_process_a_console_node_reads_for_all_controllers(tmp_path):
