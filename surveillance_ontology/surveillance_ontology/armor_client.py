@@ -204,8 +204,8 @@ class FactSubscription:
         told = self._set.follow(msg.sequence, changes_from_ros(msg))
         if told is None or (told and self._asking):
             self._resynchronise()
-        else:
-            self._tell(told)
+        # The answer that is awaited is told by its difference to what is known by then.
+        self._tell(told or [])
 
     def _on_retry(self) -> None:
         self._retry.cancel()

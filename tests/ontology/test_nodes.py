@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from rclpy.task import Future
 
 from surveillance_interfaces.msg import OntologyMap, OntologyPlace, RoomConnection
 from surveillance_interfaces.srv import (
@@ -196,6 +197,44 @@ def test_facts_come_and_go_at_a_subscriber(graph: Any) -> None:
     graph.until(lambda: not late.facts)
     build_seven_rooms(armor, False, True)
     graph.until(lambda: len(late.facts) == 2)
+
+
+class HeldClient:
+    """A client whose questions wait until they are let go."""
+
+    def __init__(self, graph: Any, armor: ArmorClient) -> None:
+        self.reference_name = armor.reference_name
+        self.query = self.facts_by_origin = self
+        self._armor = armor
+        self.go = Future(executor=graph.node.executor)
+        self.asked = 0
+
+    async def call_async(self, pattern: str) -> Any:
+        self.asked += 1
+        await self.go
+        return await self._armor.query.facts_by_origin.call_async(pattern)
+
+
+def test_what_changes_while_the_server_is_asked_is_told_too(graph: Any) -> None:
+    graph.add(ArmorServer)
+    armor = ArmorClient(graph.node, 'test', 'map')
+    build_seven_rooms(armor, False, True)
+    held = HeldClient(graph, armor)
+    told: set[str] = set()
+    visits = FactSubscription(
+        graph.node,
+        held,  # type: ignore[arg-type]
+        'visitedAt(R3, ?)',
+        lambda fact, came: (told.add if came else told.discard)(str(fact)),
+    )
+    graph.until(lambda: held.asked)
+    for before, after in (('1665579740', '5'), ('5', '6'), ('6', '7')):
+        armor.manipulation.replace_dataprop_b2_ind('visitedAt', 'R3', 'LONG', after, before)
+    last = 'visitedAt(R3, "7"^^xsd:long)'
+    graph.until(lambda: last in map(str, visits.facts))
+    graph.node.executor.create_task(held.go.set_result, None)
+    graph.until(lambda: set(map(str, visits.facts)) == {last} and held.asked > 1)
+    assert told == {last}
 
 
 # --- the map builder ---

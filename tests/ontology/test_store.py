@@ -133,6 +133,24 @@ def test_a_batch_is_there_as_a_whole_or_not_at_all(
     assert names(server.ask('QUERY IND CLASS', 'DOOR')) == ['A', 'B', 'C']
 
 
+def test_a_batch_on_a_broken_disk_is_answered_all_the_same(
+    server: Server, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    batch = [DirectiveRequest('c', 'map', 'ADD', 'IND', 'CLASS', ('A', 'DOOR'))]
+
+    def broken(*_: object) -> None:
+        raise OSError(5, 'Input/output error')
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, 'fdatasync', broken)
+        patch.setattr(Path, 'read_bytes', broken)
+        answer = server.service.execute_list(batch)
+    assert not answer.success
+    assert answer.responses[0].error_description.startswith('done, but lost at the next start: ')
+    assert len(server.notes) == 1
+    assert server.service.execute_list(batch).success
+
+
 def test_snapshots_keep_the_journal_short(tmp_path: Path) -> None:
     server = Server(tmp_path / 'store', compact_from=2000)
     server.ask(*LOAD, 'false', '', 'true')

@@ -148,8 +148,13 @@ class ArmorService:
                 with self._store.batch() if self._store else contextlib.nullcontext():
                     responses = [self.execute(request) for request in requests]
             except JournalError as error:
-                self._undo(names)
-                return ListResponse(False, False, [_refusal(f'nothing was done: {error}')])
+                problem = f'nothing was done: {error}'
+                try:
+                    self._undo(names)
+                except JournalError as worse:
+                    problem = f'done, but lost at the next start: {error}; going back: {worse}'
+                    self._warn(problem)
+                return ListResponse(False, False, [_refusal(problem)])
         return ListResponse(
             success=all(response.success for response in responses),
             is_consistent=responses[-1].is_consistent if responses else False,
