@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 import sys
 import time
 from types import TracebackType
@@ -81,7 +82,9 @@ class Step:
         self._print(line)
 
     def _draw(self, text: str) -> None:
-        self._stream.write(f'\r\x1b[K{self._head} {text}'[:110])
+        # A line that wraps could not be drawn over.
+        room = shutil.get_terminal_size().columns - 1
+        self._stream.write('\r\x1b[K' + f'{self._head} {text}'[:room])
         self._stream.flush()
 
     def _print(self, text: str) -> None:

@@ -40,6 +40,16 @@ def test_a_step_on_a_terminal_redraws_one_line():
     assert '[1/3] packages: done in' in stream.getvalue()
 
 
+def test_a_step_on_a_narrow_terminal_keeps_to_one_line(monkeypatch):
+    monkeypatch.setenv('COLUMNS', '40')
+    stream = Terminal()
+    with Step(1, 3, 'Python packages, ROS 2 Jazzy among them', stream) as step:
+        step.feed('Collecting numpy')
+    drawn = stream.getvalue().split('\r\x1b[K')[1:-1]
+    assert drawn
+    assert all(len(line) < 40 for line in drawn)
+
+
 def test_a_step_elsewhere_prints_a_line_at_its_start_and_its_end():
     stream = io.StringIO()
     with contextlib.suppress(RuntimeError), Step(2, 3, 'interfaces', stream) as step:
