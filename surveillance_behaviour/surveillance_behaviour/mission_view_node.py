@@ -46,7 +46,8 @@ class MissionViewNode(PatrolNode):
         self._over = False
         namespace = self.get_namespace().strip('/')
         where = f'ROS domain {self.context.get_domain_id()}'
-        self._empty = Snapshot(where=where + (f', namespace {namespace}' if namespace else ''))
+        where += f', namespace {namespace}' if namespace else ''
+        self._empty = Snapshot(where=where)
         self.snapshot = self._empty
         self._facts = RosMissionFacts(self, self._update)
         self._topics = RosMissionTopics(self, self._update)
@@ -54,7 +55,11 @@ class MissionViewNode(PatrolNode):
         # Steady time: a simulated clock may stand still.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(LOOK_PERIOD, self._look, clock=steady)
-        self.spawn(self._show, 'display')
+        self._draws = self._once or self._console.is_terminal
+        if self._draws:
+            self.spawn(self._draw, 'display')
+        else:
+            self._print(f'watching {where}')
 
     def see(self) -> Snapshot:
         """All that is known, at the mission's present time, or the time of its end."""
@@ -78,7 +83,7 @@ class MissionViewNode(PatrolNode):
         told = list(changes(old, new))
         events = [(at, each.text) for each in told if not each.routine]
         self.snapshot = replace(new, events=(*new.events, *events)[-KEPT_EVENTS:])
-        if not (self._once or self._console.is_terminal):
+        if not self._draws:
             for each in told:
                 self._print(f'{at} {each.text} {each.detail}'.rstrip())
 
@@ -101,18 +106,18 @@ class MissionViewNode(PatrolNode):
     def _on_clock(self, message: ClockMessage) -> None:
         self._clock_time = message.clock.sec + message.clock.nanosec / 1e9
 
-    def _show(self) -> None:
-        where = self._empty.where
-        if not self._once:
-            if self._console.is_terminal:
+    def _draw(self) -> None:
+        try:
+            if not self._once:
                 show_moving(self.see, self.stopping, self._console)
-            else:
-                self._print(f'watching {where}')
-            return
-        if not show_once(self.see, self.stopping, self._console, self._timeout):
-            print(f'watch: no mission on {where} within {self._timeout:g} s', file=sys.stderr)
-            self.fail('no mission')
-        self.finish()
+            elif not show_once(self.see, self.stopping, self._console, self._timeout):
+                where = f'{self._empty.where} within {self._timeout:g} s'
+                print(f'watch: no mission on {where}', file=sys.stderr)
+                self.fail('no mission')
+        except (OSError, SystemExit):  # nobody reads it any more; rich exits on a broken pipe
+            pass
+        finally:
+            self.finish()
 
     def _print(self, line: str) -> None:
         try:

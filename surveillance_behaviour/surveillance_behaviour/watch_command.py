@@ -19,10 +19,10 @@ EXIT_BAD_INPUT = 2
 
 class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
-        raise ValueError(f'{message} (see {self.prog} --help)')
+        self.exit(EXIT_BAD_INPUT, f'watch: {message} (see {self.prog} --help)\n')
 
 
-def _parse(argv: Sequence[str]) -> argparse.Namespace:
+def _parse(argv: Sequence[str] | None) -> argparse.Namespace:
     parser = _Parser(
         prog='launch.py watch',
         description='Shows a running mission, simulated or real, until Ctrl-C: the map with robot, '
@@ -59,11 +59,7 @@ def _parse(argv: Sequence[str]) -> argparse.Namespace:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Watch until Ctrl-C; with --once the exit code is 1 when there was no mission to be seen."""
-    try:
-        options = _parse(sys.argv[1:] if argv is None else argv)
-    except ValueError as error:
-        print(f'watch: {error}', file=sys.stderr)
-        return EXIT_BAD_INPUT
+    options = _parse(argv)
     if options.domain is not None:
         os.environ['ROS_DOMAIN_ID'] = str(options.domain)
     # As in the nodes' own processes: shared memory that a killed one left behind hides others.

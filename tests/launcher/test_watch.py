@@ -26,7 +26,9 @@ COMMAND = ['-m', 'surveillance_behaviour.watch_command']
     ],
 )
 def test_a_wrong_option_is_one_line_and_exit_code_2(arguments, wrong, capsys):
-    assert main(arguments) == 2
+    with pytest.raises(SystemExit) as exit_info:
+        main(arguments)
+    assert exit_info.value.code == 2
     error = capsys.readouterr().err
     assert error.startswith('watch: ')
     assert wrong in error
