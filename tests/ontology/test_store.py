@@ -7,7 +7,9 @@ import random
 import signal
 import subprocess
 import sys
-from contextlib import AbstractContextManager
+import threading
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 
 import pytest
@@ -163,6 +165,33 @@ def test_snapshots_keep_the_journal_short(tmp_path: Path) -> None:
     assert names(server.ask('QUERY IND CLASS', 'DOOR')) == ['X']
     assert '"200"^^xsd:long' in server.ask('QUERY DATAPROP IND', 'now', 'Robot1').queried_objects
     assert server.notes == []
+
+
+def test_one_snapshot_is_written_at_a_time(tmp_path: Path) -> None:
+    store = Store(tmp_path / 'store', compact_from=0)
+    entered: list[str] = []
+    failures: list[str] = []
+    asked, may_go = threading.Barrier(9), threading.Event()
+
+    @contextmanager
+    def hold_all() -> Iterator[list[Reference]]:
+        entered.append(threading.current_thread().name)
+        assert may_go.wait(10)
+        yield []
+
+    def ask() -> None:
+        asked.wait(10)
+        store.compact_if_large(hold_all, failures.append)
+
+    callers = [threading.Thread(target=ask) for _ in range(8)]
+    for caller in callers:
+        caller.start()
+    asked.wait(10)
+    for caller in callers:
+        caller.join(10)
+    may_go.set()
+    store.close()
+    assert (len(entered), failures) == (1, [])
 
 
 def test_references_that_come_and_go_while_a_snapshot_begins_are_not_mistaken(

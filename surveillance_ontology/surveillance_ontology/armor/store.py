@@ -43,6 +43,7 @@ class Store:
         self._lock = threading.Lock()
         self._batch = threading.local()
         self._snapshot: threading.Thread | None = None
+        self._beginning = threading.Lock()
         self._names: set[str] = set()
 
     def recover(self) -> list[Reference]:
@@ -118,8 +119,6 @@ class Store:
         journal = self._journal
         if journal.size < max(self._compact_from, journal.snapshot_size):
             return
-        if self._snapshot is not None and self._snapshot.is_alive():
-            return
 
         def write() -> None:
             try:
@@ -133,8 +132,11 @@ class Store:
             except JournalError as error:
                 failed(str(error))
 
-        self._snapshot = threading.Thread(target=write, name='snapshot', daemon=True)
-        self._snapshot.start()
+        with self._beginning:
+            if self._snapshot is not None and self._snapshot.is_alive():
+                return
+            self._snapshot = threading.Thread(target=write, name='snapshot', daemon=True)
+            self._snapshot.start()
 
     def close(self) -> None:
         """Finish a snapshot that is being written, and let another process open the store."""
