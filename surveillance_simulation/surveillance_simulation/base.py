@@ -19,6 +19,9 @@ from surveillance_simulation.world import World
 _CONTACT = 1e-3
 """Gap that remains between the robot and what it ran into, metres."""
 
+PUSH_GAP = 0.05
+"""Gap that a push leaves, metres: more than the robot drives until it has seen what is there."""
+
 
 @dataclass(frozen=True)
 class BaseModel:
@@ -134,6 +137,8 @@ class Base:
     def push(self, dx: float, dy: float, dyaw: float) -> float:
         """Push the robot sideways, unseen by its wheels, as far as the way is free.
 
+        Who pushes it holds it: it stands until the next command.
+
         Args:
             dx: Way along the world's x axis, metres.
             dy: Way along the world's y axis, metres.
@@ -146,14 +151,16 @@ class Base:
         length = math.hypot(dx, dy)
         pieces = max(1, math.ceil(length / (self.model.radius / 2)))
         gone = 0
+        needed = self.model.radius + PUSH_GAP
         for piece in range(1, pieces + 1):
             share = piece / pieces
-            if not self._world.is_free(x + share * dx, y + share * dy, self.model.radius):
+            if not self._world.is_free(x + share * dx, y + share * dy, needed):
                 break
             gone = piece
         share = gone / pieces
         self.pose = (x + share * dx, y + share * dy, _wrapped(yaw + dyaw))
         self.speed = self.turn_speed = 0.0
+        self._wanted = (0.0, 0.0)
         self._sure = 0.0
         return length * share
 

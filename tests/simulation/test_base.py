@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from surveillance_simulation.base import Base, BaseModel
+from surveillance_simulation.base import PUSH_GAP, Base, BaseModel
 from surveillance_simulation.place_file import read_world
 from surveillance_simulation.world import World
 
@@ -83,8 +83,20 @@ def test_a_push_is_not_seen_by_the_wheels_and_ends_at_the_wall() -> None:
     gone = base.push(0.0, 5.0, 0.3)
     assert 0.5 < gone < 0.8
     assert base.odometry == (1.0, 1.0, 0.0)
-    assert base.pose[1] + 0.22 < 1.95
+    assert base.pose[1] + 0.22 <= 1.95 - PUSH_GAP
     assert base.pose[2] == pytest.approx(0.3)
+
+
+def test_a_pushed_robot_stands_until_the_next_command() -> None:
+    base = Base(two_rooms(), (1.0, 1.0, 0.0))
+    drive(base, 0.5, 0.0, 0.5)
+    base.push(0.0, 5.0, math.pi / 2)
+    pushed = base.pose
+    base.step(DT)
+    assert base.pose == pushed
+    drive(base, 0.0, 0.5, 0.5)
+    assert base.pose != pushed
+    assert base.collisions == 0
 
 
 def test_a_slip_moves_the_odometry_in_the_robots_frame() -> None:
