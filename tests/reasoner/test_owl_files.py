@@ -216,6 +216,8 @@ def test_what_is_said_of_axioms_is_kept(form: str) -> None:
     again = read_ontology(ontology_bytes(read.axioms, IRI, form), IRI)
     assert set(again.axioms) >= set(read.axioms)
     assert again.unsupported == []
+    twice = ontology_bytes([*read.axioms, *read.axioms], IRI, form)
+    assert twice == ontology_bytes(read.axioms, IRI, form), 'each axiom is written once'
     kb = KnowledgeBase(IRI, read.axioms)
     assert kb.reason()
     assert kb.unsupported == ()

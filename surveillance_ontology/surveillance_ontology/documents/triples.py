@@ -347,7 +347,7 @@ def triples_of(axioms: Iterable[Axiom], iri: str) -> Iterator[Triple]:
     mapping.add(iri, _TYPE, OWL + 'Ontology')
     declared: set[tuple[str, str]] = set()
     used: dict[tuple[str, str], None] = {}
-    axioms = tuple(axioms)
+    axioms = tuple(dict.fromkeys(axioms))
     notes: dict[Axiom, list[ax.AxiomAnnotation]] = {}
     for axiom in axioms:
         if isinstance(axiom, ax.AxiomAnnotation):
