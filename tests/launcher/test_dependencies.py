@@ -22,6 +22,8 @@ DISTRIBUTIONS = {
 }
 # Looked for at run time and done without when absent: an installed ROS has them.
 OPTIONAL = {'tf2_msgs', 'nav2_msgs', 'opennav_docking_msgs', 'mujoco', 'launch', 'launch_ros'}
+# Known to type checkers alone.
+TYPES = {'_typeshed'}
 # With rclpy[fastrtps] and common_interfaces.
 ROS = re.compile(
     r'(rclpy|ament_index_python|action_msgs|builtin_interfaces|lifecycle_msgs|'
@@ -61,14 +63,15 @@ def test_every_import_is_installed_by_the_set_up(folder):
     benchmarks = {'benchmarks', *(path.stem for path in (ROOT / 'benchmarks').glob('*.py'))}
     for name, path in imports(ROOT / folder).items():
         own = name in {*PACKAGES, 'surveillance_interfaces', 'launcher', 'tests', *benchmarks}
-        if own or name in sys.stdlib_module_names or name in OPTIONAL or ROS.match(name):
+        if own or name in sys.stdlib_module_names or name in OPTIONAL | TYPES or ROS.match(name):
             continue
         distribution = DISTRIBUTIONS.get(name, name).lower().replace('_', '-')
         assert distribution in known, f'{path} imports {name}'
 
 
 def test_the_set_up_itself_needs_the_standard_library_alone():
-    first = ['commands', 'environment', 'fingerprint', 'progress', 'system', 'graph', '__init__']
+    first = ['claims', 'commands', 'environment', 'fingerprint', 'graph', 'progress', 'system']
+    first.append('__init__')
     for module in first:
         tree = ast.parse((ROOT / 'launcher' / f'{module}.py').read_text())
         for node in tree.body:  # what a function imports, it imports in the environment
