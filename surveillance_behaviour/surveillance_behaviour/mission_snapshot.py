@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
@@ -62,7 +63,8 @@ class Snapshot:
         where: Where the watcher listens, in words.
         now: The mission's time, seconds.
         mode: The controllers' execution mode.
-        nodes: The nodes that tell or answer anything of this.
+        nodes: The nodes that tell or answer anything of this, and what tells the processes of one
+            apart that was started again.
         ended: Those that did and are gone.
         status: The latest `mission_status`, kept when its node ends.
         decision, number: The latest decision, and its number.
@@ -84,7 +86,7 @@ class Snapshot:
     where: str = ''
     now: float = 0.0
     mode: str = ''
-    nodes: frozenset[str] = frozenset()
+    nodes: Mapping[str, frozenset[str]] = field(default_factory=dict)
     ended: frozenset[str] = frozenset()
     status: Status | None = None
     decision: Decision | None = None
@@ -112,8 +114,8 @@ def changes(old: Snapshot, new: Snapshot) -> Iterator[Change]:
     if new.decision is not None and (new.decision, new.number) != (old.decision, old.number):
         yield Change(decision_line(new), detail=new.decision.reason)
     if new.battery is not None:
-        before = None if old.battery is None else int(old.battery) // BATTERY_STEP
-        if before is None or before != int(new.battery) // BATTERY_STEP:
+        before = None if old.battery is None else math.ceil(old.battery / BATTERY_STEP)
+        if before != math.ceil(new.battery / BATTERY_STEP):
             yield Change(f'battery at {new.battery:.0f} %', routine=True)
     if new.battery_low != old.battery_low:
         yield Change('battery low' if new.battery_low else 'battery no longer low')
@@ -138,8 +140,11 @@ def changes(old: Snapshot, new: Snapshot) -> Iterator[Change]:
         yield Change('every node has ended: waiting for the next mission')
     elif gone := sorted(new.ended - old.ended):
         yield Change(f'{", ".join(gone)} ended')
-    if back := sorted(old.ended & new.nodes):
+    if back := sorted(old.ended & new.nodes.keys()):
         yield Change(f'{", ".join(back)} came back')
+    for node in sorted(old.nodes.keys() & new.nodes.keys()):
+        if old.nodes[node] and new.nodes[node] - old.nodes[node]:
+            yield Change(f'{node} was started again')
 
 
 def decision_line(snapshot: Snapshot) -> str:

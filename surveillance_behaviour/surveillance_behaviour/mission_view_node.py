@@ -88,11 +88,17 @@ class MissionViewNode(PatrolNode):
                 self._print(f'{at} {each.text} {each.detail}'.rstrip())
 
     def _look(self) -> None:
-        old, nodes = self.snapshot, self._topics.publishers() | self._facts.servers()
+        old = self.snapshot
+        processes: dict[str, set[str]] = {}
+        for log in self.get_publishers_info_by_topic('/rosout'):  # which every node has
+            if log.node_namespace == self.get_namespace():
+                processes.setdefault(log.node_name, set()).add(str(log.endpoint_gid))
+        names = self._topics.publishers() | self._facts.servers()
+        nodes = {name: frozenset(processes.get(name, ())) for name in names}
         if nodes != old.nodes:
-            ended, now = (old.ended | old.nodes) - nodes, self._now()
-            if nodes or old.nodes:
-                self._update(lambda old: replace(old, nodes=nodes, ended=ended, now=now))
+            ended = old.ended.union(old.nodes).difference(nodes)
+            now = self._now()
+            self._update(lambda old: replace(old, nodes=nodes, ended=ended, now=now))
             self._over = not nodes
         if not self.count_publishers('/clock'):
             self._clock_time = None

@@ -34,7 +34,7 @@ def whole() -> Snapshot:
         where='ROS domain 7',
         now=100.0,
         mode='SIMULATED',
-        nodes=frozenset({'robot_behavior'}),
+        nodes={'robot_behavior': frozenset({'1'})},
         status=STATUS,
         decision=DECISION,
         number=3,
@@ -147,7 +147,7 @@ def test_without_a_map_the_places_are_sketched():
 def test_the_end_of_a_node_and_of_the_mission_is_announced():
     crippled = replace(whole(), ended=frozenset({'battery_controller'}))
     assert 'ended: battery_controller' in shown(crippled)
-    assert 'the mission has ended: waiting' in shown(replace(whole(), nodes=frozenset()))
+    assert 'the mission has ended: waiting' in shown(replace(whole(), nodes={}))
 
 
 def test_what_does_not_fit_is_said_to_be_left_out():
@@ -155,6 +155,14 @@ def test_what_does_not_fit_is_said_to_be_left_out():
     assert '… and more places' in shown(replace(whole(), visited_at=many))
     wordy = replace(DECISION, reason='a reason ' * 40)
     assert '…' in shown(replace(whole(), decision=wordy))
+
+
+def test_a_node_that_is_started_again_is_told_though_the_killed_one_still_seems_there():
+    before = whole()
+    again = replace(before, nodes={'robot_behavior': frozenset({'1', '2'})})
+    told = [change.text for change in changes(before, again)]
+    assert told == ['robot_behavior was started again']
+    assert list(changes(again, replace(again, nodes={'robot_behavior': frozenset({'2'})}))) == []
 
 
 def test_each_change_is_told_once_in_one_line():
@@ -168,12 +176,12 @@ def test_each_change_is_told_once_in_one_line():
         after,
         doors={'D': True},
         obstacles=np.empty((0, 2)),
-        battery=79.0,
-        nodes=frozenset(),
+        battery=70.0,
+        nodes={},
         ended=frozenset({'robot_behavior'}),
     )
     assert [change.text for change in changes(after, later)] == [
-        'battery at 79 %',
+        'battery at 70 %',
         'door D opened',
         'nothing stands about any more',
         'every node has ended: waiting for the next mission',
