@@ -112,8 +112,11 @@ class MissionView:
         room -= shown_events
         if len(places) > room:
             places = [*places[: max(0, room - 1)], _dim('… and more places')][: max(0, room)]
-        lines = [*fixed, _title('places, longest unvisited first', width), *places]
-        lines += [_title('events', width), *events[len(events) - shown_events :]]
+        lines = fixed
+        if places:
+            lines += [_title('places, longest unvisited first', width), *places]
+        if shown_events:
+            lines += [_title('events', width), *events[-shown_events:]]
         return _rendered(console, options, lines[:height], width)
 
 
