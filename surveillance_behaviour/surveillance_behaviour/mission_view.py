@@ -105,9 +105,11 @@ class MissionView:
         places = place_lines(snapshot, width)
         told = snapshot.events[-MOST_EVENTS:]
         texts = [Text.assemble((at, DIM), ' ', text) for at, text in told]
-        events = _wrapped(console, texts, width)
         # The places come before all but the latest events.
         room = max(0, height - len(fixed) - 2)
+        events = _wrapped(console, texts, width)
+        if len(places) + len(events) > room:
+            events = texts
         shown_events = min(len(events), max(min(3, room), room - len(places)), MOST_EVENTS)
         room -= shown_events
         if len(places) > room:
