@@ -162,16 +162,18 @@ class Canvas:
         self._characters[row // 2, column] = character, style
 
     def label(self, x: float, y: float, text: str, style: Style) -> None:
-        """Writes beside a point, in the nearest row where nothing else would be covered."""
+        """Writes beside a point, in the nearest row where it covers nothing, or walls at most.
+
+        Where that would be over another label, or the picture is too narrow, it is left out.
+        """
         row, column = self.frame.pixels([(x, y)])[0]
         first = min(max(0, column - (len(text) - 1) // 2), self.frame.columns - len(text))
-        if first < 0:
-            return
-        rows = [row // 2 + offset for offset in (-1, 1, 0, -2, 2)]
-        free = (r for r in rows if self._is_free(r, range(first, first + len(text))))
-        chosen = next(free, row // 2)
-        for offset, character in enumerate(text):
-            self._characters[chosen, first + offset] = character, style
+        columns = range(first, first + len(text))
+        near = [row // 2 + offset for offset in (-1, 1, 0, -2, 2)]
+        unwritten = [r for r in near if first >= 0 and self._is_unwritten(r, columns)]
+        best = [r for r in unwritten if not self._is_drawn(r, columns)] + unwritten
+        for column, character in zip(columns, text if best else '', strict=False):
+            self._characters[best[0], column] = character, style
 
     def arrow(self, pose: Pose, style: Style) -> None:
         """Draws the robot, as an arrow in one of eight directions."""
@@ -196,12 +198,13 @@ class Canvas:
             runs = groupby(cells, key=lambda cell: cell[1])
             yield [Segment(''.join(text for text, _ in run), style) for style, run in runs]
 
-    def _is_free(self, row: int, columns: range) -> bool:
-        if not 0 <= row < self.frame.rows:
-            return False
+    def _is_unwritten(self, row: int, columns: range) -> bool:
+        taken = any((row, column) in self._characters for column in columns)
+        return 0 <= row < self.frame.rows and not taken
+
+    def _is_drawn(self, row: int, columns: range) -> bool:
         pixels = self.pixels[2 * row : 2 * row + 2, columns.start : columns.stop]
-        drawn = np.isin(pixels, (UNKNOWN, FREE, OLD_TRAIL, TRAIL), invert=True)
-        return not drawn.any() and not any((row, c) in self._characters for c in columns)
+        return bool(np.isin(pixels, (UNKNOWN, FREE, OLD_TRAIL, TRAIL), invert=True).any())
 
 
 @lru_cache(maxsize=256)

@@ -48,4 +48,5 @@ def show_once(see: See, stopping: Interrupt, console: Console, timeout: float) -
 def _is_complete(snapshot: Snapshot) -> bool:
     """Whether all that a simulated mission tells has come."""
     parts = (snapshot.battery, snapshot.decision, snapshot.grid, snapshot.pose, snapshot.doors)
-    return None not in parts and bool(snapshot.positions and snapshot.mode)
+    placed = snapshot.positions and snapshot.visited_at.keys() <= snapshot.positions.keys()
+    return None not in parts and bool(placed and snapshot.mode)

@@ -188,12 +188,12 @@ def place_lines(snapshot: Snapshot, width: int) -> list[Text]:
     names = sorted({*known, *snapshot.positions}, key=lambda name: (known.get(name, 0.0), name))
     if not names:
         return [_dim('nothing from the ontology yet: its map is not built')]
-    status, longest = snapshot.status, max(map(len, names))
-    column = longest + 18
+    ages = [_age(snapshot.now - known[name]) if name in known else 'never' for name in names]
+    status, longest, widest = snapshot.status, max(map(len, names)), max(map(len, ages))
+    column = longest + widest + len('  avoided ←')
     lines = [Text()]
-    for place in names:
-        age = _age(snapshot.now - known[place]) if place in known else 'never'
-        entry = Text(f'{place:<{longest}} {age:>7} ')
+    for place, age in zip(names, ages, strict=True):
+        entry = Text(f'{place:<{longest}} {age:>{widest}} ')
         if place in snapshot.urgent:
             entry.append('URGENT', URGENT)
         elif status and place in status.avoided:
@@ -238,9 +238,10 @@ def draw_map(snapshot: Snapshot, columns: int, rows: int, *, colours: bool) -> L
                 canvas.line((x1 + aside, y1 + aside), (x2 + aside, y2 + aside), kind)
     if snapshot.obstacles is not None:
         canvas.dots(snapshot.obstacles, map_raster.OBSTACLE)
-    for place, (x, y) in snapshot.positions.items():
-        if snapshot.grid is None:
+    if snapshot.grid is None:
+        for x, y in snapshot.positions.values():
             canvas.mark(x, y, '○', LABEL)
+    for place, (x, y) in snapshot.positions.items():
         canvas.label(x, y, place, URGENT if place in snapshot.urgent else LABEL)
     place = snapshot.status.place if snapshot.status else ''
     if snapshot.pose is not None:

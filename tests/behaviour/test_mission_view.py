@@ -105,12 +105,12 @@ def test_all_that_is_known_can_be_read():
         'decision 3: A → B [URGENT]',
         'B waits longest',
         'D closed',
-        'A    0:02  ●',
-        'B    1:30 URGENT ←',
+        'A 0:02  ●',
+        'B 1:30 URGENT ←',
         '12:00:00 arrived in A',
     ):
         assert words in text
-    assert text.index('B    1:30') < text.index('A    0:02')
+    assert text.index('B 1:30') < text.index('A 0:02')
 
 
 def test_the_map_shows_robot_door_obstacle_trail_and_names_without_colours_too():
@@ -119,6 +119,14 @@ def test_the_map_shows_robot_door_obstacle_trail_and_names_without_colours_too()
     assert all(character in drawn for character in ('↑', 'X', '*', '·', 'A', 'B'))
     row = next(line for line in picture if '↑' in line)
     assert row.index('·') < row.index('↑') < row.index('X')
+
+
+def test_a_name_never_covers_another():
+    close = {f'ROOM{number}': (1.0 + 0.1 * number, 3.0) for number in range(9)}
+    picture = shown(replace(whole(), grid=None, positions=close, visited_at={}), 60, 20)
+    written = [name for name in close if name in picture.split('sketched')[0]]
+    assert 0 < len(written) < 9
+    assert picture.split('sketched')[0].count('ROOM') == len(written)
 
 
 def test_colours_tell_an_open_door_from_a_closed_one():
