@@ -34,18 +34,21 @@ NODES: dict[str, Callable[..., Any]] = {
     'initial_state': InitialState,
     'robot_behavior': RobotBehavior,
 }
+PATIENCE = 60.0
+"""How long nodes wait for each other, seconds of real time: a busy machine changes no mission."""
 BEHAVIOUR = {
     'urgency_threshold': 60,
     'recovery.help_seconds': 5.0,
+    'deadline.answer': PATIENCE,
 }
 IMPATIENT = {
-    'deadline__answer': 1.0,
-    'deadline__build': 5.0,
-    'deadline__plan': 1.0,
-    'deadline__move': 2.0,
-    'deadline__charge': 2.0,
+    'deadline.answer': 1.0,
+    'deadline.build': 5.0,
+    'deadline.plan': 1.0,
+    'deadline.move': 2.0,
+    'deadline.charge': 2.0,
 }
-"""For tests in which peers do not answer; without need a busy machine would miss them."""
+"""The behaviour's deadlines where peers do not answer."""
 
 
 def place_parameters(name: str = 'seven_rooms.yaml') -> dict[str, Any]:
@@ -80,7 +83,7 @@ class Robot:
         self.nodes: dict[str, Any] = {}
         self._parameters: dict[str, dict[str, Any]] = {
             'armor_server': {},
-            'ontology_map_builder': place_parameters(),
+            'ontology_map_builder': {'armor_timeout': PATIENCE, **place_parameters()},
             'battery_controller': {
                 'execution_mode': 'RANDOM',
                 'random_seed': 3,
@@ -90,25 +93,31 @@ class Robot:
             'planner_controller': {
                 'execution_mode': 'RANDOM',
                 'random_seed': 1,
-                'peer_timeout': 0.5,
+                'peer_timeout': PATIENCE,
             },
             'motion_controller': {
                 'execution_mode': 'RANDOM',
                 'random_seed': 2,
-                'peer_timeout': 0.5,
+                'peer_timeout': PATIENCE,
             },
-            'reasoner': {'urgency_threshold': 60},
+            'reasoner': {'urgency_threshold': 60, 'deadline.answer': PATIENCE},
             'initial_state': {'map_source': 'configuration', **place_parameters()},
             'robot_behavior': {**BEHAVIOUR, 'behaviour': behaviour, 'record': str(record)},
         }
         if behaviour == 'surveillance':
             del self._parameters['reasoner'], self._parameters['initial_state']
         else:
-            self._parameters['ontology_map_builder'] = {}
+            self._parameters['ontology_map_builder'] = {'armor_timeout': PATIENCE}
 
     def configure(self, name: str, **parameters: Any) -> None:
         """Changes parameters of a node that is not there yet."""
         self._parameters[name].update({key.replace('__', '.'): v for key, v in parameters.items()})
+
+    def be_impatient(self) -> None:
+        """Has nobody wait long for whoever does not answer."""
+        self._parameters['robot_behavior'].update(IMPATIENT)
+        for name in ('planner_controller', 'motion_controller'):
+            self._parameters[name]['peer_timeout'] = 0.5
 
     def begin(self, *without: str) -> None:
         """Starts all nodes but some, and time."""

@@ -25,6 +25,8 @@ CARRIES_ON = ('surveillance', 'patrol', 'machine', ' goal', '_recharge')
 
 STEP = 0.5
 """Time passes in steps of at least this many seconds; sleeps may last that much longer."""
+MOMENT = 1e-6
+"""Sleeps shorter than this wait for nothing that time would bring, seconds."""
 START = 1.0
 """The first moment, seconds; at 0 nothing has a time yet."""
 
@@ -142,6 +144,9 @@ def simulated_time(graph: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[Simu
     sleep = ClockWait.sleep
 
     def watched(self: ClockWait, seconds: float, interrupt: Any = None) -> bool:
+        if seconds < MOMENT:
+            # It only waits for time to begin.
+            return sleep(self, seconds, interrupt)
         driver.fell_asleep(self.now() + seconds)
         try:
             return sleep(self, seconds, interrupt)

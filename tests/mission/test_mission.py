@@ -18,7 +18,7 @@ from surveillance_interfaces.msg import Decision, FsmTransition, MissionStatus
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import STATE_QOS
 
-from .robot import IMPATIENT, Robot, mission, place_parameters
+from .robot import Robot, mission, place_parameters
 from .scripted_peers import (
     ABORTED,
     ELSEWHERE,
@@ -60,7 +60,7 @@ def test_a_mission_reaches_all_places_and_charges(robot: Robot, graph: Any) -> N
 
 def test_every_node_may_leave_and_come_back(robot: Robot, graph: Any) -> None:
     status = graph.listen(MissionStatus, 'mission_status', STATE_QOS)
-    robot.configure('robot_behavior', **IMPATIENT)
+    robot.be_impatient()
     robot.configure('battery_controller', random_battery_time=[5000.0, 6000.0])
     robot.begin()
     moment = 40.0
@@ -110,7 +110,7 @@ def test_whatever_planner_and_controller_answer_the_mission_goes_on(
     def arrived(place: str) -> None:
         knowledge.note_arrival('', place, robot.time.now, Interrupt())
 
-    robot.configure('robot_behavior', **IMPATIENT)
+    robot.be_impatient()
     robot.configure('battery_controller', random_battery_time=[5000.0, 6000.0])
     robot.begin('planner_controller', 'motion_controller')
     motion = graph.add(ScriptedMotion, {'use_sim_time': True}, positions=positions, arrived=arrived)
