@@ -152,7 +152,7 @@ class Drive:
         if not lost:
             self._lost_since = None
         elif not self.state.ended:
-            return self._while_lost(now, dt)
+            return self._while_lost(now, seen, dt)
         if self.state is State.DRIVING:
             return self._drive(now, pose, seen, dt)
         if self.state is State.STOPPING:
@@ -170,7 +170,7 @@ class Drive:
                 self._next(now)
             else:
                 return Velocity(0.0, min(self._robot.turn, 1.0))
-        return self._follower.halt(dt)
+        return self._follower.halt(seen, dt)
 
     def heed(self, obstacles: Points) -> None:
         """Takes the obstacles known now (map frame); asks for another path if one is on the
@@ -194,14 +194,14 @@ class Drive:
         if self.state is State.ASKING and self._now is not None:
             self._recover(self._now, reason)
 
-    def _while_lost(self, now: float, dt: float) -> Velocity:
+    def _while_lost(self, now: float, seen: Points, dt: float) -> Velocity:
         r = self._recovery
         self._mark = self._blocked_since = None
         if self._lost_since is None:
             self._lost_since = now
         lost_for = now - self._lost_since
         if lost_for < r.stand_lost:
-            return self._follower.halt(dt)
+            return self._follower.halt(seen, dt)
         if lost_for < r.stand_lost + r.look_lost:
             return Velocity(0.0, 0.5)
         self.reason = 'the robot does not know where it is: what it sees is nowhere on the map'
@@ -223,7 +223,7 @@ class Drive:
             return guidance.velocity
         if guidance.off_path > r.off_path:
             self._ask(now, f'the robot is {guidance.off_path:.2f} m off its path')
-            return self._follower.halt(dt)
+            return self._follower.halt(seen, dt)
         if not guidance.blocked:
             self._blocked_since = None
         elif self._blocked_since is None:

@@ -134,7 +134,7 @@ class PathFollower:
         bearing = math.atan2(target[1] - pose[1], target[0] - pose[0])
         side = angle_between(pose[2], bearing)
         if abs(side) > p.turn_first:
-            return self._guide(*self._turn(side, dt), False, off_path)
+            return self._guide(*self._turn(side, seen, dt), False, off_path)
         distance = max(float(np.hypot(*(target - position))), 1e-6)
         curvature = 2 * math.sin(side) / distance
         wanted = min(
@@ -148,12 +148,7 @@ class PathFollower:
         if beside < p.caution:
             wanted *= max(beside, 0.0) / p.caution
         wanted = max(wanted, min(p.creep, remaining / max(dt, 1e-6)))
-        # The speed from which braking, after the latency, ends within the room. The last braking
-        # counts on less than the full deceleration.
-        a, t = 0.8 * p.acceleration, p.latency
-        stop = p.speed * t + p.speed**2 / (2 * a)
-        room = room_ahead(seen, curvature, p.radius + p.margin, stop + 0.1)
-        safe = max(0.0, math.sqrt((a * t) ** 2 + 2 * a * room) - a * t)
+        safe = self._safe_speed(seen, curvature, math.inf)
         blocked = safe < 0.02
         speed = self._ramped(self._velocity.speed, min(wanted, safe), p.acceleration * dt)
         speed = min(speed, safe)
@@ -162,7 +157,37 @@ class PathFollower:
             turn = math.copysign(p.turn, turn)
             speed = turn / curvature
         limited = self._ramped(self._velocity.turn, turn, p.turn_acceleration * dt)
+        if limited != turn:
+            # Until it turns as it should, the robot goes another way than the arc looked at.
+            late = abs(turn - limited) / p.turn_acceleration
+            speed = self._safely(speed, limited, seen, speed * (late + p.latency))
         return self._guide(speed, limited, blocked, off_path)
+
+    def _safe_speed(self, seen: Points, curvature: float, way: float) -> float:
+        """The speed from which the robot stops before what it sees on an arc, m/s.
+
+        Args:
+            seen: Points in the robot's frame, shape (n, 2), metres.
+            curvature: Of the arc, 1/m.
+            way: How much of the arc is looked at, metres; at most what a stop from top speed takes.
+
+        Returns:
+            At most the top speed, which also stands for: nothing is on that way.
+        """
+        p = self.parameters
+        # Braking begins after the latency, and counts on less than the full deceleration.
+        a, t = 0.8 * p.acceleration, p.latency
+        horizon = min(way, p.speed * t + p.speed**2 / (2 * a) + 0.1)
+        room = room_ahead(seen, curvature, p.radius + p.margin, horizon)
+        if room >= horizon:
+            return p.speed
+        return min(p.speed, max(0.0, math.sqrt((a * t) ** 2 + 2 * a * room) - a * t))
+
+    def _safely(self, speed: float, turn: float, seen: Points, way: float = math.inf) -> float:
+        """The speed, or less where the robot could not stop on the arc that this turn makes."""
+        if speed <= 0.0:
+            return speed
+        return min(speed, self._safe_speed(seen, turn / speed, way))
 
     def is_clear(self, obstacles: Points, reach: float, ahead: float) -> bool:
         """Whether the next part of the path keeps away from obstacles.
@@ -180,25 +205,30 @@ class PathFollower:
         gaps = np.hypot(way[:, :1] - obstacles[:, 0], way[:, 1:] - obstacles[:, 1])
         return bool((gaps >= reach).all())
 
-    def halt(self, dt: float) -> Velocity:
-        """Brakes to a stand."""
+    def halt(self, seen: Points, dt: float) -> Velocity:
+        """Brakes to a stand, gently unless something is near.
+
+        Args:
+            seen: What the lidar sees, points in the robot's frame, shape (n, 2), metres.
+            dt: Time since the last step, seconds.
+        """
         p = self.parameters
-        self._velocity = Velocity(
-            self._ramped(self._velocity.speed, 0.0, p.acceleration * dt),
-            self._ramped(self._velocity.turn, 0.0, p.turn_acceleration * dt),
-        )
+        turn = self._ramped(self._velocity.turn, 0.0, p.turn_acceleration * dt)
+        speed = self._ramped(self._velocity.speed, 0.0, p.acceleration * dt)
+        self._velocity = Velocity(self._safely(speed, turn, seen), turn)
         return self._velocity
 
     def _guide(self, speed: float, turn: float, blocked: bool, off_path: float) -> Guidance:
         self._velocity = Velocity(float(speed), float(turn))
         return Guidance(self._velocity, False, blocked, self.progress, off_path)
 
-    def _turn(self, side: float, dt: float) -> tuple[float, float]:
+    def _turn(self, side: float, seen: Points, dt: float) -> tuple[float, float]:
         p = self.parameters
-        speed = self._ramped(self._velocity.speed, 0.0, p.acceleration * dt)
         top = min(p.turn, math.sqrt(2 * p.turn_acceleration * abs(side)))
         wanted = math.copysign(top, side)
-        return speed, self._ramped(self._velocity.turn, wanted, p.turn_acceleration * dt)
+        turn = self._ramped(self._velocity.turn, wanted, p.turn_acceleration * dt)
+        speed = self._ramped(self._velocity.speed, 0.0, p.acceleration * dt)
+        return self._safely(speed, turn, seen), turn
 
     @staticmethod
     def _ramped(now: float, wanted: float, change: float) -> float:

@@ -111,6 +111,31 @@ def test_the_robot_stops_before_what_it_sees(distance: float, lag: int) -> None:
     assert abs(pose[1]) < 1e-6
 
 
+def at_top_speed() -> PathFollower:
+    """A follower of a straight path that has come up to speed, at (3, 0)."""
+    follower, pose = PathFollower([[0.0, 0], [6, 0]], ROBOT), (0.0, 0.0, 0.0)
+    while pose[0] < 3.0:
+        pose = moved(pose, follower.step(pose, NOTHING, PERIOD).velocity)
+    return follower
+
+
+AHEAD = np.array([[0.3, y] for y in np.linspace(-0.2, 0.2, 21)])
+"""A wall right before the robot, in its own frame."""
+
+
+@pytest.mark.parametrize('yaw', [0.6, 1.2])
+def test_a_robot_that_was_turned_to_a_wall_stops_before_it_turns_back(yaw: float) -> None:
+    # Off by 0.6 rad it would drive an arc back to its path, by 1.2 rad turn on the spot first.
+    velocity = at_top_speed().step((3.0, 0.0, yaw), AHEAD, PERIOD).velocity
+    assert velocity.turn < 0
+    assert velocity.speed < 0.15
+
+
+def test_a_robot_that_halts_before_a_wall_does_not_do_so_gently() -> None:
+    assert at_top_speed().halt(NOTHING, PERIOD).speed == pytest.approx(ROBOT.speed, abs=0.1)
+    assert at_top_speed().halt(AHEAD, PERIOD).speed < 0.15
+
+
 def test_what_is_beside_the_way_does_not_stop_the_robot() -> None:
     beside = np.array([[x, side * 0.3] for x in np.arange(-1, 3, 0.05) for side in (-1, 1)])
     assert room_ahead(beside, 0.0, ROBOT.radius + ROBOT.margin, 2.0) == 2.0
