@@ -13,7 +13,6 @@ from surveillance_behaviour.mission_record import MissionRecord, RecordError
 from surveillance_behaviour.mission_resumption import CutOff
 from surveillance_behaviour.policy.situation import Decision, Situation
 from surveillance_behaviour.ports import (
-    AwayError,
     InterruptedWaitError,
     LostRobotError,
     PeerError,
@@ -138,9 +137,9 @@ class Mission:
             self._sent_to_charge = ''
         try:
             self._tell_what_is_owed(interrupt)
-        except AwayError:
-            raise
         except PeerError as error:
+            # An ontology that is away says so to what follows; waiting here as well would only
+            # cost the battery.
             self.say(str(error), warning=True)
         if threshold != self._told_threshold:
             knowledge.set_urgency_threshold(threshold, interrupt)
