@@ -97,9 +97,11 @@ class ArmorKnowledge:
                 tail.append(('QUERY OBJECTPROP IND', 'connectedTo', place))
                 tail.append(_query('visitedAt', place))
             answers = self._send([*head, *tail], interrupt)[-(3 + len(classes) + len(tail)) :]
-            if not answers[0].is_consistent:
-                raise PeerError('armor', f'ontology {self._armor.reference_name} is inconsistent')
             is_in, can_reach, locations = (answer.queried_objects for answer in answers[:3])
+            if not answers[0].is_consistent:
+                # With the robot in several places at once: that can be mended, see `note_arrival`.
+                _one_place(is_in)
+                raise PeerError('armor', f'ontology {self._armor.reference_name} is inconsistent')
             self._places = _names(locations)
             if asked == self._places:
                 break

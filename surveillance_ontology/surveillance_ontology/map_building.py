@@ -162,7 +162,8 @@ class MapBuilding:
             request('DISJOINT IND CLASS', 'ROOM'),
             request('DISJOINT IND CLASS', 'DOOR'),
         ]
-        if not known or self.robot_room() is None:
+        # Who drives the robot may have told its place since the ontology was loaded.
+        if self.robot_room() is None:
             todo.append(request('ADD OBJECTPROP IND', 'isIn', ROBOT, robot_room))
         self._send([*todo, request('REASON')])
         return place

@@ -74,6 +74,27 @@ def test_visits_and_arrivals_replace_what_was_known(
     assert knowledge.robot_place(NOBODY) == 'C1'
 
 
+def test_a_robot_in_two_places_at_once_is_named_and_found_again(
+    knowledge: ArmorKnowledge, armor: ArmorClient
+) -> None:
+    armor.manipulation.add_objectprop_to_ind('isIn', 'Robot1', 'C1')
+    with pytest.raises(LostRobotError, match='Robot1 isIn C1 and E'):
+        knowledge.beliefs(RULES, 110.0, NOBODY)
+    knowledge.note_arrival('', 'C1', 110.0, NOBODY)
+    assert knowledge.beliefs(RULES, 111.0, NOBODY).place == 'C1'
+
+
+def test_a_map_that_is_built_leaves_the_robot_where_somebody_has_told_it_is() -> None:
+    transport = InProcessTransport(ArmorService())
+    armor = ArmorClient('builder', 'map', transport)
+    ontology, iri = str(DATA / 'surveillance.owl'), 'http://bnc/exp-rob-lab/2022-23'
+    armor.utils.load_ref_from_file(ontology, iri, False, 'PELLET', True)
+    armor.manipulation.add_objectprop_to_ind('isIn', 'Robot1', 'C1')
+    MapBuilding(armor, ontology, iri).build(PLACE, 100, PLACE.start)
+    knowledge = ArmorKnowledge('test', transport, Interrupt(), lambda _interrupt: 'map')
+    assert knowledge.beliefs(RULES, 110.0, NOBODY).place == 'C1'
+
+
 def test_a_lost_robot_is_named_and_found_again(
     knowledge: ArmorKnowledge, armor: ArmorClient
 ) -> None:
