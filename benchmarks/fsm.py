@@ -24,8 +24,8 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / 'surveillance_behaviour'))
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / 'surveillance_runtime'))
 
-from surveillance_behaviour import fsm
-from surveillance_behaviour.fsm.record import TransitionFeed
+import surveillance_fsm as fsm
+from surveillance_fsm.record import TransitionFeed
 
 RING = 3
 LEVELS = 3

@@ -30,16 +30,17 @@ from skimage.graph import MCP_Geometric
 from whole_stack import ROOT, Stack, ros_arguments
 
 from launcher import graph, mission
-from surveillance_controllers import polyline
-from surveillance_controllers.driving import Drive
-from surveillance_controllers.grid_map import GridMap
-from surveillance_controllers.grid_planning import GridPlanner, PlanningParameters
-from surveillance_controllers.pilot import Pilot
-from surveillance_controllers.scans import Scan
-from surveillance_simulation import occupancy_grid, place_generation
+from surveillance_controllers.geometry import polyline
+from surveillance_controllers.motion.driving import Drive
+from surveillance_controllers.motion.pilot import Pilot
+from surveillance_controllers.motion.scans import Scan
+from surveillance_controllers.planning.grid_map import GridMap
+from surveillance_controllers.planning.grid_planning import GridPlanner, PlanningParameters
+from surveillance_simulation import place_generation
 from surveillance_simulation.place_file import read_world
-from surveillance_simulation.robot import Robot
-from surveillance_simulation.world import World
+from surveillance_simulation.robot.robot import Robot
+from surveillance_simulation.world import occupancy_grid
+from surveillance_simulation.world.world import World
 
 Mask = npt.NDArray[np.bool_]
 

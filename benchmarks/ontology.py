@@ -31,17 +31,17 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
 from benchmarks.java_reasoner import KINDS, JavaFailed, JavaReasoner, absent  # noqa: E402
-from surveillance_ontology.axioms import (  # noqa: E402
+from surveillance_ontology.documents.reading import read_ontology  # noqa: E402
+from surveillance_ontology.documents.writing import write_ontology  # noqa: E402
+from surveillance_ontology.knowledge_base import KnowledgeBase  # noqa: E402
+from surveillance_ontology.owl.axioms import (  # noqa: E402
     Axiom,
     DataPropertyAssertion,
     DifferentIndividuals,
     ObjectPropertyAssertion,
 )
-from surveillance_ontology.documents.reading import read_ontology  # noqa: E402
-from surveillance_ontology.documents.writing import write_ontology  # noqa: E402
-from surveillance_ontology.expressions import Literal  # noqa: E402
-from surveillance_ontology.knowledge_base import KnowledgeBase  # noqa: E402
-from surveillance_ontology.vocabulary import XSD  # noqa: E402
+from surveillance_ontology.owl.expressions import Literal  # noqa: E402
+from surveillance_ontology.owl.vocabulary import XSD  # noqa: E402
 
 IRI = 'http://bnc/exp-rob-lab/2022-23'
 SCHEMA = ROOT / 'surveillance_ontology' / 'surveillance_ontology' / 'data' / 'surveillance.owl'

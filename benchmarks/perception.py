@@ -28,10 +28,10 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from surveillance_perception.camera_model import CameraModel
-from surveillance_perception.detection import DetectorSettings, MarkerDetector
-from surveillance_perception.dictionaries import dictionary_named
-from surveillance_perception.marker_scene import (
+from surveillance_perception.detection.camera_model import CameraModel
+from surveillance_perception.detection.detector import DetectorSettings, MarkerDetector
+from surveillance_perception.detection.dictionaries import dictionary_named
+from surveillance_perception.detection.marker_scene import (
     BACKDROPS,
     Degradation,
     Panel,

@@ -24,7 +24,7 @@ from launcher import graph  # noqa: E402
 from surveillance_runtime.domains import claim_domain  # noqa: E402
 from surveillance_runtime.node import PatrolNode  # noqa: E402
 from surveillance_runtime.process import ExecutorThread  # noqa: E402
-from surveillance_simulation.robot import Robot  # noqa: E402
+from surveillance_simulation.robot.robot import Robot  # noqa: E402
 from surveillance_simulation.simulator_node import Simulator  # noqa: E402
 
 

@@ -23,14 +23,19 @@ from rclpy.parameter import Parameter
 from sensor_msgs.msg import Image
 
 from surveillance_interfaces.srv import MarkerRoutine, PointCamera
-from surveillance_perception.annotation import annotated
 from surveillance_perception.arm_controller_node import ArmController
 from surveillance_perception.aruco_detector_node import ArucoDetector
-from surveillance_perception.camera_model import CameraModel
 from surveillance_perception.conversions import picture_from_ros
-from surveillance_perception.detection import DetectorSettings, MarkerDetector
-from surveillance_perception.dictionaries import dictionary_named
-from surveillance_perception.marker_scene import Degradation, Panel, backdrop_of, picture_of
+from surveillance_perception.detection.annotation import annotated
+from surveillance_perception.detection.camera_model import CameraModel
+from surveillance_perception.detection.detector import DetectorSettings, MarkerDetector
+from surveillance_perception.detection.dictionaries import dictionary_named
+from surveillance_perception.detection.marker_scene import (
+    Degradation,
+    Panel,
+    backdrop_of,
+    picture_of,
+)
 from surveillance_runtime.calls import ServiceCaller
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import ExecutorThread

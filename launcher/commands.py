@@ -26,8 +26,8 @@ EXIT_INTERRUPTED = 130
 # Commands that belong to a package: module and function, which takes the arguments and returns
 # the exit code.
 PACKAGE_COMMANDS = {
-    'watch': ('surveillance_behaviour.watch_command', 'show a running mission in this terminal'),
-    'map': ('surveillance_behaviour.map_command', 'check a place and draw it as a picture'),
+    'watch': ('surveillance_operator.watch_command', 'show a running mission in this terminal'),
+    'map': ('surveillance_operator.map_command', 'check a place and draw it as a picture'),
     'detect': ('surveillance_perception.detect_command', 'find ArUco markers in pictures'),
     'check-behaviour': (
         'surveillance_behaviour.check_command',

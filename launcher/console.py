@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from launcher.graph import Node
 from launcher.log import MergedLog
 from launcher.supervisor import Supervisor
-from surveillance_controllers.console import Console
-from surveillance_controllers.console_commands import BATTERY, MOTION, PLANNER, Grammar
+from surveillance_controllers.manual.console import Console
+from surveillance_controllers.manual.console_commands import BATTERY, MOTION, PLANNER, Grammar
 
 _GRAMMAR = Grammar((*BATTERY, *PLANNER, *MOTION))
 

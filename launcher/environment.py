@@ -24,11 +24,13 @@ from launcher.progress import Step
 CHECKOUT = Path(__file__).resolve().parent.parent
 PACKAGES = (
     'surveillance_runtime',
+    'surveillance_fsm',
     'surveillance_ontology',
     'surveillance_behaviour',
     'surveillance_controllers',
     'surveillance_perception',
     'surveillance_simulation',
+    'surveillance_operator',
 )
 VENV_STEP = 'virtual environment in .venv'
 PACKAGES_STEP = 'Python packages, ROS 2 Jazzy among them'

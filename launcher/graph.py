@@ -82,7 +82,7 @@ NODES = (
     ),
     Node(
         CONSOLE,
-        'surveillance_controllers',
+        'surveillance_operator',
         'ConsoleNode',
         'one prompt for the three controllers in MANUAL mode',
     ),
@@ -100,7 +100,7 @@ NODES = (
     ),
     Node(
         'mission_view',
-        'surveillance_behaviour',
+        'surveillance_operator',
         'MissionViewNode',
         'shows a running mission in the terminal',
     ),

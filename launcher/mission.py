@@ -19,7 +19,7 @@ from launcher import graph
 from launcher.claims import claim
 from launcher.log import ROS_FORMAT, MergedLog
 from launcher.supervisor import Program, Supervisor
-from surveillance_behaviour import mission_record
+from surveillance_behaviour.mission import record as mission_record
 from surveillance_runtime.place import read_place
 from surveillance_runtime.yaml_file import YamlFileError, read_yaml_file
 

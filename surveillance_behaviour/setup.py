@@ -18,11 +18,10 @@ setup(
     zip_safe=True,
     maintainer='Surveillance robot maintainers',
     maintainer_email='surveillance@example.com',
-    description='SMACH-style state machine engine, patrol policies and the behaviour of the robot.',
+    description='Patrol policies, missions and the state machines of the robot.',
     license='Apache-2.0',
     entry_points={
         'console_scripts': [
-            'mission_view = surveillance_behaviour.mission_view_node:main',
             'initial_state = surveillance_behaviour.initial_state_node:main',
             'reasoner = surveillance_behaviour.reasoner_node:main',
             'robot_behavior = surveillance_behaviour.robot_behavior_node:main',

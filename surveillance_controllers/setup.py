@@ -21,7 +21,6 @@ setup(
             'battery_controller = surveillance_controllers.battery_controller_node:main',
             'planner_controller = surveillance_controllers.planner_controller_node:main',
             'motion_controller = surveillance_controllers.motion_controller_node:main',
-            'console = surveillance_controllers.console_node:main',
         ],
     },
 )

@@ -9,13 +9,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from surveillance_behaviour.chooser import ChoiceSettings
-from surveillance_behaviour.mission import MissionSettings
+from surveillance_behaviour.mission.mission import MissionSettings
+from surveillance_behaviour.mission.recovery import RecoveryLimits
+from surveillance_behaviour.peers.ros_ports import Deadlines
 from surveillance_behaviour.policy.battery import BatteryLimits
+from surveillance_behaviour.policy.chooser import ChoiceSettings
 from surveillance_behaviour.policy.policies import POLICIES
 from surveillance_behaviour.policy.rules import DEFAULT_RULES, Rules
-from surveillance_behaviour.recovery import RecoveryLimits
-from surveillance_behaviour.ros_ports import Deadlines
 from surveillance_runtime.field_parameters import Described, declare_fields
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError

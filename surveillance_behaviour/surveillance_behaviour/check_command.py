@@ -12,14 +12,14 @@ import sys
 from collections.abc import Callable, Sequence
 from typing import NoReturn
 
-from surveillance_behaviour.battery_gauge import BatteryGauge
-from surveillance_behaviour.fsm.active import ActiveContainer
-from surveillance_behaviour.fsm.export import to_ascii, to_graphviz, to_mermaid
-from surveillance_behaviour.fsm.verification import Finding, verify
-from surveillance_behaviour.fsm.waiting import WALL_CLOCK
 from surveillance_behaviour.machines import MACHINES
-from surveillance_behaviour.mission import Mission, MissionSettings
-from surveillance_behaviour.ports import Ports
+from surveillance_behaviour.mission.battery_gauge import BatteryGauge
+from surveillance_behaviour.mission.mission import Mission, MissionSettings
+from surveillance_behaviour.peers.ports import Ports
+from surveillance_fsm.active import ActiveContainer
+from surveillance_fsm.export import to_ascii, to_graphviz, to_mermaid
+from surveillance_fsm.verification import Finding, verify
+from surveillance_fsm.waiting import WALL_CLOCK
 
 DRAWINGS: dict[str, Callable[[ActiveContainer], str]] = {
     'mermaid': to_mermaid,

@@ -11,10 +11,10 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from std_srvs.srv import Empty
 
 from surveillance_behaviour.conversions import map_message
-from surveillance_behaviour.marker_inquiry import MarkerInquiry
-from surveillance_behaviour.ros_eyes import RosEyes
-from surveillance_behaviour.surroundings import LookingAround
-from surveillance_behaviour.survey import PlaceNote, Survey, SurveyReport, notes_of
+from surveillance_behaviour.map_from_markers.marker_inquiry import MarkerInquiry
+from surveillance_behaviour.map_from_markers.ros_eyes import RosEyes
+from surveillance_behaviour.map_from_markers.surroundings import LookingAround
+from surveillance_behaviour.map_from_markers.survey import PlaceNote, Survey, SurveyReport, notes_of
 from surveillance_interfaces.msg import OntologyMap
 from surveillance_interfaces.srv import ReferenceName
 from surveillance_runtime.awaited_work import AwaitedEvent

@@ -14,12 +14,12 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.task import Future
 
 from surveillance_behaviour import behaviour_parameters
-from surveillance_behaviour.announcing import DecisionTopic
-from surveillance_behaviour.chooser import Chooser
-from surveillance_behaviour.fsm import Interrupt
+from surveillance_behaviour.peers.announcing import DecisionTopic
+from surveillance_behaviour.peers.ports import InterruptedWaitError, PeerError
+from surveillance_behaviour.peers.ros_ports import RosPlaces, ros_knowledge
+from surveillance_behaviour.policy.chooser import Chooser
 from surveillance_behaviour.policy.rules import NowhereToGoError
-from surveillance_behaviour.ports import InterruptedWaitError, PeerError
-from surveillance_behaviour.ros_ports import RosPlaces, ros_knowledge
+from surveillance_fsm import Interrupt
 from surveillance_interfaces.msg import MissionStatus
 from surveillance_interfaces.srv import Reason
 from surveillance_runtime.awaited_work import AwaitedWork

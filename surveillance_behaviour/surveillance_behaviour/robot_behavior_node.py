@@ -15,17 +15,18 @@ from typing import Any, cast
 from sensor_msgs.msg import BatteryState
 from std_msgs.msg import Bool, UInt8
 
-from surveillance_behaviour import behaviour_parameters, conversions, fsm
-from surveillance_behaviour.announcing import DecisionTopic, RosAnnouncer
-from surveillance_behaviour.battery_gauge import BatteryGauge
-from surveillance_behaviour.fsm_ros import IntrospectionServer
+import surveillance_fsm as fsm
+from surveillance_behaviour import behaviour_parameters, conversions
 from surveillance_behaviour.machines import MACHINES
-from surveillance_behaviour.mission import Mission
-from surveillance_behaviour.mission_record import MissionRecord, RecordError, read
-from surveillance_behaviour.mission_resumption import CutOff, cut_off
+from surveillance_behaviour.mission.battery_gauge import BatteryGauge
+from surveillance_behaviour.mission.mission import Mission
+from surveillance_behaviour.mission.record import MissionRecord, RecordError, read
+from surveillance_behaviour.mission.resumption import CutOff, cut_off
+from surveillance_behaviour.peers.announcing import DecisionTopic, RosAnnouncer
+from surveillance_behaviour.peers.ports import Ports
+from surveillance_behaviour.peers.ros_ports import RosMotion, RosPlaces, RosRoutine, ros_knowledge
 from surveillance_behaviour.policy.rules import RECHARGE
-from surveillance_behaviour.ports import Ports
-from surveillance_behaviour.ros_ports import RosMotion, RosPlaces, RosRoutine, ros_knowledge
+from surveillance_fsm.ros import IntrospectionServer
 from surveillance_interfaces.msg import Decision as DecisionMessage
 from surveillance_runtime.node import JOIN_SECONDS, PatrolNode, StartError
 from surveillance_runtime.process import run_node

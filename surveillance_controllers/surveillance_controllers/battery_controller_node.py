@@ -16,12 +16,12 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from std_msgs.msg import Bool, UInt8
 from std_srvs.srv import Empty
 
-from surveillance_controllers import stimuli
-from surveillance_controllers.battery_model import Battery
-from surveillance_controllers.console_commands import BATTERY, BATTERY_SET, ParsedCommand
+from surveillance_controllers.battery.model import Battery
+from surveillance_controllers.battery.robot_battery import RobotBattery
 from surveillance_controllers.controller_parameters import battery_settings, execution_mode
-from surveillance_controllers.operator_console import OperatorConsole
-from surveillance_controllers.robot_battery import RobotBattery
+from surveillance_controllers.manual import stimuli
+from surveillance_controllers.manual.console_commands import BATTERY, BATTERY_SET, ParsedCommand
+from surveillance_controllers.manual.operator_console import OperatorConsole
 from surveillance_runtime.awaited_work import AwaitedEvent
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
@@ -111,7 +111,7 @@ class BatteryController(PatrolNode):
 
     def _recharge(self) -> None:
         # Only here: a node that is never asked to recharge starts without the import.
-        from surveillance_controllers.progress_display import charge_display
+        from surveillance_controllers.manual.progress_display import charge_display
 
         charge = self._await_full if self._mode == 'SIMULATED' else self._fill
         try:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import astuple, dataclass, field, replace
 
-from surveillance_controllers.battery_model import BatteryParameters
-from surveillance_controllers.polyline import Points
-from surveillance_controllers.poses import Pose
+from surveillance_controllers.battery.model import BatteryParameters
+from surveillance_controllers.geometry.polyline import Points
+from surveillance_controllers.geometry.poses import Pose
 from surveillance_runtime.field_parameters import Described, declare_fields
 from surveillance_runtime.node import PatrolNode
 

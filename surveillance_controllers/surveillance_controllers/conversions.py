@@ -12,14 +12,14 @@ from geometry_msgs.msg import Pose as PoseMessage
 from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import BatteryState, LaserScan
 
-from surveillance_controllers.battery_model import Battery
-from surveillance_controllers.polyline import Points
-from surveillance_controllers.poses import Pose
+from surveillance_controllers.battery.model import Battery
+from surveillance_controllers.geometry.polyline import Points
+from surveillance_controllers.geometry.poses import Pose
 
 if TYPE_CHECKING:
-    from surveillance_controllers.grid_map import GridMap
-    from surveillance_controllers.path_following import Velocity
-    from surveillance_controllers.scans import Scan
+    from surveillance_controllers.motion.path_following import Velocity
+    from surveillance_controllers.motion.scans import Scan
+    from surveillance_controllers.planning.grid_map import GridMap
 
 
 def array_from_points(points: Iterable[Point]) -> Points:
@@ -105,7 +105,7 @@ def grid_from(message: OccupancyGrid) -> GridMap:
         ValueError: The message is not sound, or its origin is turned.
     """
     # Only here: a node without a map starts without OpenCV.
-    from surveillance_controllers.grid_map import GridMap
+    from surveillance_controllers.planning.grid_map import GridMap
 
     info = message.info
     cells = np.array(message.data, dtype=np.int8)
@@ -121,7 +121,7 @@ def grid_from(message: OccupancyGrid) -> GridMap:
 
 def scan_from(message: LaserScan) -> Scan:
     """A turn of a lidar; rays that are out of its range or not a number met nothing."""
-    from surveillance_controllers.scans import Scan
+    from surveillance_controllers.motion.scans import Scan
 
     ranges = np.frombuffer(message.ranges, dtype=np.float32).astype(float)
     angles = message.angle_min + message.angle_increment * np.arange(len(ranges))

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 
 from surveillance_controllers import conversions
-from surveillance_controllers.polyline import Points
+from surveillance_controllers.geometry.polyline import Points
 from surveillance_interfaces.srv import ReferenceName, RoomPosition
 from surveillance_ontology.armor.protocol import DirectiveRequest
 from surveillance_ontology.armor_client import (

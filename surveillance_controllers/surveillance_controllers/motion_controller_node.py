@@ -12,22 +12,24 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 import numpy as np
 
-from surveillance_controllers import conversions, polyline, request_texts, stimuli
-from surveillance_controllers.arrival import MotionFailed, nearest_place
-from surveillance_controllers.console_commands import MOTION, ParsedCommand
+from surveillance_controllers import conversions
 from surveillance_controllers.controller_parameters import execution_mode, motion_settings
+from surveillance_controllers.geometry import polyline
+from surveillance_controllers.geometry.polyline import Points
+from surveillance_controllers.manual import request_texts, stimuli
+from surveillance_controllers.manual.console_commands import MOTION, ParsedCommand
+from surveillance_controllers.manual.operator_console import OperatorConsole
+from surveillance_controllers.manual.operator_desk import OperatorDesk
 from surveillance_controllers.map_knowledge import KnowledgeError, MapKnowledge
-from surveillance_controllers.operator_console import OperatorConsole
-from surveillance_controllers.operator_desk import OperatorDesk
-from surveillance_controllers.polyline import Points
-from surveillance_controllers.stimulus_motion import glide
+from surveillance_controllers.motion.arrival import MotionFailed, nearest_place
+from surveillance_controllers.motion.stimulus_motion import glide
 from surveillance_interfaces.action import Control, FollowPath
 from surveillance_runtime.goals import GoalAborted, GoalRun, GoalServer
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
 
 if TYPE_CHECKING:
-    from surveillance_controllers.docking import Motion
+    from surveillance_controllers.motion.docking import Motion
 
 
 class MotionController(PatrolNode):
@@ -56,7 +58,7 @@ class MotionController(PatrolNode):
 
     def _make_robot(self) -> Motion:
         # Only here, for the libraries behind it take their time to import.
-        from surveillance_controllers.robot_motion import make_motion
+        from surveillance_controllers.motion.robot_motion import make_motion
 
         return make_motion(self, self._settings, self._knowledge)
 

@@ -12,20 +12,22 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 import numpy as np
 
-from surveillance_controllers import conversions, polyline, request_texts, stimuli
-from surveillance_controllers.console_commands import PLANNER, ParsedCommand, Point3
+from surveillance_controllers import conversions
 from surveillance_controllers.controller_parameters import execution_mode, planner_settings
+from surveillance_controllers.geometry import polyline
+from surveillance_controllers.geometry.polyline import Points
+from surveillance_controllers.manual import request_texts, stimuli
+from surveillance_controllers.manual.console_commands import PLANNER, ParsedCommand, Point3
+from surveillance_controllers.manual.operator_console import OperatorConsole
+from surveillance_controllers.manual.operator_desk import OperatorDesk
 from surveillance_controllers.map_knowledge import KnowledgeError, MapKnowledge
-from surveillance_controllers.operator_console import OperatorConsole
-from surveillance_controllers.operator_desk import OperatorDesk
-from surveillance_controllers.polyline import Points
 from surveillance_interfaces.action import ComputePath, Plan
 from surveillance_runtime.goals import GoalAborted, GoalRun, GoalServer
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
 
 if TYPE_CHECKING:
-    from surveillance_controllers.simulated_planning import SimulatedPlanning
+    from surveillance_controllers.planning.simulated_planning import SimulatedPlanning
 
 
 class PlannerController(PatrolNode):
@@ -46,7 +48,7 @@ class PlannerController(PatrolNode):
         self._simulated: SimulatedPlanning | None = None
         if self._mode == 'SIMULATED':
             # Only here, for the libraries of the search take their time to import.
-            from surveillance_controllers.simulated_planning import SimulatedPlanning
+            from surveillance_controllers.planning.simulated_planning import SimulatedPlanning
 
             timeout = self._settings.peer_timeout
             self._simulated = SimulatedPlanning(self, self._knowledge, timeout)

@@ -17,8 +17,8 @@ from surveillance_interfaces.msg import (
 )
 from surveillance_ontology.armor.facts import ShortFact, short_facts
 from surveillance_ontology.armor.protocol import DirectiveRequest, DirectiveResponse
-from surveillance_ontology.axioms import Axiom
 from surveillance_ontology.map_building import RoomNote
+from surveillance_ontology.owl.axioms import Axiom
 from surveillance_runtime.place import Position
 
 

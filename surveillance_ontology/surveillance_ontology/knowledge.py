@@ -8,9 +8,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import TypeAlias
 
-from surveillance_ontology.assertions import Assertions
-from surveillance_ontology.axiom_text import axiom_text
-from surveillance_ontology.axioms import (
+from surveillance_ontology.knowledge_changes import visible
+from surveillance_ontology.owl.assertions import Assertions
+from surveillance_ontology.owl.axiom_text import axiom_text
+from surveillance_ontology.owl.axioms import (
     Axiom,
     ClassAssertion,
     DataPropertyAssertion,
@@ -19,16 +20,15 @@ from surveillance_ontology.axioms import (
     SameIndividual,
     SubClassOf,
 )
-from surveillance_ontology.entities import entities_of
-from surveillance_ontology.explanation import Explanation
-from surveillance_ontology.expressions import ClassExpression, Literal
-from surveillance_ontology.knowledge_changes import visible
+from surveillance_ontology.owl.entities import entities_of
+from surveillance_ontology.owl.expressions import ClassExpression, Literal
+from surveillance_ontology.owl.vocabulary import THING
 from surveillance_ontology.reasoner.clauses import Predicate
 from surveillance_ontology.reasoner.engine import Engine
+from surveillance_ontology.reasoner.explanation import Explanation
 from surveillance_ontology.reasoner.reasons import Reasons
 from surveillance_ontology.reasoner.schema import Schema
 from surveillance_ontology.reasoner.view import FactView
-from surveillance_ontology.vocabulary import THING
 
 Fact: TypeAlias = ClassAssertion | ObjectPropertyAssertion | DataPropertyAssertion | SameIndividual
 

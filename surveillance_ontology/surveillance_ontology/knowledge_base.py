@@ -16,16 +16,16 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import partial
 
-from surveillance_ontology.assertions import is_assertion
-from surveillance_ontology.axioms import (
+from surveillance_ontology.bulk_building import uncollected
+from surveillance_ontology.knowledge import Knowledge
+from surveillance_ontology.knowledge_changes import Changes, Feed
+from surveillance_ontology.owl.assertions import is_assertion
+from surveillance_ontology.owl.axioms import (
     Axiom,
     DifferentIndividuals,
     SameIndividual,
 )
-from surveillance_ontology.bulk_building import uncollected
-from surveillance_ontology.entities import entities_of
-from surveillance_ontology.knowledge import Knowledge
-from surveillance_ontology.knowledge_changes import Changes, Feed
+from surveillance_ontology.owl.entities import entities_of
 from surveillance_ontology.reasoner.engine import Engine
 from surveillance_ontology.reasoner.schema import Schema
 from surveillance_ontology.renaming import renamed

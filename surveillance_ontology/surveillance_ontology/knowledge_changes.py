@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from surveillance_ontology.axioms import Axiom
+from surveillance_ontology.owl.axioms import Axiom
 from surveillance_ontology.reasoner.clauses import Fact
 from surveillance_ontology.reasoner.engine import Engine
 from surveillance_ontology.reasoner.view import FactView, is_public

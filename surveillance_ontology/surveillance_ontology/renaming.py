@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from surveillance_ontology.axioms import Axiom, Declaration
-from surveillance_ontology.entities import roles_of
+from surveillance_ontology.owl.axioms import Axiom, Declaration
+from surveillance_ontology.owl.entities import roles_of
 
 
 def renamed(axiom: Axiom, kind: str, old: str, new: str) -> Axiom:

@@ -14,10 +14,12 @@ from trajectory_msgs.msg import JointTrajectory
 
 from surveillance_interfaces.action import ScanSurroundings
 from surveillance_interfaces.srv import MarkerRoutine, PointCamera
-from surveillance_perception.arm_driver import ArmDriver, ArmError
-from surveillance_perception.arm_kinematics import UnreachableError, in_base, look_at
-from surveillance_perception.arm_parameters import arm_settings
-from surveillance_perception.arm_trajectory import TrajectoryError
+from surveillance_perception.arm.driver import ArmDriver, ArmError
+from surveillance_perception.arm.kinematics import UnreachableError, in_base, look_at
+from surveillance_perception.arm.parameters import arm_settings
+from surveillance_perception.arm.surroundings_scan import scan
+from surveillance_perception.arm.trajectory import TrajectoryError
+from surveillance_perception.arm.view_coverage import View
 from surveillance_perception.conversions import (
     base_pose_from_ros,
     scan_feedback_to_ros,
@@ -25,8 +27,6 @@ from surveillance_perception.conversions import (
     scan_result_to_ros,
     trajectory_to_ros,
 )
-from surveillance_perception.surroundings_scan import scan
-from surveillance_perception.view_coverage import View
 from surveillance_runtime.awaited_work import work_aside
 from surveillance_runtime.goals import GoalAborted, GoalRun, GoalServer
 from surveillance_runtime.node import PatrolNode

@@ -13,8 +13,6 @@ from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from std_msgs.msg import Bool, Int32
 
 from surveillance_interfaces.msg import MarkerDetectionArray
-from surveillance_perception.annotation import annotated
-from surveillance_perception.camera_model import CameraModel, camera_of
 from surveillance_perception.conversions import (
     camera_from_ros,
     detections_to_ros,
@@ -23,10 +21,12 @@ from surveillance_perception.conversions import (
     picture_to_ros,
     poses_to_ros,
 )
-from surveillance_perception.detection_watch import DetectionWatch
-from surveillance_perception.detector_parameters import DetectorParameters
-from surveillance_perception.latest import Latest
-from surveillance_perception.picture_subscription import PICTURES_QOS, PictureSubscription
+from surveillance_perception.detection.annotation import annotated
+from surveillance_perception.detection.camera_model import CameraModel, camera_of
+from surveillance_perception.detection.detection_watch import DetectionWatch
+from surveillance_perception.detection.parameters import DetectorParameters
+from surveillance_perception.stream.latest import Latest
+from surveillance_perception.stream.picture_subscription import PICTURES_QOS, PictureSubscription
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS

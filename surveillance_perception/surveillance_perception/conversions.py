@@ -19,15 +19,15 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from surveillance_interfaces.action import ScanSurroundings
 from surveillance_interfaces.msg import MarkerDetection, MarkerDetectionArray, RoomConnection
 from surveillance_interfaces.srv import RoomInformation
-from surveillance_perception.arm_trajectory import ArmTrajectory
-from surveillance_perception.camera_model import CameraModel
-from surveillance_perception.detection import Detection
-from surveillance_perception.detection_watch import Sighting, Statistics
+from surveillance_perception.arm.surroundings_scan import ScanOutcome, ScanPlan
+from surveillance_perception.arm.trajectory import ArmTrajectory
+from surveillance_perception.arm.view_coverage import View
+from surveillance_perception.detection.camera_model import CameraModel
+from surveillance_perception.detection.detection_watch import Sighting, Statistics
+from surveillance_perception.detection.detector import Detection
+from surveillance_perception.detection.pose import MarkerPose
 from surveillance_perception.marker_registry import MarkedPlace
-from surveillance_perception.picture_files import Picture, PictureError, decode_picture
-from surveillance_perception.pose import MarkerPose
-from surveillance_perception.surroundings_scan import ScanOutcome, ScanPlan
-from surveillance_perception.view_coverage import View
+from surveillance_perception.stream.picture_files import Picture, PictureError, decode_picture
 
 _CHANNELS = {'mono8': 1, 'rgb8': 3, 'bgr8': 3, 'rgba8': 4, 'bgra8': 4}
 _TO_BGR = {

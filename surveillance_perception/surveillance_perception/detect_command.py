@@ -10,9 +10,9 @@ from typing import NoReturn
 
 import cv2
 
-from surveillance_perception.annotation import annotated
-from surveillance_perception.detection import DetectorSettings, MarkerDetector
-from surveillance_perception.picture_files import PictureError, read_picture
+from surveillance_perception.detection.annotation import annotated
+from surveillance_perception.detection.detector import DetectorSettings, MarkerDetector
+from surveillance_perception.stream.picture_files import PictureError, read_picture
 
 
 class _Parser(argparse.ArgumentParser):

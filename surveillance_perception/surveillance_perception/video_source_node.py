@@ -9,11 +9,11 @@ from typing import Any
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header
 
-from surveillance_perception.camera_model import CameraModel
 from surveillance_perception.conversions import camera_to_ros, picture_to_ros
-from surveillance_perception.picture_files import Picture, PictureError
-from surveillance_perception.picture_subscription import PICTURES_QOS
-from surveillance_perception.video_frames import FrameSource, open_source
+from surveillance_perception.detection.camera_model import CameraModel
+from surveillance_perception.stream.picture_files import Picture, PictureError
+from surveillance_perception.stream.picture_subscription import PICTURES_QOS
+from surveillance_perception.stream.video_frames import FrameSource, open_source
 from surveillance_runtime.node import PatrolNode, StartError
 from surveillance_runtime.process import run_node
 from surveillance_runtime.waiting import ClockWait

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from surveillance_runtime.parameter_file import read_parameter_file
 from surveillance_simulation.floor_plan import WorldError
-from surveillance_simulation.world import World
+from surveillance_simulation.world.world import World
 
 
 def read_world(path: str | Path) -> World:

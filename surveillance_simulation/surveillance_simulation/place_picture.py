@@ -14,10 +14,10 @@ import cv2
 import numpy as np
 from PIL import Image
 
-from surveillance_simulation import boxes
 from surveillance_simulation.canvas import Canvas, blend
 from surveillance_simulation.floor_plan import WALL_THICKNESS, Door, Marker
-from surveillance_simulation.world import World
+from surveillance_simulation.world import boxes
+from surveillance_simulation.world.world import World
 
 _PAPER, _INK, _SOFT = '#fbfaf7', '#2f3742', '#7d8794'
 _ROOM, _CORRIDOR, _HOME = '#f6ecd9', '#e3ebf3', '#dff0dc'

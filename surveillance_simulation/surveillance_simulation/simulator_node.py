@@ -19,16 +19,16 @@ from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.stamps import seconds_of
 from surveillance_simulation import conversions, simulator_parameters
-from surveillance_simulation.arm_motion import TrajectoryError
-from surveillance_simulation.camera_feed import CameraFeed
-from surveillance_simulation.fault_services import FaultServices
+from surveillance_simulation.camera.mujoco_rendering import MujocoMissing
+from surveillance_simulation.feeds.camera_feed import CameraFeed
+from surveillance_simulation.feeds.fault_services import FaultServices
+from surveillance_simulation.feeds.sensor_feed import SensorFeed
 from surveillance_simulation.floor_plan import WorldError
-from surveillance_simulation.mujoco_rendering import MujocoMissing
 from surveillance_simulation.pace import Pace
-from surveillance_simulation.robot import Robot
-from surveillance_simulation.sensor_feed import SensorFeed
-from surveillance_simulation.textures import TextureError
-from surveillance_simulation.world import World
+from surveillance_simulation.robot.arm_motion import TrajectoryError
+from surveillance_simulation.robot.robot import Robot
+from surveillance_simulation.world.textures import TextureError
+from surveillance_simulation.world.world import World
 
 
 class Simulator(PatrolNode):

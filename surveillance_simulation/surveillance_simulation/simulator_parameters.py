@@ -9,10 +9,10 @@ from typing import Any
 
 from surveillance_runtime.field_parameters import Described, declare_fields
 from surveillance_runtime.node import PatrolNode
-from surveillance_simulation.base import BaseModel
-from surveillance_simulation.camera import Camera, Conditions
-from surveillance_simulation.lidar import LidarModel
+from surveillance_simulation.camera.model import Camera, Conditions
 from surveillance_simulation.pace import PaceModel
+from surveillance_simulation.robot.base import BaseModel
+from surveillance_simulation.robot.lidar import LidarModel
 
 _PACE = {
     'speed': Described(

@@ -11,15 +11,11 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from surveillance_behaviour.battery_gauge import BatteryGauge
-from surveillance_behaviour.chooser import Chooser
-from surveillance_behaviour.fsm import Interrupt
-from surveillance_behaviour.mission import Mission, MissionSettings
-from surveillance_behaviour.mission_record import MissionRecord
-from surveillance_behaviour.mission_resumption import CutOff
-from surveillance_behaviour.policy.rules import NowhereToGoError
-from surveillance_behaviour.policy.situation import Decision
-from surveillance_behaviour.ports import (
+from surveillance_behaviour.mission.battery_gauge import BatteryGauge
+from surveillance_behaviour.mission.mission import Mission, MissionSettings
+from surveillance_behaviour.mission.record import MissionRecord
+from surveillance_behaviour.mission.resumption import CutOff
+from surveillance_behaviour.peers.ports import (
     Beliefs,
     InterruptedWaitError,
     PeerError,
@@ -27,6 +23,10 @@ from surveillance_behaviour.ports import (
     Ports,
     UnknownPlaceError,
 )
+from surveillance_behaviour.policy.chooser import Chooser
+from surveillance_behaviour.policy.rules import NowhereToGoError
+from surveillance_behaviour.policy.situation import Decision
+from surveillance_fsm import Interrupt
 
 SEVEN_ROOMS = {
     'R1': ['D1'],

@@ -17,12 +17,12 @@ from hypothesis.stateful import (
     run_state_machine_as_test,
 )
 
-from surveillance_behaviour.chooser import ChoiceSettings
 from surveillance_behaviour.machines import MACHINES
-from surveillance_behaviour.mission import MissionSettings
-from surveillance_behaviour.mission_record import MissionRecord, read
+from surveillance_behaviour.mission.mission import MissionSettings
+from surveillance_behaviour.mission.record import MissionRecord, read
+from surveillance_behaviour.peers.ports import AwayError, PeerError
+from surveillance_behaviour.policy.chooser import ChoiceSettings
 from surveillance_behaviour.policy.situation import Decision
-from surveillance_behaviour.ports import AwayError, PeerError
 
 from .scripted_world import World
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from surveillance_behaviour.armor_knowledge import ArmorKnowledge
-from surveillance_behaviour.fsm import Interrupt
-from surveillance_behaviour.ports import InterruptedWaitError, LostRobotError, PeerError
+from surveillance_behaviour.peers.armor_knowledge import ArmorKnowledge
+from surveillance_behaviour.peers.ports import InterruptedWaitError, LostRobotError, PeerError
+from surveillance_fsm import Interrupt
 from surveillance_ontology.armor.client import ArmorClient, ArmorServiceCallError
 from surveillance_ontology.armor.in_process import InProcessTransport
 from surveillance_ontology.armor.service import ArmorService

@@ -10,14 +10,14 @@ from pathlib import Path
 
 import pytest
 
-from surveillance_behaviour import fsm
-from surveillance_behaviour.chooser import ChoiceSettings
-from surveillance_behaviour.fsm.testing import watching
+import surveillance_fsm as fsm
 from surveillance_behaviour.machines import MACHINES
-from surveillance_behaviour.mission import Mission, MissionSettings
-from surveillance_behaviour.mission_record import MissionRecord, read, summarize
-from surveillance_behaviour.mission_resumption import CutOff, cut_off
-from surveillance_behaviour.ports import AwayError, LostRobotError, PeerError, Point
+from surveillance_behaviour.mission.mission import Mission, MissionSettings
+from surveillance_behaviour.mission.record import MissionRecord, read, summarize
+from surveillance_behaviour.mission.resumption import CutOff, cut_off
+from surveillance_behaviour.peers.ports import AwayError, LostRobotError, PeerError, Point
+from surveillance_behaviour.policy.chooser import ChoiceSettings
+from surveillance_fsm.testing import watching
 
 from .scripted_world import POSITIONS, SEVEN_ROOMS, World, fails
 

@@ -12,8 +12,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from surveillance_behaviour.mission_record import MissionRecord, RecordError, read, summarize
-from surveillance_behaviour.mission_resumption import CutOff, cut_off
+from surveillance_behaviour.mission.record import MissionRecord, RecordError, read, summarize
+from surveillance_behaviour.mission.resumption import CutOff, cut_off
 
 
 @pytest.fixture
@@ -39,7 +39,7 @@ def test_what_was_written_is_read_back(path: Path) -> None:
 def test_a_killed_writer_loses_nothing(path: Path) -> None:
     program = (
         'import os, signal, sys\n'
-        'from surveillance_behaviour.mission_record import MissionRecord\n'
+        'from surveillance_behaviour.mission.record import MissionRecord\n'
         'record = MissionRecord(sys.argv[1])\n'
         'record.start(0.0, "surveillance", "E", ["E"])\n'
         'for turn in range(50):\n'

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from typing import Any
 
-from surveillance_behaviour.ports import PeerError
+from surveillance_behaviour.peers.ports import PeerError
 from surveillance_behaviour.reasoner_node import Reasoner
 from surveillance_interfaces.srv import Reason
 

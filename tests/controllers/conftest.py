@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 import yaml
 
-from surveillance_controllers.grid_map import GridMap, with_walls
-from surveillance_controllers.scans import Scan
+from surveillance_controllers.motion.scans import Scan
+from surveillance_controllers.planning.grid_map import GridMap, with_walls
 
 
 class Operator:

@@ -6,8 +6,8 @@ import math
 
 import pytest
 
-from surveillance_controllers.battery_model import Battery, BatteryParameters
-from surveillance_controllers.battery_use import BatteryInUse, MotionMeter
+from surveillance_controllers.battery.model import Battery, BatteryParameters
+from surveillance_controllers.battery.use import BatteryInUse, MotionMeter
 
 PARAMETERS = BatteryParameters(
     capacity=1.0,

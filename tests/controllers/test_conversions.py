@@ -12,8 +12,8 @@ from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import BatteryState, LaserScan, PointCloud2
 
 from surveillance_controllers import conversions
-from surveillance_controllers.battery_model import Battery, BatteryParameters
-from surveillance_controllers.path_following import Velocity
+from surveillance_controllers.battery.model import Battery, BatteryParameters
+from surveillance_controllers.motion.path_following import Velocity
 from surveillance_runtime.point_clouds import cloud_from_points, points_from_cloud
 
 NUMBER = st.floats(-1e4, 1e4)

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from surveillance_controllers.driving import Drive, RecoveryParameters, Spin, State
-from surveillance_controllers.path_following import DriveParameters, Velocity
-from surveillance_controllers.poses import composed
+from surveillance_controllers.geometry.poses import composed
+from surveillance_controllers.motion.driving import Drive, RecoveryParameters, Spin, State
+from surveillance_controllers.motion.path_following import DriveParameters, Velocity
 
 NOTHING = np.zeros((0, 2))
 PERIOD = 0.1

@@ -8,9 +8,9 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from skimage.graph import MCP_Geometric
 
-from surveillance_controllers import polyline
-from surveillance_controllers.grid_map import GridMap, distance_to, drawn_lines
-from surveillance_controllers.grid_planning import GridPlanner, NoPath, PlanningParameters
+from surveillance_controllers.geometry import polyline
+from surveillance_controllers.planning.grid_map import GridMap, distance_to, drawn_lines
+from surveillance_controllers.planning.grid_planning import GridPlanner, NoPath, PlanningParameters
 
 RESOLUTION = 0.05
 ROBOT = PlanningParameters(radius=0.2)

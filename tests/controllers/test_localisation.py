@@ -10,9 +10,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from surveillance_controllers.localisation import Localiser
-from surveillance_controllers.poses import composed, relative
-from surveillance_controllers.scans import Scan
+from surveillance_controllers.geometry.poses import composed, relative
+from surveillance_controllers.motion.localisation import Localiser
+from surveillance_controllers.motion.scans import Scan
 
 POSES = st.tuples(st.floats(-5, 5), st.floats(-5, 5), st.floats(-3, 3))
 

@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from surveillance_controllers import docking, nav2_motion
-from surveillance_controllers.arrival import MotionFailed
+from surveillance_controllers.motion import docking
+from surveillance_controllers.motion import nav2 as nav2_motion
+from surveillance_controllers.motion.arrival import MotionFailed
 from surveillance_runtime.calls import Unavailable
 from surveillance_runtime.goal_calls import GoalEnd
 from surveillance_runtime.node import StartError

@@ -10,14 +10,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from surveillance_controllers import polyline
-from surveillance_controllers.path_following import (
+from surveillance_controllers.geometry import polyline
+from surveillance_controllers.geometry.poses import composed
+from surveillance_controllers.motion.path_following import (
     DriveParameters,
     PathFollower,
     Velocity,
     room_ahead,
 )
-from surveillance_controllers.poses import composed
 
 NOTHING = np.zeros((0, 2))
 PERIOD = 0.1

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from surveillance_controllers.driving import Drive, State
-from surveillance_controllers.obstacle_memory import ObstacleMemory
-from surveillance_controllers.path_following import Velocity
-from surveillance_controllers.pilot import Pilot
-from surveillance_controllers.place_regions import PlaceRegions, door_segment
-from surveillance_controllers.poses import composed
-from surveillance_controllers.route_planning import NoRoute, route
+from surveillance_controllers.geometry.poses import composed
+from surveillance_controllers.motion.driving import Drive, State
+from surveillance_controllers.motion.obstacle_memory import ObstacleMemory
+from surveillance_controllers.motion.path_following import Velocity
+from surveillance_controllers.motion.pilot import Pilot
+from surveillance_controllers.motion.place_regions import PlaceRegions, door_segment
+from surveillance_controllers.planning.route_planning import NoRoute, route
 
 
 @pytest.fixture

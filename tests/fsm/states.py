@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from surveillance_behaviour import fsm
+import surveillance_fsm as fsm
 
 
 class Answer(fsm.State):

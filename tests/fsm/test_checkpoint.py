@@ -11,9 +11,9 @@ import threading
 
 import pytest
 
-from surveillance_behaviour import fsm
-from surveillance_behaviour.fsm import checkpoint
-from surveillance_behaviour.fsm.testing import FakeClock
+import surveillance_fsm as fsm
+from surveillance_fsm import checkpoint
+from surveillance_fsm.testing import FakeClock
 
 from .states import Answer, Background, Waiter, began
 
@@ -163,8 +163,8 @@ def test_a_concurrence_goes_on_with_the_children_that_had_not_ended():
 
 CHILD = """
 import os, sys
-from surveillance_behaviour import fsm
-from surveillance_behaviour.fsm import checkpoint
+import surveillance_fsm as fsm
+from surveillance_fsm import checkpoint
 path, mode = sys.argv[1:]
 def step(name, die=False):
     def work(ud):

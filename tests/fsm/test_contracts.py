@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from surveillance_behaviour import fsm
+import surveillance_fsm as fsm
 
 from .states import Answer
 

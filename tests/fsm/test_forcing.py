@@ -6,8 +6,8 @@ import threading
 
 import pytest
 
-from surveillance_behaviour import fsm
-from surveillance_behaviour.fsm.testing import watching
+import surveillance_fsm as fsm
+from surveillance_fsm.testing import watching
 
 from .states import Answer, Background, Waiter, began
 

@@ -8,10 +8,10 @@ import pytest
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_srvs.srv import Trigger
 
-from surveillance_behaviour import fsm
-from surveillance_behaviour.conversions import transition_from, transition_message
-from surveillance_behaviour.fsm.record import Transition
-from surveillance_behaviour.fsm_ros import IntrospectionServer
+import surveillance_fsm as fsm
+from surveillance_fsm.record import Transition
+from surveillance_fsm.ros import IntrospectionServer
+from surveillance_fsm.ros.conversions import transition_from, transition_message
 from surveillance_interfaces.msg import FsmStatus, FsmStructure, FsmTransition
 from surveillance_interfaces.srv import ForceOutcome, SetInitialState
 from surveillance_runtime.calls import ServiceCaller

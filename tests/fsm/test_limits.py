@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from surveillance_behaviour import fsm
-from surveillance_behaviour.fsm.testing import FakeClock
+import surveillance_fsm as fsm
+from surveillance_fsm.testing import FakeClock
 
 from .states import Answer, Background, Deaf, Waiter, began
 

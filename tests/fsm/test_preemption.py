@@ -7,7 +7,7 @@ import threading
 
 import pytest
 
-from surveillance_behaviour import fsm
+import surveillance_fsm as fsm
 
 from .states import Answer, Background, Deaf, Waiter, began
 
@@ -233,7 +233,7 @@ def test_without_a_bound_a_state_is_waited_for_in_the_callers_thread():
 
 
 def test_an_interrupt_of_the_calling_thread_preempts_before_it_is_passed_on(monkeypatch):
-    from surveillance_behaviour.fsm import active
+    from surveillance_fsm import active
 
     waiter = Waiter()
     root, _ = chain(waiter)

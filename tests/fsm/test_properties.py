@@ -8,11 +8,11 @@ import random
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from surveillance_behaviour import fsm
-from surveillance_behaviour.fsm import checkpoint
-from surveillance_behaviour.fsm.record import Transition, replay
-from surveillance_behaviour.fsm.testing import watching
-from surveillance_behaviour.fsm.verification import verify
+import surveillance_fsm as fsm
+from surveillance_fsm import checkpoint
+from surveillance_fsm.record import Transition, replay
+from surveillance_fsm.testing import watching
+from surveillance_fsm.verification import verify
 
 OUTCOMES = ('a', 'b', 'c')
 SETTINGS = settings(

@@ -8,10 +8,10 @@ import threading
 
 import pytest
 
-from surveillance_behaviour import fsm
-from surveillance_behaviour.fsm import record
-from surveillance_behaviour.fsm.engine import unfold
-from surveillance_behaviour.fsm.record import (
+import surveillance_fsm as fsm
+from surveillance_fsm import record
+from surveillance_fsm.engine import unfold
+from surveillance_fsm.record import (
     Recorder,
     RecordError,
     TransitionFeed,
@@ -19,7 +19,7 @@ from surveillance_behaviour.fsm.record import (
     read_record,
     replay,
 )
-from surveillance_behaviour.fsm.testing import FakeClock, script, watching
+from surveillance_fsm.testing import FakeClock, script, watching
 
 from .states import Answer, Background, Waiter, began
 

@@ -15,8 +15,8 @@ from rclpy.task import Future
 from std_msgs.msg import Int32
 from std_srvs.srv import SetBool, Trigger
 
-from surveillance_behaviour import fsm
-from surveillance_behaviour.fsm_ros import (
+import surveillance_fsm as fsm
+from surveillance_fsm.ros import (
     ActionServerWrapper,
     ConditionState,
     MonitorState,

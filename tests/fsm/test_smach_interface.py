@@ -6,7 +6,7 @@ import inspect
 
 import pytest
 
-from surveillance_behaviour import fsm as smach
+import surveillance_fsm as smach
 
 
 def names_of(function):

@@ -10,8 +10,8 @@ import time
 
 import pytest
 
-from surveillance_behaviour import fsm
-from surveillance_behaviour.fsm import checkpoint
+import surveillance_fsm as fsm
+from surveillance_fsm import checkpoint
 
 SECONDS = float(os.environ.get('FSM_STRESS_SECONDS', '1.5'))
 

@@ -6,9 +6,10 @@ import time
 
 import pytest
 
-from surveillance_behaviour import check_command, fsm
-from surveillance_behaviour.fsm.export import to_ascii, to_graphviz, to_mermaid
-from surveillance_behaviour.fsm.verification import verify
+import surveillance_fsm as fsm
+from surveillance_behaviour import check_command
+from surveillance_fsm.export import to_ascii, to_graphviz, to_mermaid
+from surveillance_fsm.verification import verify
 
 from .states import Answer, Waiter
 

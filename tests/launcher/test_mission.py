@@ -20,7 +20,7 @@ from launcher.mission import (
     watch_command,
     write_own_parameters,
 )
-from surveillance_behaviour.mission_record import MissionRecord
+from surveillance_behaviour.mission.record import MissionRecord
 
 
 def error_of(run: Run) -> str:

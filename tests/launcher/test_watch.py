@@ -9,11 +9,11 @@ import termios
 
 import pytest
 
-from surveillance_behaviour.watch_command import main
+from surveillance_operator.watch_command import main
 from tests.launcher.test_terminal import Terminal
 
 SHOW_CURSOR, FIRST_SCREEN = b'\x1b[?25h', b'\x1b[?1049l'
-COMMAND = ['-m', 'surveillance_behaviour.watch_command']
+COMMAND = ['-m', 'surveillance_operator.watch_command']
 
 
 @pytest.mark.parametrize(

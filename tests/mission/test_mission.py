@@ -12,8 +12,8 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.task import Future
 from std_srvs.srv import Empty
 
-from surveillance_behaviour.fsm import Interrupt
-from surveillance_behaviour.ros_ports import Deadlines, ros_knowledge
+from surveillance_behaviour.peers.ros_ports import Deadlines, ros_knowledge
+from surveillance_fsm import Interrupt
 from surveillance_interfaces.msg import Decision, FsmTransition, MissionStatus
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import STATE_QOS

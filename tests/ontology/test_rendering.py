@@ -14,8 +14,8 @@ from surveillance_ontology.armor.rendering import (
     render_entity,
     render_literal,
 )
-from surveillance_ontology.expressions import Literal
-from surveillance_ontology.vocabulary import XSD
+from surveillance_ontology.owl.expressions import Literal
+from surveillance_ontology.owl.vocabulary import XSD
 
 BASE = 'http://example.org/place'
 

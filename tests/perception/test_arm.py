@@ -10,14 +10,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from surveillance_perception.arm_driver import ArmDriver, ArmError
-from surveillance_perception.arm_kinematics import (
+from surveillance_perception.arm.driver import ArmDriver, ArmError
+from surveillance_perception.arm.kinematics import (
     AIM_TOLERANCE,
     UnreachableError,
     direction_of,
     look_at,
 )
-from surveillance_perception.arm_trajectory import (
+from surveillance_perception.arm.trajectory import (
     ArmState,
     TrajectoryError,
     motion_to,

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from surveillance_perception.confirmation import Confirmation
-from surveillance_perception.detection_watch import sizes_from
+from surveillance_perception.detection.confirmation import Confirmation
+from surveillance_perception.detection.detection_watch import sizes_from
 
 
 def test_known_id_is_confirmed_once_after_its_pictures():

@@ -13,11 +13,15 @@ from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import Header
 
 from surveillance_perception import conversions
-from surveillance_perception.arm_trajectory import ArmState, motion_to
-from surveillance_perception.camera_model import CameraModel
-from surveillance_perception.marker_scene import Panel, corners_in_camera, corners_in_picture
-from surveillance_perception.picture_files import PictureError
-from surveillance_perception.pose import pose_of, quaternion_of
+from surveillance_perception.arm.trajectory import ArmState, motion_to
+from surveillance_perception.detection.camera_model import CameraModel
+from surveillance_perception.detection.marker_scene import (
+    Panel,
+    corners_in_camera,
+    corners_in_picture,
+)
+from surveillance_perception.detection.pose import pose_of, quaternion_of
+from surveillance_perception.stream.picture_files import PictureError
 from surveillance_runtime.robot_arm import ARM
 
 CAMERA = CameraModel.from_field_of_view(640, 480, math.radians(60))

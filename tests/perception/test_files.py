@@ -9,13 +9,18 @@ import cv2
 import numpy as np
 import pytest
 
-from surveillance_perception.camera_model import CameraModel
 from surveillance_perception.detect_command import main
-from surveillance_perception.dictionaries import dictionary_named
+from surveillance_perception.detection.camera_model import CameraModel
+from surveillance_perception.detection.dictionaries import dictionary_named
+from surveillance_perception.detection.marker_scene import (
+    Degradation,
+    Panel,
+    backdrop_of,
+    picture_of,
+)
 from surveillance_perception.marker_registry import read_registry
-from surveillance_perception.marker_scene import Degradation, Panel, backdrop_of, picture_of
-from surveillance_perception.picture_files import PictureError, decode_picture
-from surveillance_perception.video_frames import open_source
+from surveillance_perception.stream.picture_files import PictureError, decode_picture
+from surveillance_perception.stream.video_frames import open_source
 from surveillance_runtime.yaml_file import YamlFileError
 
 CONFIG = Path(__file__).parents[2] / 'config'

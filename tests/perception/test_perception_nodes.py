@@ -21,10 +21,15 @@ from surveillance_interfaces.msg import MarkerDetectionArray
 from surveillance_interfaces.srv import MarkerRoutine, PointCamera, RoomInformation
 from surveillance_perception.arm_controller_node import ArmController
 from surveillance_perception.aruco_detector_node import IDS_QOS, ArucoDetector
-from surveillance_perception.camera_model import CameraModel
 from surveillance_perception.conversions import camera_to_ros, picture_to_ros
-from surveillance_perception.dictionaries import dictionary_named
-from surveillance_perception.marker_scene import Degradation, Panel, backdrop_of, picture_of
+from surveillance_perception.detection.camera_model import CameraModel
+from surveillance_perception.detection.dictionaries import dictionary_named
+from surveillance_perception.detection.marker_scene import (
+    Degradation,
+    Panel,
+    backdrop_of,
+    picture_of,
+)
 from surveillance_perception.marker_server_node import MarkerServer
 from surveillance_perception.video_source_node import VideoSource
 from surveillance_runtime.calls import Interrupted, ServiceCaller

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from surveillance_behaviour.surroundings import LookingAround
-from surveillance_behaviour.survey import PlaceNote, Survey
+from surveillance_behaviour.map_from_markers.surroundings import LookingAround
+from surveillance_behaviour.map_from_markers.survey import PlaceNote, Survey
 from surveillance_perception.marker_registry import read_registry
 
 REGISTRY = read_registry(Path(__file__).parents[2] / 'config' / 'markers.yaml')

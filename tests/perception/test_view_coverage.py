@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from surveillance_perception.view_coverage import View, coverage, views_covering
+from surveillance_perception.arm.view_coverage import View, coverage, views_covering
 
 WHOLE = (-math.pi / 2, math.pi / 2)
 

@@ -6,7 +6,7 @@ import copy
 from pathlib import Path
 from typing import Any
 
-from surveillance_simulation.world import World
+from surveillance_simulation.world.world import World
 
 CONFIG = Path(__file__).parents[2] / 'config'
 

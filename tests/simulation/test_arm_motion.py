@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from surveillance_runtime.robot_arm import ARM
-from surveillance_simulation.arm_motion import ArmMotion, TrajectoryError, TrajectoryPoint
+from surveillance_simulation.robot.arm_motion import ArmMotion, TrajectoryError, TrajectoryPoint
 
 NAMES = ARM.names
 

@@ -7,16 +7,16 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from surveillance_controllers import polyline
-from surveillance_controllers.driving import Drive, State
-from surveillance_controllers.grid_map import GridMap
-from surveillance_controllers.grid_planning import GridPlanner, NoPath
-from surveillance_controllers.pilot import Pilot
-from surveillance_controllers.scans import Scan
-from surveillance_simulation import occupancy_grid
+from surveillance_controllers.geometry import polyline
+from surveillance_controllers.motion.driving import Drive, State
+from surveillance_controllers.motion.pilot import Pilot
+from surveillance_controllers.motion.scans import Scan
+from surveillance_controllers.planning.grid_map import GridMap
+from surveillance_controllers.planning.grid_planning import GridPlanner, NoPath
 from surveillance_simulation.place_file import read_world
-from surveillance_simulation.robot import Robot
-from surveillance_simulation.world import World
+from surveillance_simulation.robot.robot import Robot
+from surveillance_simulation.world import occupancy_grid
+from surveillance_simulation.world.world import World
 
 from .places import CONFIG
 

@@ -8,11 +8,11 @@ import cv2
 import numpy as np
 import pytest
 
-from surveillance_simulation import mujoco_rendering
-from surveillance_simulation.camera import Camera, Conditions, camera_pose, expose
-from surveillance_simulation.mujoco_rendering import MujocoMissing, MujocoRenderer
+from surveillance_simulation.camera import mujoco_rendering
+from surveillance_simulation.camera.model import Camera, Conditions, camera_pose, expose
+from surveillance_simulation.camera.mujoco_rendering import MujocoMissing, MujocoRenderer
+from surveillance_simulation.camera.rendering import Renderer
 from surveillance_simulation.place_file import read_world
-from surveillance_simulation.rendering import Renderer
 
 from .places import CONFIG, two_rooms
 

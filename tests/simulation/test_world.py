@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from surveillance_runtime.yaml_file import YamlFileError
-from surveillance_simulation import occupancy_grid, place_generation
+from surveillance_simulation import place_generation
 from surveillance_simulation.floor_plan import Marker, WorldError
 from surveillance_simulation.place_file import read_world
-from surveillance_simulation.world import World
+from surveillance_simulation.world import occupancy_grid
+from surveillance_simulation.world.world import World
 
 from .places import CONFIG, changed, two_rooms
 

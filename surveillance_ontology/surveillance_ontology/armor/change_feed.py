@@ -13,8 +13,8 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from surveillance_ontology.armor.service import ArmorService
-from surveillance_ontology.axioms import Axiom
 from surveillance_ontology.knowledge_changes import Changes
+from surveillance_ontology.owl.axioms import Axiom
 
 LARGE = 2000
 """Facts in one change from which on it is only counted."""

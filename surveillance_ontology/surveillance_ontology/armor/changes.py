@@ -6,10 +6,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass, fields, is_dataclass
 from typing import Any
 
-from surveillance_ontology import axioms, expressions
-from surveillance_ontology.axioms import Axiom
-from surveillance_ontology.expressions import Literal
 from surveillance_ontology.knowledge_base import KnowledgeBase
+from surveillance_ontology.owl import axioms, expressions
+from surveillance_ontology.owl.axioms import Axiom
+from surveillance_ontology.owl.expressions import Literal
 
 
 @dataclass(frozen=True, slots=True)

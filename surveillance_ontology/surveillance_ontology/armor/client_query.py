@@ -9,7 +9,7 @@ from surveillance_ontology.armor.facts import ShortFact, parse_fact
 from surveillance_ontology.armor.operations import ClientPart, Steps, checked, operation
 from surveillance_ontology.armor.protocol import DirectiveResponse, ExitCode, ListResponse
 from surveillance_ontology.armor.rendering import parse_rendered
-from surveillance_ontology.vocabulary import local_name
+from surveillance_ontology.owl.vocabulary import local_name
 
 _IN_BRACKETS = re.compile(r'<([^<>]*)>')
 

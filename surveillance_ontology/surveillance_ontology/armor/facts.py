@@ -11,14 +11,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from surveillance_ontology.armor.rendering import render_literal
-from surveillance_ontology.axioms import (
+from surveillance_ontology.owl.axioms import (
     Axiom,
     ClassAssertion,
     DataPropertyAssertion,
     ObjectPropertyAssertion,
     SameIndividual,
 )
-from surveillance_ontology.vocabulary import local_name
+from surveillance_ontology.owl.vocabulary import local_name
 
 SAME_AS = 'owl:sameAs'
 ANY = '?'

@@ -11,10 +11,10 @@ from surveillance_ontology.armor.protocol import DirectiveError
 from surveillance_ontology.armor.reference import Origin, Reference
 from surveillance_ontology.armor.rendering import parse_entity, shown
 from surveillance_ontology.armor.settings import Settings
-from surveillance_ontology.axioms import Axiom
 from surveillance_ontology.documents.reading import OntologyFileError, read_ontology
-from surveillance_ontology.java_reasoning import JavaKnowledgeBase, JavaReasonerError
 from surveillance_ontology.knowledge_base import KnowledgeBase
+from surveillance_ontology.owl.axioms import Axiom
+from surveillance_ontology.reasoner.java_reasoning import JavaKnowledgeBase, JavaReasonerError
 
 NATIVE = ('', 'PELLET', 'NATIVE')
 """Names of the reasoner of this package; PELLET is what ARMOR's clients send."""

@@ -27,7 +27,7 @@ from surveillance_ontology.armor.table import (
     Read,
     manipulation,
 )
-from surveillance_ontology.axioms import (
+from surveillance_ontology.owl.axioms import (
     ClassAssertion,
     DataPropertyAssertion,
     DifferentIndividuals,
@@ -36,14 +36,14 @@ from surveillance_ontology.axioms import (
     ObjectPropertyAssertion,
     SubClassOf,
 )
-from surveillance_ontology.expressions import (
+from surveillance_ontology.owl.expressions import (
     ClassExpression,
     Literal,
     ObjectIntersectionOf,
     ObjectMinCardinality,
 )
+from surveillance_ontology.owl.vocabulary import NOTHING, THING
 from surveillance_ontology.reasoner.datatypes import value_of
-from surveillance_ontology.vocabulary import NOTHING, THING
 
 MOST_CLASSES = 500
 """Classes in one statement of disjointness; what it costs grows with their square."""

@@ -24,15 +24,15 @@ from surveillance_ontology.armor.rendering import parse_entity, parse_rendered, 
 from surveillance_ontology.armor.rendering import render_literal as _literal
 from surveillance_ontology.armor.restrictions import describe
 from surveillance_ontology.armor.table import CLS, DAT, IND, OBJ, flag, query, text
-from surveillance_ontology.axioms import (
+from surveillance_ontology.knowledge import Fact
+from surveillance_ontology.owl.axioms import (
     Axiom,
     ClassAssertion,
     DataPropertyAssertion,
     ObjectPropertyAssertion,
     SameIndividual,
 )
-from surveillance_ontology.knowledge import Fact
-from surveillance_ontology.vocabulary import NOTHING, THING, local_name
+from surveillance_ontology.owl.vocabulary import NOTHING, THING, local_name
 
 
 def _entities(iris: Iterable[str]) -> list[str]:

@@ -13,8 +13,8 @@ from decimal import Decimal
 from functools import lru_cache
 
 from surveillance_ontology.armor.protocol import DirectiveError, ExitCode
-from surveillance_ontology.expressions import Literal
-from surveillance_ontology.vocabulary import OWL, RDF, RDFS, XSD
+from surveillance_ontology.owl.expressions import Literal
+from surveillance_ontology.owl.vocabulary import OWL, RDF, RDFS, XSD
 
 MAX_NAME = 2048
 PREFIXES = {'owl': OWL, 'xsd': XSD, 'rdf': RDF, 'rdfs': RDFS}

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from surveillance_ontology.expressions import (
+from surveillance_ontology.owl.expressions import (
     ClassExpression,
     DataAllValuesFrom,
     DataExactCardinality,
@@ -30,7 +30,7 @@ from surveillance_ontology.expressions import (
     ObjectUnionOf,
     PropertyExpression,
 )
-from surveillance_ontology.vocabulary import local_name
+from surveillance_ontology.owl.vocabulary import local_name
 
 _VALUES = {
     ObjectSomeValuesFrom: 'SOME_OBJECT',

@@ -41,8 +41,8 @@ from surveillance_ontology.armor.sparql import SparqlEngine
 from surveillance_ontology.armor.store import Store
 from surveillance_ontology.armor.table import Directive, Kind, look_up
 from surveillance_ontology.documents.writing import OntologyWriteError, write_ontology
-from surveillance_ontology.java_reasoning import JavaReasonerError
 from surveillance_ontology.knowledge_changes import Changes
+from surveillance_ontology.reasoner.java_reasoning import JavaReasonerError
 
 LONG_ARGUMENTS = 1000
 Watcher = Callable[[str, Changes | None], None]

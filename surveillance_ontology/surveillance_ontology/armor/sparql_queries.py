@@ -10,15 +10,15 @@ from surveillance_ontology.armor.reference import Reference
 from surveillance_ontology.armor.rendering import shown
 from surveillance_ontology.armor.sparql import Binding, Graph, SparqlError, SparqlTimeoutError
 from surveillance_ontology.armor.table import query, text
-from surveillance_ontology.axioms import (
+from surveillance_ontology.documents.writing import ontology_bytes
+from surveillance_ontology.owl.axioms import (
     Axiom,
     Declaration,
     EquivalentClasses,
     SubClassOf,
 )
-from surveillance_ontology.documents.writing import ontology_bytes
-from surveillance_ontology.entities import entities_of
-from surveillance_ontology.vocabulary import XSD
+from surveillance_ontology.owl.entities import entities_of
+from surveillance_ontology.owl.vocabulary import XSD
 
 if TYPE_CHECKING:
     from surveillance_ontology.armor.service import ArmorService

@@ -17,8 +17,8 @@ from surveillance_ontology.armor.changes import Change, apply_all, decode, encod
 from surveillance_ontology.armor.journal import Journal, JournalError
 from surveillance_ontology.armor.loading import knowledge_base
 from surveillance_ontology.armor.reference import Origin, Reference
-from surveillance_ontology.axioms import Axiom
-from surveillance_ontology.java_reasoning import JavaReasonerError
+from surveillance_ontology.owl.axioms import Axiom
+from surveillance_ontology.reasoner.java_reasoning import JavaReasonerError
 
 Record = list[Any]
 """``[what, reference name, ...]``."""

@@ -9,9 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from surveillance_ontology import axioms as ax
-from surveillance_ontology import expressions as ex
-from surveillance_ontology.axioms import Axiom
 from surveillance_ontology.documents.nodes import (
     ANNOTATIONS,
     BUILT_IN,
@@ -20,8 +17,20 @@ from surveillance_ontology.documents.nodes import (
     NodeReader,
 )
 from surveillance_ontology.documents.rdf_xml import Graph, Node
-from surveillance_ontology.expressions import Literal
-from surveillance_ontology.vocabulary import NOTHING, OWL, RDF, RDFS, SWRL, THING, XSD, local_name
+from surveillance_ontology.owl import axioms as ax
+from surveillance_ontology.owl import expressions as ex
+from surveillance_ontology.owl.axioms import Axiom
+from surveillance_ontology.owl.expressions import Literal
+from surveillance_ontology.owl.vocabulary import (
+    NOTHING,
+    OWL,
+    RDF,
+    RDFS,
+    SWRL,
+    THING,
+    XSD,
+    local_name,
+)
 
 _TYPE = RDF + 'type'
 _MARKS = {

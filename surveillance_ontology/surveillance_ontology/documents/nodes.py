@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from surveillance_ontology import axioms as ax
-from surveillance_ontology import expressions as ex
-from surveillance_ontology.axioms import Axiom
 from surveillance_ontology.documents.rdf_xml import Graph, Node, RdfSyntaxError
-from surveillance_ontology.expressions import Literal
-from surveillance_ontology.vocabulary import OWL, RDF, RDFS, SWRL, XSD, local_name
+from surveillance_ontology.owl import axioms as ax
+from surveillance_ontology.owl import expressions as ex
+from surveillance_ontology.owl.axioms import Axiom
+from surveillance_ontology.owl.expressions import Literal
+from surveillance_ontology.owl.vocabulary import OWL, RDF, RDFS, SWRL, XSD, local_name
 
 _TYPE = RDF + 'type'
 DECLARATIONS = {

@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 
 from surveillance_ontology.documents.rdf_xml import Graph, Node, RdfSyntaxError
-from surveillance_ontology.expressions import Literal
-from surveillance_ontology.vocabulary import RDF, XSD
+from surveillance_ontology.owl.expressions import Literal
+from surveillance_ontology.owl.vocabulary import RDF, XSD
 
 _IRI = r'<((?:[^\x00-\x20<>"{}|^`\\]|\\u[0-9A-Fa-f]{4}|\\U[0-9A-Fa-f]{8})*)>'
 _BLANK = r'(_:[\w.\-]*[\w\-])'

@@ -14,8 +14,8 @@ from typing import TypeAlias
 from urllib.parse import urljoin
 from xml.parsers import expat
 
-from surveillance_ontology.expressions import Literal
-from surveillance_ontology.vocabulary import RDF, XSD
+from surveillance_ontology.owl.expressions import Literal
+from surveillance_ontology.owl.vocabulary import RDF, XSD
 
 Node: TypeAlias = str | Literal
 Triple: TypeAlias = tuple[str, str, Node]

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import count
 
-from surveillance_ontology import axioms as ax
-from surveillance_ontology import expressions as ex
-from surveillance_ontology.axioms import Axiom
 from surveillance_ontology.documents.rdf_xml import Node, Triple
-from surveillance_ontology.entities import entities_of
-from surveillance_ontology.expressions import Literal
-from surveillance_ontology.vocabulary import OWL, RDF, RDFS, SWRL, THING, TOP_LITERAL, XSD
+from surveillance_ontology.owl import axioms as ax
+from surveillance_ontology.owl import expressions as ex
+from surveillance_ontology.owl.axioms import Axiom
+from surveillance_ontology.owl.entities import entities_of
+from surveillance_ontology.owl.expressions import Literal
+from surveillance_ontology.owl.vocabulary import OWL, RDF, RDFS, SWRL, THING, TOP_LITERAL, XSD
 
 _TYPE = RDF + 'type'
 _KIND_TYPES = {

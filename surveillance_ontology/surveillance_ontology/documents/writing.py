@@ -9,11 +9,11 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from xml.sax.saxutils import escape, quoteattr
 
-from surveillance_ontology.axioms import Axiom
 from surveillance_ontology.documents.rdf_xml import Node, Triple
 from surveillance_ontology.documents.triples import triples_of
-from surveillance_ontology.expressions import Literal
-from surveillance_ontology.vocabulary import OWL, RDF, RDFS, SWRL, XSD
+from surveillance_ontology.owl.axioms import Axiom
+from surveillance_ontology.owl.expressions import Literal
+from surveillance_ontology.owl.vocabulary import OWL, RDF, RDFS, SWRL, XSD
 
 FORMATS = ('rdfxml', 'ntriples')
 _PREFIXES = {'rdf': RDF, 'rdfs': RDFS, 'owl': OWL, 'xsd': XSD, 'swrl': SWRL}

@@ -11,8 +11,8 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
-from surveillance_ontology.axioms import Axiom
-from surveillance_ontology.expressions import ClassExpression, PropertyExpression
+from surveillance_ontology.owl.axioms import Axiom
+from surveillance_ontology.owl.expressions import ClassExpression, PropertyExpression
 from surveillance_ontology.reasoner.datatypes import Test, Value
 
 Fact: TypeAlias = 'tuple[Any, ...]'

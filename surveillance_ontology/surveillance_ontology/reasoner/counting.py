@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from itertools import combinations, islice, product
 from typing import Any
 
-from surveillance_ontology.axioms import Axiom
+from surveillance_ontology.owl.axioms import Axiom
 from surveillance_ontology.reasoner.clauses import (
     AtLeast,
     AtMost,

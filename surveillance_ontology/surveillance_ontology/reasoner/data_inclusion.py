@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from surveillance_ontology import expressions as ex
+from surveillance_ontology.owl import expressions as ex
+from surveillance_ontology.owl.vocabulary import OWL, TOP_LITERAL, XSD
 from surveillance_ontology.reasoner.datatypes import range_test, value_of
-from surveillance_ontology.vocabulary import OWL, TOP_LITERAL, XSD
 
 
 def includes(outer: ex.DataRange, inner: ex.DataRange) -> bool:

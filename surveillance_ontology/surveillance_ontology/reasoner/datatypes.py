@@ -18,7 +18,7 @@ from fractions import Fraction
 from functools import cache
 from typing import Any, TypeAlias
 
-from surveillance_ontology.expressions import (
+from surveillance_ontology.owl.expressions import (
     DataComplementOf,
     DataIntersectionOf,
     DataOneOf,
@@ -27,7 +27,7 @@ from surveillance_ontology.expressions import (
     DataUnionOf,
     Literal,
 )
-from surveillance_ontology.vocabulary import OWL, RDF, RDFS, XSD
+from surveillance_ontology.owl.vocabulary import OWL, RDF, RDFS, XSD
 
 Value: TypeAlias = 'int | Fraction | str | tuple[Any, ...]'
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from typing import Protocol
 
-from surveillance_ontology.axioms import DifferentIndividuals
+from surveillance_ontology.owl.axioms import DifferentIndividuals
 from surveillance_ontology.reasoner.clauses import Fact, Predicate, Premises, Program
 
 _MAX_PAIRS = 1000

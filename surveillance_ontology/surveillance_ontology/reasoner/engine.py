@@ -12,15 +12,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
-from surveillance_ontology.axioms import (
+from surveillance_ontology.owl.axioms import (
     Axiom,
     DifferentIndividuals,
     SameIndividual,
 )
+from surveillance_ontology.owl.vocabulary import local_name
 from surveillance_ontology.reasoner.clauses import Fact, Predicate, Program
 from surveillance_ontology.reasoner.identification import Identification
 from surveillance_ontology.reasoner.translation import individuals_of
-from surveillance_ontology.vocabulary import local_name
 
 _MOST_VALUES = 20_000
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from surveillance_ontology.axioms import Axiom
+from surveillance_ontology.owl.axioms import Axiom
 from surveillance_ontology.reasoner.clauses import Fact, Premises
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 
-from surveillance_ontology.axioms import Axiom
+from surveillance_ontology.owl.axioms import Axiom
 from surveillance_ontology.reasoner.clauses import Fact, Predicate, Premises, Program
 from surveillance_ontology.reasoner.difference import Difference
 from surveillance_ontology.reasoner.equality import Merge

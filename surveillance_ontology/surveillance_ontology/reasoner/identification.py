@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from surveillance_ontology.axioms import Axiom, SameIndividual
+from surveillance_ontology.owl.axioms import Axiom, SameIndividual
 from surveillance_ontology.reasoner.clauses import Fact
 from surveillance_ontology.reasoner.equality import Merge
 from surveillance_ontology.reasoner.fact_state import FactState

@@ -6,11 +6,12 @@ from collections.abc import Callable
 from itertools import product
 from typing import Any
 
-from surveillance_ontology import axioms as ax
-from surveillance_ontology import expressions as ex
-from surveillance_ontology.axiom_text import axiom_text, expression_text
-from surveillance_ontology.axioms import Axiom
-from surveillance_ontology.expressions import ClassExpression
+from surveillance_ontology.owl import axioms as ax
+from surveillance_ontology.owl import expressions as ex
+from surveillance_ontology.owl.axiom_text import axiom_text, expression_text
+from surveillance_ontology.owl.axioms import Axiom
+from surveillance_ontology.owl.expressions import ClassExpression
+from surveillance_ontology.owl.vocabulary import NOTHING, THING, TOP_LITERAL, local_name
 from surveillance_ontology.reasoner.clauses import (
     AtLeast,
     BodyAtom,
@@ -29,7 +30,6 @@ from surveillance_ontology.reasoner.data_inclusion import includes
 from surveillance_ontology.reasoner.datatypes import Test, Value, range_test, value_of
 from surveillance_ontology.reasoner.normal_forms import normal
 from surveillance_ontology.reasoner.property_hierarchy import PropertyHierarchy
-from surveillance_ontology.vocabulary import NOTHING, THING, TOP_LITERAL, local_name
 
 Body = tuple[BodyAtom, ...]
 _X, _Y = 0, 1

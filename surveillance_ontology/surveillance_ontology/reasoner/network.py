@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-from surveillance_ontology.axioms import Axiom
+from surveillance_ontology.owl.axioms import Axiom
 from surveillance_ontology.reasoner.clauses import (
     Clause,
     Constant,

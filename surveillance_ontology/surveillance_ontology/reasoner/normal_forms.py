@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from surveillance_ontology import expressions as ex
-from surveillance_ontology.expressions import ClassExpression
-from surveillance_ontology.vocabulary import NOTHING, THING
+from surveillance_ontology.owl import expressions as ex
+from surveillance_ontology.owl.expressions import ClassExpression
+from surveillance_ontology.owl.vocabulary import NOTHING, THING
 
 _POSITIVE = (
     ex.ObjectSomeValuesFrom,

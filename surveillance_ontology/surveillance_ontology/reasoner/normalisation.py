@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from surveillance_ontology import axioms as ax
-from surveillance_ontology import expressions as ex
-from surveillance_ontology.axiom_text import expression_text
-from surveillance_ontology.axioms import Axiom
-from surveillance_ontology.expressions import ClassExpression
+from surveillance_ontology.owl import axioms as ax
+from surveillance_ontology.owl import expressions as ex
+from surveillance_ontology.owl.axiom_text import expression_text
+from surveillance_ontology.owl.axioms import Axiom
+from surveillance_ontology.owl.expressions import ClassExpression
+from surveillance_ontology.owl.vocabulary import local_name
 from surveillance_ontology.reasoner.clauses import (
     Clause,
     Key,
@@ -26,7 +27,6 @@ from surveillance_ontology.reasoner.normal_forms import normal
 from surveillance_ontology.reasoner.property_axioms import normalise_property_axiom
 from surveillance_ontology.reasoner.right_sides import RightSides
 from surveillance_ontology.reasoner.swrl_rules import normalise_rule
-from surveillance_ontology.vocabulary import local_name
 
 _X, _Y = 0, 1
 

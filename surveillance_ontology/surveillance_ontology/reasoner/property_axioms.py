@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from surveillance_ontology import axioms as ax
-from surveillance_ontology.axioms import Axiom
+from surveillance_ontology.owl import axioms as ax
+from surveillance_ontology.owl.axioms import Axiom
 from surveillance_ontology.reasoner.clauses import AtMost, PredicateAtom
 from surveillance_ontology.reasoner.right_sides import RightSides
 

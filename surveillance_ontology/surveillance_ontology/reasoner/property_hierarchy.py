@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from surveillance_ontology import axioms as ax
-from surveillance_ontology.axioms import Axiom
-from surveillance_ontology.expressions import PropertyExpression
+from surveillance_ontology.owl import axioms as ax
+from surveillance_ontology.owl.axioms import Axiom
+from surveillance_ontology.owl.expressions import PropertyExpression
 
 _Directed = tuple[str, bool]
 

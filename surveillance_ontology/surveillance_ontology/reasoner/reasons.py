@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from surveillance_ontology import axioms as ax
-from surveillance_ontology import expressions as ex
-from surveillance_ontology.axiom_text import axiom_text, expression_text, literal_text
-from surveillance_ontology.axioms import Axiom, Rule
-from surveillance_ontology.explanation import Explanation
+from surveillance_ontology.owl import axioms as ax
+from surveillance_ontology.owl import expressions as ex
+from surveillance_ontology.owl.axiom_text import axiom_text, expression_text, literal_text
+from surveillance_ontology.owl.axioms import Axiom, Rule
+from surveillance_ontology.owl.vocabulary import local_name
 from surveillance_ontology.reasoner.clauses import Fact
 from surveillance_ontology.reasoner.datatypes import Value
 from surveillance_ontology.reasoner.engine import Engine
 from surveillance_ontology.reasoner.equality import Merge
+from surveillance_ontology.reasoner.explanation import Explanation
 from surveillance_ontology.reasoner.proofs import Proof
 from surveillance_ontology.reasoner.swrl_builtins import builtin
 from surveillance_ontology.reasoner.view import FactView
-from surveillance_ontology.vocabulary import local_name
 
 _SIGNS = {
     'add': '+',

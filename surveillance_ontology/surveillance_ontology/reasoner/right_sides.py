@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from surveillance_ontology import expressions as ex
-from surveillance_ontology.expressions import ClassExpression
+from surveillance_ontology.owl import expressions as ex
+from surveillance_ontology.owl.expressions import ClassExpression
+from surveillance_ontology.owl.vocabulary import NOTHING, THING
 from surveillance_ontology.reasoner.clauses import (
     AtMost,
     Constant,
@@ -17,7 +18,6 @@ from surveillance_ontology.reasoner.clauses import (
 from surveillance_ontology.reasoner.datatypes import Test, Value, value_of
 from surveillance_ontology.reasoner.left_sides import Body, LeftSides, Unsupported
 from surveillance_ontology.reasoner.normal_forms import is_positive, negated, normal
-from surveillance_ontology.vocabulary import NOTHING, THING
 
 _X = 0
 

@@ -13,10 +13,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 from itertools import count
 
-from surveillance_ontology import axioms as ax
-from surveillance_ontology import expressions as ex
-from surveillance_ontology.axioms import Axiom
-from surveillance_ontology.expressions import ClassExpression
+from surveillance_ontology.owl import axioms as ax
+from surveillance_ontology.owl import expressions as ex
+from surveillance_ontology.owl.axioms import Axiom
+from surveillance_ontology.owl.expressions import ClassExpression
+from surveillance_ontology.owl.vocabulary import NOTHING, THING
 from surveillance_ontology.reasoner.clauses import (
     Clause,
     Constant,
@@ -30,7 +31,6 @@ from surveillance_ontology.reasoner.datatypes import Value
 from surveillance_ontology.reasoner.engine import Engine
 from surveillance_ontology.reasoner.normalisation import Normaliser
 from surveillance_ontology.reasoner.simplification import simplify
-from surveillance_ontology.vocabulary import NOTHING, THING
 
 _ROOT = '_:prototype'
 _MADE_UP = '_:made'

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from itertools import product
 
-from surveillance_ontology import axioms as ax
-from surveillance_ontology import expressions as ex
-from surveillance_ontology.expressions import Literal
+from surveillance_ontology.owl import axioms as ax
+from surveillance_ontology.owl import expressions as ex
+from surveillance_ontology.owl.expressions import Literal
+from surveillance_ontology.owl.vocabulary import NOTHING, SWRLB, local_name
 from surveillance_ontology.reasoner.clauses import (
     BodyAtom,
     ComputedAtom,
@@ -21,7 +22,6 @@ from surveillance_ontology.reasoner.datatypes import value_of
 from surveillance_ontology.reasoner.left_sides import Unsupported
 from surveillance_ontology.reasoner.right_sides import RightSides
 from surveillance_ontology.reasoner.swrl_builtins import builtin
-from surveillance_ontology.vocabulary import NOTHING, SWRLB, local_name
 
 
 class _Terms:

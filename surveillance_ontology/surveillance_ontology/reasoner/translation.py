@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
-from surveillance_ontology.axioms import (
+from surveillance_ontology.owl.axioms import (
     Assertion,
     Axiom,
     ClassAssertion,
@@ -15,12 +15,12 @@ from surveillance_ontology.axioms import (
     ObjectPropertyAssertion,
     SameIndividual,
 )
-from surveillance_ontology.entities import entities_of
-from surveillance_ontology.expressions import ClassExpression, Literal
+from surveillance_ontology.owl.entities import entities_of
+from surveillance_ontology.owl.expressions import ClassExpression, Literal
+from surveillance_ontology.owl.vocabulary import NOTHING, THING
 from surveillance_ontology.reasoner.clauses import Fact, Program
 from surveillance_ontology.reasoner.datatypes import Value, value_of
 from surveillance_ontology.reasoner.equality import Equality
-from surveillance_ontology.vocabulary import NOTHING, THING
 
 
 class Translation:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 
-from surveillance_ontology.axioms import (
+from surveillance_ontology.owl.axioms import (
     Axiom,
     ClassAssertion,
     DataPropertyAssertion,
     ObjectPropertyAssertion,
     SameIndividual,
 )
-from surveillance_ontology.expressions import Literal
+from surveillance_ontology.owl.expressions import Literal
 from surveillance_ontology.reasoner.clauses import Fact, Predicate
 from surveillance_ontology.reasoner.datatypes import Value, literal_of
 from surveillance_ontology.reasoner.engine import Engine

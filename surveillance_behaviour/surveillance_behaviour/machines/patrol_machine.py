@@ -1,0 +1,297 @@
+"""The patrol machine: ask the reasoner for a place, point the way, drive there, charge in between.
+
+States and outcomes are those of the second seed; ``failed`` and the recovery states are this
+project's. A low battery ends Reasoning, Pointing and Controlling at once: what runs is cancelled.
+On the way to the dock it is known already and ends nothing.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import surveillance_fsm as fsm
+from surveillance_behaviour.machines.path_checks import check_arrival, check_path, path_length
+from surveillance_behaviour.machines.shared_states import (
+    FAILED,
+    PREEMPTED,
+    MissionState,
+    Recover,
+    WaitForHelp,
+    add,
+)
+from surveillance_behaviour.mission.mission import Mission
+from surveillance_behaviour.mission.recovery import Step
+from surveillance_behaviour.peers.ports import InterruptedWaitError, PeerError, Point, Routine
+
+BATTERY_LOW = 'battery_low'
+
+
+class RoutineState(MissionState):
+    """A state that talks to the second seed's peers."""
+
+    @property
+    def routine(self) -> Routine:
+        """The peers."""
+        routine = self.mission.ports.routine
+        assert routine is not None
+        return routine
+
+
+class Initial(RoutineState):
+    """Has the robot look around and build its ontology."""
+
+    task = 'starting'
+
+    def __init__(self, mission: Mission) -> None:
+        super().__init__(mission, ['start'])
+
+    def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
+        self.routine.start(interrupt)
+        self.mission.ports.knowledge.wait_until_built(interrupt)
+        self.mission.begin(interrupt)
+        return 'start'
+
+
+class Reasoning(RoutineState):
+    """Asks for the next place, unless the battery has to be charged first."""
+
+    task = 'reasoning'
+
+    def __init__(self, mission: Mission) -> None:
+        super().__init__(mission, ['reasoned', BATTERY_LOW], output_keys=['target'])
+
+    def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
+        mission = self.mission
+        mission.look(interrupt)
+        with mission.gauge.interrupting(interrupt, lambda: bool(mission.why_charge())) as either:
+            target = self.routine.reason(either)
+        mission.heading_to = ud.target = target
+        return 'reasoned'
+
+    def interrupted(self, ud: Any) -> str:
+        self.mission.say(self.mission.why_charge())
+        return BATTERY_LOW
+
+
+class MovingState(RoutineState):
+    """A half of a move; whether a low battery ends it depends on where it goes.
+
+    Args:
+        mission: The mission's memory and ports.
+        outcome: The outcome of a half that is done.
+        heeds_battery: Whether a low battery ends it.
+    """
+
+    def __init__(
+        self,
+        mission: Mission,
+        outcome: str,
+        heeds_battery: bool,
+        input_keys: tuple[str, ...],
+        output_keys: tuple[str, ...] = (),
+    ) -> None:
+        outcomes = [outcome, BATTERY_LOW] if heeds_battery else [outcome]
+        super().__init__(mission, outcomes, input_keys, output_keys)
+        self._outcome = outcome
+        self._heeds_battery = heeds_battery
+
+    def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
+        gauge = self.mission.gauge
+        with gauge.interrupting(interrupt, lambda: self._heeds_battery and gauge.low) as either:
+            self.move(ud, either)
+        return self._outcome
+
+    def move(self, ud: Any, interrupt: fsm.Interrupt) -> None:
+        """The half itself."""
+        raise NotImplementedError
+
+    def interrupted(self, ud: Any) -> str:
+        self.mission.say(f'battery low ({self.mission.level_text()}): {self.task} is cancelled')
+        return BATTERY_LOW
+
+    def goal(self, ud: Any) -> str | None:
+        return str(ud.target)
+
+
+class Pointing(MovingState):
+    """Asks for the via points to the target."""
+
+    task = 'pointing'
+
+    def __init__(self, mission: Mission, heeds_battery: bool) -> None:
+        super().__init__(mission, 'pointed', heeds_battery, ('target',), ('via_points',))
+
+    def move(self, ud: Any, interrupt: fsm.Interrupt) -> None:
+        mission = self.mission
+        via_points = self.routine.plan(ud.target, interrupt)
+        goal = mission.ports.places.position(ud.target, interrupt)
+        check_path(via_points, goal, mission.settings.goal_tolerance, 'motion/planner')
+        ud.via_points = via_points
+
+
+class Controlling(MovingState):
+    """Drives through the via points; the motion controller notes the visit."""
+
+    task = 'controlling'
+
+    def __init__(self, mission: Mission, heeds_battery: bool) -> None:
+        super().__init__(mission, 'reached', heeds_battery, ('target', 'via_points'))
+
+    def move(self, ud: Any, interrupt: fsm.Interrupt) -> None:
+        distance = drive(self, ud.target, ud.via_points, interrupt)
+        self.mission.arrived(ud.target, distance, ud.via_points)
+
+
+class GoBack(RoutineState):
+    """Goes back to the last place the robot is known to have been in."""
+
+    task = 'going back'
+
+    def __init__(self, mission: Mission) -> None:
+        super().__init__(mission, ['returned'])
+
+    def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
+        place = self.mission.place
+        via_points = self.routine.plan(place, interrupt)
+        self.mission.came_back(drive(self, place, via_points, interrupt))
+        return 'returned'
+
+
+def drive(
+    state: RoutineState, target: str, via_points: list[Point], interrupt: fsm.Interrupt
+) -> float:
+    """Drives through the points and makes sure that it ends in ``target``; metres driven.
+
+    Raises:
+        PeerError: It does not.
+    """
+    mission, peer = state.mission, 'motion/controller'
+    check_path(via_points, None, 0.0, 'motion/planner')
+    mission.departs()
+    end = state.routine.control(via_points, interrupt)
+    check_arrival(end, via_points[-1], mission.settings.arrival_tolerance, peer)
+    place = mission.ports.knowledge.robot_place(interrupt)
+    if place != target:
+        raise PeerError(peer, f'the robot is in {place} instead of {target}')
+    return path_length(via_points)
+
+
+class Recharge(RoutineState):
+    """Charges the battery if the robot is at the dock, else chooses the dock to go to."""
+
+    task = 'recharging'
+
+    def __init__(self, mission: Mission) -> None:
+        super().__init__(mission, ['battery_full', 'not_at_dock'], output_keys=['target'])
+
+    def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
+        mission = self.mission
+        self.charging = False
+        mission.look(interrupt)
+        if not mission.at_station():
+            why = mission.why_charge() or 'charging was begun'
+            ud.target = mission.choose_station(interrupt, why).place
+            return 'not_at_dock'
+        self.charging = True
+        ud.target = mission.place
+        began = mission.now()
+        mission.say(f'charging in {mission.place} ({mission.level_text()})')
+        self._charge(interrupt)
+        with mission.gauge.interrupting(interrupt, mission.charged_enough) as told:
+            told.wait(mission.settings.settle_seconds)
+        if not mission.charged_enough():
+            raise PeerError('recharge', f'it ended at {mission.level_text()}')
+        mission.charged(mission.place, mission.now() - began)
+        return 'battery_full'
+
+    def _charge(self, interrupt: fsm.Interrupt) -> None:
+        """Has the battery charged until the peer says it is done.
+
+        Raises:
+            PeerError: It does not charge, or the robot was moved off the station.
+        """
+        gauge = self.mission.gauge
+        while True:
+            self.mission.await_contact(interrupt)
+            with gauge.interrupting(interrupt, lambda: gauge.charging is False) as off:
+                try:
+                    return self.routine.recharge(off)
+                except InterruptedWaitError:
+                    if interrupt.is_set():
+                        raise
+
+    def goal(self, ud: Any) -> str | None:
+        return self.mission.place if self.charging else None
+
+
+def moving(mission: Mission, *, heeds_battery: bool) -> fsm.StateMachine:
+    """Pointing, then Controlling."""
+    low = [BATTERY_LOW] if heeds_battery else []
+    machine = fsm.StateMachine(['reached', FAILED, PREEMPTED, *low], input_keys=['target'])
+    leave = {outcome: outcome for outcome in (FAILED, *low)}
+    with machine:
+        add('Pointing', Pointing(mission, heeds_battery), {'pointed': 'Controlling', **leave})
+        add('Controlling', Controlling(mission, heeds_battery), {'reached': 'reached', **leave})
+    return machine
+
+
+def recharge_routine(mission: Mission) -> fsm.StateMachine:
+    """Recharge, with a move to the dock before it when the robot is not there."""
+    machine = fsm.StateMachine(['battery_full', PREEMPTED])
+    steps = (Step.ANOTHER_PATH, Step.ANOTHER_PLACE, Step.WAIT_FOR_HELP)
+    with machine:
+        add(
+            'Recharge',
+            Recharge(mission),
+            {'battery_full': 'battery_full', 'not_at_dock': 'Moving', FAILED: 'Recover'},
+        )
+        add(
+            'Moving',
+            moving(mission, heeds_battery=False),
+            {'reached': 'Recharge', FAILED: 'Recover'},
+        )
+        add(
+            'Recover',
+            Recover(mission, steps=steps),
+            {
+                'another_path': 'Moving',
+                'another_place': 'Recharge',
+                'wait_for_help': 'WaitForHelp',
+            },
+        )
+        add('WaitForHelp', WaitForHelp(mission), {'try_again': 'Recharge'})
+    return machine
+
+
+def patrol_machine(mission: Mission) -> fsm.StateMachine:
+    """The second seed's machine with its recovery; it ends only when it is preempted."""
+    machine = fsm.StateMachine([PREEMPTED])
+    machine.set_name('patrol')
+    machine.set_clock(mission.clock)
+    with machine:
+        add('Initial', Initial(mission), {'start': 'Reasoning', FAILED: 'WaitForStart'})
+        add('WaitForStart', WaitForHelp(mission), {'try_again': 'Initial'})
+        add(
+            'Reasoning',
+            Reasoning(mission),
+            {'reasoned': 'Moving', BATTERY_LOW: 'RechargeRoutine', FAILED: 'Recover'},
+        )
+        add(
+            'Moving',
+            moving(mission, heeds_battery=True),
+            {'reached': 'Reasoning', BATTERY_LOW: 'RechargeRoutine', FAILED: 'Recover'},
+        )
+        add('RechargeRoutine', recharge_routine(mission), {'battery_full': 'Reasoning'})
+        add(
+            'Recover',
+            Recover(mission),
+            {
+                'another_path': 'Moving',
+                'another_place': 'Reasoning',
+                'go_back': 'GoBack',
+                'wait_for_help': 'WaitForHelp',
+            },
+        )
+        add('GoBack', GoBack(mission), {'returned': 'Reasoning', FAILED: 'WaitForHelp'})
+        add('WaitForHelp', WaitForHelp(mission), {'try_again': 'Reasoning'})
+    return machine

@@ -1,0 +1,138 @@
+"""States that both machines have: the base of all, recovery, going back, waiting for help."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import surveillance_fsm as fsm
+from surveillance_behaviour.mission.mission import Mission
+from surveillance_behaviour.mission.recovery import Step
+from surveillance_behaviour.peers.ports import AwayError, InterruptedWaitError, PeerError
+from surveillance_behaviour.policy.rules import NowhereToGoError
+
+PREEMPTED = 'preempted'
+FAILED = 'failed'
+
+
+class MissionState(fsm.State):
+    """A state that talks to peers: it ends with ``failed`` when one of them lets it down.
+
+    Args:
+        mission: The mission's memory and ports.
+        outcomes: Outcomes beside ``failed`` and ``preempted``.
+        input_keys: Userdata read.
+        output_keys: Userdata written.
+    """
+
+    task = ''
+    """What the state does, for the message when that fails."""
+    charging = False
+    """Whether a failure means that the battery is not charged."""
+
+    def __init__(
+        self,
+        mission: Mission,
+        outcomes: Iterable[str],
+        input_keys: Iterable[str] = (),
+        output_keys: Iterable[str] = (),
+    ) -> None:
+        super().__init__([*outcomes, FAILED, PREEMPTED], input_keys, output_keys)
+        self.mission = mission
+
+    def execute(self, ud: Any) -> str | None:
+        """Works until done, failed or preempted."""
+        if self.preempt_requested():
+            return self._preempted()
+        try:
+            return self.work(ud, self.interrupt)
+        except InterruptedWaitError:
+            if self.preempt_requested():
+                return self._preempted()
+            return self.interrupted(ud)
+        except AwayError as error:
+            self.mission.failed(self.task, str(error))
+            return FAILED
+        except (PeerError, NowhereToGoError) as error:
+            self.mission.failed(self.task, str(error), self.goal(ud), charging=self.charging)
+            return FAILED
+
+    def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
+        """The state's own work; the outcome."""
+        raise NotImplementedError
+
+    def interrupted(self, ud: Any) -> str:
+        """The outcome when something else than a preempt ended the work."""
+        raise NotImplementedError
+
+    def goal(self, ud: Any) -> str | None:
+        """The place that is not reached when the state fails; None: it is not about a place."""
+        return None
+
+    def _preempted(self) -> str:
+        self.service_preempt()
+        return PREEMPTED
+
+
+class Recover(fsm.State):
+    """Looks at the last failure and chooses the next step."""
+
+    def __init__(self, mission: Mission, *, steps: Iterable[Step] = tuple(Step)) -> None:
+        self._steps = tuple(steps)
+        super().__init__([*self._steps, PREEMPTED])
+        self.mission = mission
+
+    def execute(self, ud: Any) -> str:
+        """The step that the recovery takes; one that the machine lacks becomes waiting."""
+        if self.preempt_requested():
+            self.service_preempt()
+            return PREEMPTED
+        step = self.mission.next_step(may_go_back=Step.GO_BACK in self._steps)
+        if step not in self._steps:
+            step = Step.WAIT_FOR_HELP
+        self.mission.say(f'recovery: {WORDS[step]}')
+        return step.value
+
+
+WORDS = {
+    Step.ANOTHER_PATH: 'trying another path',
+    Step.ANOTHER_PLACE: 'trying another place',
+    Step.GO_BACK: 'going back to the last known place',
+    Step.WAIT_FOR_HELP: 'waiting for help',
+}
+
+
+class WaitForHelp(fsm.State):
+    """Says what is wrong and waits; then everything is tried anew, with longer pauses each time."""
+
+    def __init__(self, mission: Mission) -> None:
+        super().__init__(['try_again', PREEMPTED])
+        self.mission = mission
+
+    def execute(self, ud: Any) -> str:
+        """Waits for one pause."""
+        mission = self.mission
+        failure = mission.failure
+        reason = 'nothing works' if failure is None else f'{failure.what} failed: {failure.reason}'
+        seconds = mission.recovery.pause()
+        mission.ports.announcer.waiting_for_help(
+            f'{reason} (in {mission.place or "an unknown place"}, {mission.level_text()}; '
+            f'trying again in {seconds:g} s)'
+        )
+        if not self.wait(seconds):
+            self.service_preempt()
+            return PREEMPTED
+        mission.ports.announcer.waiting_for_help('')
+        return 'try_again'
+
+
+def add(
+    label: str,
+    state: fsm.State,
+    transitions: Mapping[str, str],
+    remapping: Mapping[str, str] | None = None,
+) -> None:
+    """Adds a state to the open machine; ``preempted`` leaves the machine unless bound."""
+    bound: dict[str, str | None] = {PREEMPTED: PREEMPTED}
+    bound.update(transitions)
+    fsm.StateMachine.add(label, state, bound, remapping)

@@ -1,0 +1,287 @@
+"""The surveillance machine: explore or charge where the robot is, choose the next room, move there.
+
+States and outcomes are those of the first seed; ``failed`` and the recovery states are this
+project's. One round of the machine is one room.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import surveillance_fsm as fsm
+from surveillance_behaviour.machines.path_checks import check_arrival, check_path, path_length
+from surveillance_behaviour.machines.shared_states import (
+    FAILED,
+    PREEMPTED,
+    MissionState,
+    Recover,
+    WaitForHelp,
+    add,
+)
+from surveillance_behaviour.mission.mission import Mission
+from surveillance_behaviour.peers.ports import InterruptedWaitError, PeerError, Point
+from surveillance_behaviour.policy.graph import GraphError
+
+LONG = 1e6
+"""One wait without a limit, seconds; it is repeated as long as need be."""
+
+
+class Initialization(MissionState):
+    """Waits until the ontology holds the map, and sets the robot's parameters."""
+
+    task = 'initialization'
+
+    def __init__(self, mission: Mission) -> None:
+        super().__init__(mission, ['initialized'])
+
+    def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
+        self.mission.ports.knowledge.wait_until_built(interrupt)
+        self.mission.begin(interrupt)
+        return 'initialized'
+
+
+class ChooseRoomTask(fsm.State):
+    """Charge if the battery asks for it and the robot is at a station, else explore."""
+
+    def __init__(self, mission: Mission) -> None:
+        super().__init__(['recharge', 'explore', PREEMPTED])
+        self.mission = mission
+
+    def execute(self, ud: Any) -> str:
+        if self.preempt_requested():
+            self.service_preempt()
+            return PREEMPTED
+        must_charge = self.mission.at_station() and self.mission.why_charge()
+        return 'recharge' if must_charge else 'explore'
+
+
+class ExploreTask(fsm.State):
+    """Looks around for a while; a battery that gets low ends it."""
+
+    def __init__(self, mission: Mission) -> None:
+        super().__init__(['explored', PREEMPTED])
+        self.mission = mission
+
+    def execute(self, ud: Any) -> str:
+        mission = self.mission
+        with mission.gauge.interrupting(self.interrupt, lambda: bool(mission.why_charge())) as wake:
+            whole = mission.explore(wake)
+        if self.preempt_requested():
+            self.service_preempt()
+            return PREEMPTED
+        if not whole:
+            mission.say(f'exploring {mission.place} ends early: {mission.why_charge()}')
+        return 'explored'
+
+
+class RechargeTask(MissionState):
+    """Waits at the station until the battery is charged enough."""
+
+    task = 'recharging'
+    charging = True
+
+    def __init__(self, mission: Mission) -> None:
+        super().__init__(mission, ['recharged'])
+
+    def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
+        mission = self.mission
+        place, began = mission.place, mission.now()
+        mission.say(f'charging in {place} ({mission.level_text()}, {mission.why_charge()})')
+        while not mission.charged_enough():
+            limit = mission.settings.charge_stall_seconds
+            with mission.gauge.interrupting(interrupt, self._news()) as wake:
+                late = mission.clock.sleep(limit if limit > 0.0 else LONG, wake)
+            if interrupt.is_set():
+                raise InterruptedWaitError
+            if mission.gauge.charging is False:
+                mission.await_contact(interrupt)
+            elif late and limit > 0.0:
+                raise PeerError('battery', f'still at {mission.level_text()} after {limit:g} s')
+        mission.charged(place, mission.now() - began)
+        return 'recharged'
+
+    def _news(self) -> Callable[[], bool]:
+        """Whether the level has risen, or the battery is not being charged."""
+        mission, before = self.mission, self.mission.gauge.level
+
+        def news() -> bool:
+            level = mission.gauge.level
+            risen = level is not None and (before is None or level > before)
+            return risen or mission.gauge.charging is False or mission.charged_enough()
+
+        return news
+
+    def goal(self, ud: Any) -> str | None:
+        return self.mission.place
+
+
+class ChooseNextRoom(MissionState):
+    """Charging place if the battery asks for it, else rules and policy."""
+
+    task = 'choosing the next room'
+
+    def __init__(self, mission: Mission) -> None:
+        super().__init__(mission, ['chosen'], output_keys=['next_room'])
+
+    def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
+        ud.next_room = self.mission.choose(interrupt).place
+        return 'chosen'
+
+
+class Move(MissionState):
+    """Plans a path to a place and follows it."""
+
+    def __init__(self, mission: Mission, outcome: str, input_keys: tuple[str, ...] = ()) -> None:
+        super().__init__(mission, [outcome], input_keys)
+        self._outcome = outcome
+
+    def move(self, place: str, interrupt: fsm.Interrupt) -> str:
+        """Moves the robot and tells the ontology where it is.
+
+        Raises:
+            PeerError: It did not get there.
+        """
+        mission = self.mission
+        before = mission.place
+        if mission.owes_arrival(place):
+            mission.tell_arrival(before, place, interrupt)
+            return self._outcome
+        mission.ports.knowledge.note_visit(before, mission.now(), interrupt)
+        mission.chooser.saw(before, mission.now())
+        path = self._drive(before, place, interrupt)
+        mission.reached(place, path_length(path), path)
+        mission.tell_arrival(before, place, interrupt)
+        return self._outcome
+
+    def _drive(self, before: str, place: str, interrupt: fsm.Interrupt) -> list[Point]:
+        mission = self.mission
+        motion = mission.ports.motion
+        assert motion is not None
+        goal = mission.ports.places.position(place, interrupt)
+        start = motion.last_position() or mission.ports.places.position(before, interrupt)
+        path: list[Point] = []
+        for stop in self._stops(before, place, goal, interrupt):
+            leg = motion.plan(path[-1] if path else start, stop, interrupt)
+            check_path(leg, stop, mission.settings.goal_tolerance, 'compute_path')
+            path.extend(leg if not path else leg[1:])
+        mission.departs()
+        end = motion.follow(path, interrupt)
+        check_arrival(end, path[-1], mission.settings.arrival_tolerance, 'follow_path')
+        return path
+
+    def _stops(self, before: str, place: str, goal: Point, interrupt: fsm.Interrupt) -> list[Point]:
+        """The goal, at the last try after the places of a way round if the map has one."""
+        mission = self.mission
+        if mission.recovery.tries(place) < max(1, mission.settings.recovery.path_tries - 1):
+            return [goal]
+        try:
+            way = mission.chooser.graph.without_leg(before, place).route(before, place)
+        except (GraphError, KeyError):
+            return [goal]
+        mission.say(f'trying the way round: {" - ".join((before, *way))}')
+        return [*(mission.ports.places.position(room, interrupt) for room in way[:-1]), goal]
+
+
+class MoveToNextRoom(Move):
+    """Notes the visit of the room it leaves, and moves to the next."""
+
+    task = 'moving'
+
+    def __init__(self, mission: Mission) -> None:
+        super().__init__(mission, 'moved', ('next_room',))
+
+    def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
+        return self.move(ud.next_room, interrupt)
+
+    def goal(self, ud: Any) -> str | None:
+        return str(ud.next_room)
+
+
+class ReturnToLastPlace(Move):
+    """Goes back to the last place the robot is known to have been in."""
+
+    task = 'going back'
+
+    def __init__(self, mission: Mission) -> None:
+        super().__init__(mission, 'returned')
+
+    def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
+        mission = self.mission
+        mission.came_back(path_length(self._drive(mission.place, mission.place, interrupt)))
+        return 'returned'
+
+
+def surveillance_machine(mission: Mission) -> fsm.StateMachine:
+    """The first seed's machine with its recovery; it ends only when it is preempted."""
+    tasks = fsm.StateMachine(['explored', 'recharged', FAILED, PREEMPTED])
+    with tasks:
+        add(
+            'CHOOSE_ROOM_TASK',
+            ChooseRoomTask(mission),
+            {'recharge': 'RECHARGE_TASK', 'explore': 'EXPLORE_TASK'},
+        )
+        add('EXPLORE_TASK', ExploreTask(mission), {'explored': 'explored'})
+        add('RECHARGE_TASK', RechargeTask(mission), {'recharged': 'recharged', FAILED: FAILED})
+
+    machine = fsm.StateMachine([PREEMPTED])
+    machine.set_name('surveillance')
+    machine.set_clock(mission.clock)
+    with machine:
+        add(
+            'INITIALIZATION',
+            Initialization(mission),
+            {'initialized': 'PERFORM_ROOM_TASKS', FAILED: 'WAIT_FOR_ONTOLOGY'},
+        )
+        add('WAIT_FOR_ONTOLOGY', WaitForHelp(mission), {'try_again': 'INITIALIZATION'})
+        add(
+            'PERFORM_ROOM_TASKS',
+            tasks,
+            {'explored': 'CHOOSE_NEXT_ROOM', 'recharged': 'CHOOSE_NEXT_ROOM', FAILED: 'RE_DOCK'},
+        )
+        add('RE_DOCK', ReDock(mission), {'again': 'MOVE_TO_NEXT_ROOM', 'give_up': 'WAIT_FOR_HELP'})
+        add(
+            'CHOOSE_NEXT_ROOM',
+            ChooseNextRoom(mission),
+            {'chosen': 'MOVE_TO_NEXT_ROOM', FAILED: 'RECOVER'},
+        )
+        add(
+            'MOVE_TO_NEXT_ROOM',
+            MoveToNextRoom(mission),
+            {'moved': 'PERFORM_ROOM_TASKS', FAILED: 'RECOVER'},
+        )
+        add(
+            'RECOVER',
+            Recover(mission),
+            {
+                'another_path': 'MOVE_TO_NEXT_ROOM',
+                'another_place': 'CHOOSE_NEXT_ROOM',
+                'go_back': 'RETURN_TO_LAST_PLACE',
+                'wait_for_help': 'WAIT_FOR_HELP',
+            },
+        )
+        add(
+            'RETURN_TO_LAST_PLACE',
+            ReturnToLastPlace(mission),
+            {'returned': 'CHOOSE_NEXT_ROOM', FAILED: 'WAIT_FOR_HELP'},
+        )
+        add('WAIT_FOR_HELP', WaitForHelp(mission), {'try_again': 'PERFORM_ROOM_TASKS'})
+    return machine
+
+
+class ReDock(fsm.State):
+    """Drives to the station again when the battery does not rise there."""
+
+    def __init__(self, mission: Mission) -> None:
+        super().__init__(['again', 'give_up', PREEMPTED], output_keys=['next_room'])
+        self.mission = mission
+
+    def execute(self, ud: Any) -> str:
+        if self.preempt_requested():
+            self.service_preempt()
+            return PREEMPTED
+        if self.mission.next_step() != 'another_path':
+            return 'give_up'
+        ud.next_room = self.mission.place
+        self.mission.say(f'driving to the station in {self.mission.place} again')
+        return 'again'

@@ -1,0 +1,1 @@
+"""The map that the robot learns from markers when it starts."""

@@ -1,0 +1,121 @@
+"""Where the behaviour says what it does: the log, and two latched topics."""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Callable
+
+import surveillance_fsm as fsm
+from surveillance_behaviour import conversions
+from surveillance_behaviour.mission.mission import Mission
+from surveillance_behaviour.policy.situation import Decision
+from surveillance_interfaces.msg import Decision as DecisionMessage
+from surveillance_interfaces.msg import MissionStatus
+from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.qos import STATE_QOS
+
+
+class DecisionTopic:
+    """Publishes and logs decisions, numbered from 1."""
+
+    def __init__(self, node: PatrolNode) -> None:
+        self._node = node
+        self._count = 0
+        self._topic = node.create_publisher(DecisionMessage, 'decision', STATE_QOS)
+
+    def publish(self, decision: Decision) -> None:
+        """One more decision."""
+        self._count += 1
+        stamp = self._node.get_clock().now().to_msg()
+        self._topic.publish(conversions.decision_message(decision, self._count, stamp))
+        self._node.get_logger().info(
+            f'decision {self._count}: {decision.from_place} -> {decision.place} '
+            f'[{decision.rule}] {decision.reason}'
+        )
+
+
+class RosAnnouncer:
+    """The machines' announcer on the robot.
+
+    Args:
+        node: The node that speaks.
+        decisions: Where decisions go.
+    """
+
+    def __init__(self, node: PatrolNode, decisions: DecisionTopic) -> None:
+        self._node = node
+        self._decisions = decisions
+        self._lock = threading.Lock()
+        self._text = ''
+        self._waiting = False
+        self._status: Callable[[], MissionStatus] = MissionStatus
+        self._topic = node.create_publisher(MissionStatus, 'mission_status', STATE_QOS)
+
+    def attach(self, mission: Mission, machine: fsm.StateMachine) -> None:
+        """Reports this machine's state from now on, at every transition and every message."""
+
+        def status() -> MissionStatus:
+            level = mission.gauge.level
+            return MissionStatus(
+                stamp=self._node.get_clock().now().to_msg(),
+                machine=mission.machine,
+                state='/'.join(active_path(machine)),
+                place=mission.place,
+                heading_to=mission.heading_to,
+                battery_level=math.nan if level is None else float(level),
+                waiting_for_help=self._waiting,
+                text=self._text,
+                avoided=sorted(mission.recovery.avoided(mission.now())),
+            )
+
+        self._status = status
+        for container in containers(machine):
+            container.register_start_cb(lambda _data, _states: self._publish())
+            container.register_transition_cb(lambda _data, _states: self._publish())
+
+    def decision(self, decision: Decision) -> None:
+        """A place was chosen."""
+        self._decisions.publish(decision)
+
+    def say(self, text: str, *, warning: bool = False) -> None:
+        """Logs and publishes."""
+        log = self._node.get_logger()
+        if warning:
+            log.warn(text)
+        else:
+            log.info(text)
+        self._text = text
+        self._publish()
+
+    def waiting_for_help(self, reason: str) -> None:
+        """Says that the robot waits, or that it goes on."""
+        self._waiting = bool(reason)
+        self._text = f'waiting for help: {reason}' if reason else 'trying again'
+        if reason:
+            self._node.get_logger().error(self._text)
+        self._publish()
+
+    def _publish(self) -> None:
+        with self._lock:
+            self._topic.publish(self._status())
+
+
+def containers(state: fsm.State) -> list[fsm.Container]:
+    """A container and all containers inside it."""
+    if not isinstance(state, fsm.Container):
+        return []
+    found = [state]
+    for child in state.get_children().values():
+        found.extend(containers(child))
+    return found
+
+
+def active_path(state: fsm.State) -> list[str]:
+    """Labels from the machine's active state down to the deepest one."""
+    if not isinstance(state, fsm.Container):
+        return []
+    active = state.get_active_states()
+    if not active:
+        return []
+    return [active[0], *active_path(state[active[0]])]

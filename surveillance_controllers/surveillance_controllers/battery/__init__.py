@@ -1,0 +1,1 @@
+"""The battery: its model, what a robot draws, and its ROS side."""

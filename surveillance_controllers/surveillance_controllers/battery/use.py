@@ -1,0 +1,113 @@
+"""The battery of a robot that moves: fed with what the robot reports, it drains and charges by
+itself.
+
+Poses come at any rate. A jump that no drive could make is a correction of the estimate, not a way
+driven, so the counted way and turn are held to what the robot's top speeds allow.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from surveillance_controllers.battery.model import Battery
+from surveillance_controllers.geometry.poses import Pose, angle_between
+
+
+class MotionMeter:
+    """Adds up way and turn between two readings.
+
+    Args:
+        top_speed: What the robot can drive, m/s.
+        top_turn: What it can turn, rad/s.
+
+    Attributes:
+        pose: The last pose seen.
+    """
+
+    def __init__(self, top_speed: float = 2.0, top_turn: float = 3.0) -> None:
+        self.pose: Pose | None = None
+        self._top_speed = top_speed
+        self._top_turn = top_turn
+        self._at = 0.0
+        self._metres = 0.0
+        self._radians = 0.0
+
+    def see(self, pose: Pose, now: float) -> None:
+        """Takes a new pose, seen at `now` (seconds)."""
+        if self.pose is not None and now > self._at:
+            passed = now - self._at
+            step = math.hypot(pose[0] - self.pose[0], pose[1] - self.pose[1])
+            self._metres += min(step, self._top_speed * passed)
+            turn = abs(angle_between(self.pose[2], pose[2]))
+            self._radians += min(turn, self._top_turn * passed)
+        self.pose, self._at = pose, now
+
+    def take(self) -> tuple[float, float]:
+        """The way (m) and turn (rad) since the last call."""
+        taken = self._metres, self._radians
+        self._metres = self._radians = 0.0
+        return taken
+
+
+class BatteryInUse:
+    """A battery in a robot that drives, uses its arm, and charges at the station only.
+
+    Args:
+        battery: The battery.
+        station: Where the charging station is.
+        dock_reach: Distance from the station within which the robot charges, metres.
+        now: Time at the start, seconds.
+    """
+
+    def __init__(self, battery: Battery, station: Pose, dock_reach: float, now: float) -> None:
+        self._battery = battery
+        self._station = station
+        self._dock_reach = dock_reach
+        self._last = now
+        self._meter = MotionMeter()
+        self._joints: tuple[float, ...] | None = None
+        self._arm_moved = False
+
+    @property
+    def pose(self) -> Pose | None:
+        """Where the robot was last; None until it reports."""
+        return self._meter.pose
+
+    @property
+    def docked(self) -> bool:
+        """Whether the robot stands at the station."""
+        pose = self._meter.pose
+        if pose is None:
+            return False
+        gap = math.hypot(pose[0] - self._station[0], pose[1] - self._station[1])
+        return gap <= self._dock_reach
+
+    def see_pose(self, pose: Pose, now: float) -> None:
+        """Takes where the robot is at `now` (seconds)."""
+        self._meter.see(pose, now)
+
+    def see_joints(self, positions: Sequence[float]) -> None:
+        """Takes the joints of the arm, radians."""
+        joints = tuple(positions)
+        self._arm_moved |= self._joints is not None and joints != self._joints
+        self._joints = joints
+
+    def advance(self, now: float) -> None:
+        """Lets time pass up to `now` (seconds): draws, and charges at the station."""
+        passed, self._last = max(0.0, now - self._last), now
+        metres, radians = self._meter.take()
+        moved, self._arm_moved = self._arm_moved, False
+        self._battery.draw(passed, metres, radians, passed if moved else 0.0)
+        if self.docked:
+            self._battery.charge(passed)
+
+    def why_not_charging(self) -> str | None:
+        """Says why the battery cannot charge now; None when it can."""
+        if self.docked:
+            return None
+        if self.pose is None:
+            return 'where the robot is is not known (nothing came on amcl_pose)'
+        x, y, _ = self.pose
+        at_x, at_y, _ = self._station
+        return f'the robot is at ({x:.2f}, {y:.2f}), not at the station ({at_x:.2f}, {at_y:.2f})'

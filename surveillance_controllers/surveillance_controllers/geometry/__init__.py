@@ -1,0 +1,1 @@
+"""Poses and polylines in the plane."""

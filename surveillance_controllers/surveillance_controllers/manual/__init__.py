@@ -1,0 +1,1 @@
+"""MANUAL mode: requests that wait for an operator, and the commands that answer them."""

@@ -1,0 +1,1 @@
+"""Localisation, path following and the drive."""

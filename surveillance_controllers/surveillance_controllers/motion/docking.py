@@ -1,0 +1,134 @@
+"""Docking by a docking server (opennav_docking) at the end of a way to the station.
+
+The server's messages come with it; without them docking cannot start and says so.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, Protocol
+
+from geometry_msgs.msg import PoseStamped
+
+from surveillance_controllers import conversions
+from surveillance_controllers.geometry.polyline import Points
+from surveillance_controllers.geometry.poses import Pose
+from surveillance_controllers.motion.arrival import MotionFailed
+from surveillance_runtime.calls import CallFailed
+from surveillance_runtime.goal_calls import GoalCaller
+from surveillance_runtime.goals import GoalRun
+from surveillance_runtime.node import PatrolNode, StartError
+
+
+class Motion(Protocol):
+    """What drives the robot: `SimulatedMotion` or `Nav2Motion`."""
+
+    def follow(self, path: Points, run: GoalRun, report: Callable[[Points], None]) -> Points:
+        """Drives along a path; returns where the robot is then, or raises `MotionFailed`."""
+
+    def place_reached(self, goal: Points, end: Points, run: GoalRun) -> str:
+        """The place the robot is in; raises `MotionFailed` when it is not the goal's."""
+
+    def look_around(self, run: GoalRun) -> None:
+        """Looks around in the place."""
+
+
+def docking_actions() -> tuple[Any, Any]:
+    """The docking server's action types, to dock and to undock.
+
+    Raises:
+        StartError: opennav_docking_msgs is not installed.
+    """
+    try:
+        from opennav_docking_msgs.action import DockRobot, UndockRobot
+    except ImportError:
+        raise StartError(
+            'parameter docking: got opennav, but the Python package opennav_docking_msgs is not '
+            'installed: install ros-jazzy-opennav-docking-msgs and source its workspace, or use '
+            'docking:=none'
+        ) from None
+    return DockRobot, UndockRobot
+
+
+class DockingMotion:
+    """Moves as another motion does, and docks where a way ends at the station.
+
+    Args:
+        node: The motion controller's node.
+        inner: Drives the robot.
+        station: Where the dock is.
+        reach: A way that ends within this distance of the station ends in the dock, metres.
+        dock_type: The dock's type, as the docking server knows it.
+        peer_timeout: How long the server may take to appear and accept a goal, seconds.
+
+    Raises:
+        StartError: opennav_docking_msgs is not installed.
+    """
+
+    def __init__(
+        self,
+        node: PatrolNode,
+        inner: Motion,
+        station: Pose,
+        reach: float,
+        dock_type: str,
+        peer_timeout: float,
+    ) -> None:
+        self._node = node
+        self._inner = inner
+        self._station = station
+        self._reach = reach
+        self._dock_type = dock_type
+        self._timeout = peer_timeout
+        self._dock, self._undock = docking_actions()
+        self._docker = GoalCaller(node, self._dock, 'dock_robot')
+        self._undocker = GoalCaller(node, self._undock, 'undock_robot')
+        self._docked = False
+
+    def follow(self, path: Points, run: GoalRun, report: Callable[[Points], None]) -> Points:
+        """Undocks where that is needed, drives, and docks where the way ends at the station.
+
+        Raises:
+            MotionFailed: One of the three failed.
+        """
+        if self._docked:
+            self._docked = False
+            goal = self._undock.Goal(dock_type=self._dock_type)
+            self._carry_out(self._undocker, goal, 'undocking', path[0], run)
+        end = self._inner.follow(path, run, report)
+        if math.dist(end[:2], self._station[:2]) > self._reach or run.interrupt.is_set():
+            return end
+        pose = PoseStamped()
+        pose.header.frame_id = 'map'
+        pose.header.stamp = self._node.get_clock().now().to_msg()
+        pose.pose = conversions.pose_message(self._station)
+        goal = self._dock.Goal(
+            use_dock_id=False,
+            dock_pose=pose,
+            dock_type=self._dock_type,
+            navigate_to_staging_pose=False,
+        )
+        self._carry_out(self._docker, goal, 'docking', end, run)
+        self._docked = True
+        return end
+
+    def place_reached(self, goal: Points, end: Points, run: GoalRun) -> str:
+        """As the motion that drives."""
+        return self._inner.place_reached(goal, end, run)
+
+    def look_around(self, run: GoalRun) -> None:
+        """As the motion that drives; a docked robot stays as it is."""
+        if not self._docked:
+            self._inner.look_around(run)
+
+    def _carry_out(
+        self, caller: GoalCaller, goal: Any, what: str, at: Points, run: GoalRun
+    ) -> None:
+        try:
+            end = caller.run(goal, accept_timeout=self._timeout, interrupt=run.interrupt)
+        except CallFailed as error:
+            raise MotionFailed(f'{what}: {error}', at) from error
+        if end.status != 'succeeded' or not end.result.success:
+            code = '' if end.result is None else f' (error code {end.result.error_code})'
+            raise MotionFailed(f'{what}: the docking server {end.status} the goal{code}', at)

@@ -1,0 +1,327 @@
+"""A drive along a path from beginning to end: following, and what to do when that does not go on.
+
+When something stands in the way, or no progress is made, the drive recovers step by step: it waits
+for what may move away, asks for another path, backs up and asks again, looks around and asks again,
+and gives up with the reason. A step that brings the robot on a good way starts the list anew.
+
+A drive is told the time with each step and never waits itself.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from surveillance_controllers.geometry.polyline import Points
+from surveillance_controllers.geometry.poses import Pose, angle_between, composed
+from surveillance_controllers.motion.path_following import (
+    DriveParameters,
+    Guidance,
+    PathFollower,
+    Velocity,
+    room_ahead,
+)
+
+
+class State(Enum):
+    """What a drive is doing."""
+
+    DRIVING = 'driving'
+    WAITING = 'waiting'
+    BACKING = 'backing up'
+    LOOKING = 'looking around'
+    ASKING = 'asking for another path'
+    STOPPING = 'stopping'
+    ARRIVED = 'arrived'
+    FAILED = 'failed'
+
+    @property
+    def ended(self) -> bool:
+        """Whether the drive is over."""
+        return self in (State.ARRIVED, State.FAILED)
+
+
+@dataclass(frozen=True)
+class RecoveryParameters:
+    """When a drive recovers, and how.
+
+    Attributes:
+        patience: Standing before something for this long begins a recovery, seconds.
+        stuck_after: As does making no progress for this long, seconds.
+        step: Less way or turn than this is no progress, metres or rad.
+        wait: How long to wait for what stands in the way, seconds.
+        back_up: How far to back up, metres.
+        back_speed: How fast, m/s.
+        look_ahead: An obstacle on this much of the path ahead makes it ask for another, metres.
+        off_path: Further from the path than this, another one is asked for, metres.
+        fresh_start: After this much progress the list of recoveries starts anew, metres.
+        most_paths: So many other paths are asked for at most without a fresh start.
+        stand_lost: A robot that does not know where it is stands this long, seconds,
+        look_lost: then looks around for this long before the drive fails, seconds.
+    """
+
+    patience: float = 0.5
+    stuck_after: float = 8.0
+    step: float = 0.1
+    wait: float = 3.0
+    back_up: float = 0.4
+    back_speed: float = 0.15
+    look_ahead: float = 3.0
+    off_path: float = 0.5
+    fresh_start: float = 1.0
+    most_paths: int = 6
+    stand_lost: float = 1.0
+    look_lost: float = 30.0
+
+
+_STANDS = 0.004
+"""A robot that moves less than this between two steps, metres or rad, stands."""
+
+_RECOVERIES = (
+    (State.WAITING, State.ASKING),
+    (State.BACKING, State.ASKING),
+    (State.LOOKING, State.ASKING),
+)
+
+
+class Drive:
+    """One drive along a path, which may be replaced on the way.
+
+    Args:
+        path: Points of shape (n, 2), n of at least 1, metres, map frame.
+        robot: The robot's limits and habits.
+        recovery: When and how the drive recovers.
+
+    Attributes:
+        state: What the drive is doing.
+        reason: Why it recovers or failed.
+        recoveries: How many recoveries were begun.
+    """
+
+    def __init__(
+        self,
+        path: ArrayLike,
+        robot: DriveParameters | None = None,
+        recovery: RecoveryParameters | None = None,
+    ) -> None:
+        self._robot = robot or DriveParameters()
+        self._recovery = recovery or RecoveryParameters()
+        self._follower = PathFollower(path, self._robot)
+        self.state = State.DRIVING
+        self.reason = ''
+        self.recoveries = 0
+        self._plan: list[State] = []
+        self._level = 0
+        self._paths = 0
+        self._now: float | None = None
+        self._since = 0.0
+        self._blocked_since: float | None = None
+        self._mark: tuple[float, Pose] | None = None
+        self._best = 0.0
+        self._turned = 0.0
+        self._backed = 0.0
+        self._last: Pose | None = None
+        self._lost_since: float | None = None
+
+    @property
+    def path(self) -> Points:
+        """The path that is followed now."""
+        return self._follower.path
+
+    @property
+    def progress(self) -> float:
+        """Way along the present path, metres."""
+        return self._follower.progress
+
+    def step(self, now: float, pose: Pose, seen: Points, *, lost: bool = False) -> Velocity:
+        """Decides the velocity for the next moment.
+
+        Args:
+            now: The time, seconds.
+            pose: Where the robot is, map frame.
+            seen: What the lidar sees, robot's frame, shape (n, 2), metres.
+            lost: The pose is not to be trusted; the robot stands still and looks.
+        """
+        dt = 0.0 if self._now is None else max(0.0, now - self._now)
+        self._now = now
+        turned, moved = self._motion(pose)
+        if not lost:
+            self._lost_since = None
+        elif not self.state.ended:
+            return self._while_lost(now, seen, dt)
+        if self.state is State.DRIVING:
+            return self._drive(now, pose, seen, dt)
+        if self.state is State.STOPPING:
+            if (moved <= _STANDS and abs(turned) <= _STANDS) or now - self._since > 3.0:
+                self.state = State.ARRIVED
+            return Velocity()
+        if self.state is State.WAITING and now - self._since >= self._recovery.wait:
+            self._next(now)
+        elif self.state is State.BACKING:
+            self._backed += moved
+            return self._back(now, seen)
+        elif self.state is State.LOOKING:
+            self._turned += abs(turned)
+            if self._turned >= math.tau or now - self._since > 20.0:
+                self._next(now)
+            else:
+                return Velocity(0.0, min(self._robot.turn, 1.0))
+        return self._follower.halt(seen, dt)
+
+    def heed(self, obstacles: Points) -> None:
+        """Takes the obstacles known now (map frame); asks for another path if one is on the
+        path."""
+        r = self._recovery
+        if self.state is State.DRIVING and self._now is not None:
+            reach = self._robot.radius + self._robot.margin / 2
+            if not self._follower.is_clear(obstacles, reach, r.look_ahead):
+                self._ask(self._now, 'something is on the path ahead')
+
+    def new_path(self, path: ArrayLike) -> None:
+        """Goes on along another path."""
+        self._follower = PathFollower(path, self._robot)
+        self.state = State.DRIVING
+        self._blocked_since = self._mark = None
+        self._best = 0.0
+
+    def no_path(self, reason: str) -> None:
+        """Says that no other path was found; the drive tries the next recovery."""
+        self.reason = reason
+        if self.state is State.ASKING and self._now is not None:
+            self._recover(self._now, reason)
+
+    def _while_lost(self, now: float, seen: Points, dt: float) -> Velocity:
+        r = self._recovery
+        self._mark = self._blocked_since = None
+        if self._lost_since is None:
+            self._lost_since = now
+        lost_for = now - self._lost_since
+        if lost_for < r.stand_lost:
+            return self._follower.halt(seen, dt)
+        if lost_for < r.stand_lost + r.look_lost:
+            return Velocity(0.0, 0.5)
+        self.reason = 'the robot does not know where it is: what it sees is nowhere on the map'
+        self.state = State.FAILED
+        return Velocity()
+
+    def _motion(self, pose: Pose) -> tuple[float, float]:
+        last, self._last = self._last, pose
+        if last is None:
+            return 0.0, 0.0
+        return angle_between(last[2], pose[2]), math.dist(last[:2], pose[:2])
+
+    def _drive(self, now: float, pose: Pose, seen: Points, dt: float) -> Velocity:
+        r = self._recovery
+        guidance = self._follower.step(pose, seen, dt)
+        if guidance.done:
+            self._since = now
+            self.state = State.STOPPING
+            return guidance.velocity
+        if guidance.off_path > r.off_path:
+            self._ask(now, f'the robot is {guidance.off_path:.2f} m off its path')
+            return self._follower.halt(seen, dt)
+        if not guidance.blocked:
+            self._blocked_since = None
+        elif self._blocked_since is None:
+            self._blocked_since = now
+        elif now - self._blocked_since >= r.patience:
+            where = self._what_is_near(pose, seen)
+            self._recover(now, f'something stands in the way{where}')
+        if self._is_stuck(now, pose, guidance):
+            self._recover(now, f'no progress for {r.stuck_after:g} s')
+        if guidance.progress - self._best >= r.fresh_start:
+            self._best, self._level, self._paths = guidance.progress, 0, 0
+        return guidance.velocity
+
+    def _is_stuck(self, now: float, pose: Pose, guidance: Guidance) -> bool:
+        r = self._recovery
+        if self._mark is None:
+            self._mark = now, pose
+            self._marked_progress = guidance.progress
+            return False
+        since, before = self._mark
+        turned = abs(angle_between(before[2], pose[2]))
+        if guidance.progress - self._marked_progress >= r.step or turned >= 3 * r.step:
+            self._mark = now, pose
+            self._marked_progress = guidance.progress
+            return False
+        return now - since >= r.stuck_after
+
+    @staticmethod
+    def _what_is_near(pose: Pose, seen: Points) -> str:
+        ahead = seen[seen[:, 0] > 0] if len(seen) else seen
+        if not len(ahead):
+            return ''
+        nearest = ahead[np.argmin((ahead**2).sum(axis=1))]
+        x, y, _ = composed(pose, (float(nearest[0]), float(nearest[1]), 0.0))
+        return f' at ({x:.2f}, {y:.2f})'
+
+    def _recover(self, now: float, reason: str) -> None:
+        self.reason = reason
+        if self._level >= len(_RECOVERIES):
+            self.state = State.FAILED
+            return
+        self.recoveries += 1
+        self._plan = list(_RECOVERIES[self._level])
+        self._level += 1
+        self._next(now)
+
+    def _ask(self, now: float, reason: str) -> None:
+        self.reason = reason
+        self._paths += 1
+        if self._paths > self._recovery.most_paths:
+            self.state = State.FAILED
+            return
+        self.recoveries += 1
+        self._plan = [State.ASKING]
+        self._next(now)
+
+    def _next(self, now: float) -> None:
+        self.state = self._plan.pop(0)
+        self._since = now
+        self._turned = self._backed = 0.0
+        self._blocked_since = self._mark = None
+
+    def _back(self, now: float, seen: Points) -> Velocity:
+        r = self._recovery
+        behind = -seen if len(seen) else seen
+        room = room_ahead(behind, 0.0, self._robot.radius + self._robot.margin, 1.0)
+        slow = r.back_speed**2 / (2 * self._robot.acceleration) + 0.02
+        if self._backed >= r.back_up or room <= slow or now - self._since > 10.0:
+            self._next(now)
+            return Velocity()
+        return Velocity(-r.back_speed, 0.0)
+
+
+class Spin:
+    """One turn on the spot.
+
+    Args:
+        turn: Turning speed, rad/s.
+        acceleration: Of the turning speed, rad/s^2.
+    """
+
+    def __init__(self, turn: float = 1.0, acceleration: float = 3.0) -> None:
+        self._top = turn
+        self._acceleration = acceleration
+        self._turned = 0.0
+        self._last: float | None = None
+
+    @property
+    def done(self) -> bool:
+        """Whether the turn is complete, to a degree."""
+        return self._turned >= math.tau - 0.02
+
+    def step(self, yaw: float) -> Velocity:
+        """Decides the velocity for the next moment from the robot's yaw, rad."""
+        if self._last is not None:
+            self._turned += angle_between(self._last, yaw)
+        self._last = yaw
+        if self.done:
+            return Velocity()
+        left = math.tau - self._turned
+        return Velocity(0.0, min(self._top, math.sqrt(2 * self._acceleration * left)))

@@ -1,0 +1,398 @@
+"""Where a robot is on a map, from its odometry and its lidar.
+
+Between scans the estimate moves with the odometry. Each scan then corrects it: the pose is sought
+at which the seen points lie on the edges of what the map has occupied, by Gauss-Newton on the
+signed distance to those edges (a likelihood field; Thrun, Burgard, Fox, "Probabilistic Robotics",
+6.4), with weights that let go of points the map cannot explain, and a pull towards the odometry
+where the scan says nothing, as along a corridor.
+
+How well a pose explains a scan is measured by casting the rays into the map: the part of them that
+go as far as they should. When that part drops, the robot doubts (it may have been pushed, carried,
+or slipped; or there only are obstacles that the map does not have) and looks for a better pose:
+near where it was, then everywhere, over a lattice of poses, the best of which are refined by the
+same correction and compared by their rays. A pose that is not clearly better is not taken.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surveillance_controllers.geometry.polyline import Points
+from surveillance_controllers.geometry.poses import Pose, composed, relative
+from surveillance_controllers.motion.scans import Scan
+from surveillance_controllers.planning.grid_map import GridMap, distance_to
+
+
+@dataclass(frozen=True)
+class LocalisationParameters:
+    """How the localiser works.
+
+    Attributes:
+        rays: Rays of a scan that are matched.
+        cast_rays: Rays that are cast into the map to measure how well a pose explains a scan.
+        update_distance: A scan is used after this way, metres,
+        update_turn: or this turn, rad,
+        update_period: or this time, seconds; and always while the robot doubts.
+        hit: A ray agrees with the map when it is off by at most this, metres.
+        spread: Points further than about this from any edge lose their weight, metres.
+        doubt_below: The robot looks for a better pose when a smaller part of the rays agrees.
+        lost_below: It counts as lost when none is found and a smaller part than this agrees.
+        sure_from: A pose near the last one that explains this part ends the search.
+        better: A pose near the last one must explain this much more to be taken instead.
+        far_better: A pose far away must explain this much more, and win in several searches: that
+            somebody carried the robot there is unlikely, and rooms look alike.
+        far_wins: In so many, one after the other.
+        rounds: After so many searches without a winner the present pose is kept.
+        doubt_time: How long scans are doubtful before it looks, seconds; one scan is enough when it
+            would be lost.
+        lost_pause: Time between two looks while it is lost, seconds.
+        top_step: Odometry that jumps further than this between two readings is not believed, m.
+        top_turn: Likewise, rad.
+        near: Radius of the first search around the last pose, metres.
+        lattice: Distance of the poses that a search tries, metres.
+        headings: How many headings a search tries at each.
+        body: Radius within which the robot cannot overlap anything, metres.
+    """
+
+    rays: int = 90
+    cast_rays: int = 45
+    update_distance: float = 0.15
+    update_turn: float = 0.15
+    update_period: float = 0.3
+    hit: float = 0.15
+    spread: float = 0.2
+    doubt_below: float = 0.85
+    lost_below: float = 0.55
+    sure_from: float = 0.93
+    better: float = 0.1
+    far_better: float = 0.2
+    far_wins: int = 3
+    rounds: int = 5
+    doubt_time: float = 0.2
+    lost_pause: float = 1.0
+    top_step: float = 0.3
+    top_turn: float = 0.6
+    near: float = 2.5
+    lattice: float = 0.25
+    headings: int = 24
+    body: float = 0.15
+
+
+class Localiser:
+    """Keeps the estimate of a robot's pose on one map.
+
+    Args:
+        grid: The map.
+        pose: Where the robot is believed to be at first.
+        parameters: How the localiser works.
+
+    Attributes:
+        pose: The estimate: x, y in metres, yaw in rad, map frame.
+        agreement: The part of the last scan's rays that the estimate explains, 0 to 1.
+        lost: Whether the estimate is known to be wrong and no better one is found yet.
+        jumps: How often the robot was found somewhere else.
+    """
+
+    def __init__(
+        self, grid: GridMap, pose: Pose, parameters: LocalisationParameters | None = None
+    ) -> None:
+        self.parameters = parameters or LocalisationParameters()
+        self.pose = pose
+        self.agreement = 1.0
+        self.lost = False
+        self.jumps = 0
+        self._odometry: Pose | None = None
+        self._look_at: float | None = None
+        self._tolerated = 1.0
+        self._rival: tuple[Pose, int] | None = None
+        self._rounds = 0
+        self._moved = (0.0, 0.0)
+        self._used_at: float | None = None
+        self.set_map(grid)
+
+    def set_map(self, grid: GridMap) -> None:
+        """Replaces the map; the estimate stays."""
+        self.grid = grid
+        half = np.float32(grid.resolution / 2)
+        occupied = grid.occupied
+        outside = distance_to(occupied, grid.resolution)
+        inside = distance_to(~occupied, grid.resolution)
+        signed = np.where(occupied, half - inside, outside - half)
+        # Without anything occupied there is nothing to match: one finite value, no slope.
+        self._edges: NDArray[np.float32] = np.minimum(signed, np.float32(10.0))
+        self._occupied = occupied
+        self._standable = grid.free & (outside - half >= self.parameters.body)
+
+    @property
+    def plausible(self) -> bool:
+        """Whether the estimate is good enough to say which place the robot is in."""
+        return not self.lost and self.agreement >= self.parameters.lost_below
+
+    @property
+    def certain(self) -> bool:
+        """Whether the last scan fitted, so that the estimate is to be trusted."""
+        return not self.lost and self._look_at is None
+
+    def believe(self, pose: Pose) -> None:
+        """Takes a pose that somebody gave as the estimate."""
+        self.pose = pose
+        self.lost = False
+        self._look_at = None
+        self._tolerated = 1.0
+        self._used_at = None
+
+    def move(self, odometry: Pose) -> None:
+        """Takes a new reading of the odometry, in the odometry's own frame."""
+        if self._odometry is not None:
+            dx, dy, turn = relative(self._odometry, odometry)
+            step = math.hypot(dx, dy)
+            p = self.parameters
+            if step <= p.top_step and abs(turn) <= p.top_turn:
+                self.pose = composed(self.pose, (dx, dy, turn))
+                self._moved = (self._moved[0] + step, self._moved[1] + abs(turn))
+        self._odometry = odometry
+
+    def see(self, scan: Scan, now: float) -> bool:
+        """Takes a scan made where the robot is now: corrects the estimate, or looks for it.
+
+        Args:
+            scan: The scan.
+            now: Its time, seconds.
+
+        Returns:
+            Whether the scan was used; one that would tell little new is not.
+        """
+        p = self.parameters
+        if not self._is_due(now):
+            return False
+        self._used_at = now
+        thin = scan.thinned(p.rays)
+        moved, self._moved = self._moved, (0.0, 0.0)
+        corrected = self._matched(self.pose, thin.points, moved)
+        agreement = self.explained(corrected, thin.thinned(p.cast_rays))
+        self._judge(corrected, agreement, thin, now)
+        return True
+
+    def _is_due(self, now: float) -> bool:
+        p = self.parameters
+        return (
+            self._used_at is None
+            or self.lost
+            or self._look_at is not None
+            or self._moved[0] >= p.update_distance
+            or self._moved[1] >= p.update_turn
+            or not 0 <= now - self._used_at < p.update_period
+        )
+
+    def _judge(self, corrected: Pose, agreement: float, thin: Scan, now: float) -> None:
+        p = self.parameters
+        if agreement >= p.doubt_below:
+            self._tolerated = 1.0
+        if agreement >= min(p.doubt_below, self._tolerated - p.better):
+            self._settle(corrected, agreement)
+            return
+        self.agreement = agreement
+        if self._look_at is None:
+            self._look_at = now + p.doubt_time
+        if agreement < p.lost_below and not self.lost:
+            # Next to nothing fits: that is no passer-by.
+            self._look_at = min(self._look_at, now)
+        if now < self._look_at - 1e-9:
+            return
+        found = self.search(thin)
+        if found is not None and self._is_convincing(found, agreement):
+            self.jumps += 1
+            self._settle(*found)
+        elif self._rival is not None and self._rounds < p.rounds:
+            # Somewhere far away fits better: the next scans decide.
+            self._rounds += 1
+        elif agreement >= p.lost_below:
+            # Nothing explains the scan better: what is seen is not on the map.
+            self._tolerated = agreement
+            self._settle(corrected, agreement)
+        else:
+            self.lost = True
+            self._look_at = now + p.lost_pause
+
+    def _is_convincing(self, found: tuple[Pose, float], agreement: float) -> bool:
+        p = self.parameters
+        pose, explained = found
+        if explained < p.lost_below or explained < agreement + p.better:
+            self._rival = None
+            return False
+        if math.dist(pose[:2], self.pose[:2]) <= p.near:
+            return True
+        if explained < agreement + p.far_better:
+            self._rival = None
+            return False
+        wins = 1
+        if self._rival is not None and math.dist(pose[:2], self._rival[0][:2]) <= p.near / 2:
+            wins = self._rival[1] + 1
+        self._rival = pose, wins
+        return wins >= p.far_wins
+
+    def _settle(self, pose: Pose, agreement: float) -> None:
+        self.pose, self.agreement = pose, agreement
+        self.lost = False
+        self._look_at = None
+        self._rounds = 0
+        self._rival = None
+
+    def search(self, scan: Scan) -> tuple[Pose, float] | None:
+        """Looks for the pose that explains a scan: near the last one first, then everywhere.
+
+        Returns:
+            The pose and the part of the rays it explains; None when the scan shows too little.
+        """
+        near = self._searched(scan, self.parameters.near)
+        if near is not None and near[1] >= self.parameters.sure_from:
+            return near
+        far = self._searched(scan, math.inf)
+        found = [f for f in (near, far) if f is not None]
+        return max(found, key=lambda f: self._worth(*f), default=None)
+
+    def _worth(self, pose: Pose, explained: float) -> float:
+        # Among poses that explain a scan as well, the nearest one is the likeliest.
+        return explained - 0.003 * min(math.dist(pose[:2], self.pose[:2]), 20.0)
+
+    def explained(self, pose: Pose, scan: Scan) -> float:
+        """The part of a scan's rays that go as far as they should from a pose, 0 to 1."""
+        expected = self.cast(pose, scan.angles, scan.range_max)
+        measured = np.minimum(scan.ranges, scan.range_max)
+        slack = self.parameters.hit + self.grid.resolution / 2
+        return float((np.abs(expected - measured) <= slack).mean()) if len(measured) else 0.0
+
+    def cast(self, pose: Pose, angles: Points, range_max: float) -> Points:
+        """How far rays go in the map from a pose until they meet something occupied.
+
+        Returns:
+            Shape of `angles`, metres, at most `range_max`; to half a cell.
+        """
+        step = self.grid.resolution / 2
+        way = np.arange(0.0, range_max + step, step)
+        heading = angles + pose[2]
+        x = pose[0] + np.cos(heading)[:, None] * way
+        y = pose[1] + np.sin(heading)[:, None] * way
+        rows, columns = self._occupied.shape
+        column = ((x - self.grid.origin[0]) * (1 / self.grid.resolution)).astype(np.int32)
+        row = ((y - self.grid.origin[1]) * (1 / self.grid.resolution)).astype(np.int32)
+        np.clip(column, 0, columns - 1, out=column)
+        np.clip(row, 0, rows - 1, out=row)
+        hit = self._occupied[row, column]
+        first = hit.argmax(axis=1)
+        met = hit[np.arange(len(angles)), first]
+        return np.where(met, np.minimum(way[first], range_max), range_max)
+
+    def _matched(self, pose: Pose, points: Points, moved: tuple[float, float]) -> Pose:
+        """The pose near `pose` at which points (robot's frame) lie on the map's edges."""
+        if len(points) < 8:
+            return pose
+        estimate = np.array(pose)
+        # Pull towards the odometry: a standard deviation per direction, beside 3 cm of a point.
+        deviation = np.array([0.05 + 0.2 * moved[0]] * 2 + [0.04 + 0.1 * moved[0] + 0.2 * moved[1]])
+        pull = (0.03 / deviation) ** 2
+        for _ in range(8):
+            cos, sin = math.cos(estimate[2]), math.sin(estimate[2])
+            x = estimate[0] + cos * points[:, 0] - sin * points[:, 1]
+            y = estimate[1] + sin * points[:, 0] + cos * points[:, 1]
+            error, slope_x, slope_y = self._edge_at(x, y)
+            weight = 1.0 / (1.0 + (error / self.parameters.spread) ** 2) ** 2
+            slope_turn = slope_y * (x - estimate[0]) - slope_x * (y - estimate[1])
+            jacobian = np.stack([slope_x, slope_y, slope_turn], axis=1)
+            weighted = jacobian * weight[:, None]
+            back = estimate - pose
+            back[2] = math.remainder(back[2], math.tau)
+            change = np.linalg.solve(
+                weighted.T @ jacobian + np.diag(pull + 1e-9),
+                -(weighted.T @ error + pull * back),
+            )
+            estimate += np.clip(change, -0.15, 0.15)
+            if np.abs(change).max() < 1e-4:
+                break
+        return float(estimate[0]), float(estimate[1]), math.remainder(estimate[2], math.tau)
+
+    def _edge_at(self, x: Points, y: Points) -> tuple[Points, Points, Points]:
+        """Signed distance to the nearest edge and its slope along x and y, bilinear."""
+        column = (x - self.grid.origin[0]) / self.grid.resolution - 0.5
+        row = (y - self.grid.origin[1]) / self.grid.resolution - 0.5
+        rows, columns = self._edges.shape
+        column = np.clip(column, 0, columns - 1.001)
+        row = np.clip(row, 0, rows - 1.001)
+        c, r = column.astype(np.intp), row.astype(np.intp)
+        u, v = column - c, row - r
+        flat = self._edges.ravel()
+        base = r * columns + c
+        sw, se, nw, ne = flat[base], flat[base + 1], flat[base + columns], flat[base + columns + 1]
+        south, north = sw + (se - sw) * u, nw + (ne - nw) * u
+        slope_x = ((se - sw) * (1 - v) + (ne - nw) * v) / self.grid.resolution
+        slope_y = (north - south) / self.grid.resolution
+        return south + (north - south) * v, slope_x, slope_y
+
+    def _searched(self, scan: Scan, reach: float) -> tuple[Pose, float] | None:
+        poses = self._lattice(reach)
+        points = scan.thinned(40).points
+        if not len(poses) or len(points) < 8:
+            return None
+        scores = self._scores(poses, points)
+        candidates = _apart(poses, scores, 24, 2 * self.parameters.lattice)
+        refined = [self._matched(pose, scan.points, (1.0, 1.0)) for pose in candidates]
+        found = [(pose, self.explained(pose, scan)) for pose in refined if self._can_stand(pose)]
+        return max(found, key=lambda f: self._worth(*f), default=None)
+
+    def _can_stand(self, pose: Pose) -> bool:
+        cell = self.grid.cells_of(pose[:2])
+        return bool(self.grid.contains(cell)[0] and self._standable[cell[0, 0], cell[0, 1]])
+
+    def _lattice(self, reach: float) -> Points:
+        """Poses to try, shape (n, 3): free places at equal distances, each with every heading."""
+        step = max(1, round(self.parameters.lattice / self.grid.resolution))
+        cells = np.argwhere(self._standable[::step, ::step]) * step
+        centres = self.grid.centres_of(cells)
+        gaps = np.hypot(centres[:, 0] - self.pose[0], centres[:, 1] - self.pose[1])
+        centres = centres[gaps <= reach]
+        turns = np.arange(self.parameters.headings) * (math.tau / self.parameters.headings)
+        headings = self.pose[2] + turns
+        return np.concatenate(
+            [
+                np.repeat(centres, len(headings), axis=0),
+                np.tile(headings, len(centres))[:, None],
+            ],
+            axis=1,
+        )
+
+    def _scores(self, poses: Points, points: Points) -> Points:
+        """How well the points fit the edges from each pose; the greater the better."""
+        scores = np.empty(len(poses))
+        flat = np.exp(-0.5 * (self._edges / np.float32(0.2)) ** 2).ravel()
+        rows, columns = self._edges.shape
+        scale = 1 / self.grid.resolution
+        px, py = points[:, 0].astype(np.float32), points[:, 1].astype(np.float32)
+        for begin in range(0, len(poses), 4096):
+            some = poses[begin : begin + 4096].astype(np.float32)
+            cos, sin = np.cos(some[:, 2:]), np.sin(some[:, 2:])
+            x = (some[:, :1] - self.grid.origin[0] + cos * px - sin * py) * scale
+            y = (some[:, 1:2] - self.grid.origin[1] + sin * px + cos * py) * scale
+            column = np.clip(x.astype(np.int32), 0, columns - 1)
+            row = np.clip(y.astype(np.int32), 0, rows - 1)
+            scores[begin : begin + 4096] = flat[row * columns + column].mean(axis=1)
+        return scores
+
+
+def _apart(poses: Points, scores: Points, count: int, distance: float) -> list[Pose]:
+    """The best poses that are not all the same: some way or turn lies between any two."""
+    taken: list[Pose] = []
+    for index in np.argsort(-scores)[: 60 * count]:
+        x, y, yaw = (float(value) for value in poses[index])
+        if all(
+            math.hypot(x - other[0], y - other[1]) > distance
+            or abs(math.remainder(yaw - other[2], math.tau)) > 0.4
+            for other in taken
+        ):
+            taken.append((x, y, yaw))
+            if len(taken) == count:
+                break
+    return taken

@@ -1,0 +1,96 @@
+"""What the lidar sees and the map does not have, remembered until it is seen to be gone.
+
+A point counts when it lies well away from everything the map has occupied. It is forgotten when a
+ray goes through where it was, or when it has not been seen for a long time.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from surveillance_controllers.geometry.polyline import Points
+from surveillance_controllers.geometry.poses import Pose
+from surveillance_controllers.motion.scans import Scan
+from surveillance_controllers.planning.grid_map import GridMap, distance_to
+
+
+class ObstacleMemory:
+    """The obstacles seen so far.
+
+    Args:
+        grid: The map.
+        cell: Points closer together than this are one, metres.
+        apart: Nearer than this to what the map has, a point is the map's, metres.
+        reach: Points further from the robot than this are not taken, metres.
+        keep: How long an obstacle that is not seen again is remembered, seconds.
+    """
+
+    def __init__(
+        self,
+        grid: GridMap,
+        cell: float = 0.05,
+        apart: float = 0.25,
+        reach: float = 4.0,
+        keep: float = 120.0,
+    ) -> None:
+        self._cell = cell
+        self._apart = apart
+        self._reach = reach
+        self._keep = keep
+        self._seen: dict[tuple[int, int], float] = {}
+        self.set_map(grid)
+
+    def set_map(self, grid: GridMap) -> None:
+        """Replaces the map; obstacles that it has are the map's from now on."""
+        self._grid = grid
+        self._known = distance_to(grid.occupied, grid.resolution)
+        for cell in list(self._seen):
+            at = (np.array(cell, dtype=float) + 0.5) * self._cell
+            if grid.interpolated(self._known, at)[0] <= self._apart:
+                del self._seen[cell]
+
+    @property
+    def points(self) -> Points:
+        """The obstacles, points of shape (n, 2), metres, map frame."""
+        cells = np.array(sorted(self._seen), dtype=float).reshape(-1, 2)
+        return (cells + 0.5) * self._cell
+
+    def update(self, pose: Pose, scan: Scan, now: float) -> bool:
+        """Takes a scan made at a pose that is to be trusted.
+
+        Returns:
+            Whether the obstacles changed.
+        """
+        before = set(self._seen)
+        self._forget(pose, scan, now)
+        local = scan.points
+        local = local[(local**2).sum(axis=1) <= self._reach**2]
+        cos, sin = math.cos(pose[2]), math.sin(pose[2])
+        points = local @ np.array([[cos, sin], [-sin, cos]]) + pose[:2]
+        inside = self._grid.contains(self._grid.cells_of(points))
+        points = points[inside]
+        new = points[self._grid.interpolated(self._known, points) > self._apart]
+        for column, row in np.unique(np.floor(new / self._cell).astype(int), axis=0):
+            self._seen[int(column), int(row)] = now
+        return set(self._seen) != before
+
+    def _forget(self, pose: Pose, scan: Scan, now: float) -> None:
+        if not self._seen:
+            return
+        cells = list(self._seen)
+        away = (np.array(cells, dtype=float) + 0.5) * self._cell - pose[:2]
+        distance = np.hypot(away[:, 0], away[:, 1])
+        bearing = np.arctan2(away[:, 1], away[:, 0]) - pose[2]
+        count = len(scan.angles)
+        step = float(scan.angles[1] - scan.angles[0]) if count > 1 else math.tau
+        ray = np.round(np.mod(bearing - scan.angles[0] + step / 2, math.tau) / step - 0.5)
+        ray = ray.astype(int)
+        beyond = np.minimum(scan.ranges, scan.range_max)
+        # The neighbours too: a thin obstacle between two rays is not gone.
+        around = [beyond[np.clip(ray + offset, 0, count - 1)] for offset in (-1, 0, 1)]
+        gone = (ray < count) & (np.minimum.reduce(around) > distance + 2 * self._cell)
+        for cell, is_gone in zip(cells, gone, strict=True):
+            if is_gone or now - self._seen[cell] > self._keep:
+                del self._seen[cell]

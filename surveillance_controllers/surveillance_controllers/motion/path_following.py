@@ -1,0 +1,315 @@
+"""Driving along a path with a differential drive: regulated pure pursuit.
+
+The robot steers on the arc to a point of the path some way ahead (pure pursuit, Coulter 1992). Its
+speed is regulated as by Macenski et al., "Regulated Pure Pursuit for Robot Path Tracking"
+(Autonomous Robots, 2023): slower in tight arcs, near obstacles and towards the end. Two things are
+added. How far ahead the point lies follows the path: only as far as the path stays close to the
+straight line to it, so that corners are not cut. And the lidar limits the speed so that the robot
+always can stop before what it sees on its arc.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from surveillance_controllers.geometry import polyline
+from surveillance_controllers.geometry.polyline import Points
+from surveillance_controllers.geometry.poses import Pose, angle_between
+
+
+@dataclass(frozen=True)
+class DriveParameters:
+    """The robot's limits and habits.
+
+    Attributes:
+        radius: Radius of the robot, metres.
+        margin: Gap kept between the robot and what the lidar sees, metres.
+        speed: Top speed, m/s.
+        turn: Top turning speed, rad/s.
+        acceleration: Of the speed, m/s^2.
+        turn_acceleration: Of the turning speed, rad/s^2.
+        shortest_look: Least distance of the point steered to, metres.
+        longest_look: Greatest distance of the point steered to, metres.
+        look_time: The point lies this many seconds ahead at the present speed, within the two.
+        deviation: The path may leave the line to the point by this much, metres.
+        tight_arc: Arcs of a smaller radius than this are driven slower, metres.
+        caution: Where an obstacle is nearer than this to the robot's side, it drives slower,
+            metres.
+        creep: What regulation does not reduce the speed below, m/s.
+        turn_first: Where the point lies further to the side than this, turn on the spot, rad.
+        tolerance: The end is reached within this distance, metres.
+        settle: Towards the end the robot goes the remaining way in this time constant, seconds.
+        latency: Time between seeing and braking, seconds; two periods of the lidar and a half.
+    """
+
+    radius: float = 0.22
+    margin: float = 0.04
+    speed: float = 0.6
+    turn: float = 1.5
+    acceleration: float = 0.8
+    turn_acceleration: float = 3.0
+    shortest_look: float = 0.25
+    longest_look: float = 0.8
+    look_time: float = 1.2
+    deviation: float = 0.05
+    tight_arc: float = 0.6
+    caution: float = 0.25
+    creep: float = 0.1
+    turn_first: float = 0.9
+    tolerance: float = 0.08
+    settle: float = 1.0
+    latency: float = 0.3
+
+
+@dataclass(frozen=True)
+class Velocity:
+    """Speed forwards, m/s, and turning speed anticlockwise, rad/s."""
+
+    speed: float = 0.0
+    turn: float = 0.0
+
+
+@dataclass(frozen=True)
+class Guidance:
+    """What one step of following says.
+
+    Attributes:
+        velocity: The velocity to command.
+        done: The end of the path is reached.
+        blocked: Something seen on the way leaves no room to go on.
+        progress: Way along the path done so far, metres.
+        off_path: Distance from the path, metres.
+    """
+
+    velocity: Velocity
+    done: bool
+    blocked: bool
+    progress: float
+    off_path: float
+
+
+class PathFollower:
+    """Follows one path.
+
+    Args:
+        path: Points of shape (n, 2), n of at least 1, metres.
+        parameters: The robot's limits and habits.
+    """
+
+    def __init__(self, path: ArrayLike, parameters: DriveParameters | None = None) -> None:
+        self.parameters = parameters or DriveParameters()
+        given = np.asarray(path, dtype=float)[:, :2]
+        keep = np.concatenate(([True], np.any(np.diff(given, axis=0) != 0, axis=1)))
+        self.path: Points = given[keep]
+        self._along = polyline.distances_along(self.path)
+        self.progress = 0.0
+        self._velocity = Velocity()
+
+    @property
+    def length(self) -> float:
+        """Length of the path, metres."""
+        return float(self._along[-1])
+
+    def step(self, pose: Pose, seen: Points, dt: float) -> Guidance:
+        """Decides the velocity for the next moment.
+
+        Args:
+            pose: Where the robot is, in the path's frame.
+            seen: What the lidar sees, points in the robot's frame, shape (n, 2), metres.
+            dt: Time since the last step, seconds.
+        """
+        p = self.parameters
+        position = np.array(pose[:2])
+        off_path = self._project(position)
+        to_end = float(np.hypot(*(self.path[-1] - position)))
+        remaining = max(self.length - self.progress, to_end)
+        if to_end <= p.tolerance and self.length - self.progress <= 2 * p.tolerance:
+            self._velocity = Velocity()
+            return Guidance(self._velocity, True, False, self.progress, off_path)
+        target = self._target(position)
+        bearing = math.atan2(target[1] - pose[1], target[0] - pose[0])
+        side = angle_between(pose[2], bearing)
+        if abs(side) > p.turn_first:
+            return self._guide(*self._turn(side, seen, dt), False, off_path)
+        distance = max(float(np.hypot(*(target - position))), 1e-6)
+        curvature = 2 * math.sin(side) / distance
+        wanted = min(
+            p.speed,
+            math.sqrt(2 * p.acceleration * max(remaining, 0.0)),
+            max(remaining / p.settle, p.creep),
+        )
+        if abs(curvature) * p.tight_arc > 1:
+            wanted /= abs(curvature) * p.tight_arc
+        beside = _nearest(seen) - p.radius
+        if beside < p.caution:
+            wanted *= max(beside, 0.0) / p.caution
+        wanted = max(wanted, min(p.creep, remaining / max(dt, 1e-6)))
+        safe = self._safe_speed(seen, curvature, math.inf)
+        blocked = safe < 0.02
+        speed = self._ramped(self._velocity.speed, min(wanted, safe), p.acceleration * dt)
+        speed = min(speed, safe)
+        turn = speed * curvature
+        if abs(turn) > p.turn:
+            turn = math.copysign(p.turn, turn)
+            speed = turn / curvature
+        limited = self._ramped(self._velocity.turn, turn, p.turn_acceleration * dt)
+        if limited != turn:
+            # Until it turns as it should, the robot goes another way than the arc looked at.
+            late = abs(turn - limited) / p.turn_acceleration
+            speed = self._safely(speed, limited, seen, speed * (late + p.latency))
+        return self._guide(speed, limited, blocked, off_path)
+
+    def _safe_speed(self, seen: Points, curvature: float, way: float) -> float:
+        """The speed from which the robot stops before what it sees on an arc, m/s.
+
+        Args:
+            seen: Points in the robot's frame, shape (n, 2), metres.
+            curvature: Of the arc, 1/m.
+            way: How much of the arc is looked at, metres; at most what a stop from top speed takes.
+
+        Returns:
+            At most the top speed, which also stands for: nothing is on that way.
+        """
+        p = self.parameters
+        # Braking begins after the latency, and counts on less than the full deceleration.
+        a, t = 0.8 * p.acceleration, p.latency
+        horizon = min(way, p.speed * t + p.speed**2 / (2 * a) + 0.1)
+        room = room_ahead(seen, curvature, p.radius + p.margin, horizon)
+        if room >= horizon:
+            return p.speed
+        return min(p.speed, max(0.0, math.sqrt((a * t) ** 2 + 2 * a * room) - a * t))
+
+    def _safely(self, speed: float, turn: float, seen: Points, way: float = math.inf) -> float:
+        """The speed, or less where the robot could not stop on the arc that this turn makes."""
+        if speed <= 0.0:
+            return speed
+        return min(speed, self._safe_speed(seen, turn / speed, way))
+
+    def is_clear(self, obstacles: Points, reach: float, ahead: float) -> bool:
+        """Whether the next part of the path keeps away from obstacles.
+
+        Args:
+            obstacles: Points of shape (n, 2), metres, in the path's frame.
+            reach: What it must keep from each, metres.
+            ahead: How much of the path is looked at, metres.
+        """
+        if not len(obstacles):
+            return True
+        end = min(self.progress + ahead, self.length)
+        count = max(2, math.ceil((end - self.progress) / 0.05) + 1)
+        way = polyline.point_at(self.path, np.linspace(self.progress, end, count))
+        gaps = np.hypot(way[:, :1] - obstacles[:, 0], way[:, 1:] - obstacles[:, 1])
+        return bool((gaps >= reach).all())
+
+    def halt(self, seen: Points, dt: float) -> Velocity:
+        """Brakes to a stand, gently unless something is near.
+
+        Args:
+            seen: What the lidar sees, points in the robot's frame, shape (n, 2), metres.
+            dt: Time since the last step, seconds.
+        """
+        p = self.parameters
+        turn = self._ramped(self._velocity.turn, 0.0, p.turn_acceleration * dt)
+        speed = self._ramped(self._velocity.speed, 0.0, p.acceleration * dt)
+        self._velocity = Velocity(self._safely(speed, turn, seen), turn)
+        return self._velocity
+
+    def _guide(self, speed: float, turn: float, blocked: bool, off_path: float) -> Guidance:
+        self._velocity = Velocity(float(speed), float(turn))
+        return Guidance(self._velocity, False, blocked, self.progress, off_path)
+
+    def _turn(self, side: float, seen: Points, dt: float) -> tuple[float, float]:
+        p = self.parameters
+        top = min(p.turn, math.sqrt(2 * p.turn_acceleration * abs(side)))
+        wanted = math.copysign(top, side)
+        turn = self._ramped(self._velocity.turn, wanted, p.turn_acceleration * dt)
+        speed = self._ramped(self._velocity.speed, 0.0, p.acceleration * dt)
+        return self._safely(speed, turn, seen), turn
+
+    @staticmethod
+    def _ramped(now: float, wanted: float, change: float) -> float:
+        return now + min(max(wanted - now, -change), change)
+
+    def _project(self, position: Points) -> float:
+        """Moves the progress to the nearest point of the path ahead; returns the distance to it."""
+        if len(self.path) == 1:
+            return float(np.hypot(*(self.path[0] - position)))
+        # Only a window: where a path comes back past itself, the near leg ahead must not be taken.
+        window = self.progress + 2 * self.parameters.longest_look
+        first = max(0, int(np.searchsorted(self._along, self.progress, side='right')) - 1)
+        last = min(len(self.path) - 1, int(np.searchsorted(self._along, window)))
+        last = max(last, first + 1) if first + 1 < len(self.path) else first
+        if last == first:
+            first -= 1
+        begin, step = self.path[first:last], np.diff(self.path[first : last + 1], axis=0)
+        lengths = np.diff(self._along[first : last + 1])
+        share = ((position - begin) * step).sum(axis=1) / lengths**2
+        share = np.clip(share, 0.0, 1.0)
+        along = np.clip(self._along[first:last] + share * lengths, self.progress, window)
+        share = (along - self._along[first:last]) / lengths
+        gaps = np.hypot(*(begin + np.clip(share, 0, 1)[:, None] * step - position).T)
+        nearest = int(np.argmin(gaps))
+        self.progress = float(max(self.progress, min(along[nearest], self.length)))
+        return float(gaps[nearest])
+
+    def _target(self, position: Points) -> Points:
+        p = self.parameters
+        look = min(max(self._velocity.speed * p.look_time, p.shortest_look), p.longest_look)
+        ahead = polyline.point_at(self.path, self.progress + np.linspace(0.0, look, 9))
+        first = max(1, math.ceil(8 * p.shortest_look / look))
+        for index in range(8, first, -1):
+            line = ahead[index] - position
+            between = ahead[1:index] - position
+            across = np.abs(line[0] * between[:, 1] - line[1] * between[:, 0])
+            if (across <= p.deviation * max(float(np.hypot(*line)), 1e-9)).all():
+                return np.asarray(ahead[index])
+        return np.asarray(ahead[first])
+
+
+def _nearest(seen: Points) -> float:
+    return float(np.sqrt((seen**2).sum(axis=1).min())) if len(seen) else math.inf
+
+
+def room_ahead(seen: Points, curvature: float, reach: float, horizon: float) -> float:
+    """How far the robot can go on an arc before a point comes within `reach` of its centre.
+
+    A point that is within reach already only counts where going on brings it closer, so that a
+    robot that stands too near to something can leave it.
+
+    Args:
+        seen: Points in the robot's frame, shape (n, 2), metres.
+        curvature: Of the arc, positive to the left, 1/m.
+        reach: Radius to be kept free, metres.
+        horizon: Longest way looked at, metres.
+
+    Returns:
+        Metres along the arc, at most `horizon`.
+    """
+    if not len(seen):
+        return horizon
+    near = seen[(np.abs(seen) <= horizon + reach).all(axis=1)]
+    if not len(near):
+        return horizon
+    way = np.linspace(0.0, horizon, max(2, math.ceil(horizon / 0.04)) + 1)
+    if abs(curvature) < 1e-6:
+        arc = np.stack([way, np.zeros_like(way)], axis=1)
+    else:
+        angle = way * curvature
+        # Beyond a half turn the robot comes back; it will not go that far on one arc.
+        arc = np.stack([np.sin(angle), 1 - np.cos(angle)], axis=1) / curvature
+        arc = arc[np.abs(angle) <= math.pi]
+    gap = np.hypot(near[:, 0] - arc[:, :1], near[:, 1] - arc[:, 1:])
+    hit = gap < np.minimum(reach, gap[0] - 1e-3)
+    hit[0] = False
+    blocked = hit.any(axis=1)
+    if not blocked.any():
+        return horizon
+    index = int(np.argmax(blocked))
+    before, after = gap[index - 1, hit[index]], gap[index, hit[index]]
+    bound = np.minimum(reach, gap[0, hit[index]])
+    share = np.clip((before - bound) / np.maximum(before - after, 1e-9), 0.0, 1.0).min()
+    return float(way[index - 1] + share * (way[1] - way[0]))

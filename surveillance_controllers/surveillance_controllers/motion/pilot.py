@@ -1,0 +1,202 @@
+"""A robot's sense of place and its steering in one: sensors go in, a velocity comes out.
+
+The pilot keeps the estimate of the pose, remembers obstacles that the map does not have, knows the
+place the robot is in, and carries out one task at a time: a `Drive` or a `Spin`. It knows no ROS;
+who feeds it takes care that calls do not overlap.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from surveillance_controllers.geometry.polyline import Points
+from surveillance_controllers.geometry.poses import Pose
+from surveillance_controllers.motion.driving import Drive, Spin
+from surveillance_controllers.motion.localisation import LocalisationParameters, Localiser
+from surveillance_controllers.motion.obstacle_memory import ObstacleMemory
+from surveillance_controllers.motion.path_following import Velocity
+from surveillance_controllers.motion.place_regions import PlaceRegions, Segment
+from surveillance_controllers.motion.scans import Scan
+from surveillance_controllers.planning.grid_map import GridMap, with_walls
+
+SETTLE_SECONDS = 0.2
+"""A place counts once the robot has been in it for this long, so that a doorway does not
+flicker."""
+
+
+class Pilot:
+    """What drives one robot.
+
+    Args:
+        doors: All doors by name, as segments; they divide the map into places.
+        localisation: How the pose is estimated.
+        guesses: Where the robot may be at first, beside where its odometry says.
+
+    Attributes:
+        task: What is carried out at the moment.
+        obstacles_changed: Set when the obstacles changed; the reader clears it.
+        place: The place the robot is in; None while that is not known.
+    """
+
+    def __init__(
+        self,
+        doors: Mapping[str, Segment] | None = None,
+        localisation: LocalisationParameters | None = None,
+        guesses: Iterable[Pose] = (),
+    ) -> None:
+        self._doors = dict(doors or {})
+        self._closed: frozenset[str] = frozenset()
+        self._localisation = localisation
+        self._guesses = tuple(guesses)
+        self._positions: dict[str, Points] = {}
+        self._grid: GridMap | None = None
+        self._localiser: Localiser | None = None
+        self._memory: ObstacleMemory | None = None
+        self._regions: PlaceRegions | None = None
+        self._odometry: Pose | None = None
+        self._believed: Pose | None = None
+        self._candidate: tuple[str | None, float] | None = None
+        self.task: Drive | Spin | None = None
+        self.obstacles_changed = False
+        self.place: str | None = None
+
+    @property
+    def missing(self) -> str | None:
+        """What has not come yet of what the pilot needs; None when it is ready."""
+        if self._grid is None:
+            return 'map'
+        if self._odometry is None:
+            return 'odom'
+        return None if self._localiser is not None else 'scan'
+
+    @property
+    def pose(self) -> Pose | None:
+        """Where the robot is, map frame; None until it is ready."""
+        return None if self._localiser is None else self._localiser.pose
+
+    @property
+    def odometry(self) -> Pose | None:
+        """The last reading of the odometry."""
+        return self._odometry
+
+    @property
+    def jumps(self) -> int:
+        """How often the robot found itself elsewhere than it thought."""
+        return 0 if self._localiser is None else self._localiser.jumps
+
+    @property
+    def lost(self) -> bool:
+        """Whether the robot does not know where it is."""
+        return self._localiser is not None and self._localiser.lost
+
+    @property
+    def obstacles(self) -> Points:
+        """Obstacles that the map does not have, shape (n, 2), metres, map frame."""
+        return np.zeros((0, 2)) if self._memory is None else self._memory.points
+
+    def set_map(self, grid: GridMap) -> None:
+        """Takes the map, or another one."""
+        self._grid = grid
+        self._redraw()
+        self._divide()
+
+    def set_closed(self, doors: Iterable[str]) -> None:
+        """Takes which doors are closed: the lidar sees them as walls."""
+        closed = frozenset(doors) & self._doors.keys()
+        if closed != self._closed:
+            self._closed = closed
+            self._redraw()
+
+    def set_positions(self, positions: Mapping[str, ArrayLike]) -> None:
+        """Takes the places: a point in each, metres."""
+        self._positions = {name: np.asarray(at, float)[:2] for name, at in positions.items()}
+        self._divide()
+
+    def believe(self, pose: Pose) -> None:
+        """Takes where the robot is said to be."""
+        self._believed = pose
+        if self._localiser is not None:
+            self._localiser.believe(pose)
+
+    def move(self, odometry: Pose) -> None:
+        """Takes a reading of the odometry."""
+        self._odometry = odometry
+        if self._localiser is not None:
+            self._localiser.move(odometry)
+
+    def see(self, scan: Scan, now: float) -> Velocity | None:
+        """Takes a scan and decides what to do.
+
+        Args:
+            scan: What the lidar sees from where the robot is.
+            now: The time, seconds.
+
+        Returns:
+            The velocity to command; None when there is no task, or something is missing yet.
+        """
+        if self._grid is None or self._odometry is None:
+            return None
+        if self._localiser is None:
+            self._localiser = self._first_localiser(scan, self._odometry)
+        if self._localiser.see(scan, now) and self._localiser.certain:
+            self._remember(scan, now)
+        if self._localiser.plausible:
+            self._settle_place(now)
+        pose = self._localiser.pose
+        if isinstance(self.task, Drive):
+            return self.task.step(now, pose, scan.points, lost=self._localiser.lost)
+        if isinstance(self.task, Spin):
+            return self.task.step(pose[2])
+        return None
+
+    def _first_localiser(self, scan: Scan, odometry: Pose) -> Localiser:
+        """Begins where the robot is said to be, or else where its first scan fits best."""
+        localiser = Localiser(self._seen_map, odometry, self._localisation)
+        if self._believed is not None:
+            localiser.believe(self._believed)
+        else:
+            # The first of equals: the odometry.
+            fits = [localiser.explained(pose, scan) for pose in (odometry, *self._guesses)]
+            localiser.believe((odometry, *self._guesses)[fits.index(max(fits))])
+        localiser.move(odometry)
+        return localiser
+
+    def _remember(self, scan: Scan, now: float) -> None:
+        assert self._localiser is not None
+        if self._memory is not None and self._memory.update(self._localiser.pose, scan, now):
+            self.obstacles_changed = True
+            if isinstance(self.task, Drive):
+                self.task.heed(self._memory.points)
+
+    def _settle_place(self, now: float) -> None:
+        if self._regions is None or self._localiser is None:
+            return
+        place = self._regions.place_at(self._localiser.pose[:2])
+        if self._candidate is None or self._candidate[0] != place:
+            self._candidate = place, now
+        if self.place is None or now - self._candidate[1] >= SETTLE_SECONDS:
+            self.place = place
+
+    def _redraw(self) -> None:
+        if self._grid is None:
+            return
+        self._seen_map = with_walls(self._grid, [self._doors[name] for name in self._closed])
+        if self._memory is None:
+            self._memory = ObstacleMemory(self._seen_map)
+        else:
+            self._memory.set_map(self._seen_map)
+        self.obstacles_changed = True
+        if self._localiser is not None:
+            self._localiser.set_map(self._seen_map)
+
+    def _divide(self) -> None:
+        if self._grid is not None and self._positions:
+            self._regions = PlaceRegions(self._grid, self._doors.values(), self._positions)
+            self._candidate = None
+
+    def place_at(self, point: ArrayLike) -> str | None:
+        """The place that a point belongs to; None when it is in none, or there is no map yet."""
+        return None if self._regions is None else self._regions.place_at(point)

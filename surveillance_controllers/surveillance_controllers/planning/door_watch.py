@@ -1,0 +1,108 @@
+"""Which doors are closed: by their own contacts, and by the ontology.
+
+What the contacts report (topic `door_states`) is told to the map builder, so that a closed door
+leaves the ontology and comes back with it. A door that the ontology has on one side only, because
+somebody closed it there, is closed for the planner as well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from surveillance_controllers.map_knowledge import KnowledgeError, MapKnowledge
+from surveillance_controllers.motion.place_regions import Segment
+from surveillance_interfaces.msg import DoorStates
+from surveillance_interfaces.srv import SetDoor
+from surveillance_runtime.calls import CallFailed, ServiceCaller
+from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.qos import STATE_QOS
+from surveillance_runtime.waiting import Interrupt
+
+RETRY_PERIOD = 1.0
+"""Pause before a peer that did not answer is asked again, seconds."""
+
+
+class DoorWatch:
+    """The doors' states.
+
+    Args:
+        node: The node that watches.
+        segments: Where the doors are.
+        knowledge: Map and ontology.
+        timeout: Deadline of each call, seconds of steady time.
+    """
+
+    def __init__(
+        self,
+        node: PatrolNode,
+        segments: Mapping[str, Segment],
+        knowledge: MapKnowledge,
+        timeout: float,
+    ) -> None:
+        self._node = node
+        self._segments = dict(segments)
+        self._knowledge = knowledge
+        self._timeout = timeout
+        self._contacts: frozenset[str] = frozenset()
+        self._told: frozenset[str] = frozenset()
+        self._news = Interrupt()
+        self._set_door = ServiceCaller(node, SetDoor, 'ontology_map/set_door')
+        node.create_subscription(DoorStates, 'door_states', self._on_states, STATE_QOS)
+        node.stopping.subscribe(self._news.set)
+        node.spawn(self._work, name='door watch')
+
+    def rooms_of(self, interrupt: Interrupt) -> dict[str, set[str]]:
+        """The places that each door leads into; empty while the ontology does not say.
+
+        Blocks for the ontology's answer, so it belongs on a worker thread.
+        """
+        if not self._knowledge.connected:
+            return {}
+        try:
+            return self._knowledge.doors(interrupt)
+        except KnowledgeError as error:
+            self._node.get_logger().warn(f'doors as their contacts report them: {error}')
+            return {}
+
+    def closed(self, rooms_of: Mapping[str, set[str]]) -> frozenset[str]:
+        """The doors that are closed, by their contacts or because they join no two places."""
+        half = {door for door in self._segments if len(rooms_of.get(door, ())) < 2}
+        return self._contacts | half if rooms_of else self._contacts
+
+    def closed_segments(self, interrupt: Interrupt) -> dict[str, Segment]:
+        """Where the closed doors are; blocks as `rooms_of` does."""
+        closed = self.closed(self.rooms_of(interrupt))
+        return {door: self._segments[door] for door in closed if door in self._segments}
+
+    def _on_states(self, message: DoorStates) -> None:
+        self._contacts = frozenset(message.closed)
+        self._news.set()
+
+    def _work(self) -> None:
+        stopping = self._node.stopping
+        while not stopping.is_set():
+            self._news.clear()
+            if stopping.is_set():
+                return
+            if self._catch_up():
+                self._news.wait()
+            else:
+                stopping.wait(RETRY_PERIOD)
+
+    def _catch_up(self) -> bool:
+        """Subscribes to the ontology's doors and tells it of the contacts; whether all went
+        well."""
+        try:
+            self._knowledge.connect(self._node.stopping)
+            for door in sorted(self._contacts ^ self._told):
+                self._tell(door, is_open=door not in self._contacts)
+        except (KnowledgeError, CallFailed):
+            return False
+        return True
+
+    def _tell(self, door: str, *, is_open: bool) -> None:
+        request = SetDoor.Request(door=door, open=is_open)
+        answer = self._set_door.call(request, self._timeout, self._node.stopping)
+        self._told = self._told - {door} if is_open else self._told | {door}
+        if not answer.success:
+            self._node.get_logger().warn(f'door {door}: {answer.message}')

@@ -1,0 +1,142 @@
+"""A map as a grid of cells, and how far each point of it is from what the robot must not touch.
+
+Cells are those of nav_msgs/OccupancyGrid: row 0 lies in the south, column 0 in the west; 0 is free,
+100 occupied, -1 unknown. A point is x, y in metres in the map's frame; arrays of points have shape
+(n, 2).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from surveillance_controllers.geometry.polyline import Points
+
+OCCUPIED = 100
+"""The value of a cell that certainly is occupied."""
+
+OCCUPIED_FROM = 65
+"""Cells of this value and above are taken as occupied, as map_server and AMCL do by default."""
+
+
+@dataclass(frozen=True, eq=False)
+class GridMap:
+    """A map.
+
+    Attributes:
+        cells: Occupancy, shape (rows, columns), int8.
+        resolution: Side of a cell, metres.
+        origin: South-west corner of row 0, column 0: x, y in metres.
+
+    Raises:
+        ValueError: The cells are no such array, or the resolution is not above 0.
+    """
+
+    cells: NDArray[np.int8]
+    resolution: float
+    origin: tuple[float, float]
+
+    def __post_init__(self) -> None:
+        if self.cells.ndim != 2 or 0 in self.cells.shape:
+            raise ValueError(f'a map of shape {self.cells.shape}: expected rows and columns')
+        if not self.resolution > 0:
+            raise ValueError(f'a map of resolution {self.resolution}: expected more than 0 m')
+
+    @property
+    def occupied(self) -> NDArray[np.bool_]:
+        """Where something is, shape (rows, columns)."""
+        return np.asarray(self.cells >= OCCUPIED_FROM)
+
+    @property
+    def free(self) -> NDArray[np.bool_]:
+        """Where nothing is, as far as known, shape (rows, columns)."""
+        return np.asarray((self.cells >= 0) & (self.cells < OCCUPIED_FROM))
+
+    def cells_of(self, points: ArrayLike) -> NDArray[np.intp]:
+        """Row and column of each point, shape (n, 2); they may lie outside of the map."""
+        xy = np.asarray(points, dtype=float).reshape(-1, 2)
+        columns_rows = np.nan_to_num(np.floor((xy - self.origin) / self.resolution), nan=-1.0)
+        # Far outside is outside: no larger number survives the conversion.
+        cells: NDArray[np.intp] = np.clip(columns_rows, -1, 2**40).astype(np.intp)[:, ::-1]
+        return cells
+
+    def centres_of(self, cells: ArrayLike) -> Points:
+        """The centre of each cell (row, column), shape (n, 2), metres."""
+        rows_columns = np.asarray(cells, dtype=float).reshape(-1, 2)
+        return np.asarray((rows_columns[:, ::-1] + 0.5) * self.resolution + self.origin)
+
+    def contains(self, cells: ArrayLike) -> NDArray[np.bool_]:
+        """Which cells (row, column) lie on the map, shape (n,)."""
+        rows_columns = np.asarray(cells).reshape(-1, 2)
+        return np.asarray(((rows_columns >= 0) & (rows_columns < self.cells.shape)).all(axis=1))
+
+    def interpolated(self, field: NDArray[np.float32], points: ArrayLike) -> Points:
+        """The values of a field of the map's shape at points, bilinear between cell centres.
+
+        Outside of the map the value is that of the nearest cell.
+
+        Returns:
+            Shape (n,).
+        """
+        xy = np.asarray(points, dtype=float).reshape(-1, 2)
+        column = np.clip((xy[:, 0] - self.origin[0]) / self.resolution - 0.5, 0, None)
+        row = np.clip((xy[:, 1] - self.origin[1]) / self.resolution - 0.5, 0, None)
+        rows, columns = self.cells.shape
+        row, column = np.minimum(row, rows - 1), np.minimum(column, columns - 1)
+        low_row = np.minimum(row.astype(np.intp), max(rows - 2, 0))
+        low_column = np.minimum(column.astype(np.intp), max(columns - 2, 0))
+        up, right = row - low_row, column - low_column
+        high_row = np.minimum(low_row + 1, rows - 1)
+        high_column = np.minimum(low_column + 1, columns - 1)
+        south = field[low_row, low_column] * (1 - right) + field[low_row, high_column] * right
+        north = field[high_row, low_column] * (1 - right) + field[high_row, high_column] * right
+        return np.asarray(south * (1 - up) + north * up, dtype=float)
+
+
+def distance_to(mask: NDArray[np.bool_], resolution: float) -> NDArray[np.float32]:
+    """How far each cell's centre is from the centre of the nearest cell of `mask`, metres.
+
+    Where `mask` is empty, the distance is infinite.
+    """
+    if not mask.any():
+        return np.full(mask.shape, np.inf, dtype=np.float32)
+    away = cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    return np.asarray(away * np.float32(resolution), dtype=np.float32)
+
+
+def drawn_lines(grid: GridMap, lines: ArrayLike) -> NDArray[np.bool_]:
+    """The cells that line segments run through.
+
+    Args:
+        grid: The map.
+        lines: Segments x1, y1, x2, y2, shape (n, 4), metres.
+
+    Returns:
+        Shape of the map; a line is at least one cell wide and has no gaps.
+    """
+    mask = np.zeros(grid.cells.shape, dtype=np.bool_)
+    for x1, y1, x2, y2 in np.asarray(lines, dtype=float).reshape(-1, 4):
+        length = float(np.hypot(x2 - x1, y2 - y1))
+        steps = max(2, int(np.ceil(2 * length / grid.resolution)) + 1)
+        share = np.linspace(0.0, 1.0, steps)[:, None]
+        mask |= marked(grid, (1 - share) * (x1, y1) + share * (x2, y2))
+    return mask
+
+
+def with_walls(grid: GridMap, lines: ArrayLike) -> GridMap:
+    """The map with further walls: segments x1, y1, x2, y2, shape (n, 4), metres."""
+    cells = grid.cells.copy()
+    cells[drawn_lines(grid, lines)] = OCCUPIED
+    return GridMap(cells, grid.resolution, grid.origin)
+
+
+def marked(grid: GridMap, points: ArrayLike) -> NDArray[np.bool_]:
+    """The cells that points lie in; points outside of the map are left out."""
+    mask = np.zeros(grid.cells.shape, dtype=np.bool_)
+    cells = grid.cells_of(points)
+    inside = cells[grid.contains(cells)]
+    mask[inside[:, 0], inside[:, 1]] = True
+    return mask

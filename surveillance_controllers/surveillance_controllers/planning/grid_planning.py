@@ -1,0 +1,376 @@
+"""Paths over an occupancy grid for a round robot: inflation, search, smoothing, and what blocks.
+
+The free cells are those whose centre keeps the robot's radius and a margin from everything that is
+not free. Among them, cells near obstacles cost more, so that a path keeps to the middle of a
+passage where there is room. The search is scikit-image's `MCP_Geometric` (Dijkstra's algorithm with
+the cost of a step its length times the mean cost of its two cells), which finds the cheapest path
+over the eight neighbours. Straight shortcuts that are no dearer replace the steps of the grid, and
+corners are rounded as far as the free space allows.
+
+Dijkstra's algorithm is kept in favour of a faster A* such as pyastar2d's: that one takes a diagonal
+step for as long as a straight one, so that its paths are longer and ignore the room beside them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import pairwise
+
+import cv2
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from skimage.graph import MCP_Geometric
+
+from surveillance_controllers.geometry import polyline
+from surveillance_controllers.geometry.polyline import Points
+from surveillance_controllers.planning.grid_map import GridMap, distance_to, drawn_lines, marked
+
+Lines = Mapping[str, tuple[float, float, float, float]]
+"""Named segments x1, y1, x2, y2, metres."""
+
+_THROUGH = 1e4
+"""Cost of a blocked cell in the search for what blocks; more than any detour."""
+
+
+class NoPath(Exception):
+    """There is no path; the text says why: what blocks it, or which point is not free."""
+
+
+@dataclass(frozen=True)
+class PlanningParameters:
+    """How close to obstacles a path may run, and how much it shuns them.
+
+    Attributes:
+        radius: Radius of the robot, metres.
+        margin: What a path keeps beyond the radius, metres; at least 0.71 cells, so that a
+            diagonal step between two free cells grazes nothing.
+        comfort: Beyond radius and margin, room up to this distance makes a cell cheaper, metres.
+        aversion: How many times dearer than an open cell one at the margin is, minus one.
+        escape: A start that is not free may be left over at most this distance, metres.
+        goal_shift: A goal on which an obstacle stands is moved by at most this distance, metres.
+        corner: Longest part of a straight line that rounding a corner may take, metres.
+    """
+
+    radius: float = 0.22
+    margin: float = 0.05
+    comfort: float = 0.5
+    aversion: float = 3.0
+    escape: float = 0.6
+    goal_shift: float = 1.0
+    corner: float = 0.5
+
+
+@dataclass
+class _Costs:
+    clearance: NDArray[np.float32]
+    cost: NDArray[np.float32]
+    regions: NDArray[np.int32]
+
+    @cached_property
+    def search(self) -> MCP_Geometric:
+        # It copies the costs into its own layout, which takes about as long as a short search.
+        return MCP_Geometric(self.cost)
+
+
+@dataclass
+class GridPlanner:
+    """Finds paths on one map, with doors closed and obstacles seen since; one call at a time.
+
+    Args:
+        grid: The map.
+        parameters: The robot's size and habits.
+    """
+
+    grid: GridMap
+    parameters: PlanningParameters = field(default_factory=PlanningParameters)
+    _closed: Lines = field(default_factory=dict, init=False)
+    _obstacles: Points = field(default_factory=lambda: np.zeros((0, 2)), init=False)
+    _costs: _Costs = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._static = self._distance(~self.grid.free)
+        self._update()
+
+    def set_closed(self, doors: Lines) -> None:
+        """Closes doors: nothing leads across their segments. Replaces what was closed before."""
+        if dict(doors) != dict(self._closed):
+            self._closed = dict(doors)
+            self._update()
+
+    def set_obstacles(self, points: ArrayLike) -> None:
+        """Takes obstacles that the map does not have, points of shape (n, 2) on their surface."""
+        array = np.asarray(points, dtype=float).reshape(-1, 2)
+        if not np.array_equal(array, self._obstacles):
+            self._obstacles = array
+            self._update()
+
+    @property
+    def cost(self) -> NDArray[np.float32]:
+        """What the search works on: each cell's cost, -1 where the robot cannot be."""
+        return self._costs.cost
+
+    def clearance(self, points: ArrayLike) -> Points:
+        """How far points are from everything that is not free, shape (n,), metres.
+
+        A lower bound, to within a part of a cell: what is not free fills its cells.
+        """
+        return self.grid.interpolated(self._costs.clearance, points)
+
+    def is_free(self, path: ArrayLike) -> bool:
+        """Whether the robot can go along a path, shape (n, 2), without touching anything."""
+        samples = _samples(np.asarray(path, dtype=float), self.grid.resolution / 2)
+        inside = self.grid.contains(self.grid.cells_of(samples)).all()
+        return bool(inside and (self.clearance(samples) >= self.parameters.radius).all())
+
+    def plan(self, start: ArrayLike, goal: ArrayLike) -> Points:
+        """Finds the way from one point to another.
+
+        Args:
+            start: x, y in metres; when it is not free, the path leaves it by the shortest way.
+            goal: x, y in metres; when an obstacle that the map does not have stands there, the
+                path ends as near to it as it can.
+
+        Returns:
+            The path, shape (n, 2), n of at least 2, both points included.
+
+        Raises:
+            NoPath: There is none; the text says what blocks it.
+        """
+        begin: Points = np.asarray(start, dtype=float)[:2]
+        end: Points = np.asarray(goal, dtype=float)[:2]
+        goal_cell = self._cell('the goal', end)
+        start_cell = self._free_cell_near(begin)
+        if self._costs.regions[goal_cell] == 0:
+            goal_cell = self._cell_beside(end, goal_cell, start_cell)
+            end = self.grid.centres_of(goal_cell)[0]
+        if self._costs.regions[start_cell] != self._costs.regions[goal_cell]:
+            raise NoPath(
+                f'no path from {_shown(begin)} to {_shown(end)}: '
+                f'{self._what_blocks(start_cell, goal_cell)}'
+            )
+        cells = self._search(start_cell, goal_cell)
+        path = self.grid.centres_of(cells)
+        path[0] = begin if self._is_free_at(begin) else path[0]
+        path[-1] = end
+        path = self._rounded(self._shortened(path))
+        return path if np.array_equal(path[0], begin) else np.vstack([begin, path])
+
+    def _distance(self, mask: NDArray[np.bool_]) -> NDArray[np.float32]:
+        # From a cell's centre to the edge of the nearest cell that is not free.
+        away = distance_to(mask, self.grid.resolution)
+        return np.asarray(away - np.float32(self.grid.resolution / 2), dtype=np.float32)
+
+    def _update(self) -> None:
+        p = self.parameters
+        clearance = self._static
+        extra = drawn_lines(self.grid, list(self._closed.values()))
+        extra |= marked(self.grid, self._obstacles)
+        if extra.any():
+            clearance = np.minimum(clearance, self._distance(extra))
+        spare = clearance - np.float32(p.radius + p.margin)
+        free = spare >= 0
+        crowded = np.clip(1 - spare / np.float32(max(p.comfort, 1e-6)), 0, 1)
+        price = 1 + np.float32(p.aversion) * crowded * crowded
+        cost = np.where(free, price, np.float32(-1))
+        _, regions = cv2.connectedComponents(free.astype(np.uint8), connectivity=8)
+        self._costs = _Costs(clearance, cost, regions)
+
+    def _cell(self, what: str, point: Points) -> tuple[int, int]:
+        cell = self.grid.cells_of(point)
+        if not np.isfinite(point).all() or not self.grid.contains(cell)[0]:
+            rows, columns = self.grid.cells.shape
+            west, south = self.grid.origin
+            east = west + columns * self.grid.resolution
+            north = south + rows * self.grid.resolution
+            raise NoPath(
+                f'{what} {_shown(point)} lies outside of the map, which goes from '
+                f'({west:.2f}, {south:.2f}) to ({east:.2f}, {north:.2f})'
+            )
+        return int(cell[0, 0]), int(cell[0, 1])
+
+    def _is_free_at(self, point: Points) -> bool:
+        return bool(self.clearance(point)[0] >= self.parameters.radius)
+
+    def _free_cell_near(self, start: Points) -> tuple[int, int]:
+        row, column = self._cell('the start', start)
+        if self._costs.regions[row, column] != 0:
+            return row, column
+        if not self.grid.free[row, column]:
+            raise NoPath(f'the start {_shown(start)} {self._why_not_free(start)}')
+        reach = int(np.ceil(self.parameters.escape / self.grid.resolution))
+        first_row, first_column = max(0, row - reach), max(0, column - reach)
+        window = self._costs.regions[first_row : row + reach + 1, first_column : column + reach + 1]
+        found = np.argwhere(window > 0) + np.array([first_row, first_column])
+        gaps = np.hypot(*(found - (row, column)).T)
+        for index in np.argsort(gaps, kind='stable'):
+            if gaps[index] > reach:
+                break
+            if self._can_escape(start, self.grid.centres_of(found[index])[0]):
+                return int(found[index, 0]), int(found[index, 1])
+        raise NoPath(f'the start {_shown(start)} {self._why_not_free(start)}')
+
+    def _cell_beside(
+        self, goal: Points, cell: tuple[int, int], start: tuple[int, int]
+    ) -> tuple[int, int]:
+        """The cell nearest to a goal that an obstacle covers, among those that can be reached."""
+        needed = self.parameters.radius + self.parameters.margin
+        if self._static[cell] >= needed:
+            reach = int(self.parameters.goal_shift / self.grid.resolution)
+            first_row, first_column = max(0, cell[0] - reach), max(0, cell[1] - reach)
+            window = self._costs.regions[
+                first_row : cell[0] + reach + 1, first_column : cell[1] + reach + 1
+            ]
+            found = np.argwhere(window == self._costs.regions[start])
+            found += np.array([first_row, first_column])
+            gaps = np.hypot(*(found - np.array(cell)).T)
+            if len(gaps) and gaps.min() <= reach:
+                nearest = found[int(np.argmin(gaps))]
+                return int(nearest[0]), int(nearest[1])
+        raise NoPath(f'the goal {_shown(goal)} {self._why_not_free(goal)}')
+
+    def _can_escape(self, start: Points, end: Points) -> bool:
+        """Whether the way out only leads away from what is near: it must never come closer."""
+        clearance = self.clearance(_samples(np.array([start, end]), self.grid.resolution / 2))
+        return bool((np.diff(clearance) > -self.grid.resolution / 4).all())
+
+    def _why_not_free(self, point: Points) -> str:
+        cell = self.grid.cells_of(point)
+        row, column = int(cell[0, 0]), int(cell[0, 1])
+        if self.grid.occupied[row, column]:
+            return 'lies inside a wall'
+        if not self.grid.free[row, column]:
+            return 'lies where the map is unknown'
+        needed = self.parameters.radius + self.parameters.margin
+        near = f'{max(0.0, float(self._costs.clearance[row, column])):.2f} m from '
+        if self._static[row, column] < needed:
+            what = 'a wall'
+        else:
+            what = self._nearest_extra(point)
+        return f'is {near}{what}: expected at least {needed:.2f} m'
+
+    def _nearest_extra(self, point: Points) -> str:
+        gaps = {
+            f'the closed door {name}': float(
+                np.hypot(*(polyline.equally_spaced(_ends(line), 0.05) - point).T).min()
+            )
+            for name, line in self._closed.items()
+        }
+        if len(self._obstacles):
+            index = int(np.argmin(np.hypot(*(self._obstacles - point).T)))
+            obstacle = self._obstacles[index]
+            gaps[f'an obstacle at {_shown(obstacle)}'] = float(np.hypot(*(obstacle - point)))
+        return min(gaps, key=lambda name: gaps[name])
+
+    def _what_blocks(self, start: tuple[int, int], goal: tuple[int, int]) -> str:
+        """Names what lies on the path that would be taken if doors and obstacles were not there."""
+        needed = np.float32(self.parameters.radius + self.parameters.margin)
+        cost = np.where(self._costs.cost > 0, self._costs.cost, np.float32(_THROUGH))
+        cost = np.where(self._static >= needed, cost, np.float32(-1))
+        search = MCP_Geometric(cost)
+        try:
+            search.find_costs([start], [goal])
+            cells = np.asarray(search.traceback(goal))
+        except ValueError:
+            return 'walls lie between them, with no opening wide enough'
+        path = self.grid.centres_of(cells)
+        blocked = path[self._costs.cost[cells[:, 0], cells[:, 1]] < 0]
+        return self._nearest_extra(blocked[len(blocked) // 2]) + ' is in the way'
+
+    def _search(self, start: tuple[int, int], goal: tuple[int, int]) -> NDArray[np.intp]:
+        search = self._costs.search
+        search.find_costs([start], [goal])
+        return np.asarray(search.traceback(goal), dtype=np.intp)
+
+    def _shortened(self, path: Points) -> Points:
+        """Replaces steps of the grid by straight lines that are free and no dearer."""
+        path = path[_corners(path)]
+        dear = np.array([self._price(first, last) for first, last in pairwise(path)])
+        dear = np.concatenate(([0.0], np.cumsum(dear)))
+        kept = [0]
+        while kept[-1] < len(path) - 1:
+            at = kept[-1]
+            good, reach = at + 1, 2
+            # Ever longer lines until one is not good, then the limit between by halving.
+            while at + reach < len(path) and self._is_line(path, at, at + reach, dear):
+                good = at + reach
+                reach *= 2
+            bad = min(at + reach, len(path))
+            while bad - good > 1:
+                middle = (good + bad) // 2
+                if self._is_line(path, at, middle, dear):
+                    good = middle
+                else:
+                    bad = middle
+            kept.append(good)
+        return np.asarray(path[kept])
+
+    def _is_line(self, path: Points, first: int, last: int, dear: Points) -> bool:
+        price = self._price(path[first], path[last])
+        return price <= float(dear[last] - dear[first]) * 1.02 + 1e-6
+
+    def _price(self, begin: Points, end: Points) -> float:
+        """What the straight line between two points costs; infinite where it is not free."""
+        (x, y), (dx, dy) = begin, end - begin
+        length = math.hypot(dx, dy)
+        count = math.ceil(2 * length / self.grid.resolution) + 1
+        share = np.arange(count) / max(1, count - 1)
+        scale = 1.0 / self.grid.resolution
+        west, south = self.grid.origin
+        columns = (((x - west) + share * dx) * scale).astype(np.intp)
+        rows = (((y - south) + share * dy) * scale).astype(np.intp)
+        costs = self._costs.cost[rows, columns]
+        # The ends are the start's and the goal's own, which may be nearer to something.
+        if count > 2 and costs[1:-1].min() < 0:
+            return math.inf
+        return float(np.abs(costs).sum()) / count * length
+
+    def _rounded(self, path: Points) -> Points:
+        """Rounds each corner by a quadratic Bezier curve, as far as that is free."""
+        result = [path[:1]]
+        for before, corner, after in zip(path, path[1:], path[2:], strict=False):
+            reach = self.parameters.corner
+            arms = [min(reach, float(np.hypot(*(end - corner))) / 2) for end in (before, after)]
+            result.append(self._round(before, corner, after, arms))
+        result.append(path[-1:])
+        return np.vstack(result)
+
+    def _round(self, before: Points, corner: Points, after: Points, arms: list[float]) -> Points:
+        for _ in range(3):
+            entry = corner + (before - corner) * (arms[0] / math.dist(before, corner))
+            leave = corner + (after - corner) * (arms[1] / math.dist(after, corner))
+            # The curve is shorter than its two arms: samples are at most half a cell apart.
+            count = 2 * math.ceil(sum(arms) / self.grid.resolution) + 1
+            share = np.arange(count)[:, None] / (count - 1)
+            curve = (1 - share) ** 2 * entry + 2 * share * (1 - share) * corner + share**2 * leave
+            cells = ((curve - self.grid.origin) / self.grid.resolution).astype(np.intp)
+            if self._costs.cost[cells[:, 1], cells[:, 0]].min() > 0:
+                step = max(1, count // 6)
+                return np.vstack([curve[:-1:step], curve[-1:]])
+            arms = [arm / 2 for arm in arms]
+        return corner[None, :]
+
+
+def _corners(path: Points) -> NDArray[np.intp]:
+    """Where a path of cells changes its direction, and its two ends."""
+    if len(path) < 3:
+        return np.arange(len(path))
+    steps = np.diff(path, axis=0)
+    turns = np.flatnonzero(np.abs(np.diff(steps, axis=0)).max(axis=1) > 1e-9) + 1
+    return np.concatenate(([0], turns, [len(path) - 1]))
+
+
+def _ends(line: tuple[float, float, float, float]) -> Points:
+    return np.array(line, dtype=float).reshape(2, 2)
+
+
+def _samples(path: Points, spacing: float) -> Points:
+    if len(path) == 1:
+        return path
+    return polyline.equally_spaced(path, spacing) if len(path) else path
+
+
+def _shown(point: Points) -> str:
+    return f'({point[0]:.2f}, {point[1]:.2f})'

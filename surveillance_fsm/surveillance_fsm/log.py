@@ -1,0 +1,51 @@
+"""Where the engine's words go: the four log functions, replaceable with `set_loggers`.
+
+By default they feed the standard logger ``surveillance_fsm``. `chatty` tells whether
+anybody reads the info level, so that the engine formats nothing that nobody sees.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from typing import Any
+
+Logger = Callable[[str], Any]
+
+_standard = logging.getLogger('surveillance_fsm')
+_loggers: dict[str, Logger] = {}
+
+
+def loginfo(msg: object) -> None:
+    """Log at level info."""
+    _loggers.get('info', _standard.info)(str(msg))
+
+
+def logwarn(msg: object) -> None:
+    """Log at level warning."""
+    _loggers.get('warn', _standard.warning)(str(msg))
+
+
+def logdebug(msg: object) -> None:
+    """Log at level debug."""
+    _loggers.get('debug', _standard.debug)(str(msg))
+
+
+def logerr(msg: object) -> None:
+    """Log at level error."""
+    _loggers.get('error', _standard.error)(str(msg))
+
+
+def set_loggers(info: Logger, warn: Logger, debug: Logger, error: Logger) -> None:
+    """Replace the four log functions (in SMACH's order of arguments)."""
+    _loggers.update(info=info, warn=warn, debug=debug, error=error)
+
+
+def reset_loggers() -> None:
+    """Go back to the standard ``logging`` logger."""
+    _loggers.clear()
+
+
+def chatty() -> bool:
+    """Whether transitions are worth a line: the info level is read by somebody."""
+    return 'info' in _loggers or _standard.isEnabledFor(logging.INFO)

@@ -1,0 +1,1 @@
+"""OWL's own terms as records: axioms, expressions, entities."""

@@ -1,0 +1,135 @@
+"""The asserted axioms of a knowledge base, by what they mention, and which changed since when."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from surveillance_ontology.owl.axioms import (
+    Annotation,
+    Assertion,
+    Axiom,
+    AxiomAnnotation,
+    DataPropertyAssertion,
+    Declaration,
+    DifferentIndividuals,
+    ObjectPropertyAssertion,
+    SameIndividual,
+    SubClassOf,
+)
+from surveillance_ontology.owl.entities import entities_of
+from surveillance_ontology.owl.expressions import Literal
+from surveillance_ontology.owl.vocabulary import THING
+
+
+class Assertions:
+    """A set of axioms.
+
+    Attributes:
+        axioms: All of them, oldest first.
+        about: The axioms that mention an entity.
+        literals: The values asserted for a data property (first) of an individual (second).
+        added, removed: What changed about individuals since `settle`.
+        schema_changed: Whether anything else that matters to a reasoner changed since `settle`.
+    """
+
+    def __init__(self) -> None:
+        self.axioms: dict[Axiom, None] = {}
+        self.about: dict[str, dict[Axiom, None]] = {}
+        self.literals: dict[tuple[str, str], dict[Literal, None]] = {}
+        self.added: dict[Axiom, None] = {}
+        self.removed: dict[Axiom, None] = {}
+        self.schema_changed = True
+        self._notes: dict[Axiom, dict[AxiomAnnotation, None]] = {}
+
+    def settle(self) -> tuple[tuple[Axiom, ...], tuple[Axiom, ...]]:
+        """Takes what was added and removed; from here on, nothing changed."""
+        changes = tuple(self.added), tuple(self.removed)
+        self.added.clear()
+        self.removed.clear()
+        self.schema_changed = False
+        return changes
+
+    def mentioning(self, entity: str) -> Iterable[Axiom]:
+        """The axioms that mention an entity."""
+        return self.about.get(entity, ())
+
+    def insert(self, axiom: Axiom) -> bool:
+        """Asserts an axiom; False when it was asserted already."""
+        if axiom in self.axioms:
+            return False
+        self.axioms[axiom] = None
+        for entity in _mentioned(axiom):
+            mentions = self.about.get(entity)
+            if mentions is None:
+                self.about[entity] = {axiom: None}
+            else:
+                mentions[axiom] = None
+        if type(axiom) is DataPropertyAssertion:
+            self.literals.setdefault((axiom.prop, axiom.subject), {})[axiom.literal] = None
+        if is_assertion(axiom):
+            if axiom in self.removed:
+                del self.removed[axiom]
+            else:
+                self.added[axiom] = None
+        elif isinstance(axiom, AxiomAnnotation):
+            self._notes.setdefault(axiom.axiom, {})[axiom] = None
+        elif _is_schema(axiom):
+            self.schema_changed = True
+        return True
+
+    def discard(self, axiom: Axiom) -> bool:
+        """Retracts an axiom and what annotates it; False when it was not asserted."""
+        if axiom not in self.axioms:
+            return False
+        if self._notes:
+            for note in tuple(self._notes.get(axiom, ())):
+                self.discard(note)
+        del self.axioms[axiom]
+        for entity in _mentioned(axiom):
+            mentions = self.about.get(entity)
+            if mentions is not None:
+                mentions.pop(axiom, None)
+                if not mentions:
+                    del self.about[entity]
+        if type(axiom) is DataPropertyAssertion:
+            written = self.literals[axiom.prop, axiom.subject]
+            del written[axiom.literal]
+            if not written:
+                del self.literals[axiom.prop, axiom.subject]
+        if is_assertion(axiom):
+            if axiom in self.added:
+                del self.added[axiom]
+            else:
+                self.removed[axiom] = None
+        elif isinstance(axiom, AxiomAnnotation):
+            notes = self._notes[axiom.axiom]
+            del notes[axiom]
+            if not notes:
+                del self._notes[axiom.axiom]
+        elif _is_schema(axiom):
+            self.schema_changed = True
+        return True
+
+
+def _mentioned(axiom: Axiom) -> Iterable[str]:
+    kind = type(axiom)
+    if kind is DataPropertyAssertion:
+        return (axiom.prop, axiom.subject)  # type: ignore[attr-defined]
+    if kind is ObjectPropertyAssertion:
+        return (axiom.prop, axiom.subject, axiom.object)  # type: ignore[attr-defined]
+    if kind is DifferentIndividuals or kind is SameIndividual:
+        return axiom.individuals  # type: ignore[attr-defined, no-any-return]
+    return {iri for _, iri in entities_of(axiom)}
+
+
+def is_assertion(axiom: Axiom) -> bool:
+    """Whether an axiom is about individuals; the declaration of one is."""
+    if isinstance(axiom, Declaration):
+        return axiom.kind == 'individual'
+    return isinstance(axiom, Assertion)
+
+
+def _is_schema(axiom: Axiom) -> bool:
+    if isinstance(axiom, SubClassOf):
+        return axiom.sup != THING
+    return not isinstance(axiom, Declaration | Annotation)

@@ -1,0 +1,91 @@
+"""The entities that axioms and expressions mention, each with the kind it is mentioned as."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import fields
+from typing import Any
+
+from surveillance_ontology.owl.axioms import Declaration, Import
+from surveillance_ontology.owl.expressions import Literal, Variable
+
+# The kind of entity a string field stands for, by field name; fields of class expressions, property
+# expressions and data ranges recurse. 'individual' wins over the rest in assertions.
+_ROLE_OF_FIELD = {
+    'cls': 'class',
+    'classes': 'class',
+    'sub': 'class',
+    'sup': 'class',
+    'filler': 'class',
+    'operand': 'class',
+    'operands': 'class',
+    'domain': 'class',
+    'individual': 'individual',
+    'individuals': 'individual',
+    'subject': 'individual',
+    'object': 'individual',
+    'argument': 'individual',
+    'datatype': 'datatype',
+}
+_OBJECT, _DATA = 'object_property', 'data_property'
+
+
+_ROLES: dict[type, tuple[tuple[str, str], ...]] = {}
+
+
+def roles_of(record: type) -> tuple[tuple[str, str], ...]:
+    """For each field of a record type, the entity kind a bare `str` in it stands for, or ''."""
+    roles = _ROLES.get(record)
+    if roles is None:
+        roles = _ROLES[record] = _roles_of(record)
+    return roles
+
+
+def _roles_of(record: type[Any]) -> tuple[tuple[str, str], ...]:
+    name = record.__name__
+    data = name.startswith('Data') or 'Data' in name
+    pairs = []
+    for entry in fields(record):
+        role = _ROLE_OF_FIELD.get(entry.name, '')
+        if entry.name in ('prop', 'props', 'chain'):
+            role = 'annotation_property' if name == 'AnnotationAssertion' else ''
+            role = role or (_DATA if data else _OBJECT)
+        elif entry.name in ('sub', 'sup') and 'Property' in name:
+            role = _DATA if data else _OBJECT
+        elif entry.name in ('first', 'second'):
+            role = _OBJECT if name == 'InverseObjectProperties' else 'individual'
+        elif entry.name == 'object_props':
+            role = _OBJECT
+        elif entry.name == 'data_props':
+            role = _DATA
+        elif entry.name == 'range':
+            role = 'class' if name == 'ObjectPropertyRange' else 'datatype'
+        elif data and entry.name in ('operand', 'operands'):
+            role = 'datatype'
+        elif (entry.name == 'subject' and name == 'AnnotationAssertion') or entry.name == 'value':
+            role = 'annotated'
+        pairs.append((entry.name, role))
+    return tuple(pairs)
+
+
+def entities_of(record: object) -> Iterator[tuple[str, str]]:
+    """Every entity a record mentions, as pairs (kind, IRI), with repeats.
+
+    `kind` is one of `axioms.KINDS`, or 'annotated' for the IRIs of an annotation.
+    """
+    if isinstance(record, Declaration):
+        yield record.kind, record.iri
+        return
+    if isinstance(record, (Literal, Variable, Import, str)):
+        return
+    for name, role in roles_of(type(record)):
+        value = getattr(record, name)
+        if name in ('annotations', 'facets'):
+            continue
+        parts = value if isinstance(value, (tuple, frozenset)) else (value,)
+        for part in parts:
+            if isinstance(part, str):
+                if role:
+                    yield role, part
+            elif not isinstance(part, (int, Literal, Variable)):
+                yield from entities_of(part)

@@ -1,0 +1,25 @@
+from setuptools import find_packages, setup
+
+package_name = 'surveillance_operator'
+
+setup(
+    name=package_name,
+    version='0.1.0',
+    packages=find_packages(),
+    package_data={'': ['py.typed']},
+    data_files=[
+        ('share/ament_index/resource_index/packages', ['resource/' + package_name]),
+        ('share/' + package_name, ['package.xml']),
+    ],
+    zip_safe=True,
+    maintainer='Surveillance robot maintainers',
+    maintainer_email='surveillance@example.com',
+    description='What a person looks at and types: watching, console, drawing places.',
+    license='Apache-2.0',
+    entry_points={
+        'console_scripts': [
+            'console = surveillance_operator.console_node:main',
+            'mission_view = surveillance_operator.mission_view_node:main',
+        ],
+    },
+)

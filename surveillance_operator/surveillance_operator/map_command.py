@@ -1,0 +1,158 @@
+"""The command `map`: checks a place and draws it, after a run with the run in it."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NoReturn
+
+from surveillance_behaviour.mission import record as mission_record
+from surveillance_behaviour.policy.graph import PatrolGraph
+from surveillance_runtime.place import Place
+from surveillance_runtime.yaml_file import YamlFileError
+from surveillance_simulation.floor_plan import FloorPlan
+from surveillance_simulation.place_file import read_world
+from surveillance_simulation.place_picture import Run, draw_place
+from surveillance_simulation.world.textures import TextureError, marker_panel
+
+EXIT_BAD_INPUT = 2
+_SUFFIXES = ('.png', '.jpg', '.jpeg', '.webp')
+
+
+class CommandError(Exception):
+    """What was asked for cannot be done; the message is one line."""
+
+
+class _Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> NoReturn:
+        raise CommandError(f'{message} (see {self.prog} --help)')
+
+
+def graph_over_doors(plan: FloorPlan) -> PatrolGraph:
+    """Return the graph of a place, each leg as long as the way over the middle of the door, metres.
+
+    Where two doors join the same places, the shorter way counts.
+    """
+    place = plan.place
+    legs: dict[str, dict[str, float]] = {name: {} for name in place.rooms}
+    for name, (first, second) in place.doors.items():
+        door = plan.doors[name]
+        length = sum(
+            math.dist(place.positions[room][:2], (door.x, door.y)) for room in (first, second)
+        )
+        length = min(length, legs[first].get(second, math.inf))
+        legs[first][second] = legs[second][first] = length
+    return PatrolGraph(legs)
+
+
+def facts(plan: FloorPlan) -> str:
+    """Return what there is to say about a place in one line."""
+    parts = [_count(len(plan.place.rooms), 'place'), _count(len(plan.doors), 'door')]
+    if plan.markers:
+        parts.append(_count(len(plan.markers), 'marker'))
+    tour = graph_over_doors(plan).tour
+    if tour.exact:
+        parts.append(f'shortest tour {tour.length:.1f} m')
+    else:
+        parts.append(f'tour {tour.length:.1f} m (none is shorter than {tour.bound:.1f} m)')
+    return ' · '.join(parts)
+
+
+def run_of(events: Sequence[mission_record.Event], place: Place, source: str) -> Run:
+    """Return what a mission's record adds to the picture of its place.
+
+    Raises:
+        CommandError: The record is of another place, or empty.
+    """
+    summary = mission_record.summarize(events)
+    if not summary.visits:
+        raise CommandError(f'{source}: nothing was recorded')
+    unknown = sorted(set(summary.visits) - set(place.rooms))
+    if unknown:
+        raise CommandError(
+            f"{source}: visits '{unknown[0]}', which the place does not have; "
+            f'expected the record of a run through {", ".join(place.rooms)}'
+        )
+    hours, seconds = divmod(round(summary.seconds), 3600)
+    lasted = f'{hours} h {seconds // 60} min' if hours else f'{seconds // 60} min {seconds % 60} s'
+    line = ' · '.join(
+        (
+            f'{lasted} of patrol',
+            _count(sum(summary.visits.values()), 'visit'),
+            f'{summary.distance:.0f} m driven',
+            _count(summary.recharges, 'recharge'),
+        )
+    )
+    return Run(list(_driven(events, place)), summary.unvisited, summary.visits, line)
+
+
+def _driven(
+    events: Sequence[mission_record.Event], place: Place
+) -> list[list[tuple[float, float]]]:
+    """Return the ways driven; where the record does not have one, it is the straight line."""
+    ways = []
+    here: tuple[float, float] | None = None
+    for event in events:
+        if event.name == 'start':
+            here = place.positions[event.text('place')][:2]
+        elif event.name == 'visit':
+            there = place.positions[event.text('place')][:2]
+            path = event.fields.get('path')
+            if isinstance(path, list) and len(path) > 1:
+                ways.append([(float(point[0]), float(point[1])) for point in path])
+            elif here is not None:
+                ways.append([here, there])
+            here = there
+    return ways
+
+
+def _count(number: int, word: str) -> str:
+    return f'{number} {word}{"" if number == 1 else "s"}'
+
+
+def _parse(argv: Sequence[str]) -> argparse.Namespace:
+    parser = _Parser(prog='launch.py map', description='Checks a place and draws it as a picture.')
+    parser.add_argument('place', type=Path, metavar='FILE', help='the place, a file of config/')
+    parser.add_argument(
+        '--record', type=Path, metavar='RUN.jsonl', help='draw this run through the place'
+    )
+    parser.add_argument(
+        '-o', '--output', type=Path, metavar='PNG', help='the picture (default: FILE.png here)'
+    )
+    return parser.parse_args(argv)
+
+
+def _draw(options: argparse.Namespace) -> list[str]:
+    world = read_world(options.place)
+    for marker in world.plan.markers.values():
+        marker_panel(world.plan.marker_dictionary, marker.id, 'whole')
+    output: Path = options.output or Path(options.place.stem + '.png')
+    if output.suffix.lower() not in _SUFFIXES:
+        raise CommandError(f'{output}: expected a picture, one of *{", *".join(_SUFFIXES)}')
+    run = None
+    lines = [f'{options.place}: {facts(world.plan)}']
+    if options.record:
+        events = mission_record.read(options.record)
+        run = run_of(events, world.plan.place, str(options.record))
+        lines.append(f'{options.record}: {run.summary}')
+    title = options.place.stem.replace('_', ' ')
+    picture = draw_place(world, title[:1].upper() + title[1:], facts(world.plan), run)
+    try:
+        picture.save(output)
+    except OSError as error:
+        raise CommandError(f'{output}: {error.strerror or error}') from None
+    return [*lines, f'drawn: {output}']
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Check a place, draw it, and say what was found; the exit code is 2 for bad input."""
+    try:
+        lines = _draw(_parse(sys.argv[1:] if argv is None else argv))
+    except (CommandError, YamlFileError, TextureError, mission_record.RecordError) as error:
+        print(f'map: {error}', file=sys.stderr)
+        return EXIT_BAD_INPUT
+    print('\n'.join(lines))
+    return 0

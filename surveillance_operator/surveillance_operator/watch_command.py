@@ -1,0 +1,76 @@
+"""The `watch` command: shows a running mission in this terminal."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from typing import NoReturn
+
+from rclpy.exceptions import InvalidNamespaceException
+from rclpy.validate_namespace import validate_namespace
+
+from surveillance_operator import mission_view_node
+from surveillance_runtime.domains import LAST_DOMAIN
+
+EXIT_BAD_INPUT = 2
+
+
+class _Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> NoReturn:
+        self.exit(EXIT_BAD_INPUT, f'watch: {message} (see {self.prog} --help)\n')
+
+
+def _parse(argv: Sequence[str] | None) -> argparse.Namespace:
+    parser = _Parser(
+        prog='launch.py watch',
+        description='Shows a running mission, simulated or real, until Ctrl-C: the map with robot, '
+        'doors and obstacles, what the robot does and why. Where the output is no terminal, it '
+        'prints a line for each change.',
+    )
+    parser.add_argument('--namespace', default='', metavar='NAME', help="the robot's namespace")
+    parser.add_argument(
+        '--domain',
+        type=int,
+        metavar='N',
+        help="the mission's ROS domain, 0 to 101 (default: ROS_DOMAIN_ID, else 0)",
+    )
+    parser.add_argument('--once', action='store_true', help='print one picture and end')
+    parser.add_argument(
+        '--timeout',
+        type=float,
+        default=5.0,
+        metavar='SECONDS',
+        help='with --once: longest wait for a mission (default: %(default)g)',
+    )
+    options = parser.parse_args(argv)
+    if options.domain is not None and not 0 <= options.domain <= LAST_DOMAIN:
+        parser.error(f'--domain {options.domain}: expected a number from 0 to {LAST_DOMAIN}')
+    if not 0.1 <= options.timeout < 1e9:
+        parser.error(f'--timeout {options.timeout:g}: expected 0.1 seconds or more')
+    try:
+        options.namespace = options.namespace and '/' + options.namespace.strip('/')
+        validate_namespace(options.namespace or '/')
+    except InvalidNamespaceException:
+        parser.error(f'--namespace {options.namespace}: expected letters, digits and _ like robot1')
+    return options
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Watch until Ctrl-C; with --once the exit code is 1 when there was no mission to be seen."""
+    options = _parse(argv)
+    if options.domain is not None:
+        os.environ['ROS_DOMAIN_ID'] = str(options.domain)
+    # As in the nodes' own processes: shared memory that a killed one left behind hides others.
+    os.environ.setdefault('FASTDDS_BUILTIN_TRANSPORTS', 'UDPv4')
+    # What ROS logs would stand in the middle of the picture.
+    arguments = ['--ros-args', '--disable-stdout-logs']
+    arguments += ['-p', f'once:={str(options.once).lower()}', '-p', f'timeout:={options.timeout}']
+    if options.namespace:
+        arguments += ['-r', f'__ns:={options.namespace}']
+    return mission_view_node.main(arguments)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,1 @@
+"""The arm that carries the camera."""

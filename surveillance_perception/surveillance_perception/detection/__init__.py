@@ -1,0 +1,1 @@
+"""Markers in pictures: detection, pose, confirmation."""

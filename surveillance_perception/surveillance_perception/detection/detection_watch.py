@@ -1,0 +1,141 @@
+"""One camera stream as the detector sees it: pictures in; detections, poses and new ids out."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from surveillance_perception.detection.camera_model import Array, CameraModel
+from surveillance_perception.detection.confirmation import Confirmation
+from surveillance_perception.detection.detector import Detection, DetectorSettings, MarkerDetector
+from surveillance_perception.detection.pose import MarkerPose, pose_of
+from surveillance_perception.stream.picture_files import Picture
+
+
+def sizes_from(entries: Sequence[str]) -> dict[int, float]:
+    """Marker sizes by id from entries such as '14:0.3' (metres).
+
+    Raises:
+        ValueError: An entry is not an id and a positive size.
+    """
+    sizes = {}
+    for entry in entries:
+        marker_id, _, size = entry.partition(':')
+        try:
+            sizes[int(marker_id)] = float(size)
+        except ValueError:
+            raise ValueError(f"'{entry}' is not 'id:size in metres', such as '14:0.3'") from None
+        if not 0.0 < sizes[int(marker_id)] < 100.0:
+            raise ValueError(f"'{entry}': a size must be positive")
+    return sizes
+
+
+@dataclass(frozen=True)
+class WatchSettings:
+    """How detections of a stream are judged.
+
+    Attributes:
+        detector: What to look for.
+        size: Side of a marker's black square, metres.
+        sizes: The same for ids that differ.
+        known_frames: Pictures that must show an id of the known list before it is confirmed.
+        unknown_frames: The same for any other id.
+    """
+
+    detector: DetectorSettings = field(default_factory=DetectorSettings)
+    size: float = 0.2
+    sizes: Mapping[int, float] = field(default_factory=dict)
+    known_frames: int = 2
+    unknown_frames: int = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Sighting:
+    """A marker in one picture of the stream."""
+
+    detection: Detection
+    pose: MarkerPose | None
+    size: float
+    confirmed: bool
+
+
+@dataclass
+class Statistics:
+    """What the stream was like since the last look at it."""
+
+    pictures: int = 0
+    seconds: float = 0.0
+    refused: int = 0
+    last_error: str = ''
+
+    @property
+    def mean_milliseconds(self) -> float:
+        """Time for a picture; 0 without any."""
+        return 1e3 * self.seconds / self.pictures if self.pictures else 0.0
+
+
+class DetectionWatch:
+    """Detects in picture after picture; what was seen in one is expected in the next."""
+
+    def __init__(self, settings: WatchSettings) -> None:
+        self.statistics = Statistics()
+        self._confirmation = Confirmation(settings.known_frames, settings.unknown_frames)
+        self._expected: list[Array] = []
+        self._settings = settings
+        self._detector = MarkerDetector(settings.detector)
+
+    @property
+    def confirmed(self) -> frozenset[int]:
+        """All ids confirmed so far."""
+        return self._confirmation.confirmed
+
+    def adopt(self, settings: WatchSettings) -> None:
+        """Go on with other settings; confirmed ids stay so, unless the dictionary changes.
+
+        Raises:
+            ValueError: The settings do not fit each other.
+        """
+        detector = MarkerDetector(settings.detector)
+        before = frozenset[int]()
+        if settings.detector.dictionary == self._settings.detector.dictionary:
+            before = self._confirmation.confirmed
+        self._confirmation = Confirmation(
+            settings.known_frames, settings.unknown_frames, confirmed=before
+        )
+        self._settings, self._detector = settings, detector
+
+    def look(self, picture: Picture, camera: CameraModel) -> tuple[list[Sighting], list[int]]:
+        """Detect in the next picture.
+
+        Returns:
+            What it shows, and the ids that it confirms for the first time.
+
+        Raises:
+            ValueError: The picture is not as a detector takes it.
+        """
+        start = time.perf_counter()
+        detections = self._detector.detect(picture, self._expected)
+        self._expected = [np.array(detection.corners) for detection in detections]
+        new = self._confirmation.picture((each.marker_id, each.known) for each in detections)
+        confirmed = self._confirmation.confirmed
+        sightings = []
+        for detection in detections:
+            size = self._settings.sizes.get(detection.marker_id, self._settings.size)
+            pose = pose_of(detection.corners, size, camera)
+            sightings.append(Sighting(detection, pose, size, detection.marker_id in confirmed))
+        self.statistics.pictures += 1
+        self.statistics.seconds += time.perf_counter() - start
+        return sightings, new
+
+    def refuse(self, error: str) -> None:
+        """Take note of a picture that could not be used."""
+        self.statistics.refused += 1
+        self.statistics.last_error = error
+
+    def take_statistics(self) -> Statistics:
+        """The statistics since the last call, which begin anew."""
+        taken, self.statistics = self.statistics, Statistics()
+        return taken

@@ -1,0 +1,196 @@
+"""Finding ArUco markers in pictures, also where they are small, oblique, blurred, dark or noisy.
+
+The way from a picture to markers:
+
+1. `prepare` stretches a dark picture and smooths a noisy one.
+2. `dark_masks` and `quads_around` propose quadrilaterals, `RingTest` keeps those with a white
+   margin, a black border and something inside.
+3. `TemplateFit` compares each with every code of the dictionary through the camera's blur, aligns
+   the likely ones with the picture, and tries stronger blur where the fit is poor.
+4. A reading is accepted by its correlation and by its lead over the second best code: a lower lead
+   is enough for an id on the known list than for any other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from surveillance_perception.detection.dictionaries import MarkerCodes, dictionary_named
+from surveillance_perception.detection.marker_reading import MarkerReader, Readings
+from surveillance_perception.detection.picture_preparation import Grey, PreparedPicture, prepare
+from surveillance_perception.detection.picture_sampling import (
+    Array,
+    PicturePyramid,
+    corners_of,
+    homographies_of,
+)
+from surveillance_perception.detection.quads import Quads, dark_masks, distinct, quads_around
+from surveillance_perception.detection.ring_test import RingTest
+
+_SAME_QUAD = 1.0
+_SAME_MARKER = 0.5
+_LARGE_CELL = 8.0
+
+
+@dataclass(frozen=True)
+class DetectorSettings:
+    """What to look for, and how hard.
+
+    Attributes:
+        dictionary: Name of one of OpenCV's dictionaries.
+        known_ids: Ids that are expected; None when none is more likely than another.
+        windows: Sides in pixels of the neighbourhoods a border is compared with, odd.
+        bridges: Gaps in pixels that are closed for markers seen at a flat angle.
+        contrast: Grey levels by which a border must be darker than its neighbourhood.
+        min_length: Longer side in pixels of the smallest marker.
+        max_outlines: Dark outlines after which no further neighbourhood or bridge is tried.
+        max_candidates: How many quadrilaterals of a picture are read, the likeliest first.
+        blur: Standard deviation in pixels of the lens's blur.
+        least_correlation: Correlation with the picture that a reading needs, 0 to 1.
+        least_inner_correlation: The same over the code's own cells.
+        known_lead: How many times less than the second best code the best one must leave
+            unexplained, when its id is known.
+        unknown_lead: The same for any other id.
+    """
+
+    dictionary: str = 'DICT_5X5_100'
+    known_ids: frozenset[int] | None = None
+    windows: tuple[int, ...] = (15, 31)
+    bridges: tuple[int, ...] = (5, 7)
+    contrast: float = 7.0
+    min_length: float = 8.0
+    max_outlines: int = 400
+    max_candidates: int = 16
+    blur: float = 0.8
+    least_correlation: float = 0.85
+    least_inner_correlation: float = 0.8
+    known_lead: float = 2.2
+    unknown_lead: float = 3.0
+
+    def __post_init__(self) -> None:
+        if not self.windows or any(each < 3 or each % 2 == 0 for each in self.windows):
+            raise ValueError(f'windows must be odd and at least 3, got {list(self.windows)}')
+        if any(each < 2 for each in self.bridges):
+            raise ValueError(f'bridges must be at least 2 pixels, got {list(self.bridges)}')
+
+
+@dataclass(frozen=True, eq=False)
+class Detection:
+    """A marker in one picture.
+
+    Attributes:
+        marker_id: Its id.
+        corners: (4, 2) pixels, clockwise from the marker's own top left corner.
+        confidence: 0 to 1: its correlation, less the share by which the second best code does
+            nearly as well.
+        known: Whether its id is on the known list (always when there is no list).
+    """
+
+    marker_id: int
+    corners: Array
+    confidence: float
+    known: bool
+
+
+@dataclass
+class MarkerDetector:
+    """Finds the markers of one dictionary in pictures; keeps nothing from one to the next."""
+
+    settings: DetectorSettings = field(default_factory=DetectorSettings)
+
+    def __post_init__(self) -> None:
+        dictionary = dictionary_named(self.settings.dictionary)
+        if self.settings.known_ids is not None:
+            MarkerCodes.of(dictionary, self.settings.known_ids)
+        self._reader = MarkerReader(MarkerCodes.of(dictionary), self.settings.blur)
+        self._ring = RingTest(self._reader.codes.side)
+
+    def detect(
+        self, picture: npt.NDArray[np.uint8], expected: Sequence[Array] = ()
+    ) -> list[Detection]:
+        """Markers in a picture.
+
+        Args:
+            picture: (height, width) grey levels or (height, width, 3) BGR.
+            expected: Corners (4, 2) where markers were in the picture before.
+
+        Raises:
+            ValueError: The picture is empty, not of 8 bits, or of another shape.
+        """
+        prepared = prepare(picture)
+        pyramid = PicturePyramid(prepared.grey)
+        quads = self._candidates(prepared, pyramid)
+        if len(expected):
+            quads = np.concatenate([np.asarray(expected, dtype=float), quads])
+        if not len(quads):
+            return []
+        readings = self._reader.read(pyramid, homographies_of(quads))
+        return self._accepted(readings, prepared.grey)
+
+    def _candidates(self, prepared: PreparedPicture, pyramid: PicturePyramid) -> Quads:
+        settings = self.settings
+        contrast = max(settings.contrast, 2.5 * prepared.noise)
+        masks = dark_masks(prepared.smooth, settings.windows, contrast, settings.bridges)
+        quads = quads_around(masks, min_length=settings.min_length, limit=settings.max_outlines)
+        if not len(quads):
+            return quads
+        correlation = self._ring.correlation(pyramid, homographies_of(quads), contrast)
+        order = np.argsort(-correlation)
+        quads = quads[order[correlation[order] > 0.0][: 4 * settings.max_candidates]]
+        return np.asarray(quads[distinct(quads, _SAME_QUAD)][: settings.max_candidates])
+
+    def _accepted(self, readings: Readings, grey: Grey) -> list[Detection]:
+        settings, codes = self.settings, self._reader.codes
+        ids = codes.ids[readings.entries]
+        known = np.ones(len(ids), bool)
+        if settings.known_ids is not None:
+            known = np.isin(ids, list(settings.known_ids))
+            lead = np.where(known, settings.known_lead, settings.unknown_lead)
+        else:
+            lead = np.full(len(ids), settings.unknown_lead)
+        accepted = (
+            (readings.correlation > settings.least_correlation)
+            & (readings.inner > settings.least_inner_correlation)
+            & (readings.lead > lead)
+        )
+        confidence = readings.correlation * (1.0 - 1.0 / np.maximum(readings.lead, 1.0))
+        chosen = np.flatnonzero(accepted)
+        chosen = chosen[np.argsort(-confidence[chosen])]
+        corners = corners_of(readings.homographies)
+        detections: list[Detection] = []
+        for index in chosen:
+            outline = np.roll(corners[index], -int(codes.turns[readings.entries[index]]), axis=0)
+            if any(_overlap(outline, other.corners) for other in detections):
+                continue
+            outline = _sharpened(outline, grey, codes.side)
+            detections.append(
+                Detection(int(ids[index]), outline, float(confidence[index]), bool(known[index]))
+            )
+        return detections
+
+
+def _sharpened(outline: Array, grey: Grey, side: int) -> Array:
+    """Corners of a large marker, which was read from halved pictures, found in the whole one."""
+    cell = float(np.linalg.norm(np.roll(outline, -1, axis=0) - outline, axis=1).min()) / side
+    if cell < _LARGE_CELL:
+        return outline
+    reach = (min(int(cell / 2.5), 8),) * 2
+    limits = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 20, 0.01)
+    start = outline.astype(np.float32).reshape(-1, 1, 2)
+    refined = cv2.cornerSubPix(grey, start.copy(), reach, (-1, -1), limits)
+    moved = np.linalg.norm(refined - start, axis=2)
+    return np.where(moved[:, :, None] < cell / 2.0, refined, start).reshape(4, 2).astype(float)
+
+
+def _overlap(first: Array, second: Array) -> bool:
+    """Whether the middle of one outline lies well within the other."""
+    reach = min(
+        np.linalg.norm(first - first.mean(axis=0), axis=1).mean(),
+        np.linalg.norm(second - second.mean(axis=0), axis=1).mean(),
+    )
+    return bool(np.linalg.norm(first.mean(axis=0) - second.mean(axis=0)) < _SAME_MARKER * reach)

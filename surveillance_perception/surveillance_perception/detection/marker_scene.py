@@ -1,0 +1,281 @@
+"""Pictures of marker panels with known truth, for measuring a detector against one's own camera.
+
+A panel (a white sheet with an ArUco marker in its middle) is warped by its exact homography into
+a supersampled patch, averaged down to pixels, and put in front of a backdrop. What a lens and a
+sensor do to it (`Degradation`) comes last. Every random number comes from the caller's generator.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from surveillance_perception.detection.camera_model import Array, CameraModel
+
+Picture = npt.NDArray[np.uint8]
+
+BACKDROPS = ('plain', 'clouds', 'bricks', 'boards', 'boxes', 'letters', 'stripes', 'leaves')
+_SUPERSAMPLING = 8
+_WHITE, _BLACK = 225.0, 25.0
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A marker on a white sheet, seen from a camera.
+
+    Attributes:
+        marker_id: Id within the dictionary.
+        distance: Metres from the camera to the marker's centre.
+        turn: Angle in radians between the panel's normal and the line of sight.
+        size: Side of the marker's black square in metres.
+        axis: Direction in the picture of the axis it is turned about (pi/2: vertical).
+        roll: Rotation about the line of sight, radians.
+        offset: Pixel of the marker's centre, from the picture's centre.
+        margin: White border in cells of the marker.
+    """
+
+    marker_id: int
+    distance: float
+    turn: float = 0.0
+    size: float = 0.2
+    axis: float = math.pi / 2
+    roll: float = 0.0
+    offset: tuple[float, float] = (0.0, 0.0)
+    margin: float = 1.5
+
+
+@dataclass(frozen=True)
+class Degradation:
+    """What happens between the scene and the pixel values.
+
+    Attributes:
+        blur: Standard deviation of the lens blur in pixels.
+        motion: Length in pixels of a motion streak, and `direction` its angle in radians.
+        light: Factor on the brightness before the sensor (0.1: a dark room, 3: overexposed).
+        slope: Brightness falls from 1 + slope on the left to 1 - slope on the right.
+        noise: Standard deviation of the sensor's noise in grey levels.
+    """
+
+    blur: float = 0.5
+    motion: float = 0.0
+    direction: float = 0.0
+    light: float = 1.0
+    slope: float = 0.0
+    noise: float = 2.0
+
+
+def corners_in_camera(panel: Panel, camera: CameraModel) -> Array:
+    """Marker corners (4, 3) in metres in the optical frame, clockwise from the top left one."""
+    return _panel_points(panel, camera, panel.size / 2.0)
+
+
+def corners_in_picture(panel: Panel, camera: CameraModel) -> Array:
+    """Marker corners (4, 2) in pixels, clockwise from the marker's own top left one."""
+    return camera.project(corners_in_camera(panel, camera))
+
+
+def picture_of(
+    panels: list[Panel],
+    camera: CameraModel,
+    dictionary: cv2.aruco.Dictionary,
+    backdrop: npt.NDArray[np.float32],
+    degradation: Degradation,
+    generator: np.random.Generator,
+) -> Picture:
+    """A grey picture (height, width) of the panels in front of a backdrop."""
+    scene = backdrop.copy()
+    for panel in sorted(panels, key=lambda each: -each.distance):
+        _paste(scene, panel, camera, dictionary)
+    return degrade(scene, degradation, generator)
+
+
+def degrade(
+    scene: npt.NDArray[np.float32], degradation: Degradation, generator: np.random.Generator
+) -> Picture:
+    """Light, lens, motion and sensor applied to a scene of grey levels."""
+    result = scene
+    if degradation.blur > 0:
+        result = cv2.GaussianBlur(result, (0, 0), degradation.blur)
+    if degradation.motion > 1:
+        result = cv2.filter2D(result, -1, _streak(degradation.motion, degradation.direction))
+    if degradation.slope:
+        ramp = np.linspace(1 + degradation.slope, 1 - degradation.slope, scene.shape[1])
+        result = result * ramp.astype(np.float32)
+    result = result * degradation.light
+    if degradation.noise > 0:
+        grain = generator.standard_normal(result.shape, dtype=np.float32)
+        result = result + np.float32(degradation.noise) * grain
+    return np.asarray(np.clip(np.rint(result), 0, 255), dtype=np.uint8)
+
+
+def backdrop_of(
+    kind: str, camera: CameraModel, generator: np.random.Generator
+) -> npt.NDArray[np.float32]:
+    """Grey levels (height, width) of a background without any marker.
+
+    Args:
+        kind: One of `BACKDROPS`.
+        camera: Gives the size.
+        generator: Source of every random choice.
+
+    Raises:
+        ValueError: `kind` is unknown.
+    """
+    shape = (camera.height, camera.width)
+    level = generator.uniform(90, 170)
+    clouds = level + 18.0 * _clouds(shape, generator)
+    if kind == 'plain':
+        drawn = np.full(shape, level)
+    elif kind == 'clouds':
+        drawn = level + 70.0 * _clouds(shape, generator)
+    elif kind == 'bricks':
+        drawn = _bricks(shape, clouds, generator)
+    elif kind == 'boards':
+        drawn = _boards(shape, generator)
+    elif kind == 'boxes':
+        drawn = _boxes(clouds, generator)
+    elif kind == 'letters':
+        drawn = _letters(clouds, generator)
+    elif kind == 'stripes':
+        drawn = _stripes(shape, generator)
+    elif kind == 'leaves':
+        noise = generator.normal(0, 1, shape)
+        drawn = level + 160.0 * cv2.GaussianBlur(noise, (0, 0), generator.uniform(1.0, 3.0))
+    else:
+        raise ValueError(f"unknown backdrop '{kind}', expected one of {', '.join(BACKDROPS)}")
+    return np.asarray(np.clip(drawn, 0, 255), dtype=np.float32)
+
+
+def _panel_points(panel: Panel, camera: CameraModel, half: float) -> Array:
+    square = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], dtype=float) * half
+    axis = np.array([math.cos(panel.axis), math.sin(panel.axis), 0.0]) * panel.turn
+    turned = cv2.Rodrigues(axis)[0] @ cv2.Rodrigues(np.array([0.0, 0.0, panel.roll]))[0]
+    principal = np.array([camera.matrix[0, 2], camera.matrix[1, 2]])
+    pixel = np.array([*(principal + panel.offset), 1.0])
+    sight = np.linalg.inv(camera.matrix) @ pixel
+    sight /= np.linalg.norm(sight)
+    # the panel faces the camera along the line of sight, so `turn` means the same everywhere
+    right = np.cross([0.0, 1.0, 0.0], sight)
+    right /= np.linalg.norm(right)
+    facing = np.column_stack([right, np.cross(sight, right), sight])
+    return np.asarray(square @ (facing @ turned).T + sight * panel.distance)
+
+
+def _paste(
+    scene: npt.NDArray[np.float32],
+    panel: Panel,
+    camera: CameraModel,
+    dictionary: cv2.aruco.Dictionary,
+) -> None:
+    cells = dictionary.markerSize + 2
+    side = panel.size * (1.0 + 2.0 * panel.margin / cells)
+    outline = camera.project(_panel_points(panel, camera, side / 2.0))
+    low = np.maximum(np.floor(outline.min(axis=0)).astype(int) - 1, 0)
+    high = np.minimum(
+        np.ceil(outline.max(axis=0)).astype(int) + 2, [scene.shape[1], scene.shape[0]]
+    )
+    width, height = (high - low).tolist()
+    if width <= 0 or height <= 0:
+        return
+    extent = float(np.linalg.norm(np.roll(outline, -1, axis=0) - outline, axis=1).max())
+    factor = _SUPERSAMPLING if extent < 120 else 3
+    texture = _sheet(panel, dictionary, min(64, max(4, round(extent * factor / cells))))
+    size = texture.shape[0]
+    source = np.array([[0, 0], [size, 0], [size, size], [0, size]], np.float32) - 0.5
+    target = ((outline - low + 0.5) * factor - 0.5).astype(np.float32)
+    homography = cv2.getPerspectiveTransform(source, target)
+    shape = (width * factor, height * factor)
+    fine = cv2.warpPerspective(texture, homography, shape, flags=cv2.INTER_LINEAR)
+    cover = cv2.warpPerspective(np.ones_like(texture), homography, shape, flags=cv2.INTER_LINEAR)
+    grey = cv2.resize(fine, (width, height), interpolation=cv2.INTER_AREA)
+    share = cv2.resize(cover, (width, height), interpolation=cv2.INTER_AREA)
+    part = scene[low[1] : high[1], low[0] : high[0]]
+    part[:] = part * (1.0 - share) + grey
+
+
+def _sheet(panel: Panel, dictionary: cv2.aruco.Dictionary, cell: int) -> npt.NDArray[np.float32]:
+    cells = dictionary.markerSize + 2
+    margin = round(panel.margin * cell)
+    sheet = np.full((cells * cell + 2 * margin,) * 2, _WHITE, np.float32)
+    marker = cv2.aruco.generateImageMarker(dictionary, panel.marker_id, cells * cell)
+    inner = slice(margin, margin + cells * cell)
+    sheet[inner, inner] = np.where(marker > 127, _WHITE, _BLACK)
+    return sheet
+
+
+def _streak(length: float, direction: float) -> npt.NDArray[np.float32]:
+    half = math.ceil(length / 2)
+    fine = np.zeros(((2 * half + 1) * 8,) * 2, np.float32)
+    centre = fine.shape[0] / 2
+    reach = 4.0 * length * np.array([math.cos(direction), math.sin(direction)])
+    ends = [tuple(int(v) for v in np.rint(centre + sign * reach)) for sign in (-1, 1)]
+    cv2.line(fine, ends[0], ends[1], 1.0, 8)
+    kernel = cv2.resize(fine, (2 * half + 1,) * 2, interpolation=cv2.INTER_AREA)
+    return np.asarray(kernel / kernel.sum(), dtype=np.float32)
+
+
+def _clouds(shape: tuple[int, int], generator: np.random.Generator) -> Array:
+    total = np.zeros(shape)
+    for octave in range(1, 7):
+        grid = generator.uniform(-1, 1, (2**octave + 1, 2**octave + 1))
+        total += cv2.resize(grid, shape[::-1], interpolation=cv2.INTER_CUBIC) / 1.6**octave
+    return total
+
+
+def _bricks(shape: tuple[int, int], base: Array, generator: np.random.Generator) -> Array:
+    drawn = base.copy()
+    height, width = generator.integers(8, 50, 2)
+    mortar = generator.uniform(-80, 80)
+    for row, y in enumerate(range(0, shape[0], height)):
+        drawn[y : y + 2] += mortar
+        for x in range((row % 2) * width // 2, shape[1], width):
+            drawn[y : y + height, x : x + 2] += mortar
+            drawn[y : y + height, x : x + width] += generator.normal(0, 12)
+    return drawn
+
+
+def _boards(shape: tuple[int, int], generator: np.random.Generator) -> Array:
+    square = generator.uniform(3, 40)
+    angle = generator.uniform(0, math.pi)
+    y, x = np.mgrid[: shape[0], : shape[1]].astype(float)
+    across = x * math.cos(angle) + y * math.sin(angle)
+    along = -x * math.sin(angle) + y * math.cos(angle)
+    odd = (np.floor(across / square) + np.floor(along / square)) % 2
+    dark, light = sorted(generator.uniform(10, 240, 2))
+    return np.asarray(dark + (light - dark) * odd)
+
+
+def _boxes(base: Array, generator: np.random.Generator) -> Array:
+    drawn = base.astype(np.float32)
+    for _ in range(int(generator.integers(20, 150))):
+        centre = generator.uniform(0, 1, 2) * drawn.shape[::-1]
+        size = generator.uniform(6, 90, 2)
+        box = cv2.boxPoints((centre.tolist(), size.tolist(), float(generator.uniform(0, 180))))
+        cv2.fillConvexPoly(drawn, np.rint(box).astype(np.int32), float(generator.uniform(0, 255)))
+    return drawn.astype(float)
+
+
+def _letters(base: Array, generator: np.random.Generator) -> Array:
+    drawn = np.clip(base, 0, 255).astype(np.uint8)
+    alphabet = list('ABCDEFGHKLMNOPQRSTUVXYZ0123456789#%&@')
+    for _ in range(int(generator.integers(20, 80))):
+        text = ''.join(generator.choice(alphabet, int(generator.integers(2, 12))))
+        x, y = (generator.uniform(0, 1, 2) * drawn.shape[::-1]).astype(int).tolist()
+        scale = float(generator.uniform(0.3, 2.0))
+        grey = float(generator.choice([15, 40, 235]))
+        cv2.putText(drawn, text, (x, y), 0, scale, grey, max(1, int(2 * scale)), cv2.LINE_AA)
+    return drawn.astype(float)
+
+
+def _stripes(shape: tuple[int, int], generator: np.random.Generator) -> Array:
+    period = generator.uniform(4, 60)
+    angle = generator.uniform(0, math.pi)
+    y, x = np.mgrid[: shape[0], : shape[1]].astype(float)
+    phase = (x * math.cos(angle) + y * math.sin(angle)) / period
+    second = (-x * math.sin(angle) + y * math.cos(angle)) / generator.uniform(4, 60)
+    wave = np.sign(np.sin(2 * math.pi * phase)) + np.sign(np.sin(2 * math.pi * second))
+    return np.asarray(128 + 50 * wave)

@@ -1,0 +1,103 @@
+"""Pictures one after the other: from a webcam, a video file or a folder."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Protocol
+
+import cv2
+import numpy as np
+
+from surveillance_perception.stream.picture_files import (
+    PICTURE_SUFFIXES,
+    Picture,
+    PictureError,
+    read_picture,
+)
+
+_SILENT = 0
+
+
+class FrameSource(Protocol):
+    """Where pictures come from.
+
+    Attributes:
+        rate: Pictures a second that the source itself has; 0 when it has none.
+    """
+
+    rate: float
+
+    def frames(self) -> Iterator[Picture | PictureError]:
+        """Each picture (height, width, 3) BGR in turn, or why one cannot be read."""
+
+    def close(self) -> None:
+        """Let go of the source."""
+
+
+def open_source(source: str) -> FrameSource:
+    """Open a webcam by its number, a video file, a picture or a folder of pictures.
+
+    Raises:
+        PictureError: There is no such thing, or it holds no pictures.
+    """
+    if source.isdigit():
+        return _Capture(int(source), f'camera {source}')
+    path = Path(source)
+    if path.is_dir():
+        files = sorted(each for each in path.iterdir() if each.suffix.lower() in PICTURE_SUFFIXES)
+        if not files:
+            raise PictureError(f'{path} holds no pictures ({", ".join(PICTURE_SUFFIXES)})')
+        return _Files(files)
+    if not path.exists():
+        raise PictureError(f'{source}: no such video file or folder of pictures')
+    if path.suffix.lower() in PICTURE_SUFFIXES:
+        return _Files([path])
+    return _Capture(str(path), f'video {path}')
+
+
+class _Files:
+    rate = 0.0
+
+    def __init__(self, files: list[Path]) -> None:
+        self._files = files
+
+    def frames(self) -> Iterator[Picture | PictureError]:
+        for path in self._files:
+            try:
+                yield read_picture(path)
+            except PictureError as error:
+                yield error
+
+    def close(self) -> None:
+        """Nothing is held open."""
+
+
+class _Capture:
+    def __init__(self, source: int | str, what: str) -> None:
+        # what cannot be opened is said here in one line, not by OpenCV's backends in many
+        # OpenCV 4 has the function at the top, OpenCV 5 in a module
+        set_level = (
+            cv2.setLogLevel if hasattr(cv2, 'setLogLevel') else cv2.utils.logging.setLogLevel
+        )
+        level = set_level(_SILENT)
+        self._capture = cv2.VideoCapture(source)
+        set_level(level)
+        if not self._capture.isOpened():
+            raise PictureError(f'{what} cannot be opened')
+        self.rate = float(self._capture.get(cv2.CAP_PROP_FPS))
+        if not 0.0 < self.rate < 1000.0:
+            self.rate = 0.0
+        if isinstance(source, int):
+            # a camera keeps its own time: reading blocks until the next picture
+            self.rate = 0.0
+
+    def frames(self) -> Iterator[Picture | PictureError]:
+        while True:
+            good, frame = self._capture.read()
+            if not good:
+                return
+            yield np.asarray(frame, dtype=np.uint8)
+
+    def close(self) -> None:
+        self._capture.release()

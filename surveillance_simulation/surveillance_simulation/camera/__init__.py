@@ -1,0 +1,1 @@
+"""The simulated camera and what it renders."""

@@ -1,0 +1,200 @@
+"""Perspective pictures of a world: each face warped by its homography into one depth buffer.
+
+The picture is drawn at a multiple of its size and averaged down. Textures are shrunk to about the
+size they appear in before they are warped, so that distant ones do not flicker (a mipmap). Which
+face is in front is decided pixel by pixel from the inverse depth, which is linear in the picture.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from surveillance_simulation.camera.model import Array, Camera, Conditions, Picture, expose
+from surveillance_simulation.camera.scene import Face, faces_of
+from surveillance_simulation.world.textures import Texture
+from surveillance_simulation.world.world import World
+
+_NEAR = 0.03
+"""What is nearer to the lens than this is not seen, metres."""
+
+_CEILING = (196.0, 198.0, 200.0)
+
+
+class Renderer:
+    """Takes pictures of one world with one camera, keeping what does not change between them."""
+
+    def __init__(self, world: World, camera: Camera, supersampling: int = 2) -> None:
+        """Prepare pictures, drawn at `supersampling` times the camera's resolution.
+
+        Raises:
+            TextureError: A marker's dictionary or id does not exist.
+        """
+        self._world = world
+        self._camera = camera
+        self._factor = supersampling
+        matrix = camera.matrix
+        matrix[:2] *= supersampling
+        # The centre of pixel 0 stays the centre of the block of fine pixels that it is made of.
+        matrix[:2, 2] += (supersampling - 1) / 2
+        self._matrix = matrix
+        self._inverse = np.linalg.inv(matrix)
+        self._size = (camera.width * supersampling, camera.height * supersampling)
+        self._faces: list[Face] = []
+        self._version = -1
+        self._shrunk: dict[tuple[int, int, int], Texture] = {}
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Take over what has changed in the world since the last time.
+
+        Raises:
+            TextureError: A marker's dictionary or id does not exist.
+        """
+        if self._version != self._world.version:
+            self._faces = faces_of(self._world)
+            self._version = self._world.version
+            self._shrunk.clear()
+
+    def close(self) -> None:
+        """Free what the pictures needed: nothing but memory."""
+
+    def ideal(self, camera_pose: Array) -> npt.NDArray[np.float32]:
+        """Return the picture of the world as it was at `refresh`, before light, noise and blur.
+
+        Args:
+            camera_pose: Transform (4, 4) from the camera's optical frame to the world, metres.
+
+        Returns:
+            (rows, columns, 3) in RGB; `expose` makes of it what a camera takes.
+        """
+        width, height = self._size
+        colours = np.empty((height, width, 3), np.uint8)
+        colours[:] = _CEILING
+        nearness = np.zeros((height, width), np.float32)
+        to_camera: Array = np.linalg.inv(camera_pose).astype(np.float64)
+        # What is near is drawn first: most of what it hides is then never warped.
+        middles = np.array([face.middle for face in self._faces]) - camera_pose[:3, 3]
+        for index in np.argsort(np.linalg.norm(middles, axis=1)):
+            face = self._faces[index]
+            self._draw(face, to_camera, colours, nearness)
+        small = cv2.resize(
+            colours,
+            (self._camera.width, self._camera.height),
+            interpolation=cv2.INTER_AREA,
+        )
+        return np.asarray(small, dtype=np.float32)
+
+    def _draw(
+        self, face: Face, to_camera: Array, colours: Picture, nearness: npt.NDArray[np.float32]
+    ) -> None:
+        turn = to_camera[:3, :3]
+        corner = turn @ face.corner + to_camera[:3, 3]
+        across, down = turn @ face.across, turn @ face.down
+        normal = np.cross(down, across)
+        distance = float(normal @ corner)
+        if distance >= 0:
+            return
+        outline = _in_front(
+            np.array([corner, corner + across, corner + across + down, corner + down])
+        )
+        if len(outline) < 3:
+            return
+        seen = outline @ self._matrix.T
+        seen = seen[:, :2] / seen[:, 2:]
+        low = np.maximum(np.floor(seen.min(axis=0)), 0).astype(int)
+        high = np.minimum(np.ceil(seen.max(axis=0)) + 1, self._size).astype(int)
+        if (high <= low).any():
+            return
+        part = (slice(low[1], high[1]), slice(low[0], high[0]))
+        size = (int(high[0] - low[0]), int(high[1] - low[1]))
+        mask = np.zeros((size[1], size[0]), np.uint8)
+        # Four bits after the point: edges are placed to a sixteenth of a fine pixel.
+        polygon = np.rint((seen - low) * 16).clip(-(2**20), 2**20).astype(np.int32)
+        cv2.fillConvexPoly(mask, polygon, 255, shift=4)
+        plane = (normal @ self._inverse) / distance
+        columns = (plane[0] * np.arange(low[0], high[0]) + plane[2]).astype(np.float32)
+        rows = (plane[1] * np.arange(low[1], high[1])).astype(np.float32)
+        inverse_depth = rows[:, None] + columns
+        before = nearness[part]
+        cv2.bitwise_and(mask, cv2.compare(inverse_depth, before, cv2.CMP_GT), mask)
+        if not cv2.countNonZero(mask):
+            return
+        texture = self._texture(face, seen)
+        rows_of_texture, columns_of_texture = texture.shape[:2]
+        left, top, right, bottom = face.crop
+        # From the texture's pixels to metres on the face, then to the picture.
+        scale_x = 1.0 / ((right - left) * columns_of_texture)
+        scale_y = 1.0 / ((bottom - top) * rows_of_texture)
+        origin = (
+            corner
+            + across * ((0.5 - left * columns_of_texture) * scale_x)
+            + down * ((0.5 - top * rows_of_texture) * scale_y)
+        )
+        homography = self._matrix @ np.column_stack([across * scale_x, down * scale_y, origin])
+        homography[:2] -= low[:, None] * homography[2]
+        drawn = cv2.warpPerspective(
+            texture, homography, size, flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+        )
+        if face.shade != 1.0:
+            drawn = cv2.convertScaleAbs(drawn, alpha=face.shade)
+        cv2.copyTo(drawn, mask, colours[part])
+        cv2.copyTo(inverse_depth, mask, before)
+
+    def _texture(self, face: Face, seen: Array) -> Texture:
+        """Return the face's texture, shrunk to about the size at which it is seen."""
+        texture = face.texture
+        rows, columns = texture.shape[:2]
+        left, top, right, bottom = face.crop
+        if len(seen) == 4:
+            edges = np.linalg.norm(np.roll(seen, -1, axis=0) - seen, axis=1)
+            wide, high = max(edges[0], edges[2]), max(edges[1], edges[3])
+            halvings_x = _halvings((right - left) * columns, wide)
+            halvings_y = _halvings((bottom - top) * rows, high)
+        else:
+            # Cut off by the lens: it is near, at least partly.
+            halvings_x = halvings_y = 0
+        if not halvings_x and not halvings_y:
+            return texture
+        key = (id(texture), halvings_x, halvings_y)
+        if key not in self._shrunk:
+            size = (max(1, columns >> halvings_x), max(1, rows >> halvings_y))
+            self._shrunk[key] = cv2.resize(texture, size, interpolation=cv2.INTER_AREA)
+        return self._shrunk[key]
+
+
+def render(
+    world: World,
+    camera_pose: Array,
+    camera: Camera,
+    conditions: Conditions,
+    rng: np.random.Generator,
+) -> Picture:
+    """Return one picture (rows, columns, 3) of a world in RGB. For many, keep a `Renderer`."""
+    return expose(Renderer(world, camera).ideal(camera_pose), conditions, rng)
+
+
+def _halvings(texels: float, pixels: float) -> int:
+    """Return how often a side can be halved and still has a texel for each pixel."""
+    count = 0
+    while texels >= 2.0 * pixels and texels >= 4.0:
+        texels /= 2.0
+        count += 1
+    return count
+
+
+def _in_front(outline: Array) -> Array:
+    """Return the part of a convex polygon (n, 3) in front of the lens (Sutherland-Hodgman)."""
+    depths = outline[:, 2] - _NEAR
+    if (depths > 0).all():
+        return outline
+    kept = []
+    for index in range(len(outline)):
+        here, there = outline[index - 1], outline[index]
+        before, after = depths[index - 1], depths[index]
+        if (before > 0) != (after > 0):
+            kept.append(here + (there - here) * (before / (before - after)))
+        if after > 0:
+            kept.append(there)
+    return np.array(kept).reshape(-1, 3)

@@ -1,0 +1,173 @@
+"""A world as flat textured faces in space: what the camera can see of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from surveillance_simulation.camera.model import Array
+from surveillance_simulation.floor_plan import WALL_HEIGHT, WALL_THICKNESS, Door
+from surveillance_simulation.world import boxes, textures
+from surveillance_simulation.world.textures import TILE, Texture
+from surveillance_simulation.world.world import Obstacle, Panel, World
+
+DOOR_HEIGHT = 2.05
+OBSTACLE_HEIGHT = 0.8
+STATION_SIDE = 0.6
+
+
+@dataclass(frozen=True)
+class Face:
+    """A textured rectangle in space.
+
+    Attributes:
+        corner: Top left corner (3,), metres, world frame.
+        across: Vector (3,) along the texture's rows from the corner to the top right corner.
+        down: Vector (3,) along the texture's columns from the corner to the bottom left corner.
+        texture: The picture on it.
+        crop: Part of the texture shown: left, top, right and bottom as shares of its size.
+        shade: Factor on the texture's brightness.
+    """
+
+    corner: Array
+    across: Array
+    down: Array
+    texture: Texture
+    crop: tuple[float, float, float, float] = (0.0, 0.0, 1.0, 1.0)
+    shade: float = 1.0
+
+    @property
+    def middle(self) -> Array:
+        """Its middle (3,), metres, world frame."""
+        return self.corner + (self.across + self.down) / 2
+
+    @property
+    def normal(self) -> Array:
+        """Direction (3,) from which the face is seen, not of unit length."""
+        return np.cross(self.down, self.across)
+
+
+def faces_of(world: World) -> list[Face]:
+    """Return every face of a world.
+
+    Raises:
+        TextureError: A marker's dictionary or id does not exist.
+    """
+    plan = world.plan
+    faces = list(_floor(plan.bounds))
+    for start, end in plan.wall_pieces():
+        faces += _box(start, end, WALL_THICKNESS, 0.0, WALL_HEIGHT, None)
+    for door in plan.doors.values():
+        faces += _door(door, is_open=world.is_open(door.name))
+    for obstacle in world.obstacles.values():
+        faces += _barrel(obstacle)
+    for panel in world.panels.values():
+        faces.append(_panel(panel, plan.marker_dictionary))
+    x, y, yaw = plan.station
+    faces.append(_lying(x, y, 0.004, yaw, STATION_SIDE, textures.station()))
+    return faces
+
+
+def _floor(bounds: tuple[float, float, float, float]) -> Iterator[Face]:
+    west, south, east, north = bounds
+    for x in np.arange(west, east, TILE):
+        for y in np.arange(south, north, TILE):
+            wide, high = min(TILE, east - x), min(TILE, north - y)
+            crop = (0.0, 1.0 - high / TILE, wide / TILE, 1.0)
+            yield Face(
+                np.array([x, y + high, 0.0]),
+                np.array([wide, 0.0, 0.0]),
+                np.array([0.0, -high, 0.0]),
+                textures.floor(),
+                crop,
+            )
+
+
+def _upright(
+    left: tuple[float, float],
+    right: tuple[float, float],
+    bottom: float,
+    top: float,
+    texture: Texture | None,
+) -> Iterator[Face]:
+    """Yield a standing rectangle, seen with `left` on the left; plaster is cut into tiles."""
+    length = math.dist(left, right)
+    direction = np.array([right[0] - left[0], right[1] - left[1], 0.0]) / length
+    # Light falls in from one side, so that walls at an angle look different.
+    shade = 0.86 + 0.1 * direction[0] + 0.04 * direction[1]
+    down = np.array([0.0, 0.0, bottom - top])
+    if texture is not None:
+        corner = np.array([left[0], left[1], top])
+        yield Face(corner, direction * length, down, texture, shade=shade)
+        return
+    for start in np.arange(0.0, length, TILE):
+        wide = min(TILE, length - start)
+        corner = np.array([left[0], left[1], top]) + direction * start
+        crop = (0.0, 0.0, wide / TILE, min(1.0, (top - bottom) / TILE))
+        yield Face(corner, direction * wide, down, textures.plaster(), crop, shade)
+
+
+def _box(
+    start: tuple[float, float],
+    end: tuple[float, float],
+    thickness: float,
+    bottom: float,
+    top: float,
+    texture: Texture | None,
+) -> Iterator[Face]:
+    outline = boxes.corners(boxes.boxes_around([(start, end)], thickness))[0]
+    for first, second in zip(outline, np.roll(outline, -1, axis=0), strict=True):
+        # Anticlockwise from above: seen from outside, the first corner is on the left.
+        yield from _upright(
+            (float(first[0]), float(first[1])),
+            (float(second[0]), float(second[1])),
+            bottom,
+            top,
+            texture if math.dist(first, second) > 2 * thickness else None,
+        )
+
+
+def _door(door: Door, *, is_open: bool) -> Iterator[Face]:
+    yield from _box(*door.ends, WALL_THICKNESS, DOOR_HEIGHT, WALL_HEIGHT, None)
+    if not is_open:
+        yield from _box(*door.ends, WALL_THICKNESS, 0.0, DOOR_HEIGHT, textures.leaf())
+        return
+    along = np.array([math.cos(door.yaw), math.sin(door.yaw), 0.0]) * door.width
+    across = np.array([-math.sin(door.yaw), math.cos(door.yaw), 0.0]) * WALL_THICKNESS
+    corner = np.array([door.x, door.y, DOOR_HEIGHT]) - along / 2 - across / 2
+    crop = (0.0, 0.0, min(1.0, door.width / TILE), WALL_THICKNESS / TILE)
+    yield Face(corner, along, across, textures.plaster(), crop, shade=0.7)
+
+
+def _barrel(obstacle: Obstacle, sides: int = 12) -> Iterator[Face]:
+    angles = np.arange(sides + 1) * (2 * math.pi / sides)
+    ring = [
+        (obstacle.x + obstacle.radius * math.cos(a), obstacle.y + obstacle.radius * math.sin(a))
+        for a in angles
+    ]
+    for first, second in pairwise(ring):
+        yield from _upright(first, second, 0.0, OBSTACLE_HEIGHT, textures.barrel())
+    lid = np.full((4, 4, 3), (198, 88, 22), np.uint8)
+    side = obstacle.radius * math.sqrt(2.0)
+    yield _lying(obstacle.x, obstacle.y, OBSTACLE_HEIGHT, math.pi / 4, side, lid)
+
+
+def _panel(panel: Panel, dictionary: str) -> Face:
+    marker = panel.marker
+    texture = textures.marker_panel(dictionary, marker.id, panel.state)
+    side = marker.size * textures.panel_share(dictionary)
+    # Seen from the front, the panel's left is on the left of someone who looks against its normal.
+    across = np.array([-math.sin(marker.yaw), math.cos(marker.yaw), 0.0]) * side
+    down = np.array([0.0, 0.0, -side])
+    centre = np.array([marker.x, marker.y, marker.z])
+    return Face(centre - across / 2 - down / 2, across, down, texture)
+
+
+def _lying(x: float, y: float, z: float, yaw: float, side: float, texture: Texture) -> Face:
+    across = np.array([math.cos(yaw), math.sin(yaw), 0.0]) * side
+    down = np.array([math.sin(yaw), -math.cos(yaw), 0.0]) * side
+    return Face(np.array([x, y, z]) - across / 2 - down / 2, across, down, texture)

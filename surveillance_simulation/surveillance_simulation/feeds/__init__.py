@@ -1,0 +1,1 @@
+"""The simulated sensors as ROS topics, and the fault services."""

@@ -1,0 +1,103 @@
+"""Publishes what the camera sees, on a thread of its own, only while somebody looks."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from builtin_interfaces.msg import Time
+from sensor_msgs.msg import CameraInfo, Image
+
+from surveillance_runtime.node import PatrolNode
+from surveillance_simulation import conversions, simulator_parameters
+from surveillance_simulation.camera.model import Conditions, expose
+from surveillance_simulation.camera.mujoco_rendering import MujocoRenderer
+from surveillance_simulation.camera.rendering import Renderer
+from surveillance_simulation.feeds.sensor_feed import SENSOR_DEPTH
+from surveillance_simulation.robot.robot import Robot
+
+_FRAME = 'camera_optical_frame'
+
+
+class CameraFeed:
+    """The topics `camera/rgb/image_raw` and `camera/rgb/camera_info` of a simulated robot.
+
+    Attributes:
+        conditions: Light, noise and blur of the next pictures.
+    """
+
+    def __init__(
+        self,
+        node: PatrolNode,
+        robot: Robot,
+        seed: int,
+        changing: Any,
+        stamp: Callable[[], Time],
+    ) -> None:
+        """Create the topics and the thread.
+
+        Args:
+            node: The node that publishes.
+            robot: The robot that carries the camera.
+            seed: Seed of the noise.
+            changing: Lock that is held while robot or world change.
+            stamp: Returns the present time for the pictures.
+
+        Raises:
+            TextureError: A marker's dictionary or id does not exist.
+            MujocoMissing: MuJoCo is to render and is not installed.
+        """
+        self.conditions = simulator_parameters.conditions(node, self._take_conditions)
+        self._robot = robot
+        self._camera = simulator_parameters.camera(node)
+        kind = simulator_parameters.renderer(node)
+        take = MujocoRenderer if kind == 'mujoco' else Renderer
+        self._renderer: Renderer | MujocoRenderer = take(robot.world, self._camera)
+        self._period = 1.0 / simulator_parameters.camera_rate(node)
+        self._next = 0.0
+        self._rng = np.random.default_rng(seed)
+        self._changing = changing
+        self._stamp = stamp
+        self._wanted = threading.Semaphore(0)
+        self._images = node.create_publisher(Image, 'camera/rgb/image_raw', SENSOR_DEPTH)
+        self._infos = node.create_publisher(CameraInfo, 'camera/rgb/camera_info', SENSOR_DEPTH)
+        self._stopping = node.stopping
+        node.stopping.subscribe(self._wanted.release)
+        node.spawn(self._work, 'camera')
+
+    @property
+    def is_watched(self) -> bool:
+        """Whether somebody subscribes to the pictures."""
+        return bool(self._images.get_subscription_count())
+
+    def tick(self) -> None:
+        """Ask for a picture when it is time for one and somebody looks; never blocks."""
+        now = self._robot.time
+        if now + 1e-9 < self._next:
+            return
+        self._next = now + self._period
+        if self.is_watched or self._infos.get_subscription_count():
+            self._wanted.release()
+
+    def _take_conditions(self, conditions: Conditions) -> None:
+        self.conditions = conditions
+
+    def _work(self) -> None:
+        while True:
+            self._wanted.acquire()
+            # Pictures that were asked for while one was drawn are out of date.
+            while self._wanted.acquire(blocking=False):
+                pass
+            if self._stopping.is_set():
+                self._renderer.close()
+                return
+            with self._changing:
+                self._renderer.refresh()
+                pose = self._robot.camera_pose()
+                stamp = self._stamp()
+            self._infos.publish(conversions.camera_info_to_ros(self._camera, _FRAME, stamp))
+            if self.is_watched:
+                picture = expose(self._renderer.ideal(pose), self.conditions, self._rng)
+                self._images.publish(conversions.image_to_ros(picture, _FRAME, stamp))

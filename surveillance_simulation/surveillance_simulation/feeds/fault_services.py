@@ -1,0 +1,121 @@
+"""The services through which a test or a demonstration makes things go wrong."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import rclpy.node
+from rclpy.qos import QoSProfile
+from std_msgs.msg import Float32
+
+from surveillance_interfaces.srv import (
+    DrainBattery,
+    PlaceObstacle,
+    PushRobot,
+    RemoveObstacle,
+    SetDoor,
+    SetMarker,
+    SlipOdometry,
+)
+from surveillance_simulation import conversions
+from surveillance_simulation.floor_plan import WorldError
+from surveillance_simulation.robot.robot import Robot
+from surveillance_simulation.world.textures import TextureError, marker_panel
+
+
+class FaultServices:
+    """Offers the services below `simulation/` on a node."""
+
+    def __init__(
+        self,
+        node: rclpy.node.Node,
+        robot: Robot,
+        changing: Any,
+        on_change: Callable[[], None],
+    ) -> None:
+        """Create the services.
+
+        Args:
+            node: The node that offers them.
+            robot: The robot in its world, which they change.
+            changing: Lock to hold during a change.
+            on_change: Called after each change.
+        """
+        self._node = node
+        self._robot = robot
+        self._changing = changing
+        self._on_change = on_change
+        self._drained = node.create_publisher(Float32, 'battery_drain', QoSProfile(depth=10))
+        for name, kind, change in (
+            ('set_door', SetDoor, self._set_door),
+            ('place_obstacle', PlaceObstacle, self._place_obstacle),
+            ('remove_obstacle', RemoveObstacle, self._remove_obstacle),
+            ('push_robot', PushRobot, self._push_robot),
+            ('slip_odometry', SlipOdometry, self._slip_odometry),
+            ('drain_battery', DrainBattery, self._drain_battery),
+            ('set_marker', SetMarker, self._set_marker),
+        ):
+            node.create_service(kind, f'simulation/{name}', self._answered(change))
+
+    def _answered(self, change: Callable[[Any], str]) -> Callable[[Any, Any], Any]:
+        def answer(request: Any, response: Any) -> Any:
+            try:
+                with self._changing:
+                    response.message = change(request)
+                response.success = True
+            except (WorldError, TextureError) as error:
+                response.success, response.message = False, str(error)
+            self._node.get_logger().info(response.message)
+            if response.success:
+                self._on_change()
+            return response
+
+        return answer
+
+    def _set_door(self, request: SetDoor.Request) -> str:
+        self._robot.world.set_door(request.door, request.open)
+        return f'door {request.door} is {"open" if request.open else "closed"}'
+
+    def _place_obstacle(self, request: PlaceObstacle.Request) -> str:
+        self._robot.world.place_obstacle(request.name, request.x, request.y, request.radius)
+        return f'obstacle {request.name} stands at ({request.x:.2f}, {request.y:.2f})'
+
+    def _remove_obstacle(self, request: RemoveObstacle.Request) -> str:
+        self._robot.world.remove_obstacle(request.name)
+        return f'obstacle {request.name} is gone'
+
+    def _push_robot(self, request: PushRobot.Request) -> str:
+        _check_finite(request.dx, request.dy, request.dyaw)
+        way = self._robot.base.push(request.dx, request.dy, request.dyaw)
+        return f'pushed by {way:.2f} m and {request.dyaw:.2f} rad'
+
+    def _slip_odometry(self, request: SlipOdometry.Request) -> str:
+        _check_finite(request.dx, request.dy, request.dyaw)
+        self._robot.base.slip(request.dx, request.dy, request.dyaw)
+        return f'odometry slipped by ({request.dx:.2f}, {request.dy:.2f}) m, {request.dyaw:.2f} rad'
+
+    def _drain_battery(self, request: DrainBattery.Request) -> str:
+        if not 0.0 <= request.percent <= 100.0:
+            raise WorldError(f'percent {request.percent:g}: expected 0 to 100')
+        self._drained.publish(Float32(data=float(request.percent)))
+        return f'battery drained by {request.percent:g} percent'
+
+    def _set_marker(self, request: SetMarker.Request) -> str:
+        world = self._robot.world
+        if request.state != SetMarker.Request.MOVED:
+            world.set_marker(request.name, request.state)
+            return f'marker {request.name} is {request.state}'
+        marker = conversions.marker_from_ros(request, world.plan.marker_size)
+        # Whether the dictionary holds the id shows when it is drawn: better now than in a picture.
+        marker_panel(world.plan.marker_dictionary, marker.id, 'whole')
+        world.hang_marker(marker)
+        return (
+            f'marker {request.name} with id {request.id} hangs at ({marker.x:.2f}, {marker.y:.2f})'
+        )
+
+
+def _check_finite(*numbers: float) -> None:
+    if not all(map(math.isfinite, numbers)):
+        raise WorldError(f'expected finite numbers, got {", ".join(map(str, numbers))}')

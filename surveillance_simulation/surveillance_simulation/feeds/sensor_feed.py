@@ -1,0 +1,97 @@
+"""Publishes what the robot's sensors measure; the costly ones only while somebody listens."""
+
+from __future__ import annotations
+
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
+from nav_msgs.msg import OccupancyGrid, Odometry
+from rclpy.event_handler import PublisherEventCallbacks
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import JointState, LaserScan
+from std_msgs.msg import UInt32
+
+from surveillance_interfaces.msg import DoorStates
+from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.qos import STATE_QOS
+from surveillance_simulation import conversions, simulator_parameters
+from surveillance_simulation.feeds.tf_feed import TfFeed
+from surveillance_simulation.robot.robot import Robot
+from surveillance_simulation.world import occupancy_grid
+
+SENSOR_DEPTH = 5
+"""Sensors offer reliable delivery, so that subscribers of either kind are served (REP-2003)."""
+
+
+class SensorFeed:
+    """The topics of a robot's sensors, of the map and of simulated time."""
+
+    def __init__(self, node: PatrolNode, robot: Robot, *, drives_clock: bool) -> None:
+        """Create the topics on a node; publish the map and the doors' states."""
+        self._robot = robot
+        self._drives_clock = drives_clock
+        self._clock = node.create_publisher(Clock, '/clock', 1) if drives_clock else None
+        self._odometry = node.create_publisher(Odometry, 'odom', SENSOR_DEPTH)
+        self._scan = node.create_publisher(LaserScan, 'scan', SENSOR_DEPTH)
+        self._joints = node.create_publisher(JointState, 'joint_states', SENSOR_DEPTH)
+        self._truth = node.create_publisher(PoseStamped, 'ground_truth', SENSOR_DEPTH)
+        self._collisions = node.create_publisher(UInt32, 'collisions', STATE_QOS)
+        self._doors = node.create_publisher(DoorStates, 'door_states', STATE_QOS)
+        self._map = node.create_publisher(OccupancyGrid, 'map', STATE_QOS)
+        self._tf = TfFeed(node)
+        self._told_collisions = -1
+        resolution = simulator_parameters.map_resolution(node)
+        grid = occupancy_grid.draw(robot.world.plan, resolution)
+        self._map.publish(conversions.grid_to_ros(grid, 'map', Time()))
+        self.tell_doors()
+        if simulator_parameters.announces_pose(node):
+            self._announce_pose(node)
+
+    def tell_doors(self) -> None:
+        """Publish which doors are open."""
+        self._doors.publish(conversions.doors_to_ros(self._robot.world))
+
+    def publish(self, stamp: Time) -> None:
+        """Publish the clock, then everything measured at this moment."""
+        if self._clock is not None:
+            self._clock.publish(Clock(clock=stamp))
+        base = self._robot.base
+        self._odometry.publish(
+            conversions.odometry_to_ros(
+                base.odometry, base.speed, base.turn_speed, 'odom', 'base_link', stamp
+            )
+        )
+        self._tf.tick(base.odometry, stamp)
+        if self._scan.get_subscription_count():
+            ranges = self._robot.scan()
+            self._scan.publish(
+                conversions.scan_to_ros(ranges, self._robot.lidar, 'base_link', stamp)
+            )
+        if self._joints.get_subscription_count():
+            arm, now = self._robot.arm, self._robot.time
+            self._joints.publish(
+                conversions.joints_to_ros(
+                    arm.arm.names, arm.positions(now), arm.velocities(now), stamp
+                )
+            )
+        if self._truth.get_subscription_count():
+            self._truth.publish(conversions.stamped_pose_to_ros(base.pose, 'map', stamp))
+        if base.collisions != self._told_collisions:
+            self._told_collisions = base.collisions
+            self._collisions.publish(UInt32(data=base.collisions))
+
+    def _announce_pose(self, node: PatrolNode) -> None:
+        def on_match(matched: object) -> None:
+            if getattr(matched, 'current_count_change', 0) > 0:
+                stamp = node.get_clock().now().to_msg()
+                publisher.publish(
+                    conversions.uncertain_pose_to_ros(
+                        self._robot.base.pose, 'map', stamp, 0.1, 0.05
+                    )
+                )
+
+        publisher = node.create_publisher(
+            PoseWithCovarianceStamped,
+            'initialpose',
+            1,
+            event_callbacks=PublisherEventCallbacks(matched=on_match),
+        )

@@ -1,0 +1,227 @@
+"""A round robot on two driven wheels: how it moves, what stops it, and where it believes it is.
+
+The base follows its velocity command within limits of speed and acceleration, on exact arcs. It is
+a disc that nothing passes through: it stops where it touches a wall, and can turn or back away.
+Odometry integrates what the wheels did, with errors in proportion to the motion; wheels that spin
+against a wall do not count, so a blocked robot does not believe it moves.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from surveillance_simulation.floor_plan import Pose
+from surveillance_simulation.world.world import World
+
+_CONTACT = 1e-3
+"""Gap that remains between the robot and what it ran into, metres."""
+
+PUSH_GAP = 0.05
+"""Gap that a push leaves, metres: more than the robot drives until it has seen what is there."""
+
+
+@dataclass(frozen=True)
+class BaseModel:
+    """The base's body, limits and errors.
+
+    Attributes:
+        radius: Radius of the robot, metres.
+        speed: Greatest forward and backward speed, m/s.
+        turn_speed: Greatest turning speed, rad/s.
+        acceleration: Greatest change of speed, m/s^2.
+        turn_acceleration: Greatest change of turning speed, rad/s^2.
+        command_timeout: After this many seconds without a command the base stops.
+        distance_error: Standard deviation of the odometry's distance per sqrt(m), metres.
+        turn_error: Standard deviation of the odometry's heading per sqrt(rad), rad.
+    """
+
+    radius: float = 0.22
+    speed: float = 0.6
+    turn_speed: float = 1.5
+    acceleration: float = 1.0
+    turn_acceleration: float = 4.0
+    command_timeout: float = 0.5
+    distance_error: float = 0.004
+    turn_error: float = 0.003
+
+
+class Base:
+    """The robot's base in a world.
+
+    Attributes:
+        pose: Where the robot really is: x, y in metres, yaw in rad, world frame.
+        odometry: Where its wheels say it is; equal to the pose at the start.
+        speed: Forward speed, m/s.
+        turn_speed: Turning speed, rad/s, anticlockwise.
+        collisions: How often the robot ran into something by its own motion.
+        travelled: Length of the way driven, metres.
+        turned: Sum of the turns made, rad.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        pose: Pose,
+        model: BaseModel | None = None,
+        rng: np.random.Generator | None = None,
+    ) -> None:
+        """Put the robot into the world; without `rng` the odometry is exact."""
+        self.model = model or BaseModel()
+        self.pose = pose
+        self.odometry = pose
+        self.speed = 0.0
+        self.turn_speed = 0.0
+        self.collisions = 0
+        self.travelled = 0.0
+        self.turned = 0.0
+        self._world = world
+        self._rng = rng
+        self._wanted = (0.0, 0.0)
+        self._since_command = math.inf
+        self._touching = False
+        # Nothing solid is nearer than this, so shorter ways need no check.
+        self._sure = 0.0
+        self._seen_version = -1
+
+    def command(self, speed: float, turn_speed: float) -> None:
+        """Set the wanted velocity: m/s forwards, rad/s anticlockwise; anything not finite is 0."""
+        wanted_speed = speed if math.isfinite(speed) else 0.0
+        wanted_turn = turn_speed if math.isfinite(turn_speed) else 0.0
+        limit, turn_limit = self.model.speed, self.model.turn_speed
+        self._wanted = (
+            min(max(wanted_speed, -limit), limit),
+            min(max(wanted_turn, -turn_limit), turn_limit),
+        )
+        self._since_command = 0.0
+
+    def step(self, dt: float) -> None:
+        """Move on for `dt` seconds (of a size that the robot moves less than its radius in)."""
+        self._since_command += dt
+        if self._since_command > self.model.command_timeout:
+            self._wanted = (0.0, 0.0)
+        if not self.is_moving:
+            return
+        wanted_speed, wanted_turn = self._wanted
+        change = self.model.acceleration * dt
+        turn_change = self.model.turn_acceleration * dt
+        self.speed += min(max(wanted_speed - self.speed, -change), change)
+        self.turn_speed += min(max(wanted_turn - self.turn_speed, -turn_change), turn_change)
+        distance, turn = self.speed * dt, self.turn_speed * dt
+        reached = self._free_part(distance, turn)
+        if reached < 1.0:
+            if not self._touching:
+                self.collisions += 1
+            self._touching = True
+            self.speed = 0.0
+        elif distance:
+            self._touching = False
+        self.pose = _moved(self.pose, distance * reached, turn * reached)
+        if reached < 1.0:
+            # A disc that is stopped can still turn on the spot.
+            x, y, yaw = self.pose
+            self.pose = (x, y, _wrapped(yaw + turn * (1.0 - reached)))
+            distance *= reached
+        self._sure -= abs(distance)
+        self.travelled += abs(distance)
+        self.turned += abs(turn)
+        self._count(distance, turn)
+
+    @property
+    def is_moving(self) -> bool:
+        """Whether the base moves, or is told to."""
+        return bool(any(self._wanted) or self.speed or self.turn_speed)
+
+    def push(self, dx: float, dy: float, dyaw: float) -> float:
+        """Push the robot sideways, unseen by its wheels, as far as the way is free.
+
+        Who pushes it holds it: it stands until the next command.
+
+        Args:
+            dx: Way along the world's x axis, metres.
+            dy: Way along the world's y axis, metres.
+            dyaw: Turn, rad.
+
+        Returns:
+            How far it went, metres.
+        """
+        x, y, yaw = self.pose
+        length = math.hypot(dx, dy)
+        pieces = max(1, math.ceil(length / (self.model.radius / 2)))
+        gone = 0
+        needed = self.model.radius + PUSH_GAP
+        for piece in range(1, pieces + 1):
+            share = piece / pieces
+            if not self._world.is_free(x + share * dx, y + share * dy, needed):
+                break
+            gone = piece
+        share = gone / pieces
+        self.pose = (x + share * dx, y + share * dy, _wrapped(yaw + dyaw))
+        self.speed = self.turn_speed = 0.0
+        self._wanted = (0.0, 0.0)
+        self._sure = 0.0
+        return length * share
+
+    def slip(self, dx: float, dy: float, dyaw: float) -> None:
+        """Shift the odometry in the robot's own frame (metres, rad); the robot stays."""
+        x, y, yaw = self.odometry
+        self.odometry = (
+            x + dx * math.cos(yaw) - dy * math.sin(yaw),
+            y + dx * math.sin(yaw) + dy * math.cos(yaw),
+            _wrapped(yaw + dyaw),
+        )
+
+    def _free_part(self, distance: float, turn: float) -> float:
+        """Return the part of a motion, 0 to 1, that ends before the robot touches something."""
+        if self._seen_version != self._world.version:
+            self._seen_version = self._world.version
+            self._sure = 0.0
+        if abs(distance) <= self._sure or not distance:
+            return 1.0
+        before = self._gap(self.pose)
+        if abs(distance) <= before - _CONTACT:
+            self._sure = before - _CONTACT
+            return 1.0
+        after = self._gap(_moved(self.pose, distance, turn))
+        # Something was put onto the robot: any way that leads out of it is free.
+        if after > _CONTACT or after > before:
+            return 1.0
+        if before <= _CONTACT:
+            return 0.0
+        low, high = 0.0, 1.0
+        for _ in range(12):
+            middle = (low + high) / 2
+            gap = self._gap(_moved(self.pose, distance * middle, turn * middle))
+            if gap > _CONTACT:
+                low = middle
+            else:
+                high = middle
+        return low
+
+    def _gap(self, pose: Pose) -> float:
+        return self._world.clearance(pose[0], pose[1]) - self.model.radius
+
+    def _count(self, distance: float, turn: float) -> None:
+        if self._rng is not None:
+            distance += self._rng.normal(0.0, self.model.distance_error * math.sqrt(abs(distance)))
+            turn += self._rng.normal(0.0, self.model.turn_error * math.sqrt(abs(turn)))
+        self.odometry = _moved(self.odometry, distance, turn)
+
+
+def _moved(pose: Pose, distance: float, turn: float) -> Pose:
+    """Return the pose after an arc of this length and turn."""
+    x, y, yaw = pose
+    # The chord of an arc is sinc(turn / 2) times as long and points half way between the ends.
+    half = turn / 2
+    chord = distance * (math.sin(half) / half if abs(half) > 1e-9 else 1.0)
+    return (
+        x + chord * math.cos(yaw + half),
+        y + chord * math.sin(yaw + half),
+        _wrapped(yaw + turn),
+    )
+
+
+def _wrapped(angle: float) -> float:
+    return math.remainder(angle, 2.0 * math.pi)

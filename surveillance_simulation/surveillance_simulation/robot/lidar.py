@@ -1,0 +1,99 @@
+"""A planar lidar: how far each ray of a full turn goes before it meets something.
+
+Every ray is cut with every box at once (slab method: the ray enters a box where it has passed the
+nearer face of both pairs of faces) and with every disc (quadratic equation). Only what is within
+range is looked at.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from surveillance_simulation.floor_plan import Pose
+from surveillance_simulation.world import boxes
+from surveillance_simulation.world.world import World
+
+_PARALLEL = 1e-12
+
+
+@dataclass(frozen=True)
+class LidarModel:
+    """What the lidar can do.
+
+    Attributes:
+        rays: Rays of a full turn; the first looks backwards (-pi), the others follow anticlockwise.
+        range_min: Least distance reported, metres.
+        range_max: Greatest distance reported, metres; beyond it a ray returns infinity.
+        noise: Standard deviation of a distance, metres.
+    """
+
+    rays: int = 360
+    range_min: float = 0.1
+    range_max: float = 8.0
+    noise: float = 0.01
+
+    @property
+    def angles(self) -> boxes.Array:
+        """Direction of each ray in the robot's frame (rays,), rad."""
+        steps: boxes.Array = np.arange(self.rays, dtype=np.float64) * (2.0 * math.pi / self.rays)
+        return steps - math.pi
+
+
+def scan(
+    world: World, pose: Pose, model: LidarModel, rng: np.random.Generator | None = None
+) -> npt.NDArray[np.float32]:
+    """Return the distance (rays,) along each ray in metres, infinity where nothing is in range.
+
+    Args:
+        world: The place.
+        pose: Where the lidar is, metres and rad.
+        model: The lidar.
+        rng: Source of the noise; None measures exactly.
+    """
+    x, y, yaw = pose
+    angles = model.angles + yaw
+    direction = np.stack([np.cos(angles), np.sin(angles)])
+    near = boxes.distances(world.solid, x, y) <= model.range_max
+    distance = _to_boxes(world.solid[near], x, y, direction)
+    discs = world.discs
+    if len(discs):
+        distance = np.minimum(distance, _to_discs(discs, x, y, direction))
+    if rng is not None and model.noise > 0:
+        distance = distance + rng.normal(0.0, model.noise, model.rays)
+    distance[distance > model.range_max] = np.inf
+    return np.maximum(distance, model.range_min).astype(np.float32)
+
+
+def _to_boxes(solid: boxes.Array, x: float, y: float, direction: boxes.Array) -> boxes.Array:
+    if not len(solid):
+        return np.full(direction.shape[1], np.inf)
+    dx, dy = x - solid[:, 0, None], y - solid[:, 1, None]
+    cos, sin = solid[:, 2, None], solid[:, 3, None]
+    first = _slab(dx * cos + dy * sin, cos * direction[0] + sin * direction[1], solid[:, 4, None])
+    second = _slab(dy * cos - dx * sin, cos * direction[1] - sin * direction[0], solid[:, 5, None])
+    enter = np.maximum(first[0], second[0])
+    leave = np.minimum(first[1], second[1])
+    hit = (leave >= enter) & (leave >= 0.0)
+    return np.asarray(np.where(hit, np.maximum(enter, 0.0), np.inf).min(axis=0))
+
+
+def _slab(
+    origin: boxes.Array, slope: boxes.Array, half: boxes.Array
+) -> tuple[boxes.Array, boxes.Array]:
+    inverse = 1.0 / np.where(np.abs(slope) < _PARALLEL, _PARALLEL, slope)
+    middle = -origin * inverse
+    reach = half * np.abs(inverse)
+    return middle - reach, middle + reach
+
+
+def _to_discs(discs: boxes.Array, x: float, y: float, direction: boxes.Array) -> boxes.Array:
+    dx, dy = discs[:, 0, None] - x, discs[:, 1, None] - y
+    along = dx * direction[0] + dy * direction[1]
+    inside = discs[:, 2, None] ** 2 - (dx**2 + dy**2 - along**2)
+    half = np.sqrt(np.maximum(inside, 0.0))
+    hit = (inside >= 0.0) & (along + half >= 0.0)
+    return np.asarray(np.where(hit, np.maximum(along - half, 0.0), np.inf).min(axis=0))

@@ -1,0 +1,68 @@
+"""The simulated robot as one: base, lidar, arm and camera in a world, moved on in time."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from surveillance_runtime.robot_arm import ARM, Arm, Array
+from surveillance_simulation.robot.arm_motion import ArmMotion
+from surveillance_simulation.robot.base import Base, BaseModel
+from surveillance_simulation.robot.lidar import LidarModel, scan
+from surveillance_simulation.world.world import World
+
+_PHYSICS_STEP = 0.05
+
+
+class Robot:
+    """The robot in its world.
+
+    Attributes:
+        world: The place.
+        base: Its wheels.
+        lidar: Its lidar, at the middle of the base.
+        arm: Its arm's motors.
+        time: Seconds since the start.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        base_model: BaseModel | None = None,
+        lidar: LidarModel | None = None,
+        arm: Arm = ARM,
+        rng: np.random.Generator | None = None,
+    ) -> None:
+        """Put the robot at its start; without `rng` its sensors have no errors."""
+        self.world = world
+        self.base = Base(world, world.plan.start, base_model, rng)
+        self.lidar = lidar or LidarModel()
+        self.arm = ArmMotion(arm)
+        self.time = 0.0
+        self._rng = rng
+
+    def advance(self, seconds: float) -> None:
+        """Move on in time, in steps so short that nothing is driven through."""
+        steps = max(1, math.ceil(seconds / _PHYSICS_STEP - 1e-9))
+        for _ in range(steps):
+            self.base.step(seconds / steps)
+        self.time += seconds
+
+    @property
+    def is_moving(self) -> bool:
+        """Whether the base moves or is told to, or the arm moves."""
+        return self.base.is_moving or self.arm.is_moving(self.time)
+
+    def scan(self) -> npt.NDArray[np.float32]:
+        """Return the lidar's distances, see `lidar.scan`."""
+        return scan(self.world, self.base.pose, self.lidar, self._rng)
+
+    def camera_pose(self) -> Array:
+        """Return the transform (4, 4) from the camera's optical frame to the world, metres."""
+        x, y, yaw = self.base.pose
+        pose = np.eye(4)
+        pose[:2, :2] = [[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]]
+        pose[:2, 3] = x, y
+        return np.asarray(pose @ self.arm.arm.camera_frame(self.arm.positions(self.time)))

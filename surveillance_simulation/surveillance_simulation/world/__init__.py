@@ -1,0 +1,1 @@
+"""The simulated place: walls, doors, obstacles, markers."""

@@ -1,0 +1,278 @@
+"""A place as it is now: its floor plan, which doors are open, what stands in the way.
+
+The world answers where the robot may be: how far the nearest solid surface is, and which place a
+point belongs to. It knows nothing of time, sensors or the robot itself.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from surveillance_simulation.floor_plan import (
+    WALL_THICKNESS,
+    FloorPlan,
+    Marker,
+    WorldError,
+)
+from surveillance_simulation.world import boxes
+from surveillance_simulation.world.occupancy_grid import FREE, Grid, regions
+
+MARKER_STATES = ('whole', 'broken', 'covered')
+
+
+@dataclass(frozen=True)
+class Obstacle:
+    """An upright cylinder that stands in the way: centre and radius, metres."""
+
+    name: str
+    x: float
+    y: float
+    radius: float
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A marker as it is now.
+
+    Attributes:
+        marker: Where it hangs and what it shows.
+        state: 'whole'; 'broken', a corner torn off so that its code is gone; 'covered' by a sheet.
+    """
+
+    marker: Marker
+    state: str = 'whole'
+
+
+class World:
+    """A place whose doors, obstacles and markers change.
+
+    Attributes:
+        plan: The place's unchanging geometry.
+        version: Counts the changes; whoever caches something drawn from the world compares it.
+    """
+
+    def __init__(self, plan: FloorPlan) -> None:
+        """Start with every door open and no obstacles.
+
+        Raises:
+            WorldError: The walls do not fit the map: two places are one room, a door does not touch
+                the place it leads into, or a position lies in a wall.
+        """
+        self.plan = plan
+        self.version = 0
+        self._closed: set[str] = set()
+        self._obstacles: dict[str, Obstacle] = {}
+        self._panels = {name: Panel(marker) for name, marker in plan.markers.items()}
+        self._walls = boxes.boxes_around(plan.wall_pieces(), WALL_THICKNESS)
+        self._grid, self._labels = regions(plan)
+        self._places = self._seeded()
+        self._check_doors()
+        self._check_station()
+        self._refresh()
+
+    @classmethod
+    def from_parameters(cls, parameters: Mapping[str, Any]) -> World:
+        """Return the world that a place's parameters describe.
+
+        Args:
+            parameters: The mapping below `ros__parameters` in the place's file.
+
+        Raises:
+            WorldError: The parameters describe no sound place.
+        """
+        return cls(FloorPlan.from_parameters(parameters))
+
+    @property
+    def solid(self) -> boxes.Array:
+        """Walls and closed doors as boxes (n, 6)."""
+        return self._solid
+
+    @property
+    def discs(self) -> boxes.Array:
+        """Obstacles (n, 3): centre x, y and radius, metres."""
+        return self._discs
+
+    @property
+    def obstacles(self) -> Mapping[str, Obstacle]:
+        """Obstacles by name."""
+        return self._obstacles
+
+    @property
+    def panels(self) -> Mapping[str, Panel]:
+        """Markers by name, as they are now."""
+        return self._panels
+
+    @property
+    def closed_doors(self) -> frozenset[str]:
+        """Names of the doors that are closed."""
+        return frozenset(self._closed)
+
+    def is_open(self, door: str) -> bool:
+        """Tell whether a door is open.
+
+        Raises:
+            WorldError: There is no such door.
+        """
+        self._known(door, self.plan.doors, 'door')
+        return door not in self._closed
+
+    def set_door(self, door: str, is_open: bool) -> None:
+        """Open or close a door.
+
+        Raises:
+            WorldError: There is no such door.
+        """
+        self._known(door, self.plan.doors, 'door')
+        if is_open:
+            self._closed.discard(door)
+        else:
+            self._closed.add(door)
+        self._refresh()
+
+    def place_obstacle(self, name: str, x: float, y: float, radius: float) -> None:
+        """Put a cylinder into the place, or move the one of this name.
+
+        Raises:
+            WorldError: A number is not finite, or the radius is not between 1 cm and 5 m.
+        """
+        if not name:
+            raise WorldError("obstacle '': expected a name")
+        if not (math.isfinite(x) and math.isfinite(y)):
+            raise WorldError(f"obstacle '{name}' at ({x:g}, {y:g}): expected two numbers in metres")
+        if not 0.01 <= radius <= 5.0:
+            raise WorldError(f"obstacle '{name}': radius {radius:g} m: expected 0.01 to 5 m")
+        self._obstacles[name] = Obstacle(name, x, y, radius)
+        self._refresh()
+
+    def remove_obstacle(self, name: str) -> None:
+        """Take an obstacle away.
+
+        Raises:
+            WorldError: There is no such obstacle.
+        """
+        self._known(name, self._obstacles, 'obstacle')
+        del self._obstacles[name]
+        self._refresh()
+
+    def set_marker(self, name: str, state: str) -> None:
+        """Make a marker whole, break or cover it.
+
+        Raises:
+            WorldError: There is no such marker or state.
+        """
+        self._known(name, self._panels, 'marker')
+        if state not in MARKER_STATES:
+            raise WorldError(f"marker state '{state}': expected one of {', '.join(MARKER_STATES)}")
+        self._panels[name] = replace(self._panels[name], state=state)
+        self.version += 1
+
+    def hang_marker(self, marker: Marker) -> None:
+        """Hang a marker up, or move the one of this name; it is whole.
+
+        Raises:
+            WorldError: A number is not finite, the id is negative or the size not positive.
+        """
+        numbers = (marker.x, marker.y, marker.z, marker.yaw, marker.size)
+        if not all(map(math.isfinite, numbers)) or marker.size <= 0 or marker.id < 0:
+            raise WorldError(
+                f"marker '{marker.name}': {marker}: expected finite numbers, id >= 0 and size > 0"
+            )
+        self._panels[marker.name] = Panel(marker)
+        self.version += 1
+
+    def clearance(self, x: float, y: float) -> float:
+        """Return the distance from a point to the nearest solid surface, 0 inside one, metres."""
+        nearest = float(boxes.distances(self._solid, x, y).min())
+        if len(self._discs):
+            centre = np.hypot(self._discs[:, 0] - x, self._discs[:, 1] - y)
+            nearest = min(nearest, float((centre - self._discs[:, 2]).min()))
+        return max(nearest, 0.0)
+
+    def is_free(self, x: float, y: float, radius: float) -> bool:
+        """Tell whether a disc touches nothing."""
+        return self.clearance(x, y) > radius
+
+    def place_at(self, x: float, y: float) -> str | None:
+        """Return the place that a point (metres) lies in, None outside of every place."""
+        row, column = self._grid.cell_of(x, y)
+        if not self._grid.contains(row, column):
+            return None
+        return self._places.get(int(self._labels[row, column]))
+
+    def regions(self) -> tuple[Grid, dict[str, npt.NDArray[np.bool_]]]:
+        """Return the grid with every door closed, and on it the cells (rows, columns) per place."""
+        masks = {name: self._labels == label for label, name in self._places.items()}
+        return self._grid, masks
+
+    def _seeded(self) -> dict[int, str]:
+        places: dict[int, str] = {}
+        outside = int(self._labels[0, 0])
+        for place, (x, y, _) in self.plan.place.positions.items():
+            where = ('room_positions', place)
+            row, column = self._grid.cell_of(x, y)
+            inside = self._grid.contains(row, column)
+            label = int(self._labels[row, column]) if inside else outside
+            if label == outside:
+                raise WorldError(f'({x:g}, {y:g}) lies outside: expected walls all around', *where)
+            if self._grid.cells[row, column] != FREE:
+                raise WorldError(
+                    f'({x:g}, {y:g}) lies in a wall or a door: expected free space', *where
+                )
+            if label in places:
+                raise WorldError(
+                    f"'{place}' and '{places[label]}' are one room: "
+                    f'expected a wall between their positions',
+                    *where,
+                )
+            places[label] = place
+        return places
+
+    def _check_doors(self) -> None:
+        for place, doors in self.plan.place.rooms.items():
+            for name in doors:
+                door = self.plan.doors[name]
+                across = (-math.sin(door.yaw), math.cos(door.yaw))
+                sides = {
+                    self.place_at(door.x + step * across[0], door.y + step * across[1])
+                    for step in (-WALL_THICKNESS, WALL_THICKNESS)
+                }
+                if place not in sides:
+                    found = ' and '.join(sorted(side or 'outside' for side in sides))
+                    raise WorldError(
+                        f"stands between {found}: expected it at '{place}', as the map says",
+                        'doors',
+                        name,
+                    )
+
+    def _check_station(self) -> None:
+        x, y, _ = self.plan.station
+        place = self.place_at(x, y)
+        allowed = self.plan.place.recharge_rooms or tuple(self.plan.place.rooms)
+        if place not in allowed:
+            raise WorldError(
+                f'({x:g}, {y:g}) lies in {place or "no place"}: '
+                f'expected a point in {" or ".join(allowed)}',
+                'station',
+            )
+
+    def _refresh(self) -> None:
+        panels = boxes.boxes_around(
+            [self.plan.doors[name].ends for name in sorted(self._closed)], WALL_THICKNESS
+        )
+        self._solid = np.concatenate([self._walls, panels])
+        self._discs = np.array(
+            [(each.x, each.y, each.radius) for each in self._obstacles.values()], dtype=float
+        ).reshape(-1, 3)
+        self.version += 1
+
+    @staticmethod
+    def _known(name: str, names: Mapping[str, object], kind: str) -> None:
+        if name not in names:
+            known = ', '.join(names) or 'none'
+            raise WorldError(f"there is no {kind} '{name}': expected one of {known}")

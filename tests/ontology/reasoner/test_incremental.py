@@ -1,0 +1,191 @@
+"""What is derived step by step equals what is derived from nothing, on random ontologies and
+changes.
+"""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from surveillance_ontology.knowledge_base import KnowledgeBase
+from surveillance_ontology.knowledge_changes import Changes
+from surveillance_ontology.owl.axioms import (
+    Assertion,
+    Axiom,
+    ClassAssertion,
+    DataPropertyAssertion,
+    Declaration,
+    EquivalentClasses,
+    SymmetricObjectProperty,
+    TransitiveObjectProperty,
+)
+from surveillance_ontology.reasoner.datatypes import value_of
+from tests.ontology.reasoner.patrol_map import (
+    DOOR_FACTS,
+    DOORS_DIFFER,
+    IRI,
+    NOW,
+    PLACES_DIFFER,
+    ROBOT_FACTS,
+    SCHEMA,
+    SEVEN_ROOMS,
+    VISITS,
+    different,
+    link,
+    n,
+    names,
+    seven_rooms,
+    value,
+)
+from tests.ontology.reasoner.random_ontologies import RandomOntology
+
+
+def by_value(axiom: Axiom) -> object:
+    """An axiom, with a literal replaced by its value: derived values may be written in several
+    ways.
+    """
+    if isinstance(axiom, DataPropertyAssertion):
+        return axiom.prop, axiom.subject, value_of(axiom.literal)
+    return axiom
+
+
+def derived(kb: KnowledgeBase) -> set[object]:
+    return {by_value(axiom) for axiom in kb.facts()} - {by_value(a) for a in kb.facts(False)}
+
+
+def assert_as_from_nothing(kb: KnowledgeBase) -> None:
+    fresh = KnowledgeBase(kb.iri, kb.axioms())
+    assert fresh.reason() == kb.consistent
+    assert derived(kb) == derived(fresh)
+
+
+def changeable(kb: KnowledgeBase) -> list[Axiom]:
+    return [
+        axiom
+        for axiom in kb.axioms()
+        if isinstance(axiom, Assertion)
+        or (isinstance(axiom, Declaration) and axiom.kind == 'individual')
+    ]
+
+
+def walk(seed: int) -> None:
+    """A random ontology and random changes, compared after each `reason`; the feed too."""
+    drawn = RandomOntology(seed)
+    rng = drawn.random
+    kb = KnowledgeBase('http://example.org/random', drawn.ontology(rng.randrange(1, 10), 12))
+    kb.reason()
+    shown = derived(kb) if kb.consistent else set()
+    feed: list[Changes] = []
+    kb.subscribe(feed.append)
+    for _ in range(4):
+        feed.clear()
+        for _ in range(rng.choice([1, 2, 3])):
+            pool = changeable(kb)
+            if pool and rng.random() < 0.5:
+                assert kb.remove(rng.choice(pool))
+            else:
+                kb.add(drawn.assertion())
+        kb.reason()
+        assert_as_from_nothing(kb)
+        for changes in feed:
+            shown -= {by_value(axiom) for axiom, is_derived in changes.removed if is_derived}
+            shown |= {by_value(axiom) for axiom, is_derived in changes.added if is_derived}
+        assert shown - {by_value(a) for a in kb.facts(False)} == derived(kb)
+        for fact in list(kb.facts())[:25]:
+            explanation = kb.explain(fact)
+            assert explanation is not None
+            assert explanation.tree()
+            assert explanation.sentence()
+        assert (kb.explain_inconsistency() is None) == kb.consistent
+
+
+@settings(max_examples=50, deadline=None, derandomize=True, database=None)
+@given(st.integers(min_value=0, max_value=2**32))
+def test_random_ontologies(seed: int) -> None:
+    walk(seed)
+
+
+@pytest.mark.long
+@pytest.mark.timeout(0)
+def test_random_ontologies_for_long() -> None:
+    for seed in range(3000):
+        walk(seed)
+
+
+@settings(max_examples=12, deadline=None, derandomize=True, database=None)
+@given(st.integers(min_value=0, max_value=2**32))
+def test_random_changes_of_the_patrol_map(seed: int) -> None:
+    rng = random.Random(seed)
+    facts: list[Axiom] = [*DOOR_FACTS, *ROBOT_FACTS, *VISITS, PLACES_DIFFER, DOORS_DIFFER]
+    kb = KnowledgeBase(IRI, [*SCHEMA, *facts])
+    kb.reason()
+    extra: list[Axiom] = [
+        different(['E', 'C1', 'C2']),
+        different(['D1', 'D2', 'D5']),
+        ClassAssertion(n('CORRIDOR'), n('R1')),
+    ]
+    extra += [link('isIn', 'Robot1', place) for place in SEVEN_ROOMS]
+    extra += [value('now', 'Robot1', NOW + later) for later in (0, 3, 9, 20)]
+    extra += [value('visitedAt', place, NOW + later) for place in SEVEN_ROOMS for later in (0, 8)]
+    for _ in range(6):
+        for _ in range(rng.choice([1, 2, 4])):
+            axiom = rng.choice([*facts, *extra])
+            if not kb.remove(axiom):
+                kb.add(axiom)
+        kb.reason()
+        assert_as_from_nothing(kb)
+
+
+def test_a_fact_derived_twice_survives_the_loss_of_one() -> None:
+    kb = seven_rooms(link('hasDoor', 'R1', 'D2'), link('hasDoor', 'C1', 'D2'))
+    assert n('C1') in kb.object_values(n('connectedTo'), n('R1'))
+    kb.remove(link('hasDoor', 'R1', 'D1'))
+    kb.reason()
+    assert n('C1') in kb.object_values(n('connectedTo'), n('R1'))
+    kb.remove(link('hasDoor', 'R1', 'D2'))
+    kb.reason()
+    assert n('C1') not in kb.object_values(n('connectedTo'), n('R1'))
+
+
+def test_facts_that_support_each_other_go_together() -> None:
+    kb = KnowledgeBase(
+        IRI,
+        [
+            EquivalentClasses((n('A'), n('B'))),
+            SymmetricObjectProperty(n('near')),
+            TransitiveObjectProperty(n('near')),
+            ClassAssertion(n('A'), n('x')),
+            link('near', 'x', 'y'),
+            link('near', 'y', 'z'),
+        ],
+    )
+    kb.reason()
+    assert kb.types(n('x')) == {n('A'), n('B')}
+    assert names(kb.object_values(n('near'), n('z'))) == {'x', 'y', 'z'}
+    kb.remove(ClassAssertion(n('A'), n('x')))
+    kb.remove(link('near', 'y', 'z'))
+    kb.reason()
+    assert kb.types(n('x')) == set()
+    assert kb.object_values(n('near'), n('z')) == set()
+    assert names(kb.object_values(n('near'), n('x'))) == {'x', 'y'}
+
+
+def test_the_clock_changes_only_the_places_that_cross_the_threshold() -> None:
+    kb = seven_rooms()
+    feed: list[Changes] = []
+    kb.subscribe(feed.append)
+    seen = {place: NOW - order for order, place in enumerate(SEVEN_ROOMS)}
+    for now in range(NOW + 1, NOW + 12):
+        kb.change([value('now', 'Robot1', now)], [value('now', 'Robot1', now - 1)])
+        feed.clear()
+        kb.reason()
+        crossing = {place for place, visit in seen.items() if now - visit == 8}
+        come = {axiom for changes in feed for axiom, _ in changes.added}
+        assert come == {ClassAssertion(n('URGENT'), n(place)) for place in crossing}
+        assert not any(changes.removed for changes in feed)
+    kb.change([value('now', 'Robot1', NOW)], [value('now', 'Robot1', NOW + 11)])
+    kb.reason()
+    assert kb.instances(n('URGENT')) == set()

@@ -1,0 +1,289 @@
+"""Reading and writing documents: exact datatypes, located errors, bounded expansion, nothing
+half-written.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from surveillance_ontology.documents.reading import OntologyFileError, read_ontology
+from surveillance_ontology.documents.writing import (
+    OntologyWriteError,
+    ontology_bytes,
+    write_ontology,
+)
+from surveillance_ontology.knowledge_base import KnowledgeBase
+from surveillance_ontology.owl.axioms import (
+    Axiom,
+    AxiomAnnotation,
+    ClassAssertion,
+    DataPropertyAssertion,
+    Declaration,
+    DifferentIndividuals,
+    Import,
+    Rule,
+    SubClassOf,
+)
+from surveillance_ontology.owl.expressions import Literal
+from surveillance_ontology.owl.vocabulary import OWL, RDF, XSD
+from tests.ontology.reasoner.patrol_map import (
+    IRI,
+    SCHEMA,
+    VISITS,
+    link,
+    n,
+    names,
+    seven_rooms,
+    value,
+)
+from tests.ontology.reasoner.random_ontologies import RandomOntology
+
+DATA = Path(__file__).parent / 'data'
+HEAD = (
+    f'<rdf:RDF xmlns="{IRI}#" xml:base="{IRI}" xmlns:owl="{OWL}" xmlns:rdf="{RDF}"'
+    ' xmlns:rdfs="http://www.w3.org/2000/01/rdf-schema#">\n'
+)
+
+
+def document(body: str) -> bytes:
+    return f'{HEAD}{body}\n</rdf:RDF>'.encode()
+
+
+def test_a_map_written_by_another_tool() -> None:
+    read = read_ontology(DATA / 'two_rooms.owl', IRI)
+    assert (read.format, read.iri, read.unsupported) == ('rdfxml', IRI, [])
+    rules = [axiom for axiom in read.axioms if isinstance(axiom, Rule)]
+    assert [rule.label for rule in rules] == ['Urgency']
+    kb = KnowledgeBase(IRI, read.axioms)
+    assert kb.reason()
+    assert kb.unsupported == ()
+    assert kb.types(n('C1')) == {n('CORRIDOR'), n('LOCATION')}
+    assert names(kb.instances(n('URGENT'))) == {'R1'}
+    # Both spellings of the members of owl:AllDifferent are read.
+    sets = {
+        names(a.individuals) == {'D1', 'D2'}
+        for a in read.axioms
+        if isinstance(a, DifferentIndividuals)
+    }
+    assert sets == {True, False}
+
+
+def test_datatypes_are_kept_exactly() -> None:
+    body = f"""<owl:NamedIndividual rdf:about="#x">
+      <a rdf:datatype="{XSD}int">007</a><b xml:lang="EN">hi</b><c>plain</c><d rdf:datatype="http://u/t">?</d>
+    </owl:NamedIndividual>"""
+    found = {
+        a for a in read_ontology(document(body), IRI).axioms if isinstance(a, DataPropertyAssertion)
+    }
+    assert found == {
+        DataPropertyAssertion(n('a'), n('x'), Literal('007', XSD + 'int')),
+        DataPropertyAssertion(n('b'), n('x'), Literal('hi', RDF + 'langString', 'en')),
+        DataPropertyAssertion(n('c'), n('x'), Literal('plain')),
+        DataPropertyAssertion(n('d'), n('x'), Literal('?', 'http://u/t')),
+    }
+
+
+@pytest.mark.parametrize(
+    ('text', 'line', 'words'),
+    [
+        (b'', 1, 'empty'),
+        (b'<rdf:RDF', 1, 'not well-formed'),
+        (b'<?xml version="1.0" encoding="UTF-99"?><a/>', 1, 'unknown encoding: UTF-99'),
+        (b'<?xml version="1.0" encoding="shift_jis"?><a/>', 1, 'encoding cannot be read'),
+        (document('<owl:Class xml:base="http://[x" rdf:about="b"/>'), 2, 'Invalid IPv6 URL'),
+        (b'hello world', 1, 'expected an RDF/XML document or an N-Triples statement'),
+        (b'<a:b> <a:c> <a:d> .\n<a:b> <a:c> .', 2, 'N-Triples'),
+        (document('<owl:Class rdf:about="#A">\n<owl:Class>'), 4, 'mismatched tag'),
+        (document('<owl:Class rdf:about="a b"/>'), 2, "contains ' '"),
+        (document('<owl:Class rdf:about="#A">\nstray</owl:Class>'), 3, "text 'stray'"),
+        (
+            document(
+                '<owl:Class rdf:about="#A"><rdfs:subClassOf>\n<owl:Restriction>'
+                '<owl:onProperty rdf:resource="#p"/>\n<owl:minCardinality>two</owl:minCardinality>'
+                '</owl:Restriction></rdfs:subClassOf></owl:Class>'
+            ),
+            3,
+            "whole number as minCardinality, got 'two'",
+        ),
+        (document('<owl:Class rdf:ID="A"/>\n<owl:Class rdf:ID="A"/>'), 3, 'stands twice'),
+        (
+            document('\n<owl:Thing rdf:about="#a"><owl:sameAs>b</owl:sameAs></owl:Thing>'),
+            3,
+            "sameAs of a has the literal 'b', expected a resource",
+        ),
+        (
+            document(
+                '<owl:ObjectProperty rdf:about="#p"><owl:inverseOf>q</owl:inverseOf>\n'
+                '</owl:ObjectProperty>'
+            ),
+            2,
+            "inverseOf of p has the literal 'q', expected a resource",
+        ),
+        (
+            document('<owl:Class rdf:about="#A"><owl:unionOf rdf:nodeID="x"/></owl:Class>'),
+            2,
+            'rdf:first',
+        ),
+    ],
+)
+def test_errors_name_line_and_column(text: bytes, line: int, words: str) -> None:
+    with pytest.raises(OntologyFileError) as caught:
+        read_ontology(text, IRI)
+    error = caught.value
+    assert error.line == line
+    assert error.column >= 1
+    assert words in error.message
+    assert '\n' not in str(error)
+
+
+def test_a_missing_or_large_file(tmp_path: Path) -> None:
+    with pytest.raises(OntologyFileError, match='No such file'):
+        read_ontology(tmp_path / 'none.owl', IRI)
+    big = tmp_path / 'big.owl'
+    big.write_bytes(document('<!-- ' + 'x' * 5000 + ' -->'))
+    with pytest.raises(OntologyFileError, match='limit of 1000 bytes'):
+        read_ontology(big, IRI, size_limit=1000)
+
+
+@pytest.mark.parametrize(
+    'entity',
+    [
+        '<!ENTITY a "x"><!ENTITY b "&a;&a;&a;">',
+        '<!ENTITY a SYSTEM "file:///etc/hostname">',
+        '<!ENTITY % a "x">',
+        f'<!ENTITY a "{"x" * 600}">',
+    ],
+)
+def test_entities_that_expand_are_refused(entity: str) -> None:
+    with pytest.raises(OntologyFileError, match='refused'):
+        read_ontology(f'<!DOCTYPE r [{entity}]>'.encode() + document('<owl:Class/>'), IRI)
+
+
+def test_entities_for_namespaces_are_read() -> None:
+    text = f'<!DOCTYPE r [<!ENTITY m "{IRI}#">]>'.encode()
+    text += document('<owl:Class rdf:about="&m;A"/>')
+    (axiom,) = read_ontology(text, 'http://other').axioms
+    assert n('A') in repr(axiom)
+
+
+def test_what_is_not_understood_is_reported_with_its_line() -> None:
+    read = read_ontology(
+        document(
+            '<owl:Ontology rdf:about=""><owl:imports\n rdf:resource="http://x/y"/></owl:Ontology>'
+        ),
+        IRI,
+    )
+    assert Import('http://x/y') in read.axioms
+    (sentence,) = read.unsupported
+    assert sentence.startswith('line 2: owl:imports <http://x/y>')
+
+
+ANNOTATED = """
+<owl:AnnotationProperty rdf:about="#why">
+  <rdfs:domain rdf:resource="#ROOM"/></owl:AnnotationProperty>
+<owl:AnnotationProperty rdf:about="#source">
+  <rdfs:subPropertyOf rdf:resource="#why"/></owl:AnnotationProperty>
+<owl:Class rdf:about="#ROOM"><rdfs:subClassOf rdf:resource="#LOCATION"/>
+  <rdfs:subClassOf rdf:nodeID="two"/></owl:Class>
+<owl:Restriction rdf:nodeID="two"><owl:onProperty rdf:resource="#hasDoor"/>
+  <owl:minCardinality rdf:datatype="http://www.w3.org/2001/XMLSchema#nonNegativeInteger"
+  >1</owl:minCardinality></owl:Restriction>
+<ROOM rdf:about="#R1"><hasDoor rdf:resource="#D1"/><size>9</size></ROOM>
+<owl:Axiom><owl:annotatedSource rdf:resource="#ROOM"/>
+  <owl:annotatedProperty rdf:resource="http://www.w3.org/2000/01/rdf-schema#subClassOf"/>
+  <owl:annotatedTarget rdf:resource="#LOCATION"/>
+  <rdfs:comment>one</rdfs:comment><source rdf:resource="#plan"/></owl:Axiom>
+<owl:Axiom><owl:annotatedSource rdf:resource="#ROOM"/>
+  <owl:annotatedProperty rdf:resource="http://www.w3.org/2000/01/rdf-schema#subClassOf"/>
+  <owl:annotatedTarget rdf:nodeID="two"/><rdfs:comment>two</rdfs:comment></owl:Axiom>
+<owl:Axiom><owl:annotatedSource rdf:resource="#R1"/>
+  <owl:annotatedProperty rdf:resource="#size"/><owl:annotatedTarget>9</owl:annotatedTarget>
+  <rdfs:comment>three</rdfs:comment></owl:Axiom>
+<owl:Axiom><owl:annotatedSource rdf:resource="#R1"/>
+  <owl:annotatedProperty rdf:resource="http://www.w3.org/1999/02/22-rdf-syntax-ns#type"/>
+  <owl:annotatedTarget rdf:resource="#ROOM"/><rdfs:comment>four</rdfs:comment></owl:Axiom>
+<owl:AllDifferent><rdfs:comment>five</rdfs:comment><owl:members rdf:parseType="Collection">
+  <rdf:Description rdf:about="#D1"/><rdf:Description rdf:about="#D2"/>
+  <rdf:Description rdf:about="#D3"/></owl:members></owl:AllDifferent>
+"""
+
+
+@pytest.mark.parametrize('form', ['rdfxml', 'ntriples'])
+def test_what_is_said_of_axioms_is_kept(form: str) -> None:
+    read = read_ontology(document(ANNOTATED), IRI)
+    assert read.unsupported == []
+    notes = {a.axiom: a.annotations for a in read.axioms if isinstance(a, AxiomAnnotation)}
+    comment = 'http://www.w3.org/2000/01/rdf-schema#comment'
+    below = SubClassOf(n('ROOM'), n('LOCATION'))
+    size = DataPropertyAssertion(n('size'), n('R1'), Literal('9'))
+    assert notes[below] == ((comment, Literal('one')), (n('source'), n('plan')))
+    assert notes[size] == ((comment, Literal('three')),)
+    assert notes[ClassAssertion(n('ROOM'), n('R1'))] == ((comment, Literal('four')),)
+    assert len(notes) == 5
+    again = read_ontology(ontology_bytes(read.axioms, IRI, form), IRI)
+    assert set(again.axioms) >= set(read.axioms)
+    assert again.unsupported == []
+    twice = ontology_bytes([*read.axioms, *read.axioms], IRI, form)
+    assert twice == ontology_bytes(read.axioms, IRI, form), 'each axiom is written once'
+    kb = KnowledgeBase(IRI, read.axioms)
+    assert kb.reason()
+    assert kb.unsupported == ()
+    assert kb.rename('individual', n('R1'), n('R2'))
+    renamed = DataPropertyAssertion(n('size'), n('R2'), Literal('9'))
+    assert AxiomAnnotation(renamed, notes[size]) in kb
+    kb.remove(renamed)
+    assert not any(isinstance(a, AxiomAnnotation) and a.axiom == renamed for a in kb.axioms())
+    assert kb.reason()
+
+
+@pytest.mark.parametrize('form', ['rdfxml', 'ntriples'])
+def test_round_trip_of_the_patrol_map(form: str, tmp_path: Path) -> None:
+    axioms = list(seven_rooms().axioms())
+    path = tmp_path / 'map.owl'
+    write_ontology(axioms, IRI, path, form)
+    read = read_ontology(path, IRI)
+    assert read.format == form
+    assert read.unsupported == []
+    # What was used without a declaration comes back declared; all else comes back equal.
+    more = set(read.axioms) - set(axioms)
+    assert set(axioms) <= set(read.axioms)
+    assert all(isinstance(axiom, Declaration) for axiom in more)
+
+
+@pytest.mark.parametrize('seed', range(25))
+def test_round_trip_of_random_ontologies(seed: int) -> None:
+    axioms = RandomOntology(seed).ontology(12, 12)
+    for form in ('rdfxml', 'ntriples'):
+        read = read_ontology(ontology_bytes(axioms, 'http://example.org/random', form), 'x:')
+        assert read.unsupported == []
+        assert set(read.axioms) == set(axioms)
+
+
+@pytest.mark.parametrize('text', ['a<b & "c"', ' two\nlines\r\n\ttab ', 'ünïcode \U0001f916', ''])
+@pytest.mark.parametrize('form', ['rdfxml', 'ntriples'])
+def test_any_text_survives(text: str, form: str) -> None:
+    axiom = DataPropertyAssertion(n('note'), n('x'), Literal(text))
+    declared: list[Axiom] = [axiom]
+    assert axiom in read_ontology(ontology_bytes(declared, IRI, form), IRI).axioms
+
+
+def test_rdf_xml_says_what_it_cannot_hold() -> None:
+    with pytest.raises(OntologyWriteError, match='save it as N-Triples'):
+        ontology_bytes([value('now', 'x', Literal('\x01'))], IRI)
+    with pytest.raises(OntologyWriteError, match='cannot name'):
+        ontology_bytes([link('42', 'x', 'y')], IRI)
+    assert ontology_bytes([value('now', 'x', Literal('\x01'))], IRI, 'ntriples')
+
+
+def test_a_failed_write_leaves_the_old_file(tmp_path: Path) -> None:
+    path = tmp_path / 'map.owl'
+    write_ontology(SCHEMA, IRI, path)
+    old = path.read_bytes()
+    with pytest.raises(OntologyWriteError):
+        write_ontology([value('now', 'x', Literal('\x01'))], IRI, path)
+    assert path.read_bytes() == old
+    assert [entry.name for entry in tmp_path.iterdir()] == ['map.owl']
+    with pytest.raises(OntologyWriteError, match='No such file'):
+        write_ontology(VISITS, IRI, tmp_path / 'no' / 'map.owl')

@@ -1,0 +1,146 @@
+"""The command that checks a place and draws it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from surveillance_behaviour.mission.record import MissionRecord
+from surveillance_operator import map_command
+from surveillance_simulation.canvas import Canvas, blend
+from surveillance_simulation.place_file import read_world
+from surveillance_simulation.place_picture import draw_place
+
+CONFIG = Path(__file__).parents[2] / 'config'
+
+
+@pytest.fixture
+def record(tmp_path: Path) -> Path:
+    path = tmp_path / 'run.jsonl'
+    with MissionRecord(path) as mission:
+        mission.start(0.0, 'surveillance', 'E', ['R1', 'R2', 'R3', 'R4', 'E', 'C1', 'C2'])
+        mission.visit(10.0, 'C1', 5.4)
+        mission.write('visit', 20.0, place='R1', distance=3.0, path=[[10, 8], [10, 6.5], [10, 5]])
+        mission.end(60.0)
+    return path
+
+
+@pytest.mark.parametrize(
+    ('place', 'facts'),
+    [
+        ('seven_rooms', '7 places · 7 doors · shortest tour 52.4 m'),
+        ('patrol_world', '7 places · 7 doors · 7 markers · shortest tour 81.0 m'),
+        ('office', '46 places · 46 doors · shortest tour 720.9 m'),
+    ],
+)
+def test_it_draws_a_place_and_says_what_it_is(
+    place: str, facts: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    output = tmp_path / 'place.png'
+    file = CONFIG / f'{place}.yaml'
+    assert map_command.main([str(file), '-o', str(output)]) == 0
+    assert capsys.readouterr().out.splitlines() == [f'{file}: {facts}', f'drawn: {output}']
+    with Image.open(output) as picture:
+        assert min(picture.size) > 400
+        assert len(picture.getcolors(picture.size[0] * picture.size[1])) > 20
+
+
+def test_the_tour_of_a_place_is_measured_over_the_doors() -> None:
+    plan = read_world(CONFIG / 'seven_rooms.yaml').plan
+    graph = map_command.graph_over_doors(plan)
+    assert graph.legs['C1']['R1'] == pytest.approx(1.5 + 1.5)
+    assert graph.legs['E']['C1'] == pytest.approx(np.hypot(2.0, 1.5) + np.hypot(3.0, 0.5))
+
+
+def test_a_run_is_drawn_with_its_waits(
+    record: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    output = tmp_path / 'run.png'
+    place = CONFIG / 'seven_rooms.yaml'
+    assert map_command.main([str(place), '--record', str(record), '-o', str(output)]) == 0
+    line = f'{record}: 1 min 0 s of patrol · 2 visits · 8 m driven · 0 recharges'
+    assert line in capsys.readouterr().out
+    plain = draw_place(read_world(place), 'x', 'y')
+    with Image.open(output) as picture:
+        assert picture.size[0] > plain.size[0]
+
+
+def test_driven_ways_come_from_the_record_or_are_straight(record: Path) -> None:
+    from surveillance_behaviour.mission import record as mission_record
+
+    place = read_world(CONFIG / 'seven_rooms.yaml').plan.place
+    run = map_command.run_of(mission_record.read(record), place, 'run')
+    assert run.driven == [
+        [(5.0, 10.0), (10.0, 8.0)],
+        [(10.0, 8.0), (10.0, 6.5), (10.0, 5.0)],
+    ]
+    assert run.waits['R2'] == 60.0
+    assert run.visits['R1'] == 1
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'message'),
+    [
+        ([], 'the following arguments are required: FILE'),
+        (['nowhere.yaml'], 'nowhere.yaml: No such file'),
+        (['{config}/seven_rooms.yaml', '-o', 'picture.txt'], 'picture.txt: expected a picture'),
+        (['{config}/seven_rooms.yaml', '-o', '{tmp}/no/such.png'], 'such.png: No such file'),
+        (['{config}/seven_rooms.yaml', '--record', '{tmp}/none'], 'none: No such file'),
+        (['{config}/office.yaml', '--record', '{record}'], "visits 'R1', which the place does not"),
+        (['{broken}'], "broken.yaml:1: expected the top-level key '/**', got nothing"),
+        (['{marker}'], 'marker id 400: DICT_5X5_100 holds ids 0 to 99'),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_code_2(
+    arguments: list[str],
+    message: str,
+    tmp_path: Path,
+    record: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    broken, marker = tmp_path / 'broken.yaml', tmp_path / 'marker.yaml'
+    broken.write_text('{}\n')
+    text = (CONFIG / 'patrol_world.yaml').read_text()
+    marker.write_text(text.replace('m11: [11.0', 'm11: [400.0'))
+    names = {
+        'config': CONFIG,
+        'tmp': tmp_path,
+        'record': record,
+        'broken': broken,
+        'marker': marker,
+    }
+    assert map_command.main([each.format(**names) for each in arguments]) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert error.startswith('map: ')
+    assert error.count('\n') == 1
+
+
+def test_closed_doors_and_obstacles_change_the_picture() -> None:
+    world = read_world(CONFIG / 'seven_rooms.yaml')
+    before = np.asarray(draw_place(world, 'a', 'b'), dtype=int)
+    world.set_door('D5', False)
+    world.place_obstacle('box', 4.0, 8.0, 0.3)
+    after = np.asarray(draw_place(world, 'a', 'b'), dtype=int)
+    rows, columns = np.nonzero(np.abs(after - before).sum(axis=2) > 60)
+    assert len(rows) > 200
+    # Only around the door and the obstacle.
+    assert columns.max() - columns.min() < 0.6 * before.shape[1]
+
+
+def test_a_canvas_puts_metres_where_they_belong() -> None:
+    canvas = Canvas((0.0, 0.0, 4.0, 2.0), 50.0, (10, 20, 30, 40), '#ffffff')
+    assert canvas.size == (240, 160)
+    assert canvas.at((0.0, 2.0)) == (10.0, 20.0)
+    canvas.polygon([(1.0, 0.0), (2.0, 0.0), (2.0, 1.0), (1.0, 1.0)], '#ff0000')
+    picture = np.asarray(canvas.finished())
+    assert tuple(picture[95, 85]) == (255, 0, 0)
+    assert tuple(picture[60, 85]) == (255, 255, 255)
+
+
+def test_colours_blend() -> None:
+    assert blend('#000000', '#ffffff', 0.5) == '#808080'
+    assert blend('#000000', '#ffffff', 7.0) == '#ffffff'

@@ -1,0 +1,196 @@
+"""What whoever watches a mission gets to see."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from rich.console import Console
+
+from surveillance_behaviour.policy.situation import Decision
+from surveillance_operator import map_raster
+from surveillance_operator.map_raster import Frame, Grid, rasterise
+from surveillance_operator.snapshot import Snapshot, Status, changes
+from surveillance_operator.watch.view import MissionView
+
+STATUS = Status(95.0, 'surveillance', 'MOVE_TO_NEXT_ROOM', 'A', 'B', False, 'arrived in A', ())
+DECISION = Decision(90.0, 'A', 'B', 'B', 'URGENT', 'tour', 'B waits longest', {})
+
+
+def two_rooms() -> Grid:
+    """A room of 4 x 2 m and one of 2 x 2 m, a wall of 5 cm with an opening of 1 m between."""
+    cells = np.zeros((40, 120), np.int8)
+    cells[[0, -1], :] = cells[:, [0, 80, -1]] = 100
+    cells[10:30, 80] = 0
+    return Grid(cells, 0.05, (-1.0, 2.0))
+
+
+def whole() -> Snapshot:
+    return Snapshot(
+        where='ROS domain 7',
+        now=100.0,
+        mode='SIMULATED',
+        nodes={'robot_behavior': frozenset({'1'})},
+        status=STATUS,
+        decision=DECISION,
+        number=3,
+        battery=80.0,
+        grid=two_rooms(),
+        positions={'A': (1.0, 3.0), 'B': (4.0, 3.0)},
+        doors={'D': False},
+        door_lines={'D': (3.0, 2.5, 3.0, 3.5)},
+        visited_at={'A': 98.0, 'B': 10.0},
+        urgent=frozenset({'B'}),
+        pose=(1.0, 3.0, math.pi / 2),
+        trail=np.array([(0.0, 3.0), (1.0, 3.0)]),
+        obstacles=np.array([(2.0, 3.5)]),
+        events=(('12:00:00', 'arrived in A'),),
+    )
+
+
+def shown(snapshot: Snapshot, width: int = 100, height: int = 30, colours: bool = False) -> str:
+    system = 'truecolor' if colours else None
+    console = Console(width=width, height=height, color_system=system, force_terminal=colours)
+    with console.capture() as capture:
+        console.print(MissionView(snapshot), end='')
+    return capture.get()
+
+
+@settings(max_examples=60, deadline=None, derandomize=True)
+@given(st.integers(1, 90), st.integers(1, 50), st.integers(1, 90), st.integers(1, 50), st.data())
+def test_every_wall_is_in_the_picture_where_its_points_are(height, width, columns, rows, data):
+    at = data.draw(st.integers(0, height - 1)), data.draw(st.integers(0, width - 1))
+    cells = np.zeros((height, width), np.int8)
+    cells[at] = 100
+    grid = Grid(cells, 0.1, (-3.0, 5.0))
+    frame = Frame.around(grid.known, columns, rows)
+    assert 1 <= frame.columns <= columns
+    assert 1 <= frame.rows <= rows
+    picture = rasterise(grid, frame)
+    assert picture.shape == (2 * frame.rows, frame.columns)
+    assert (picture == map_raster.WALL).any()
+    # Of the pixels that a cell is in, the last one is its own: look at its lower right corner.
+    corner = -3.0 + 0.1 * (at[1] + 1) - 1e-5, 5.0 + 0.1 * at[0] + 1e-5
+    assert picture[tuple(frame.pixels([corner])[0])] == map_raster.WALL
+
+
+def test_a_picture_keeps_the_aspect_and_leaves_out_what_is_not_known():
+    cells = np.full((200, 200), -1, np.int8)
+    cells[50:70, 100:180] = 0
+    grid = Grid(cells, 0.5)
+    assert grid.known == (50.0, 25.0, 90.0, 35.0)
+    frame = Frame.around(grid.known, 40, 40)
+    assert (frame.columns, frame.rows, frame.scale) == (40, 5, 1.0)
+    assert (rasterise(grid, frame) == map_raster.FREE).all()
+
+
+@pytest.mark.parametrize(('width', 'height'), [(100, 30), (80, 24), (40, 30), (40, 12), (7, 3)])
+def test_the_picture_fills_any_terminal_exactly(width, height):
+    for snapshot in (whole(), Snapshot(), replace(whole(), grid=None)):
+        lines = shown(snapshot, width, height).split('\n')
+        assert [len(line) for line in lines] == [width] * height
+
+
+def test_all_that_is_known_can_be_read():
+    text = shown(whole())
+    for words in (
+        'surveillance in mode SIMULATED · ROS domain 7',
+        'MOVE_TO_NEXT_ROOM for 0:05',
+        'in A, heading for B',
+        '80 %',
+        'decision 3: A → B [URGENT]',
+        'B waits longest',
+        'D closed',
+        'A 0:02  ●',
+        'B 1:30 URGENT ←',
+        '12:00:00 arrived in A',
+    ):
+        assert words in text
+    assert text.index('B 1:30') < text.index('A 0:02')
+
+
+def test_the_map_shows_robot_door_obstacle_trail_and_names_without_colours_too():
+    picture = [line[:59] for line in shown(whole()).split('\n')]
+    drawn = '\n'.join(picture)
+    assert all(character in drawn for character in ('↑', 'X', '*', '·', 'A', 'B'))
+    row = next(line for line in picture if '↑' in line)
+    assert row.index('·') < row.index('↑') < row.index('X')
+
+
+def test_a_name_never_covers_another():
+    close = {f'ROOM{number}': (1.0 + 0.1 * number, 3.0) for number in range(9)}
+    picture = shown(replace(whole(), grid=None, positions=close, visited_at={}), 60, 20)
+    written = [name for name in close if name in picture.split('sketched')[0]]
+    assert 0 < len(written) < 9
+    assert picture.split('sketched')[0].count('ROOM') == len(written)
+
+
+def test_colours_tell_an_open_door_from_a_closed_one():
+    opened = replace(whole(), doors={'D': True})
+    assert shown(opened, colours=True) != shown(whole(), colours=True)
+    assert 'all 1 open' in shown(opened)
+
+
+def test_what_does_not_come_is_said_in_its_place():
+    text = shown(Snapshot(where='ROS domain 7'))
+    assert 'no mission yet: waiting on ROS domain 7' in text
+    for topic in ('map', 'mission_status', 'decision', 'battery_level', 'door_states'):
+        assert f'nothing on {topic} yet' in text
+    assert 'nothing from the ontology yet' in text
+    why = replace(Snapshot(), silent={'map': 'its publisher offers another durability'})
+    assert 'nothing on map yet: its publisher offers another durability' in shown(why)
+
+
+def test_without_a_map_the_places_are_sketched():
+    text = shown(replace(whole(), grid=None, pose=None, links=frozenset({('A', 'B')})))
+    assert 'sketched: nothing on map yet' in text
+    row = next(line for line in text.split('\n') if '○' in line)
+    assert row.index('●') < row.index('.') < row.index('○')
+
+
+def test_the_end_of_a_node_and_of_the_mission_is_announced():
+    crippled = replace(whole(), ended=frozenset({'battery_controller'}))
+    assert 'ended: battery_controller' in shown(crippled)
+    assert 'the mission has ended: waiting' in shown(replace(whole(), nodes={}))
+
+
+def test_what_does_not_fit_is_said_to_be_left_out():
+    many = {f'R{number}': float(number) for number in range(60)}
+    assert '… and more places' in shown(replace(whole(), visited_at=many))
+    wordy = replace(DECISION, reason='a reason ' * 40)
+    assert '…' in shown(replace(whole(), decision=wordy))
+
+
+def test_a_node_that_is_started_again_is_told_though_the_killed_one_still_seems_there():
+    before = whole()
+    again = replace(before, nodes={'robot_behavior': frozenset({'1', '2'})})
+    told = [change.text for change in changes(before, again)]
+    assert told == ['robot_behavior was started again']
+    assert list(changes(again, replace(again, nodes={'robot_behavior': frozenset({'2'})}))) == []
+
+
+def test_each_change_is_told_once_in_one_line():
+    before, after = Snapshot(), whole()
+    first = {change.text: change.detail for change in changes(before, after)}
+    assert first['decision 3: A → B [URGENT]'] == 'B waits longest'
+    assert {'door D closed', 'B is URGENT', 'arrived in A', 'battery at 80 %'} <= first.keys()
+    assert 'something stands at (2.0, 3.5)' in first
+    assert list(changes(after, after)) == []
+    later = replace(
+        after,
+        doors={'D': True},
+        obstacles=np.empty((0, 2)),
+        battery=70.0,
+        nodes={},
+        ended=frozenset({'robot_behavior'}),
+    )
+    assert [change.text for change in changes(after, later)] == [
+        'battery at 70 %',
+        'door D opened',
+        'nothing stands about any more',
+        'every node has ended: waiting for the next mission',
+    ]

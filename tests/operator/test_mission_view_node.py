@@ -1,0 +1,148 @@
+"""The watching node among real and scripted peers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from geometry_msgs.msg import PoseWithCovarianceStamped
+from nav_msgs.msg import OccupancyGrid
+from rclpy.qos import QoSProfile
+from std_msgs.msg import Bool, UInt8
+
+from surveillance_interfaces.action import FollowPath
+from surveillance_interfaces.msg import Decision, DoorStates, MissionStatus
+from surveillance_ontology.armor_server_node import ArmorServer
+from surveillance_ontology.ontology_map_builder_node import OntologyMapBuilder
+from surveillance_operator import mission_view_node
+from surveillance_operator.mission_view_node import MissionViewNode
+from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.point_clouds import cloud_from_points
+from surveillance_runtime.qos import STATE_QOS
+
+PLACE = {
+    'map.A': ['D'],
+    'map.B': ['D'],
+    'room_positions.A': [1.0, 1.0],
+    'room_positions.B': [5.0, 1.0],
+    'robot_room': 'A',
+    'recharge_rooms': ['A'],
+}
+
+
+class Planner(PatrolNode):
+    """The planner's parameters."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__('planner_controller', **options)
+        self.parameter('execution_mode', 'SIMULATED', 'Mode.')
+        self.parameters_under('doors')
+
+
+@pytest.fixture(autouse=True)
+def _look_often(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(mission_view_node, 'LOOK_PERIOD', 0.05)
+    return
+
+
+def say(graph: Any, topic: str, message: Any, qos: Any = STATE_QOS) -> Any:
+    publisher = graph.node.create_publisher(type(message), topic, qos)
+    publisher.publish(message)
+    return publisher
+
+
+def test_it_gathers_what_topics_ontology_and_parameters_tell(graph: Any) -> None:
+    graph.add(ArmorServer)
+    graph.add(OntologyMapBuilder, parameters=PLACE)
+    planner = graph.add(Planner, parameters={'doors.D': [3.0, 1.0, 0.0, 1.0]})
+    view = graph.add(MissionViewNode)
+
+    grid = OccupancyGrid(data=[0, 100, -1, 0, 0, 0])
+    grid.info.width, grid.info.height, grid.info.resolution = 3, 2, 0.5
+    say(graph, 'map', grid)
+    say(graph, 'mission_status', MissionStatus(machine='surveillance', state='MOVE', place='A'))
+    say(graph, 'decision', Decision(sequence=4, from_place='A', place='B', rule='URGENT'))
+    say(graph, 'battery_level', UInt8(data=15))
+    say(graph, 'state/battery_low', Bool(data=True))
+    say(graph, 'door_states', DoorStates(closed=['D']))
+    say(graph, 'obstacles', cloud_from_points(np.array([[2.0, 1.0]])))
+    pose = PoseWithCovarianceStamped()
+    pose.pose.pose.position.x, pose.pose.pose.orientation.w = 1.5, 1.0
+    say(graph, 'amcl_pose', pose)
+
+    graph.until(
+        lambda: (
+            view.snapshot.mode == 'SIMULATED'
+            and view.snapshot.positions == {'A': (1.0, 1.0), 'B': (5.0, 1.0)}
+            and view.snapshot.visited_at.keys() == {'A', 'B'}
+            and view.snapshot.links
+            and view.snapshot.pose
+            and view.snapshot.doors
+            and view.snapshot.obstacles is not None
+            and view.snapshot.grid is not None
+            and view.snapshot.battery_low
+            and 'planner_controller' in view.snapshot.nodes
+        )
+    )
+    seen = view.see()
+    assert seen.battery == 15.0
+    assert seen.status is not None
+    assert seen.status.state == 'MOVE'
+    assert seen.decision is not None
+    assert (seen.number, seen.decision.place) == (4, 'B')
+    assert seen.grid is not None
+    assert seen.grid.cells.tolist() == [[0, 100, -1], [0, 0, 0]]
+    assert seen.doors == {'D': False}
+    assert seen.door_lines['D'] == pytest.approx((2.5, 1.0, 3.5, 1.0))
+    assert seen.obstacles is not None
+    assert seen.obstacles.tolist() == [[2.0, 1.0]]
+    assert seen.pose == (1.5, 0.0, 0.0)
+    assert seen.trail.tolist() == [[1.5, 0.0]]
+    assert 0 <= seen.now - seen.visited_at['A'] < 60
+    assert 'door D closed' in [text for _, text in seen.events]
+
+    graph.remove(planner)
+    graph.until(lambda: view.snapshot.ended == {'planner_controller'})
+    assert ('planner_controller ended') in view.snapshot.events[-1][1]
+
+
+def test_where_nobody_estimates_the_pose_the_feedback_of_the_drive_tells_it(graph: Any) -> None:
+    view = graph.add(MissionViewNode)
+    kind = FollowPath.Impl.FeedbackMessage
+    drive = graph.node.create_publisher(kind, 'follow_path/_action/feedback', 1)
+    graph.until(drive.get_subscription_count)
+    for x in (1.0, 2.0):
+        message = kind()
+        message.feedback.position.x = message.feedback.position.y = x
+        drive.publish(message)
+        graph.until(lambda x=x: view.snapshot.pose and view.snapshot.pose[0] == x)
+    assert view.snapshot.pose == pytest.approx((2.0, 2.0, np.pi / 4))
+
+
+def test_why_a_topic_cannot_be_used_is_known(graph: Any) -> None:
+    view = graph.add(MissionViewNode)
+    say(graph, 'battery_level', UInt8(data=50), QoSProfile(depth=1))
+    say(graph, 'map', OccupancyGrid(data=[0, 0]))
+    graph.until(lambda: {'battery_level', 'map'} <= view.snapshot.silent.keys())
+    assert 'another DURABILITY' in view.snapshot.silent['battery_level']
+    assert '2 cells came' in view.snapshot.silent['map']
+
+
+def test_the_next_mission_begins_with_an_empty_picture(graph: Any) -> None:
+    view = graph.add(MissionViewNode)
+    status = say(graph, 'mission_status', MissionStatus(state='FIRST'))
+    battery = say(graph, 'battery_level', UInt8(data=50))
+    graph.until(lambda: view.snapshot.battery == 50 and view.snapshot.nodes)
+    for publisher in (status, battery):
+        graph.node.destroy_publisher(publisher)
+    graph.until(lambda: not view.snapshot.nodes)
+    frozen = view.see()
+    assert frozen.status is not None
+    assert frozen.status.state == 'FIRST'
+    assert view.see().now == frozen.now
+
+    say(graph, 'mission_status', MissionStatus(state='SECOND'))
+    graph.until(lambda: view.snapshot.status and view.snapshot.status.state == 'SECOND')
+    assert view.snapshot.battery is None
+    assert any('waiting for the next mission' in text for _, text in view.snapshot.events)
