@@ -19,6 +19,7 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.node import Node
 from rclpy.task import Future
 
+from surveillance_runtime.qos import CLIENT_QOS
 from surveillance_runtime.waiting import Interrupt
 
 DISCOVERY_PERIOD = 0.02
@@ -56,7 +57,9 @@ class ServiceCaller:
 
     def __init__(self, node: Node, srv_type: Any, name: str) -> None:
         self._node = node
-        self._client = node.create_client(srv_type, name, callback_group=ReentrantCallbackGroup())
+        self._client = node.create_client(
+            srv_type, name, callback_group=ReentrantCallbackGroup(), qos_profile=CLIENT_QOS
+        )
         self.name = name
 
     def is_ready(self) -> bool:

@@ -29,6 +29,7 @@ from surveillance_runtime.calls import (
     block_on,
 )
 from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.qos import ACTION_CLIENT_QOS, CLIENT_QOS
 from surveillance_runtime.waiting import Interrupt
 
 PROBE_PERIOD = 0.5
@@ -76,14 +77,19 @@ class GoalCaller:
     ) -> None:
         self._node = node
         group = ReentrantCallbackGroup()
-        self._client = ActionClient(node, action_type, name, callback_group=group)
+        self._client = ActionClient(
+            node, action_type, name, callback_group=group, **ACTION_CLIENT_QOS
+        )
         if isinstance(node, PatrolNode):
             node.own(self._client)
         self._action_type = action_type
         self._cancel_timeout = cancel_timeout
         self._watch: _ServerWatch | None = None
         self._probe = node.create_client(
-            action_type.Impl.GetResultService, f'{name}/_action/get_result', callback_group=group
+            action_type.Impl.GetResultService,
+            f'{name}/_action/get_result',
+            callback_group=group,
+            qos_profile=CLIENT_QOS,
         )
         self._status = node.create_subscription(
             action_type.Impl.GoalStatusMessage,

@@ -15,6 +15,7 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 
 from surveillance_runtime.awaited_work import work_aside
 from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.qos import ACTION_SERVER_QOS
 from surveillance_runtime.waiting import ClockWait, Interrupt
 
 RESULT_KEPT = 300
@@ -107,6 +108,7 @@ class GoalServer:
             handle_accepted_callback=self._accepted,
             cancel_callback=self._cancel,
             result_timeout=RESULT_KEPT,
+            **ACTION_SERVER_QOS,
         )
         node.own(self._server)
         node.stopping.subscribe(self._stop)

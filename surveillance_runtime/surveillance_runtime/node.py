@@ -17,6 +17,7 @@ from rcl_interfaces.msg import (
     ParameterDescriptor,
     SetParametersResult,
 )
+from rclpy.client import Client
 from rclpy.event_handler import (
     PublisherEventCallbacks,
     QoSRequestedIncompatibleQoSInfo,
@@ -27,9 +28,11 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
 from rclpy.qos import qos_policy_name_from_kind
+from rclpy.service import Service
 from rclpy.subscription import Subscription
 
 from surveillance_runtime.parameters import Check, ParameterError, ParameterSpec, element_type
+from surveillance_runtime.qos import CLIENT_QOS, SERVICE_QOS
 from surveillance_runtime.waiting import Interrupt
 
 JOIN_SECONDS = 2.0
@@ -178,6 +181,18 @@ class PatrolNode(Node):  # type: ignore[misc]
             SubscriptionEventCallbacks(incompatible_qos=on_mismatch, use_default_callbacks=False),
         )
         return super().create_subscription(msg_type, topic, *args, **kwargs)
+
+    def create_service(
+        self, srv_type: Any, name: str, callback: Callable[..., Any], **options: Any
+    ) -> Service:
+        """Create a service as rclpy does, with a queue that does not lose requests."""
+        options.setdefault('qos_profile', SERVICE_QOS)
+        return super().create_service(srv_type, name, callback, **options)
+
+    def create_client(self, srv_type: Any, name: str, **options: Any) -> Client:
+        """Create a client as rclpy does, with a queue that does not lose answers."""
+        options.setdefault('qos_profile', CLIENT_QOS)
+        return super().create_client(srv_type, name, **options)
 
     def spawn(self, work: Callable[[], None], name: str | None = None) -> threading.Thread:
         """Start a thread for long work; `stop` joins it, so it must heed `stopping`.

@@ -277,3 +277,29 @@ def test_clock_wait_ends_by_interrupt(graph):
     end = in_thread(lambda: wait.sleep(1000.0, interrupt))
     interrupt.set()
     assert end() is False
+
+
+def test_requests_that_wait_for_a_busy_server_are_not_lost(graph, server):
+    """rclpy's default keeps ten requests and ten answers and drops the rest without a word."""
+    began, go_on = threading.Event(), threading.Event()
+
+    def serve(_request, answer):
+        began.set()
+        assert go_on.wait(10.0)
+        return answer
+
+    server.create_service(Trigger, 'busy', serve)
+    client = graph.node.create_client(Trigger, 'busy')
+    assert client.wait_for_service(5.0)
+    futures = [client.call_async(Trigger.Request()) for _ in range(300)]
+    assert began.wait(5.0)
+    go_on.set()
+    answered = threading.Event()
+
+    def count(_future):
+        if all(future.done() for future in futures):
+            answered.set()
+
+    for future in futures:
+        future.add_done_callback(count)
+    assert answered.wait(10.0), sum(not future.done() for future in futures)
