@@ -7,6 +7,7 @@ same rules and policies as the surveillance machine. The decision is published w
 from __future__ import annotations
 
 import random
+import threading
 from collections.abc import Sequence
 from typing import Any
 
@@ -48,6 +49,7 @@ class Reasoner(PatrolNode):
         self._avoided: frozenset[str] = frozenset()
         self._work = AwaitedWork(self, 1)
         self._next: Future | None = None
+        self._sharing = threading.Lock()
         self._interrupt = Interrupt()
         self.stopping.subscribe(self._interrupt.set)
         self.create_subscription(MissionStatus, 'mission_status', self._on_status, STATE_QOS)
@@ -61,9 +63,11 @@ class Reasoner(PatrolNode):
     async def _on_reason(self, _request: Any, response: Any) -> Any:
         # Who asks before a choice is begun shares it: one client that gave up and asks again must
         # not have to wait until all that it asked before has been chosen.
-        if self._next is None:
-            self._next = self._work.run(self._choose)
-        response.point = await self._next
+        with self._sharing:
+            if self._next is None:
+                self._next = self._work.run(self._choose)
+            shared = self._next
+        response.point = await shared
         return response
 
     def on_stop(self) -> None:
@@ -72,7 +76,9 @@ class Reasoner(PatrolNode):
 
     def _choose(self) -> str:
         """The next place; empty when there is none, and the log says why."""
-        self._next = None
+        with self._sharing:
+            # The lock is held until the request that began this choice has noted it as the next.
+            self._next = None
         try:
             situation = self._chooser.look(self._wait.now(), self._interrupt, self._avoided)
             decision = self._chooser.choose(situation)

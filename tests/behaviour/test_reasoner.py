@@ -6,6 +6,7 @@ import threading
 from typing import Any
 
 from surveillance_behaviour.peers.ports import PeerError
+from surveillance_behaviour.policy.situation import Decision
 from surveillance_behaviour.reasoner_node import Reasoner
 from surveillance_interfaces.srv import Reason
 
@@ -38,3 +39,32 @@ def test_requests_that_come_while_a_choice_is_made_share_the_next_one(
     assert len(looks) <= 3, 'one choice for each request'
     for look_ended in looks:
         look_ended.set()
+
+
+def test_a_choice_that_begins_at_once_is_given_once(graph: Any, monkeypatch: Any) -> None:
+    reasoner = graph.add(Reasoner)
+    answers = iter(['C1', 'C2'])
+    begun = threading.Event()
+
+    def choose_now(_situation: Any) -> Any:
+        return Decision(0.0, 'E', next(answers), 'E', 'ROOM', 'tour', '', {})
+
+    put = reasoner._work.run
+
+    def run_and_wait(work: Any) -> Any:
+        future = put(lambda: (begun.set(), work())[1])
+        assert begun.wait(10.0)
+        # The worker goes on while the request that asked is still on its way.
+        graph_pause.wait(0.05)
+        return future
+
+    graph_pause = threading.Event()
+    monkeypatch.setattr(reasoner._chooser, 'look', lambda *_: None)
+    monkeypatch.setattr(reasoner._chooser, 'choose', choose_now)
+    monkeypatch.setattr(reasoner._work, 'run', run_and_wait)
+    client = graph.node.create_client(Reason, 'reason')
+    graph.until(client.service_is_ready)
+    for place in ('C1', 'C2'):
+        answer = client.call_async(Reason.Request())
+        graph.until(answer.done)
+        assert answer.result().point == place
