@@ -2,7 +2,7 @@
 
     python benchmarks/perception.py [--quick] [--picture FILE]
 
-Both detectors get the same rendered pictures: 640x480 pixels, 60 degrees field of view, markers of
+Both detectors get the same rendered images: 640x480 pixels, 60 degrees field of view, markers of
 0.20 m from DICT_5X5_100, a lens blur of 0.8 pixels and a noise of 2 grey levels. Seven ids are on
 the known list; what OpenCV finds is held against the same list. Times are processor time of one
 thread. `--picture` draws recall over distance and angle for both.
@@ -31,14 +31,14 @@ import numpy.typing as npt
 from surveillance_perception.detection.camera_model import CameraModel
 from surveillance_perception.detection.detector import DetectorSettings, MarkerDetector
 from surveillance_perception.detection.dictionaries import dictionary_named
-from surveillance_perception.detection.marker_scene import (
+from surveillance_perception.testing.marker_scene import (
     BACKDROPS,
     Degradation,
+    ImageArray,
     Panel,
-    Picture,
     backdrop_of,
-    corners_in_picture,
-    picture_of,
+    corners_in_image,
+    image_of,
 )
 
 CAMERA = CameraModel.from_field_of_view(640, 480, math.radians(60))
@@ -64,15 +64,15 @@ DEGRADED = {
 DECOYS = ('DICT_4X4_50', 'DICT_6X6_250', 'DICT_APRILTAG_36h11')
 
 Found = list[tuple[int, npt.NDArray[np.float64]]]
-Detect = Callable[[Picture], Found]
+Detect = Callable[[ImageArray], Found]
 
 
 def opencv_defaults() -> Detect:
     """OpenCV's detector as it comes."""
     detector = cv2.aruco.ArucoDetector(DICTIONARY)
 
-    def detect(picture: Picture) -> Found:
-        corners, ids, _ = detector.detectMarkers(picture)
+    def detect(image: ImageArray) -> Found:
+        corners, ids, _ = detector.detectMarkers(image)
         if ids is None:
             return []
         # (N, 1) in OpenCV 4, (N,) in OpenCV 5
@@ -85,12 +85,12 @@ def opencv_defaults() -> Detect:
 def this_project(known: frozenset[int] | None = KNOWN) -> Detect:
     """The detector of surveillance_perception."""
     detector = MarkerDetector(DetectorSettings(known_ids=known))
-    return lambda picture: [(each.marker_id, each.corners) for each in detector.detect(picture)]
+    return lambda image: [(each.marker_id, each.corners) for each in detector.detect(image)]
 
 
 @dataclass
 class Tally:
-    """What one detector did with some pictures."""
+    """What one detector did with some images."""
 
     pictures: int = 0
     found: int = 0
@@ -100,14 +100,14 @@ class Tally:
     seconds: list[float] = field(default_factory=list)
     errors: list[float] = field(default_factory=list)
 
-    def look(self, detect: Detect, picture: Picture, panels: Sequence[Panel]) -> None:
-        """Have one picture looked at and hold it against the truth."""
+    def look(self, detect: Detect, image: ImageArray, panels: Sequence[Panel]) -> None:
+        """Have one image looked at and hold it against the truth."""
         start = time.thread_time()
-        found = detect(picture)
+        found = detect(image)
         self.seconds.append(time.thread_time() - start)
-        self.pictures += 1
+        self.images += 1
         self.shown += len(panels)
-        truths = [(panel.marker_id, corners_in_picture(panel, CAMERA)) for panel in panels]
+        truths = [(panel.marker_id, corners_in_image(panel, CAMERA)) for panel in panels]
         for marker_id, corners in found:
             errors = [
                 float(np.linalg.norm(corners - truth, axis=1).mean())
@@ -132,7 +132,7 @@ Tallies = dict[str, Tally]
 
 
 def panel(distance: float, degrees: float, generator: np.random.Generator) -> Panel:
-    """A known marker somewhere in the picture, turned about an upright or a level axis."""
+    """A known marker somewhere in the image, turned about an upright or a level axis."""
     upright = generator.random() < 0.75
     return Panel(
         int(generator.choice(sorted(KNOWN))),
@@ -150,10 +150,10 @@ def scene(
     degradation: Degradation,
     generator: np.random.Generator,
     dictionary: cv2.aruco.Dictionary = DICTIONARY,
-) -> Picture:
-    """A picture of panels in front of a backdrop."""
+) -> ImageArray:
+    """An image of panels in front of a backdrop."""
     ground = backdrop_of(backdrop, CAMERA, generator)
-    return picture_of(list(panels), CAMERA, dictionary, ground, degradation, generator)
+    return image_of(list(panels), CAMERA, dictionary, ground, degradation, generator)
 
 
 def indoors(generator: np.random.Generator) -> str:
@@ -170,9 +170,9 @@ def grid(detectors: dict[str, Detect], samples: int) -> dict[tuple[int, int], Ta
             tallies = {name: Tally() for name in detectors}
             for _ in range(samples):
                 panels = [panel(distance, degrees, generator)]
-                picture = scene(panels, indoors(generator), SHARP, generator)
+                image = scene(panels, indoors(generator), SHARP, generator)
                 for name, detect in detectors.items():
-                    tallies[name].look(detect, picture, panels)
+                    tallies[name].look(detect, image, panels)
             cells[distance, degrees] = tallies
     return cells
 
@@ -187,15 +187,15 @@ def degraded(detectors: dict[str, Detect], samples: int) -> dict[str, Tallies]:
             for degrees in (0, 20, 40, 60):
                 for _ in range(samples):
                     panels = [panel(distance, degrees, generator)]
-                    picture = scene(panels, indoors(generator), degradation, generator)
+                    image = scene(panels, indoors(generator), degradation, generator)
                     for name, detect in detectors.items():
-                        tallies[name].look(detect, picture, panels)
+                        tallies[name].look(detect, image, panels)
         result[condition] = tallies
     return result
 
 
-def without_markers(count: int) -> Iterator[tuple[str, Picture]]:
-    """Pictures without a marker of the dictionary: textures, and markers of other dictionaries."""
+def without_markers(count: int) -> Iterator[tuple[str, ImageArray]]:
+    """Images without a marker of the dictionary: textures, and markers of other dictionaries."""
     kinds = [*BACKDROPS, 'other dictionaries']
     conditions = [SHARP, *DEGRADED.values()]
     for index in range(count):
@@ -220,7 +220,7 @@ def summed(tallies: Sequence[Tally]) -> Tally:
     """Several tallies as one."""
     total = Tally()
     for each in tallies:
-        total.pictures += each.pictures
+        total.images += each.images
         total.found += each.found
         total.shown += each.shown
         total.wrong_known += each.wrong_known
@@ -246,7 +246,7 @@ def ratio(ours: float, theirs: float) -> str:
 
 
 def print_recall(title: str, groups: dict[str, Tallies]) -> None:
-    """Recall, corner error and time of both detectors for groups of pictures."""
+    """Recall, corner error and time of both detectors for groups of images."""
     rows = []
     for name, tallies in groups.items():
         theirs, ours = tallies['OpenCV'], tallies['here']
@@ -275,7 +275,7 @@ def print_recall(title: str, groups: dict[str, Tallies]) -> None:
             'ms OpenCV',
             'here',
             '95 %',
-            'pictures',
+            'images',
         ],
         rows,
     )
@@ -284,13 +284,13 @@ def print_recall(title: str, groups: dict[str, Tallies]) -> None:
 def main(argv: Sequence[str] | None = None) -> int:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument('--quick', action='store_true', help='fewer pictures, under 50 s')
+    parser.add_argument('--quick', action='store_true', help='fewer images, under 50 s')
     parser.add_argument('--picture', type=Path, help='draw recall over distance and angle')
     options = parser.parse_args(argv)
     cv2.setNumThreads(1)
     detectors = {'OpenCV': opencv_defaults(), 'here': this_project()}
     samples, degraded_samples, empty = (2, 1, 90) if options.quick else (12, 5, 1008)
-    print(f'OpenCV {cv2.__version__}, {samples} pictures a cell\n')
+    print(f'OpenCV {cv2.__version__}, {samples} images a cell\n')
 
     cells = grid(detectors, samples)
     for name in detectors:
@@ -319,14 +319,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     print_recall('2-5 m, to 60 deg', {**conditions, 'all degraded': whole})
 
     kinds: defaultdict[str, Tallies] = defaultdict(lambda: {name: Tally() for name in detectors})
-    for kind, picture in without_markers(empty):
+    for kind, image in without_markers(empty):
         for name, detect in detectors.items():
-            kinds[kind][name].look(detect, picture, [])
+            kinds[kind][name].look(detect, image, [])
     total = {name: summed([each[name] for each in kinds.values()]) for name in detectors}
     print_table(
         [
-            'no marker in the picture',
-            'pictures',
+            'no marker in the image',
+            'images',
             'known ids OpenCV',
             'here',
             'other ids OpenCV',
@@ -337,7 +337,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         [
             [
                 kind,
-                str(tallies['here'].pictures),
+                str(tallies['here'].images),
                 str(tallies['OpenCV'].wrong_known),
                 str(tallies['here'].wrong_known),
                 str(tallies['OpenCV'].wrong_other),

@@ -25,16 +25,16 @@ from sensor_msgs.msg import Image
 from surveillance_interfaces.srv import MarkerRoutine, PointCamera
 from surveillance_perception.arm_controller_node import ArmController
 from surveillance_perception.aruco_detector_node import ArucoDetector
-from surveillance_perception.conversions import picture_from_ros
+from surveillance_perception.conversions import image_from_ros
 from surveillance_perception.detection.annotation import annotated
 from surveillance_perception.detection.camera_model import CameraModel
 from surveillance_perception.detection.detector import DetectorSettings, MarkerDetector
 from surveillance_perception.detection.dictionaries import dictionary_named
-from surveillance_perception.detection.marker_scene import (
+from surveillance_perception.testing.marker_scene import (
     Degradation,
     Panel,
     backdrop_of,
-    picture_of,
+    image_of,
 )
 from surveillance_runtime.calls import ServiceCaller
 from surveillance_runtime.node import PatrolNode
@@ -45,7 +45,7 @@ from surveillance_simulation.simulator_node import Simulator
 ROOT = Path(__file__).resolve().parents[1]
 IMAGES = ROOT / 'docs' / 'images'
 KNOWN = list(range(11, 18))
-Picture = npt.NDArray[np.uint8]
+ImageArray = npt.NDArray[np.uint8]
 
 
 def place() -> dict[str, Any]:
@@ -65,7 +65,7 @@ def overrides(**values: Any) -> list[Parameter]:
     return [Parameter(name, value=value) for name, value in values.items()]
 
 
-def markers_seen() -> Picture:
+def markers_seen() -> ImageArray:
     """What the detector shows at three poses, and looking at the two markers that none shows."""
     # a domain of its own: another robot may be running on this machine
     rclpy.init(domain_id=97)
@@ -85,12 +85,12 @@ def markers_seen() -> Picture:
         spinner.executor.add_node(node)
     spinner.start()
 
-    def rested() -> Picture:
+    def rested() -> ImageArray:
         while not shown.empty():
             shown.get()
         for _ in range(6):
             message = shown.get(timeout=30.0)
-        return picture_from_ros(message, 10**7)
+        return image_from_ros(message, 10**7)
 
     pictures = []
     try:
@@ -118,7 +118,7 @@ def markers_seen() -> Picture:
     return cv2.resize(np.vstack(rows), None, fx=0.6, fy=0.6, interpolation=cv2.INTER_AREA)
 
 
-def hard_markers() -> Picture:
+def hard_markers() -> ImageArray:
     """Markers at the edge of what can be read, five times enlarged, and what was read."""
     camera = CameraModel.from_field_of_view(640, 480, math.radians(60))
     detector = MarkerDetector(DetectorSettings(known_ids=frozenset(KNOWN)))
@@ -136,7 +136,7 @@ def hard_markers() -> Picture:
     for name, (panel, degradation) in cases.items():
         generator = np.random.default_rng(4)
         ground = backdrop_of('clouds', camera, generator)
-        picture = picture_of(
+        picture = image_of(
             [panel], camera, dictionary_named('DICT_5X5_100'), ground, degradation, generator
         )
         cut = (slice(216, 264), slice(296, 344))

@@ -1,4 +1,4 @@
-"""The `aruco_detector` node: camera pictures in, markers out."""
+"""The `aruco_detector` node: camera images in, markers out."""
 
 from __future__ import annotations
 
@@ -17,16 +17,15 @@ from surveillance_perception.conversions import (
     camera_from_ros,
     detections_to_ros,
     diagnostics_to_ros,
-    picture_from_any,
-    picture_to_ros,
+    image_from_any,
+    image_to_ros,
     poses_to_ros,
 )
 from surveillance_perception.detection.annotation import annotated
 from surveillance_perception.detection.camera_model import CameraModel, camera_of
-from surveillance_perception.detection.detection_watch import DetectionWatch
+from surveillance_perception.detection.marker_stream import MarkerStream
 from surveillance_perception.detection.parameters import DetectorParameters
-from surveillance_perception.stream.latest import Latest
-from surveillance_perception.stream.picture_subscription import PICTURES_QOS, PictureSubscription
+from surveillance_perception.stream.image_subscription import IMAGES_QOS, ImageSubscription, Latest
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
@@ -36,10 +35,10 @@ IDS_QOS = QoSProfile(depth=200, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 class ArucoDetector(PatrolNode):
-    """Finds ArUco markers in the camera's pictures.
+    """Finds ArUco markers in the camera's images.
 
     Attributes:
-        skipped: How many pictures were left out because the arm moved.
+        skipped: How many images were left out because the arm moved.
     """
 
     def __init__(self, **node_options: Any) -> None:
@@ -49,18 +48,18 @@ class ArucoDetector(PatrolNode):
         self._rest_since: Time | None = Time(clock_type=self.get_clock().clock_type)
         self._stale = False
         self.skipped = 0
-        self._watch = DetectionWatch(self._options.settings())
-        self._pictures: Latest[Image | CompressedImage] = Latest()
+        self._watch = MarkerStream(self._options.settings())
+        self._images: Latest[Image | CompressedImage] = Latest()
         self._ids = self.create_publisher(Int32, 'aruco_detector/id', IDS_QOS)
         self._detections = self.create_publisher(
             MarkerDetectionArray, 'aruco_detector/detections', 10
         )
         self._poses = self.create_publisher(PoseArray, 'aruco_detector/poses', 10)
-        self._annotated = self.create_publisher(Image, 'aruco_detector/annotated', PICTURES_QOS)
+        self._annotated = self.create_publisher(Image, 'aruco_detector/annotated', IMAGES_QOS)
         self._diagnostics = self.create_publisher(DiagnosticArray, 'diagnostics', 10)
         topic = 'camera/rgb/image_raw'
-        PictureSubscription(self, Image, topic, self._pictures.put)
-        PictureSubscription(self, CompressedImage, topic + '/compressed', self._pictures.put)
+        ImageSubscription(self, Image, topic, self._images.put)
+        ImageSubscription(self, CompressedImage, topic + '/compressed', self._images.put)
         self.create_subscription(
             CameraInfo, 'camera/rgb/camera_info', self._on_camera_info, SENSOR_QOS
         )
@@ -77,7 +76,7 @@ class ArucoDetector(PatrolNode):
 
     def on_stop(self) -> None:
         """End the worker."""
-        self._pictures.close()
+        self._images.close()
 
     def _settings_changed(self) -> None:
         self._stale = True
@@ -92,7 +91,7 @@ class ArucoDetector(PatrolNode):
         self._rest_since = self.get_clock().now() if message.data else None
 
     def _work(self) -> None:
-        while (message := self._pictures.take()) is not None:
+        while (message := self._images.take()) is not None:
             if self._stale:
                 self._stale = False
                 self._adopt()
@@ -116,21 +115,21 @@ class ArucoDetector(PatrolNode):
         return since is not None and Time.from_msg(message.header.stamp) >= since
 
     def _look(self, message: Any) -> None:
-        picture = picture_from_any(message, self._options.max_pixels)
-        height, width = picture.shape[:2]
+        image = image_from_any(message, self._options.max_pixels)
+        height, width = image.shape[:2]
         camera = camera_of(width, height, self._camera, self._options.field_of_view)
-        sightings, new = self._watch.look(picture, camera)
+        sightings, new = self._watch.look(image, camera)
         for marker_id in new:
             self._ids.publish(Int32(data=marker_id))
         self._detections.publish(detections_to_ros(message.header, sightings))
         self._poses.publish(poses_to_ros(message.header, sightings))
         if self._annotated.get_subscription_count():
-            drawn = annotated(picture, (s.detection for s in sightings), self._watch.confirmed)
-            self._annotated.publish(picture_to_ros(drawn, message.header))
+            drawn = annotated(image, (s.detection for s in sightings), self._watch.confirmed)
+            self._annotated.publish(image_to_ros(drawn, message.header))
 
     def _diagnose(self) -> None:
         further = {
-            'dropped in all': self._pictures.dropped,
+            'dropped in all': self._images.dropped,
             'taken in motion in all': self.skipped,
             'confirmed ids': ' '.join(str(each) for each in sorted(self._watch.confirmed)),
         }

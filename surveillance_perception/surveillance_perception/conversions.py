@@ -19,15 +19,15 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from surveillance_interfaces.action import ScanSurroundings
 from surveillance_interfaces.msg import MarkerDetection, MarkerDetectionArray, RoomConnection
 from surveillance_interfaces.srv import RoomInformation
-from surveillance_perception.arm.surroundings_scan import ScanOutcome, ScanPlan
+from surveillance_perception.arm.scan import ScanOutcome, ScanPlan
 from surveillance_perception.arm.trajectory import ArmTrajectory
 from surveillance_perception.arm.view_coverage import View
 from surveillance_perception.detection.camera_model import CameraModel
-from surveillance_perception.detection.detection_watch import Sighting, Statistics
 from surveillance_perception.detection.detector import Detection
+from surveillance_perception.detection.marker_stream import Sighting, Statistics
 from surveillance_perception.detection.pose import MarkerPose
 from surveillance_perception.marker_registry import MarkedPlace
-from surveillance_perception.stream.picture_files import Picture, PictureError, decode_picture
+from surveillance_perception.stream.image_files import ImageArray, ImageError, decode_image
 
 _CHANNELS = {'mono8': 1, 'rgb8': 3, 'bgr8': 3, 'rgba8': 4, 'bgra8': 4}
 _TO_BGR = {
@@ -37,36 +37,36 @@ _TO_BGR = {
 }
 
 
-def picture_from_ros(message: Any, max_pixels: int) -> Picture:
-    """A grey (height, width) or BGR (height, width, 3) picture from an Image.
+def image_from_ros(message: Any, max_pixels: int) -> ImageArray:
+    """A grey (height, width) or BGR (height, width, 3) image from an Image.
 
     Args:
         message: sensor_msgs/Image.
-        max_pixels: The largest picture that is taken.
+        max_pixels: The largest image that is taken.
 
     Raises:
-        PictureError: The picture is empty, too large, shorter than its size says, or in an encoding
+        ImageError: The image is empty, too large, shorter than its size says, or in an encoding
             other than mono8, rgb8, bgr8, rgba8 and bgra8.
     """
     size = f'{message.width}x{message.height}'
     channels = _CHANNELS.get(message.encoding)
     if channels is None:
-        raise PictureError(
-            f"picture encoded as '{message.encoding}', expected one of {', '.join(_CHANNELS)}"
+        raise ImageError(
+            f"image encoded as '{message.encoding}', expected one of {', '.join(_CHANNELS)}"
         )
     if message.width == 0 or message.height == 0:
-        raise PictureError(f'picture of {size} pixels is empty')
+        raise ImageError(f'image of {size} pixels is empty')
     if message.width * message.height > max_pixels:
-        raise PictureError(f'picture of {size} pixels is larger than {max_pixels} pixels')
+        raise ImageError(f'image of {size} pixels is larger than {max_pixels} pixels')
     if message.step < message.width * channels:
-        raise PictureError(
-            f'picture has rows of {message.step} bytes, expected at least '
+        raise ImageError(
+            f'image has rows of {message.step} bytes, expected at least '
             f'{message.width * channels} for {message.width} pixels of {message.encoding}'
         )
     expected = message.step * message.height
     if len(message.data) < expected:
-        raise PictureError(
-            f'picture of {size} pixels has {len(message.data)} bytes, expected {expected}'
+        raise ImageError(
+            f'image of {size} pixels has {len(message.data)} bytes, expected {expected}'
         )
     rows = np.frombuffer(message.data, np.uint8, expected).reshape(message.height, message.step)
     pixels = rows[:, : message.width * channels].reshape(message.height, message.width, channels)
@@ -77,34 +77,34 @@ def picture_from_ros(message: Any, max_pixels: int) -> Picture:
     return np.ascontiguousarray(pixels)
 
 
-def picture_from_compressed(message: CompressedImage, max_pixels: int) -> Picture:
-    """A BGR picture (height, width, 3) from a CompressedImage.
+def image_from_compressed(message: CompressedImage, max_pixels: int) -> ImageArray:
+    """A BGR image (height, width, 3) from a CompressedImage.
 
     Raises:
-        PictureError: The data is no picture, or the picture is larger than `max_pixels`.
+        ImageError: The data is no image, or the image is larger than `max_pixels`.
     """
-    picture = decode_picture(bytes(message.data), 'compressed picture')
-    if picture.shape[0] * picture.shape[1] > max_pixels:
-        size = f'{picture.shape[1]}x{picture.shape[0]}'
-        raise PictureError(f'picture of {size} pixels is larger than {max_pixels} pixels')
-    return picture
+    image = decode_image(bytes(message.data), 'compressed image')
+    if image.shape[0] * image.shape[1] > max_pixels:
+        size = f'{image.shape[1]}x{image.shape[0]}'
+        raise ImageError(f'image of {size} pixels is larger than {max_pixels} pixels')
+    return image
 
 
-def picture_from_any(message: Image | CompressedImage, max_pixels: int) -> Picture:
-    """A picture from either kind of message; otherwise as the two above."""
+def image_from_any(message: Image | CompressedImage, max_pixels: int) -> ImageArray:
+    """An image from either kind of message; otherwise as the two above."""
     if isinstance(message, Image):
-        return picture_from_ros(message, max_pixels)
-    return picture_from_compressed(message, max_pixels)
+        return image_from_ros(message, max_pixels)
+    return image_from_compressed(message, max_pixels)
 
 
-def picture_to_ros(picture: npt.NDArray[np.uint8], header: Header) -> Image:
-    """An Image (mono8 or bgr8) of a grey or BGR picture."""
-    height, width = picture.shape[:2]
+def image_to_ros(image: npt.NDArray[np.uint8], header: Header) -> Image:
+    """An Image (mono8 or bgr8) of a grey or BGR image."""
+    height, width = image.shape[:2]
     message = Image(header=header, height=height, width=width)
-    message.encoding = 'mono8' if picture.ndim == 2 else 'bgr8'
-    message.step = width * (1 if picture.ndim == 2 else 3)
+    message.encoding = 'mono8' if image.ndim == 2 else 'bgr8'
+    message.step = width * (1 if image.ndim == 2 else 3)
     # rclpy takes an array.array without looking at each byte
-    message.data.frombytes(np.ascontiguousarray(picture).tobytes())
+    message.data.frombytes(np.ascontiguousarray(image).tobytes())
     return message
 
 
@@ -120,7 +120,7 @@ def camera_from_ros(message: CameraInfo) -> CameraModel:
 
 
 def camera_to_ros(camera: CameraModel, header: Header) -> CameraInfo:
-    """A CameraInfo of a camera whose picture is not rectified further."""
+    """A CameraInfo of a camera whose image is not rectified further."""
     message = CameraInfo(header=header, width=camera.width, height=camera.height)
     message.distortion_model = 'plumb_bob'
     message.d = camera.distortion.tolist()
@@ -150,7 +150,7 @@ def detection_to_ros(
 
 
 def detections_to_ros(header: Header, sightings: Iterable[Sighting]) -> MarkerDetectionArray:
-    """All markers of one picture."""
+    """All markers of one image."""
     return MarkerDetectionArray(
         header=header,
         detections=[
@@ -161,7 +161,7 @@ def detections_to_ros(header: Header, sightings: Iterable[Sighting]) -> MarkerDe
 
 
 def poses_to_ros(header: Header, sightings: Iterable[Sighting]) -> PoseArray:
-    """The poses of those markers of a picture that are confirmed."""
+    """The poses of those markers of an image that are confirmed."""
     poses = [pose_to_ros(each.pose) for each in sightings if each.pose and each.confirmed]
     return PoseArray(header=header, poses=poses)
 
@@ -169,17 +169,17 @@ def poses_to_ros(header: Header, sightings: Iterable[Sighting]) -> PoseArray:
 def diagnostics_to_ros(
     name: str, stamp: Any, statistics: Statistics, further: Mapping[str, Any]
 ) -> DiagnosticArray:
-    """How the stream of pictures was, with further figures to show."""
+    """How the stream of images was, with further figures to show."""
     status = DiagnosticStatus(name=f'{name}: pictures', hardware_id='camera')
     status.level, status.message = DiagnosticStatus.OK, 'looking'
     if statistics.refused:
         status.level, status.message = DiagnosticStatus.ERROR, statistics.last_error
-    elif not statistics.pictures:
-        status.level, status.message = DiagnosticStatus.WARN, 'no pictures'
+    elif not statistics.images:
+        status.level, status.message = DiagnosticStatus.WARN, 'no images'
     figures = {
-        'pictures': statistics.pictures,
+        'pictures': statistics.images,
         'refused': statistics.refused,
-        'ms per picture': f'{statistics.mean_milliseconds:.1f}',
+        'ms per image': f'{statistics.mean_milliseconds:.1f}',
         **further,
     }
     status.values = [KeyValue(key=key, value=str(value)) for key, value in figures.items()]

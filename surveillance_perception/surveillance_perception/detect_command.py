@@ -1,4 +1,4 @@
-"""The `detect` command: prints the markers in picture files and writes annotated copies."""
+"""The `detect` command: prints the markers in image files and writes annotated copies."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import cv2
 
 from surveillance_perception.detection.annotation import annotated
 from surveillance_perception.detection.detector import DetectorSettings, MarkerDetector
-from surveillance_perception.stream.picture_files import PictureError, read_picture
+from surveillance_perception.stream.image_files import ImageError, read_image
 
 
 class _Parser(argparse.ArgumentParser):
@@ -24,11 +24,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command.
 
     Returns:
-        0 when every picture could be read, 1 when one could not, 2 for a wrong command line.
+        0 when every image could be read, 1 when one could not, 2 for a wrong command line.
     """
     parser = _Parser(
         prog='launch.py detect',
-        description='Find ArUco markers in pictures and write annotated copies.',
+        description='Find ArUco markers in images and write annotated copies.',
     )
     parser.add_argument('images', nargs='+', type=Path, metavar='IMAGE')
     parser.add_argument('--dictionary', default='DICT_5X5_100', help='default: %(default)s')
@@ -47,19 +47,19 @@ def main(argv: Sequence[str] | None = None) -> int:
     for path in options.images:
         try:
             _detect(detector, path, options.out)
-        except (PictureError, OSError) as error:
+        except (ImageError, OSError) as error:
             print(f'detect: {error}', file=sys.stderr)
             failed += 1
     return 1 if failed else 0
 
 
 def _detect(detector: MarkerDetector, path: Path, folder: Path | None) -> None:
-    picture = read_picture(path)
-    detections = detector.detect(picture)
+    image = read_image(path)
+    detections = detector.detect(image)
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
     target = (folder or path.parent) / f'{path.stem}_markers.png'
-    encoded = cv2.imencode('.png', annotated(picture, detections))[1]
+    encoded = cv2.imencode('.png', annotated(image, detections))[1]
     target.write_bytes(encoded.tobytes())
     count = f'{len(detections)} marker{"" if len(detections) == 1 else "s"}'
     print(f'{path}: {count}, drawn in {target}')

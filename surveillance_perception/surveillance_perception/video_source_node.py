@@ -1,4 +1,4 @@
-"""The `video_source` node: a webcam, a video or pictures as the camera topic."""
+"""The `video_source` node: a webcam, a video or images as the camera topic."""
 
 from __future__ import annotations
 
@@ -9,23 +9,23 @@ from typing import Any
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header
 
-from surveillance_perception.conversions import camera_to_ros, picture_to_ros
+from surveillance_perception.conversions import camera_to_ros, image_to_ros
 from surveillance_perception.detection.camera_model import CameraModel
-from surveillance_perception.stream.picture_files import Picture, PictureError
-from surveillance_perception.stream.picture_subscription import PICTURES_QOS
-from surveillance_perception.stream.video_frames import FrameSource, open_source
+from surveillance_perception.stream.image_files import ImageArray, ImageError
+from surveillance_perception.stream.image_subscription import IMAGES_QOS
+from surveillance_perception.stream.video import FrameSource, open_source
 from surveillance_runtime.node import PatrolNode, StartError
 from surveillance_runtime.process import run_node
 from surveillance_runtime.waiting import ClockWait
 
 
 class VideoSource(PatrolNode):
-    """Publishes pictures from outside ROS on `camera/rgb/image_raw`."""
+    """Publishes images from outside ROS on `camera/rgb/image_raw`."""
 
     def __init__(self, **node_options: Any) -> None:
         super().__init__('video_source', **node_options)
         path = self.parameter(
-            'source', '', 'A video file or a folder of pictures; empty: a webcam.', read_only=True
+            'source', '', 'A video file or a folder of images; empty: a webcam.', read_only=True
         )
         camera = self.parameter('camera', 0, 'Number of the webcam.', minimum=0, read_only=True)
         self._source = path or str(camera)
@@ -33,7 +33,7 @@ class VideoSource(PatrolNode):
         self._rate = self.parameter(
             'rate',
             0.0,
-            "Pictures a second; 0: the video's own, 5 for pictures.",
+            "Images a second; 0: the video's own, 5 for images.",
             minimum=0.0,
             maximum=1000.0,
             on_change=lambda value: setattr(self, '_rate', value),
@@ -41,7 +41,7 @@ class VideoSource(PatrolNode):
         self._loop = self.parameter(
             'loop',
             False,
-            'Begin again after the last picture.',
+            'Begin again after the last image.',
             on_change=lambda value: setattr(self, '_loop', value),
         )
         self._frame = self.parameter(
@@ -55,12 +55,12 @@ class VideoSource(PatrolNode):
             maximum=170.0,
             on_change=lambda value: setattr(self, '_field_of_view', value),
         )
-        self._images = self.create_publisher(Image, 'camera/rgb/image_raw', PICTURES_QOS)
-        self._infos = self.create_publisher(CameraInfo, 'camera/rgb/camera_info', PICTURES_QOS)
+        self._images = self.create_publisher(Image, 'camera/rgb/image_raw', IMAGES_QOS)
+        self._infos = self.create_publisher(CameraInfo, 'camera/rgb/camera_info', IMAGES_QOS)
         self._wait = ClockWait(self)
         try:
             opened = open_source(self._source)
-        except PictureError as error:
+        except ImageError as error:
             raise StartError(f'{self.get_name()}: {error}') from None
         self.spawn(lambda: self._work(opened), 'video')
 
@@ -71,18 +71,18 @@ class VideoSource(PatrolNode):
             if self.stopping.is_set():
                 return
             if self._is_camera:
-                self.fail(f'camera {self._source} gives no more pictures')
+                self.fail(f'camera {self._source} gives no more images')
                 return
             if not self._loop or not good:
-                self.get_logger().info('the last picture was sent')
+                self.get_logger().info('the last image was sent')
                 return
             source = open_source(self._source)
 
     def _play(self, source: FrameSource) -> bool:
-        """Send every picture once; whether there was one."""
+        """Send every image once; whether there was one."""
         good = False
         for frame in source.frames():
-            if isinstance(frame, PictureError):
+            if isinstance(frame, ImageError):
                 self.get_logger().error(str(frame))
                 continue
             self._send(frame)
@@ -92,13 +92,13 @@ class VideoSource(PatrolNode):
                 break
         return good
 
-    def _send(self, frame: Picture) -> None:
+    def _send(self, frame: ImageArray) -> None:
         header = Header(stamp=self.get_clock().now().to_msg(), frame_id=self._frame)
         height, width = frame.shape[:2]
         field_of_view = math.radians(self._field_of_view)
         camera = CameraModel.from_field_of_view(width, height, field_of_view)
         self._infos.publish(camera_to_ros(camera, header))
-        self._images.publish(picture_to_ros(frame, header))
+        self._images.publish(image_to_ros(frame, header))
 
 
 def main(args: Sequence[str] | None = None) -> int:

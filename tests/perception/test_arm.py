@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from surveillance_perception.arm.driver import ArmDriver, ArmError
+from surveillance_perception.arm.driver import ArmDriver, ArmMotionError
 from surveillance_perception.arm.kinematics import (
     AIM_TOLERANCE,
     UnreachableError,
@@ -144,7 +144,7 @@ def in_thread(work):
         try:
             work()
             outcome.append(None)
-        except ArmError as error:
+        except ArmMotionError as error:
             outcome.append(error)
 
     thread = threading.Thread(target=body)
@@ -213,7 +213,7 @@ def test_halt_waits_for_the_standstill():
 
 
 def test_arm_that_never_reports_is_named():
-    with pytest.raises(ArmError, match='does not report'):
+    with pytest.raises(ArmMotionError, match='does not report'):
         FollowingArm(patience=0.05).driver.move(HOME)
 
 

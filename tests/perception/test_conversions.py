@@ -1,4 +1,4 @@
-"""Pictures, poses and trajectories there and back."""
+"""Images, poses and trajectories there and back."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from std_msgs.msg import Header
 from surveillance_perception import conversions
 from surveillance_perception.arm.trajectory import ArmState, motion_to
 from surveillance_perception.detection.camera_model import CameraModel
-from surveillance_perception.detection.marker_scene import (
+from surveillance_perception.detection.pose import pose_of, quaternion_of
+from surveillance_perception.stream.image_files import ImageError
+from surveillance_perception.testing.marker_scene import (
     Panel,
     corners_in_camera,
-    corners_in_picture,
+    corners_in_image,
 )
-from surveillance_perception.detection.pose import pose_of, quaternion_of
-from surveillance_perception.stream.picture_files import PictureError
 from surveillance_runtime.robot_arm import ARM
 
 CAMERA = CameraModel.from_field_of_view(640, 480, math.radians(60))
@@ -46,19 +46,19 @@ def image(encoding, pixels, padding=0):
 )
 def test_every_encoding_becomes_bgr(encoding, order, padding):
     message = image(encoding, RED[..., order], padding)
-    assert (conversions.picture_from_ros(message, LIMIT) == RED).all()
+    assert (conversions.image_from_ros(message, LIMIT) == RED).all()
 
 
 def test_mono_stays_grey():
     grey = np.arange(15, dtype=np.uint8).reshape(3, 5)
-    assert (conversions.picture_from_ros(image('mono8', grey, 1), LIMIT) == grey).all()
+    assert (conversions.image_from_ros(image('mono8', grey, 1), LIMIT) == grey).all()
 
 
-@pytest.mark.parametrize('picture', [RED, RED[..., 2]])
-def test_picture_there_and_back(picture):
+@pytest.mark.parametrize('image', [RED, RED[..., 2]])
+def test_image_there_and_back(image):
     header = Header(frame_id='camera')
-    message = conversions.picture_to_ros(np.ascontiguousarray(picture), header)
-    assert (conversions.picture_from_ros(message, LIMIT) == picture).all()
+    message = conversions.image_to_ros(np.ascontiguousarray(image), header)
+    assert (conversions.image_from_ros(message, LIMIT) == image).all()
     assert message.header.frame_id == 'camera'
 
 
@@ -81,18 +81,18 @@ def wrong(**fields):
         (wrong(data=[]), 'has 0 bytes, expected 45'),
     ],
 )
-def test_wrong_pictures_are_refused_in_one_line(message, reason):
-    with pytest.raises(PictureError, match=reason):
-        conversions.picture_from_ros(message, LIMIT)
+def test_wrong_images_are_refused_in_one_line(message, reason):
+    with pytest.raises(ImageError, match=reason):
+        conversions.image_from_ros(message, LIMIT)
 
 
-def test_compressed_picture_is_decoded_or_refused():
+def test_compressed_image_is_decoded_or_refused():
     data = cv2.imencode('.png', RED)[1].tobytes()
-    assert (conversions.picture_from_compressed(CompressedImage(data=data), LIMIT) == RED).all()
-    with pytest.raises(PictureError, match='larger than 2 pixels'):
-        conversions.picture_from_compressed(CompressedImage(data=data), 2)
-    with pytest.raises(PictureError, match='no picture'):
-        conversions.picture_from_compressed(CompressedImage(data=b'\x00\x01'), LIMIT)
+    assert (conversions.image_from_compressed(CompressedImage(data=data), LIMIT) == RED).all()
+    with pytest.raises(ImageError, match='larger than 2 pixels'):
+        conversions.image_from_compressed(CompressedImage(data=data), 2)
+    with pytest.raises(ImageError, match='no image'):
+        conversions.image_from_compressed(CompressedImage(data=b'\x00\x01'), LIMIT)
 
 
 def test_camera_there_and_back():
@@ -109,7 +109,7 @@ def test_camera_there_and_back():
 @given(st.floats(0.5, 8.0), st.floats(-1.2, 1.2), st.floats(-3.1, 3.1), st.floats(-100, 100))
 def test_pose_of_exact_corners_is_exact(distance, turn, roll, offset):
     panel = Panel(0, distance, turn, roll=roll, offset=(offset, -offset / 2))
-    pose = pose_of(corners_in_picture(panel, CAMERA), panel.size, CAMERA)
+    pose = pose_of(corners_in_image(panel, CAMERA), panel.size, CAMERA)
     truth = corners_in_camera(panel, CAMERA)
     # the marker's frame: x right, y up, z out of the paper, towards the camera
     seen = np.array([[-0.1, 0.1, 0], [0.1, 0.1, 0], [0.1, -0.1, 0], [-0.1, -0.1, 0]])

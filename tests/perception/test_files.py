@@ -1,4 +1,4 @@
-"""What is read from files: pictures, videos, the registry of markers, and the detect command."""
+"""What is read from files: images, videos, the registry of markers, and the detect command."""
 
 from __future__ import annotations
 
@@ -12,33 +12,33 @@ import pytest
 from surveillance_perception.detect_command import main
 from surveillance_perception.detection.camera_model import CameraModel
 from surveillance_perception.detection.dictionaries import dictionary_named
-from surveillance_perception.detection.marker_scene import (
+from surveillance_perception.marker_registry import read_registry
+from surveillance_perception.stream.image_files import ImageError, decode_image
+from surveillance_perception.stream.video import open_source
+from surveillance_perception.testing.marker_scene import (
     Degradation,
     Panel,
     backdrop_of,
-    picture_of,
+    image_of,
 )
-from surveillance_perception.marker_registry import read_registry
-from surveillance_perception.stream.picture_files import PictureError, decode_picture
-from surveillance_perception.stream.video_frames import open_source
 from surveillance_runtime.yaml_file import YamlFileError
 
 CONFIG = Path(__file__).parents[2] / 'config'
 
 
 @pytest.fixture(scope='module')
-def picture():
+def image():
     generator = np.random.default_rng(3)
     camera = CameraModel.from_field_of_view(320, 240, math.radians(60))
     scene = backdrop_of('plain', camera, generator)
     panels = [Panel(12, 1.5, offset=(-60.0, 0.0)), Panel(17, 1.5, offset=(60.0, 0.0))]
     dictionary = dictionary_named('DICT_5X5_100')
-    return picture_of(panels, camera, dictionary, scene, Degradation(), generator)
+    return image_of(panels, camera, dictionary, scene, Degradation(), generator)
 
 
-def test_detect_prints_ids_and_writes_the_annotated_picture(tmp_path, capsys, picture):
+def test_detect_prints_ids_and_writes_the_annotated_image(tmp_path, capsys, image):
     path = tmp_path / 'room.png'
-    cv2.imwrite(str(path), picture)
+    cv2.imwrite(str(path), image)
     assert main([str(path), '--known', '12']) == 0
     said = capsys.readouterr().out
     assert '2 markers' in said
@@ -46,19 +46,19 @@ def test_detect_prints_ids_and_writes_the_annotated_picture(tmp_path, capsys, pi
     assert 'not on the known list' in said.splitlines()[-1]
     drawn = cv2.imread(str(tmp_path / 'room_markers.png'))
     assert drawn.shape == (240, 320, 3)
-    assert (drawn != cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR)).any()
+    assert (drawn != cv2.cvtColor(image, cv2.COLOR_GRAY2BGR)).any()
 
 
-def test_detect_names_each_file_that_is_no_picture_and_goes_on(tmp_path, capsys, picture):
+def test_detect_names_each_file_that_is_no_image_and_goes_on(tmp_path, capsys, image):
     good, bad = tmp_path / 'good.png', tmp_path / 'bad.png'
-    cv2.imwrite(str(good), picture)
-    bad.write_bytes(b'not a picture')
+    cv2.imwrite(str(good), image)
+    bad.write_bytes(b'not an image')
     assert (
         main([str(bad), str(tmp_path / 'none.png'), str(good), '--out', str(tmp_path / 'o')]) == 1
     )
     captured = capsys.readouterr()
     assert captured.err.splitlines() == [
-        f'detect: {bad} is no picture that OpenCV can decode',
+        f'detect: {bad} is no image that OpenCV can decode',
         f'detect: {tmp_path / "none.png"}: No such file or directory',
     ]
     assert '2 markers' in captured.out
@@ -78,19 +78,19 @@ def test_detect_refuses_wrong_options_in_one_line(capsys, options, reason):
 
 
 @pytest.mark.parametrize('data', [b'', b'\x89PNG\r\n\x1a\n', b'\xff\xd8\xff\xe0junk', b'BM'])
-def test_corrupted_pictures_are_refused_in_one_line(data):
-    with pytest.raises(PictureError) as error:
-        decode_picture(data, 'picture')
+def test_corrupted_images_are_refused_in_one_line(data):
+    with pytest.raises(ImageError) as error:
+        decode_image(data, 'image')
     assert '\n' not in str(error.value)
 
 
-def test_folder_is_played_in_order_of_names(tmp_path, picture):
+def test_folder_is_played_in_order_of_names(tmp_path, image):
     for index, level in enumerate((10, 20, 30)):
         cv2.imwrite(str(tmp_path / f'{index}.png'), np.full((8, 8), level, np.uint8))
-    (tmp_path / 'notes.txt').write_text('no picture')
+    (tmp_path / 'notes.txt').write_text('no image')
     (tmp_path / '1b.png').write_bytes(b'broken')
     frames = list(open_source(str(tmp_path)).frames())
-    assert [int(each[0, 0, 0]) for each in frames if not isinstance(each, PictureError)] == [
+    assert [int(each[0, 0, 0]) for each in frames if not isinstance(each, ImageError)] == [
         10,
         20,
         30,
@@ -111,9 +111,9 @@ def test_video_file_is_played_at_its_own_rate(tmp_path):
 
 
 def test_source_that_is_not_there_is_named(tmp_path):
-    with pytest.raises(PictureError, match='no such video file or folder'):
+    with pytest.raises(ImageError, match='no such video file or folder'):
         open_source(str(tmp_path / 'none.avi'))
-    with pytest.raises(PictureError, match='holds no pictures'):
+    with pytest.raises(ImageError, match='holds no images'):
         open_source(str(tmp_path))
 
 

@@ -21,16 +21,16 @@ from surveillance_interfaces.msg import MarkerDetectionArray
 from surveillance_interfaces.srv import MarkerRoutine, PointCamera, RoomInformation
 from surveillance_perception.arm_controller_node import ArmController
 from surveillance_perception.aruco_detector_node import IDS_QOS, ArucoDetector
-from surveillance_perception.conversions import camera_to_ros, picture_to_ros
+from surveillance_perception.conversions import camera_to_ros, image_to_ros
 from surveillance_perception.detection.camera_model import CameraModel
 from surveillance_perception.detection.dictionaries import dictionary_named
-from surveillance_perception.detection.marker_scene import (
+from surveillance_perception.marker_server_node import MarkerServer
+from surveillance_perception.testing.marker_scene import (
     Degradation,
     Panel,
     backdrop_of,
-    picture_of,
+    image_of,
 )
-from surveillance_perception.marker_server_node import MarkerServer
 from surveillance_perception.video_source_node import VideoSource
 from surveillance_runtime.calls import Interrupted, ServiceCaller
 from surveillance_runtime.goal_calls import GoalCaller
@@ -43,19 +43,19 @@ from surveillance_runtime.waiting import Interrupt
 CAMERA = CameraModel.from_field_of_view(320, 240, math.radians(60))
 
 
-def picture(*panels: Panel, dictionary: str = 'DICT_5X5_100') -> np.ndarray:
+def image(*panels: Panel, dictionary: str = 'DICT_5X5_100') -> np.ndarray:
     generator = np.random.default_rng(5)
     scene = backdrop_of('plain', CAMERA, generator)
-    return picture_of(
+    return image_of(
         list(panels), CAMERA, dictionary_named(dictionary), scene, Degradation(), generator
     )
 
 
-ROOM = picture(Panel(12, 1.5, 0.3, offset=(-60.0, 0.0)), Panel(70, 1.5, offset=(60.0, 0.0)))
+ROOM = image(Panel(12, 1.5, 0.3, offset=(-60.0, 0.0)), Panel(70, 1.5, offset=(60.0, 0.0)))
 
 
 class Camera:
-    """Publishes pictures and listens to what the detector makes of them."""
+    """Publishes images and listens to what the detector makes of them."""
 
     def __init__(self, graph: Any, qos: Any = 5) -> None:
         self.graph = graph
@@ -75,10 +75,10 @@ class Camera:
         self.graph.until(lambda: self.compressed.get_subscription_count())
 
     def show(self, shown: np.ndarray) -> Any:
-        """Publish a picture until the detector has looked at it; its detections."""
+        """Publish an image until the detector has looked at it; its detections."""
         before = len(self.detections)
         header = Header(frame_id='lens', stamp=self.graph.node.get_clock().now().to_msg())
-        self.images.publish(picture_to_ros(shown, header))
+        self.images.publish(image_to_ros(shown, header))
         self.graph.until(lambda: len(self.detections) > before)
         return self.detections[-1]
 
@@ -90,7 +90,7 @@ def detector(graph: Any, qos: Any = 5, **parameters: Any) -> tuple[Camera, Aruco
     return camera, node
 
 
-def test_each_marker_is_announced_once_when_enough_pictures_agree(graph: Any) -> None:
+def test_each_marker_is_announced_once_when_enough_images_agree(graph: Any) -> None:
     camera, _ = detector(graph, confirmation_frames=2, unknown_confirmation_frames=3)
     for _ in range(5):
         camera.show(ROOM)
@@ -125,7 +125,7 @@ def test_detections_are_typed_posed_and_drawn(graph: Any) -> None:
     assert (camera.drawn[-1].width, camera.drawn[-1].encoding) == (320, 'bgr8')
 
 
-def test_compressed_pictures_are_looked_at_too(graph: Any) -> None:
+def test_compressed_images_are_looked_at_too(graph: Any) -> None:
     camera, _ = detector(graph)
     data = cv2.imencode('.jpg', ROOM)[1].tobytes()
     camera.compressed.publish(CompressedImage(format='jpeg', data=data))
@@ -133,9 +133,9 @@ def test_compressed_pictures_are_looked_at_too(graph: Any) -> None:
     assert {each.id for each in camera.detections[-1].detections} == {12, 70}
 
 
-def test_pictures_that_are_none_are_named_and_the_node_goes_on(graph: Any) -> None:
+def test_images_that_are_none_are_named_and_the_node_goes_on(graph: Any) -> None:
     camera, node = detector(graph, diagnostics_period=0.02)
-    good = picture_to_ros(ROOM, Header())
+    good = image_to_ros(ROOM, Header())
 
     def named(reason: str) -> bool:
         return any(
@@ -155,14 +155,14 @@ def test_pictures_that_are_none_are_named_and_the_node_goes_on(graph: Any) -> No
         camera.images.publish(wrong)
         graph.until(lambda reason=reason: named(reason))
     camera.compressed.publish(CompressedImage(data=b'junk'))
-    graph.until(lambda: named('compressed picture is no picture'))
+    graph.until(lambda: named('compressed image is no image'))
     assert len(camera.show(ROOM).detections) == 2
     assert not node.stopping.is_set()
 
 
 def test_settings_change_while_it_runs(graph: Any) -> None:
     camera, node = detector(graph)
-    other = picture(Panel(7, 1.5), dictionary='DICT_4X4_50')
+    other = image(Panel(7, 1.5), dictionary='DICT_4X4_50')
     assert not camera.show(other).detections
     setter = ServiceCaller(graph.node, SetParameters, 'aruco_detector/set_parameters')
 
@@ -187,7 +187,7 @@ def test_settings_change_while_it_runs(graph: Any) -> None:
     assert not node.stopping.is_set()
 
 
-def test_pictures_taken_while_the_arm_moves_are_not_read(graph: Any) -> None:
+def test_images_taken_while_the_arm_moves_are_not_read(graph: Any) -> None:
     rest = graph.node.create_publisher(Bool, 'arm/at_rest', STATE_QOS)
     camera, node = detector(graph)
     graph.until(lambda: rest.get_subscription_count())
@@ -195,11 +195,11 @@ def test_pictures_taken_while_the_arm_moves_are_not_read(graph: Any) -> None:
     rest.publish(Bool(data=False))
     graph.until(lambda: node._rest_since is None)
     moving = Header(stamp=graph.node.get_clock().now().to_msg())
-    camera.images.publish(picture_to_ros(ROOM, moving))
+    camera.images.publish(image_to_ros(ROOM, moving))
     graph.until(lambda: node.skipped == 1)
     rest.publish(Bool(data=True))
     graph.until(lambda: node._rest_since is not None)
-    camera.images.publish(picture_to_ros(ROOM, moving))
+    camera.images.publish(image_to_ros(ROOM, moving))
     graph.until(lambda: node.skipped == 2)
     camera.show(ROOM)
     assert len(camera.detections) == 2
@@ -242,7 +242,7 @@ def test_video_source_sends_a_folder_as_the_camera(graph: Any, tmp_path: Any) ->
 
 
 def test_video_source_does_not_start_without_a_source(graph: Any) -> None:
-    with pytest.raises(StartError, match='no such video file or folder of pictures'):
+    with pytest.raises(StartError, match='no such video file or folder of images'):
         graph.add(VideoSource, parameters={'source': 'none.mp4'})
     with pytest.raises(StartError, match='camera 77 cannot be opened'):
         graph.add(VideoSource, parameters={'camera': 77})

@@ -1,1 +1,30 @@
-"""The arm that carries the camera."""
+"""The arm that carries the camera: where it looks, how it moves, and scans of all around."""
+
+from surveillance_perception.arm.driver import ArmDriver, ArmMotionError
+from surveillance_perception.arm.kinematics import Aim, UnreachableError, look_at
+from surveillance_perception.arm.scan import ScanOutcome, ScanPlan, scan
+from surveillance_perception.arm.trajectory import (
+    ArmState,
+    ArmTrajectory,
+    TrajectoryError,
+    motion_to,
+)
+from surveillance_perception.arm.view_coverage import View, coverage, views_covering
+
+__all__ = [
+    'Aim',
+    'ArmDriver',
+    'ArmMotionError',
+    'ArmState',
+    'ArmTrajectory',
+    'ScanOutcome',
+    'ScanPlan',
+    'TrajectoryError',
+    'UnreachableError',
+    'View',
+    'coverage',
+    'look_at',
+    'motion_to',
+    'scan',
+    'views_covering',
+]

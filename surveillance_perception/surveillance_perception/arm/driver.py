@@ -23,7 +23,7 @@ REST_SPEED = 0.01
 """Speed of every joint below which the arm rests, rad/s."""
 
 
-class ArmError(Exception):
+class ArmMotionError(Exception):
     """A motion did not reach its goal; the message is one line."""
 
 
@@ -106,7 +106,7 @@ class ArmDriver:
                 after a change.
 
         Raises:
-            ArmError: The arm does not report, does not get there, or another motion took over.
+            ArmMotionError: The arm does not report or get there, or another motion took over.
             TrajectoryError: The goal is outside the limits.
         """
         with self._changed:
@@ -130,7 +130,7 @@ class ArmDriver:
         """Stop, and block until the arm rests.
 
         Raises:
-            ArmError: The arm does not report, or another motion took over.
+            ArmMotionError: The arm does not report, or another motion took over.
         """
         with self._changed:
             self.stop()
@@ -156,7 +156,7 @@ class ArmDriver:
         deadline = time.monotonic() + self._patience
         while self._measured is None:
             if not self._changed.wait(deadline - time.monotonic()):
-                raise ArmError('the arm does not report its joints')
+                raise ArmMotionError('the arm does not report its joints')
             self._check(turn, ended)
 
     def _follow(self, turn: int, motion: ArmTrajectory, ended: Callable[[], bool]) -> None:
@@ -171,16 +171,16 @@ class ArmDriver:
                 best, progress = min(best, left), time.monotonic()
             if time.monotonic() - progress > self._patience:
                 if self._reports == reports:
-                    raise ArmError('the arm does not report its joints')
-                raise ArmError(f'the arm stays {left:.3f} rad away from its goal')
+                    raise ArmMotionError('the arm does not report its joints')
+                raise ArmMotionError(f'the arm stays {left:.3f} rad away from its goal')
         self._settle()
 
     def _check(self, turn: int, ended: Callable[[], bool]) -> None:
         if turn != self._turn:
-            raise ArmError('another motion took over')
+            raise ArmMotionError('another motion took over')
         if ended():
             self.stop()
-            raise ArmError('the motion was given up')
+            raise ArmMotionError('the motion was given up')
 
     def _arrived(self, motion: ArmTrajectory) -> bool:
         if self._measured is None or self._now() - self._began < motion.duration:

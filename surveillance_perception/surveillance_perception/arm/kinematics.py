@@ -1,6 +1,6 @@
 """Turning the arm so that its camera looks at a point.
 
-Two directions of the line of sight and an upright picture are asked of five joints; what freedom is
+Two directions of the line of sight and an upright image are asked of five joints; what freedom is
 left keeps the arm near a posture. Damped least squares (Wampler, "Manipulator inverse kinematic
 solutions based on vector formulations and damped least-squares methods", IEEE Trans. SMC 16(1),
 1986), with joints that would leave their range held at its end for that step.
@@ -42,7 +42,7 @@ class Aim:
     Attributes:
         positions: (n,) rad, within the limits.
         error: Angle left between the line of sight and the target, rad.
-        roll: Angle by which the picture's rows are off the horizon, rad.
+        roll: Angle by which the image's rows are off the horizon, rad.
     """
 
     positions: Array
@@ -51,7 +51,7 @@ class Aim:
 
 
 def look_at(arm: Arm, target: Array, start: Array) -> Aim:
-    """Joint positions that make the camera look at a point, the picture upright.
+    """Joint positions that make the camera look at a point, the image upright.
 
     Args:
         arm: The arm.
@@ -158,7 +158,7 @@ def _damped_step(residual: Array, jacobian: Array, towards_posture: Array) -> Ar
 
 
 def _task(arm: Arm, positions: Array, target: Array) -> tuple[Array, Array]:
-    """What is wrong (4,): line of sight less direction of the target, tilt of the picture's rows.
+    """What is wrong (4,): line of sight less direction of the target, tilt of the image's rows.
 
     Also its change (4, n) with each joint.
     """

@@ -1,8 +1,8 @@
 """Directions in which to look so that no direction stays unseen.
 
 Views stand in rows of equal elevation. How far a row may be from the next, and a view from the one
-beside it, follows from what a rectangular picture covers: the condition is looked at exactly, at
-closely spaced directions of each row's band, instead of taking the picture for a rectangle of
+beside it, follows from what a rectangular image covers: the condition is looked at exactly, at
+closely spaced directions of each row's band, instead of taking the image for a rectangle of
 angles, which it is not away from the horizon.
 """
 
@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from surveillance_perception.detection.camera_model import Array
+from surveillance_runtime.robot_arm import Array
 
 _BAND_SAMPLES = 25
 _AZIMUTH_STEP = math.radians(0.5)
@@ -40,9 +40,9 @@ def views_covering(
     """Views that together show every direction between two elevations, all the way around.
 
     Args:
-        horizontal: Field of view along the picture's rows, rad.
+        horizontal: Field of view along the image's rows, rad.
         vertical: Field of view along its columns, rad.
-        overlap: Share of the picture's angles at its edge that does not count, 0 to 0.8, so that
+        overlap: Share of the image's angles at its edge that does not count, 0 to 0.8, so that
             what lies on the border of a view is whole in some view.
         lowest: Lowest elevation, rad, from -pi/2.
         highest: Highest elevation, rad, to pi/2.
@@ -90,7 +90,7 @@ def coverage(
     highest: float,
     samples: int = 4000,
 ) -> float:
-    """Share of the directions between two elevations that lie in at least one view's picture."""
+    """Share of the directions between two elevations that lie in at least one view's image."""
     # evenly spread directions: the golden angle between neighbours on a spiral
     index: Array = np.arange(samples, dtype=float) + 0.5
     sine = math.sin(lowest) + (math.sin(highest) - math.sin(lowest)) * index / samples
@@ -142,7 +142,7 @@ def _reach(
 def _seen(
     offset: Array, elevation: Array, view: float, half_width: float, half_height: float
 ) -> npt.NDArray[np.bool_]:
-    """Whether directions lie in the picture of a view at azimuth 0."""
+    """Whether directions lie in the image of a view at azimuth 0."""
     flat, up = np.cos(elevation), np.sin(elevation)
     depth = flat * np.cos(offset) * math.cos(view) + up * math.sin(view)
     right = flat * np.sin(offset)

@@ -1,4 +1,4 @@
-"""Drawing what was detected into the picture."""
+"""Drawing what was detected into the image."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ _GROUND = (20, 20, 20)
 
 
 def annotated(
-    picture: npt.NDArray[np.uint8],
+    image: npt.NDArray[np.uint8],
     detections: Iterable[Detection],
     confirmed: Iterable[int] | None = None,
 ) -> npt.NDArray[np.uint8]:
-    """A BGR copy of a picture with outlines and ids.
+    """A BGR copy of an image with outlines and ids.
 
     Args:
-        picture: (height, width) grey or (height, width, 3) BGR.
+        image: (height, width) grey or (height, width, 3) BGR.
         detections: What to draw.
         confirmed: Ids to draw in green, others in orange; None draws all in green.
     """
-    drawn = cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR) if picture.ndim == 2 else picture.copy()
+    drawn = cv2.cvtColor(image, cv2.COLOR_GRAY2BGR) if image.ndim == 2 else image.copy()
     believed = None if confirmed is None else set(confirmed)
     scale = max(0.45, min(drawn.shape[:2]) / 1100.0)
     thickness = max(1, round(1.6 * scale))

@@ -20,10 +20,10 @@ class CameraModel:
     """Intrinsic parameters of a camera.
 
     Attributes:
-        width: Picture width in pixels.
-        height: Picture height in pixels.
+        width: ImageArray width in pixels.
+        height: ImageArray height in pixels.
         matrix: (3, 3) camera matrix K.
-        distortion: (n,) coefficients in OpenCV's order; empty or zeros mean a rectified picture.
+        distortion: (n,) coefficients in OpenCV's order; empty or zeros mean a rectified image.
     """
 
     width: int
@@ -33,7 +33,7 @@ class CameraModel:
 
     def __post_init__(self) -> None:
         if self.width <= 0 or self.height <= 0:
-            raise ValueError(f'a picture of {self.width}x{self.height} pixels has no area')
+            raise ValueError(f'an image of {self.width}x{self.height} pixels has no area')
         if self.matrix.shape != (3, 3) or not np.isfinite(self.matrix).all():
             raise ValueError('the camera matrix must be 3x3 finite numbers')
         if self.matrix[0, 0] <= 0 or self.matrix[1, 1] <= 0:
@@ -47,8 +47,8 @@ class CameraModel:
         """A distortion-free camera from its horizontal field of view.
 
         Args:
-            width: Picture width in pixels.
-            height: Picture height in pixels.
+            width: ImageArray width in pixels.
+            height: ImageArray height in pixels.
             horizontal: Horizontal field of view in radians, between 0 and pi.
 
         Raises:
@@ -81,12 +81,12 @@ class CameraModel:
 def camera_of(
     width: int, height: int, described: CameraModel | None, horizontal: float
 ) -> CameraModel:
-    """The camera that took a picture.
+    """The camera that took an image.
 
     Args:
-        width: The picture's width in pixels.
+        width: The image's width in pixels.
         height: Its height in pixels.
-        described: The camera as it describes itself, of use for pictures of its size alone.
+        described: The camera as it describes itself, of use for images of its size alone.
         horizontal: Horizontal field of view in radians of a camera that does not.
     """
     if described is not None and (described.width, described.height) == (width, height):

@@ -1,12 +1,12 @@
-"""Finding ArUco markers in pictures, also where they are small, oblique, blurred, dark or noisy.
+"""Finding ArUco markers in images, also where they are small, oblique, blurred, dark or noisy.
 
-The way from a picture to markers:
+The way from an image to markers:
 
-1. `prepare` stretches a dark picture and smooths a noisy one.
-2. `dark_masks` and `quads_around` propose quadrilaterals, `RingTest` keeps those with a white
+1. `prepare` stretches a dark image and smooths a noisy one.
+2. `dark_masks` and `quads_around` propose quadrilaterals, `BorderCheck` keeps those with a white
    margin, a black border and something inside.
 3. `TemplateFit` compares each with every code of the dictionary through the camera's blur, aligns
-   the likely ones with the picture, and tries stronger blur where the fit is poor.
+   the likely ones with the image, and tries stronger blur where the fit is poor.
 4. A reading is accepted by its correlation and by its lead over the second best code: a lower lead
    is enough for an id on the known list than for any other.
 """
@@ -20,17 +20,23 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from surveillance_perception.detection.candidates import (
+    BorderCheck,
+    Quads,
+    dark_masks,
+    distinct,
+    quads_around,
+)
+from surveillance_perception.detection.decoding import MarkerReader, Readings
 from surveillance_perception.detection.dictionaries import MarkerCodes, dictionary_named
-from surveillance_perception.detection.marker_reading import MarkerReader, Readings
-from surveillance_perception.detection.picture_preparation import Grey, PreparedPicture, prepare
-from surveillance_perception.detection.picture_sampling import (
+from surveillance_perception.detection.image_sampling import (
     Array,
-    PicturePyramid,
+    Grey,
+    ImagePyramid,
     corners_of,
     homographies_of,
 )
-from surveillance_perception.detection.quads import Quads, dark_masks, distinct, quads_around
-from surveillance_perception.detection.ring_test import RingTest
+from surveillance_perception.detection.preprocessing import PreparedImage, prepare
 
 _SAME_QUAD = 1.0
 _SAME_MARKER = 0.5
@@ -49,9 +55,9 @@ class DetectorSettings:
         contrast: Grey levels by which a border must be darker than its neighbourhood.
         min_length: Longer side in pixels of the smallest marker.
         max_outlines: Dark outlines after which no further neighbourhood or bridge is tried.
-        max_candidates: How many quadrilaterals of a picture are read, the likeliest first.
+        max_candidates: How many quadrilaterals of an image are read, the likeliest first.
         blur: Standard deviation in pixels of the lens's blur.
-        least_correlation: Correlation with the picture that a reading needs, 0 to 1.
+        least_correlation: Correlation with the image that a reading needs, 0 to 1.
         least_inner_correlation: The same over the code's own cells.
         known_lead: How many times less than the second best code the best one must leave
             unexplained, when its id is known.
@@ -81,7 +87,7 @@ class DetectorSettings:
 
 @dataclass(frozen=True, eq=False)
 class Detection:
-    """A marker in one picture.
+    """A marker in one image.
 
     Attributes:
         marker_id: Its id.
@@ -99,7 +105,7 @@ class Detection:
 
 @dataclass
 class MarkerDetector:
-    """Finds the markers of one dictionary in pictures; keeps nothing from one to the next."""
+    """Finds the markers of one dictionary in images; keeps nothing from one to the next."""
 
     settings: DetectorSettings = field(default_factory=DetectorSettings)
 
@@ -108,22 +114,22 @@ class MarkerDetector:
         if self.settings.known_ids is not None:
             MarkerCodes.of(dictionary, self.settings.known_ids)
         self._reader = MarkerReader(MarkerCodes.of(dictionary), self.settings.blur)
-        self._ring = RingTest(self._reader.codes.side)
+        self._ring = BorderCheck(self._reader.codes.side)
 
     def detect(
-        self, picture: npt.NDArray[np.uint8], expected: Sequence[Array] = ()
+        self, image: npt.NDArray[np.uint8], expected: Sequence[Array] = ()
     ) -> list[Detection]:
-        """Markers in a picture.
+        """Markers in an image.
 
         Args:
-            picture: (height, width) grey levels or (height, width, 3) BGR.
-            expected: Corners (4, 2) where markers were in the picture before.
+            image: (height, width) grey levels or (height, width, 3) BGR.
+            expected: Corners (4, 2) where markers were in the image before.
 
         Raises:
-            ValueError: The picture is empty, not of 8 bits, or of another shape.
+            ValueError: The image is empty, not of 8 bits, or of another shape.
         """
-        prepared = prepare(picture)
-        pyramid = PicturePyramid(prepared.grey)
+        prepared = prepare(image)
+        pyramid = ImagePyramid(prepared.grey)
         quads = self._candidates(prepared, pyramid)
         if len(expected):
             quads = np.concatenate([np.asarray(expected, dtype=float), quads])
@@ -132,7 +138,7 @@ class MarkerDetector:
         readings = self._reader.read(pyramid, homographies_of(quads))
         return self._accepted(readings, prepared.grey)
 
-    def _candidates(self, prepared: PreparedPicture, pyramid: PicturePyramid) -> Quads:
+    def _candidates(self, prepared: PreparedImage, pyramid: ImagePyramid) -> Quads:
         settings = self.settings
         contrast = max(settings.contrast, 2.5 * prepared.noise)
         masks = dark_masks(prepared.smooth, settings.windows, contrast, settings.bridges)
@@ -175,7 +181,7 @@ class MarkerDetector:
 
 
 def _sharpened(outline: Array, grey: Grey, side: int) -> Array:
-    """Corners of a large marker, which was read from halved pictures, found in the whole one."""
+    """Corners of a large marker, which was read from halved images, found in the whole one."""
     cell = float(np.linalg.norm(np.roll(outline, -1, axis=0) - outline, axis=1).min()) / side
     if cell < _LARGE_CELL:
         return outline

@@ -41,7 +41,7 @@ class MarkerCodes:
     Attributes:
         bits: Cells along a side of the code, without border.
         ids: (k,) marker id of each entry.
-        turns: (k,) quarter turns clockwise by which the entry's picture is turned.
+        turns: (k,) quarter turns clockwise by which the entry's image is turned.
         cells: (k, bits + 4, bits + 4) +1 white, -1 black, with border and margin.
     """
 

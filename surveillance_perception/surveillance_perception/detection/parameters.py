@@ -7,16 +7,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from surveillance_perception.detection.detection_watch import WatchSettings, sizes_from
 from surveillance_perception.detection.detector import DetectorSettings, MarkerDetector
 from surveillance_perception.detection.dictionaries import DICTIONARY_NAMES
+from surveillance_perception.detection.marker_stream import StreamSettings, sizes_from
 from surveillance_runtime.field_parameters import Described, declare_fields
 from surveillance_runtime.node import PatrolNode
 
 
 @dataclass(frozen=True)
-class PictureSettings:
-    """Which pictures are looked at, and through which lens."""
+class ImageSettings:
+    """Which images are looked at, and through which lens."""
 
     field_of_view: float = 60.0
     max_pixels: int = 20_000_000
@@ -42,7 +42,7 @@ _DETECTOR = {
     'bridges': Described('Gaps to close in a border, pixels.', 2, 99, of=int),
     'contrast': Described('Grey levels by which a border is darker than around it.', 1.0, 100.0),
     'min_length': Described('Longer side of the smallest marker, pixels.', 4.0, 1000.0),
-    'blur': Described("Deviation of the lens's blur in a sharp picture, pixels.", 0.0, 5.0),
+    'blur': Described("Deviation of the lens's blur in a sharp image, pixels.", 0.0, 5.0),
     'least_correlation': Described('Correlation that a reading needs.', 0.0, 1.0),
     'least_inner_correlation': Described(
         "Correlation over the code's own cells that a reading needs.", 0.0, 1.0
@@ -52,22 +52,22 @@ _DETECTOR = {
     'max_outlines': Described(
         'Dark outlines after which no further neighbourhood or bridge is tried.', 1, 100_000
     ),
-    'max_candidates': Described('Outlines of a picture that are read.', 1, 500),
+    'max_candidates': Described('Outlines of an image that are read.', 1, 500),
 }
 _WATCH = {
     'size': Described('Side of the black square, metres.', 1e-3, 100.0, name='marker_size'),
     'known_frames': Described(
-        'Pictures that confirm a known id.', 1, 100, name='confirmation_frames'
+        'Images that confirm a known id.', 1, 100, name='confirmation_frames'
     ),
     'unknown_frames': Described(
-        'Pictures that confirm any other id.', 1, 100, name='unknown_confirmation_frames'
+        'Images that confirm any other id.', 1, 100, name='unknown_confirmation_frames'
     ),
 }
 _PICTURES = {
     'field_of_view': Described('Horizontal, degrees, while there is no camera_info.', 5.0, 170.0),
-    'max_pixels': Described('The largest picture that is looked at.', 1),
+    'max_pixels': Described('The largest image that is looked at.', 1),
     'only_at_rest': Described(
-        'Leave out pictures taken while arm/at_rest is false; without an arm it is never told.'
+        'Leave out images taken while arm/at_rest is false; without an arm it is never told.'
     ),
 }
 
@@ -86,8 +86,8 @@ class DetectorParameters:
     def __init__(self, node: PatrolNode, changed: Callable[[], None]) -> None:
         self._changed = changed
         self._detector = DetectorSettings()
-        self._watch = WatchSettings()
-        self._pictures = PictureSettings()
+        self._watch = StreamSettings()
+        self._images = ImageSettings()
         dictionary = node.parameter(
             'marker_dictionary',
             self._detector.dictionary,
@@ -119,28 +119,26 @@ class DetectorParameters:
             node, self._detector, _DETECTOR, on_change=self._set_detector
         )
         self._watch = declare_fields(node, self._watch, _WATCH, on_change=self._set_watch)
-        self._pictures = declare_fields(
-            node, self._pictures, _PICTURES, on_change=self._set_pictures
-        )
+        self._images = declare_fields(node, self._images, _PICTURES, on_change=self._set_images)
 
-    def settings(self) -> WatchSettings:
+    def settings(self) -> StreamSettings:
         """The settings that the present values make."""
         return replace(self._watch, detector=self._detector)
 
     @property
     def field_of_view(self) -> float:
         """Horizontal field of view of a camera that tells nothing of itself, rad."""
-        return math.radians(self._pictures.field_of_view)
+        return math.radians(self._images.field_of_view)
 
     @property
     def max_pixels(self) -> int:
-        """The largest picture that is looked at."""
-        return self._pictures.max_pixels
+        """The largest image that is looked at."""
+        return self._images.max_pixels
 
     @property
     def only_at_rest(self) -> bool:
-        """Whether pictures taken while the arm moves are left out."""
-        return self._pictures.only_at_rest
+        """Whether images taken while the arm moves are left out."""
+        return self._images.only_at_rest
 
     def _set_detector(self, field: str, value: Any) -> None:
         self._detector = replace(self._detector, **{field: value})
@@ -150,8 +148,8 @@ class DetectorParameters:
         self._watch = replace(self._watch, **{field: value})
         self._changed()
 
-    def _set_pictures(self, field: str, value: Any) -> None:
-        self._pictures = replace(self._pictures, **{field: value})
+    def _set_images(self, field: str, value: Any) -> None:
+        self._images = replace(self._images, **{field: value})
         self._changed()
 
     def _problem(self, **changed: Any) -> str | None:

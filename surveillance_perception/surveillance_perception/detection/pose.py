@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from surveillance_perception.detection.camera_model import Array, CameraModel
-from surveillance_perception.detection.picture_sampling import homographies_of
+from surveillance_perception.detection.image_sampling import homographies_of
 
 _OUTLINE = np.array([[-1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [-1.0, -1.0, 0.0]])
 
@@ -41,7 +41,7 @@ def pose_of(corners: Array, size: float, camera: CameraModel) -> MarkerPose | No
     Args:
         corners: (4, 2) pixels, clockwise from the marker's own top left corner.
         size: Side of the black square, metres.
-        camera: The camera that took the picture.
+        camera: The camera that took the image.
 
     Returns:
         The pose that fits the corners best; None when none lies in front of the camera.

@@ -1,10 +1,10 @@
 """Which marker a quadrilateral shows, and where exactly: matching of blurred codes.
 
 The usual way to read a marker samples each cell and votes black or white, which needs two or three
-pixels a cell. Here a picture patch is compared with what each code of the dictionary would look
+pixels a cell. Here an image patch is compared with what each code of the dictionary would look
 like through the same lens: a code's cells blurred by one pixel's footprint. As that blur is taken
 as separable in the marker's own axes, all codes are compared by a few small matrix products. The
-homography of the best ones is then aligned with the picture by the inverse-compositional
+homography of the best ones is then aligned with the image by the inverse-compositional
 Gauss-Newton method (Baker and Matthews, "Lucas-Kanade 20 years on", IJCV 56(3), 2004), all
 candidates at once, with brightness and contrast projected out.
 
@@ -19,10 +19,10 @@ import numpy as np
 import numpy.typing as npt
 
 from surveillance_perception.detection.dictionaries import MarkerCodes
-from surveillance_perception.detection.picture_sampling import (
+from surveillance_perception.detection.image_sampling import (
     Array,
+    ImagePyramid,
     Patches,
-    PicturePyramid,
     jacobians_of,
     levels_for,
 )
@@ -46,7 +46,7 @@ class Footprint(NamedTuple):
 
 
 class TemplateFit:
-    """Compares quadrilaterals of a picture with the codes of a dictionary."""
+    """Compares quadrilaterals of an image with the codes of a dictionary."""
 
     def __init__(self, codes: MarkerCodes) -> None:
         self.codes = codes
@@ -68,11 +68,11 @@ class TemplateFit:
         self._sum = self._profile.sum(axis=1)
 
     def levels(self, homographies: Array) -> Indices:
-        """How often to halve the picture before each candidate is read."""
+        """How often to halve the image before each candidate is read."""
         return levels_for(homographies, self.codes.side, _LEVEL_CELL_PIXELS)
 
-    def sample(self, pyramid: PicturePyramid, homographies: Array, levels: Indices) -> Patches:
-        """Patches (m, n) of the picture under each homography."""
+    def sample(self, pyramid: ImagePyramid, homographies: Array, levels: Indices) -> Patches:
+        """Patches (m, n) of the image under each homography."""
         return pyramid.sample(homographies, self._grid, levels)
 
     def footprint(self, homographies: Array, levels: Indices, blur: float | Array) -> Footprint:
@@ -80,7 +80,7 @@ class TemplateFit:
 
         Args:
             homographies: (m, 3, 3).
-            levels: (m,) how often the picture was halved.
+            levels: (m,) how often the image was halved.
             blur: Standard deviation of the lens's blur in pixels: one, or (m, 2) across and down
                 the marker.
         """
@@ -127,13 +127,13 @@ class TemplateFit:
 
     def refine(
         self,
-        pyramid: PicturePyramid,
+        pyramid: ImagePyramid,
         homographies: Array,
         entries: Indices,
         blur: float | Array,
         iterations: int,
     ) -> Array:
-        """Homographies (m, 3, 3) aligned so that the codes lie on the picture."""
+        """Homographies (m, 3, 3) aligned so that the codes lie on the image."""
         levels = self.levels(homographies)
         footprint = self.footprint(homographies, levels, blur)
         template = self._render(entries, footprint)

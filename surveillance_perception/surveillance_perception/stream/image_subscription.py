@@ -1,32 +1,36 @@
-"""Subscribing to pictures so that they arrive, whatever the camera offers.
+"""Subscribing to images so that they arrive, whatever the camera offers.
 
-A picture is hundreds of network packets. Of a best-effort picture one lost packet loses the whole,
+An image is hundreds of network packets. Of a best-effort image one lost packet loses the whole,
 which on a busy machine is most of them; so delivery is asked to be reliable. A camera that offers
 best effort only would not be heard at all then: once one shows up, the subscription is made anew.
 """
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 
 from surveillance_runtime.node import PatrolNode
 
-PICTURES_QOS = QoSProfile(depth=2, reliability=ReliabilityPolicy.RELIABLE)
-"""For whoever publishes or reads pictures; an older one is never waited for."""
+IMAGES_QOS = QoSProfile(depth=2, reliability=ReliabilityPolicy.RELIABLE)
+"""For whoever publishes or reads images; an older one is never waited for."""
 
 
-class PictureSubscription:
-    """Hears one topic of pictures.
+Item = TypeVar('Item')
+
+
+class ImageSubscription:
+    """Hears one topic of images.
 
     Args:
         node: The node that subscribes.
         kind: The message's type.
         topic: The topic's name, relative to the node's namespace.
-        callback: Called with each picture.
+        callback: Called with each image.
     """
 
     def __init__(
@@ -48,7 +52,7 @@ class PictureSubscription:
             self._kind,
             self._topic,
             self._callback,
-            PICTURES_QOS if reliable else best_effort,
+            IMAGES_QOS if reliable else best_effort,
             event_callbacks=events,
         )
 
@@ -60,3 +64,37 @@ class PictureSubscription:
         former, self._subscription = self._subscription, self._subscribe(reliable=False)
         self._node.destroy_subscription(former)
         self._node.get_logger().info(f'{self._topic}: the camera offers best effort only')
+
+
+class Latest(Generic[Item]):
+    """Holds one item; a newer one takes its place.
+
+    Attributes:
+        dropped: How many items were replaced before they were taken.
+    """
+
+    def __init__(self) -> None:
+        self.dropped = 0
+        self._changed = threading.Condition()
+        self._item: Item | None = None
+        self._closed = False
+
+    def put(self, item: Item) -> None:
+        """Offer an item."""
+        with self._changed:
+            self.dropped += self._item is not None
+            self._item = item
+            self._changed.notify()
+
+    def take(self) -> Item | None:
+        """Wait for an item; None once closed."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._item is not None or self._closed)
+            item, self._item = self._item, None
+            return None if self._closed else item
+
+    def close(self) -> None:
+        """End all waits."""
+        with self._changed:
+            self._closed = True
+            self._changed.notify_all()

@@ -1,4 +1,4 @@
-"""Pictures of marker panels with known truth, for measuring a detector against one's own camera.
+"""Images of marker panels with known truth, for measuring a detector against one's own camera.
 
 A panel (a white sheet with an ArUco marker in its middle) is warped by its exact homography into
 a supersampled patch, averaged down to pixels, and put in front of a backdrop. What a lens and a
@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from surveillance_perception.detection.camera_model import Array, CameraModel
 
-Picture = npt.NDArray[np.uint8]
+ImageArray = npt.NDArray[np.uint8]
 
 BACKDROPS = ('plain', 'clouds', 'bricks', 'boards', 'boxes', 'letters', 'stripes', 'leaves')
 _SUPERSAMPLING = 8
@@ -32,9 +32,9 @@ class Panel:
         distance: Metres from the camera to the marker's centre.
         turn: Angle in radians between the panel's normal and the line of sight.
         size: Side of the marker's black square in metres.
-        axis: Direction in the picture of the axis it is turned about (pi/2: vertical).
+        axis: Direction in the image of the axis it is turned about (pi/2: vertical).
         roll: Rotation about the line of sight, radians.
-        offset: Pixel of the marker's centre, from the picture's centre.
+        offset: Pixel of the marker's centre, from the image's centre.
         margin: White border in cells of the marker.
     """
 
@@ -73,20 +73,20 @@ def corners_in_camera(panel: Panel, camera: CameraModel) -> Array:
     return _panel_points(panel, camera, panel.size / 2.0)
 
 
-def corners_in_picture(panel: Panel, camera: CameraModel) -> Array:
+def corners_in_image(panel: Panel, camera: CameraModel) -> Array:
     """Marker corners (4, 2) in pixels, clockwise from the marker's own top left one."""
     return camera.project(corners_in_camera(panel, camera))
 
 
-def picture_of(
+def image_of(
     panels: list[Panel],
     camera: CameraModel,
     dictionary: cv2.aruco.Dictionary,
     backdrop: npt.NDArray[np.float32],
     degradation: Degradation,
     generator: np.random.Generator,
-) -> Picture:
-    """A grey picture (height, width) of the panels in front of a backdrop."""
+) -> ImageArray:
+    """A grey image (height, width) of the panels in front of a backdrop."""
     scene = backdrop.copy()
     for panel in sorted(panels, key=lambda each: -each.distance):
         _paste(scene, panel, camera, dictionary)
@@ -95,7 +95,7 @@ def picture_of(
 
 def degrade(
     scene: npt.NDArray[np.float32], degradation: Degradation, generator: np.random.Generator
-) -> Picture:
+) -> ImageArray:
     """Light, lens, motion and sensor applied to a scene of grey levels."""
     result = scene
     if degradation.blur > 0:

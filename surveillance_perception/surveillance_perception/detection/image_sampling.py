@@ -1,4 +1,4 @@
-"""Reading grey levels of a picture under many homographies at once.
+"""Reading grey levels of an image under many homographies at once.
 
 Marker coordinates: a marker's black square spans [-1, 1] in x (right) and y (down). A homography
 takes them to pixels, pixel centres having integer coordinates.
@@ -19,11 +19,11 @@ _CORNERS = np.array([[-1.0, -1.0, 1.0], [1.0, -1.0, 1.0], [1.0, 1.0, 1.0], [-1.0
 _LAST_LEVEL = 5
 
 
-class PicturePyramid:
-    """A grey picture and its halves, so that a large marker is read from few averaged pixels."""
+class ImagePyramid:
+    """A grey image and its halves, so that a large marker is read from few averaged pixels."""
 
-    def __init__(self, picture: Grey) -> None:
-        self._levels = [picture]
+    def __init__(self, image: Grey) -> None:
+        self._levels = [image]
 
     def sample(self, homographies: Array, grid: Array, levels: npt.NDArray[np.int64]) -> Patches:
         """Grey levels under homographies, linearly interpolated.
@@ -31,10 +31,10 @@ class PicturePyramid:
         Args:
             homographies: (m, 3, 3).
             grid: (3, n) homogeneous marker coordinates.
-            levels: (m,) how often the picture is halved before it is read.
+            levels: (m,) how often the image is halved before it is read.
 
         Returns:
-            (m, n) grey levels; outside the picture those of its edge.
+            (m, n) grey levels; outside the image those of its edge.
         """
         points = homographies @ grid
         depth = points[:, 2]
@@ -66,7 +66,7 @@ class PicturePyramid:
 
 
 def levels_for(homographies: Array, cells: int, cell_pixels: float) -> npt.NDArray[np.int64]:
-    """How often to halve the picture so that a cell is at most `cell_pixels` wide."""
+    """How often to halve the image so that a cell is at most `cell_pixels` wide."""
     side = np.linalg.norm(jacobians_of(homographies), axis=1).min(axis=1) * 2.0 / cells
     level = np.floor(np.log2(np.maximum(side / cell_pixels, 1e-3))) + 1
     return np.asarray(np.clip(level, 0, _LAST_LEVEL), dtype=np.int64)

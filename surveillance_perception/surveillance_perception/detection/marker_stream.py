@@ -1,18 +1,18 @@
-"""One camera stream as the detector sees it: pictures in; detections, poses and new ids out."""
+"""One camera stream as the detector sees it: images in; detections, poses and new ids out."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections import defaultdict, deque
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from surveillance_perception.detection.camera_model import Array, CameraModel
-from surveillance_perception.detection.confirmation import Confirmation
 from surveillance_perception.detection.detector import Detection, DetectorSettings, MarkerDetector
 from surveillance_perception.detection.pose import MarkerPose, pose_of
-from surveillance_perception.stream.picture_files import Picture
+from surveillance_perception.stream.image_files import ImageArray
 
 
 def sizes_from(entries: Sequence[str]) -> dict[int, float]:
@@ -34,14 +34,14 @@ def sizes_from(entries: Sequence[str]) -> dict[int, float]:
 
 
 @dataclass(frozen=True)
-class WatchSettings:
+class StreamSettings:
     """How detections of a stream are judged.
 
     Attributes:
         detector: What to look for.
         size: Side of a marker's black square, metres.
         sizes: The same for ids that differ.
-        known_frames: Pictures that must show an id of the known list before it is confirmed.
+        known_frames: Images that must show an id of the known list before it is confirmed.
         unknown_frames: The same for any other id.
     """
 
@@ -54,7 +54,7 @@ class WatchSettings:
 
 @dataclass(frozen=True, eq=False)
 class Sighting:
-    """A marker in one picture of the stream."""
+    """A marker in one image of the stream."""
 
     detection: Detection
     pose: MarkerPose | None
@@ -66,21 +66,73 @@ class Sighting:
 class Statistics:
     """What the stream was like since the last look at it."""
 
-    pictures: int = 0
+    images: int = 0
     seconds: float = 0.0
     refused: int = 0
     last_error: str = ''
 
     @property
     def mean_milliseconds(self) -> float:
-        """Time for a picture; 0 without any."""
-        return 1e3 * self.seconds / self.pictures if self.pictures else 0.0
+        """Time for an image; 0 without any."""
+        return 1e3 * self.seconds / self.images if self.images else 0.0
 
 
-class DetectionWatch:
-    """Detects in picture after picture; what was seen in one is expected in the next."""
+class Confirmation:
+    """Counts in how many of the last images each id was seen.
 
-    def __init__(self, settings: WatchSettings) -> None:
+    Args:
+        known_frames: Images that must show an id of the known list.
+        unknown_frames: Images that must show any other id.
+        window: The images that count, as a multiple of those that must show the id: 2 means that
+            half of them may miss it.
+        confirmed: Ids that are believed from the start.
+    """
+
+    def __init__(
+        self,
+        known_frames: int,
+        unknown_frames: int,
+        window: int = 2,
+        confirmed: Iterable[int] = (),
+    ) -> None:
+        self._needed = {True: known_frames, False: unknown_frames}
+        self._window = window
+        self._frame = 0
+        self._seen: defaultdict[int, deque[int]] = defaultdict(deque)
+        self._confirmed: set[int] = set(confirmed)
+
+    @property
+    def confirmed(self) -> frozenset[int]:
+        """All ids confirmed so far."""
+        return frozenset(self._confirmed)
+
+    def image(self, ids: Iterable[tuple[int, bool]]) -> list[int]:
+        """Take note of one image.
+
+        Args:
+            ids: Each id in the image and whether it is known.
+
+        Returns:
+            The ids confirmed by this image, for the first time.
+        """
+        self._frame += 1
+        new = []
+        for marker_id, known in dict(ids).items():
+            needed = self._needed[known]
+            frames = self._seen[marker_id]
+            frames.append(self._frame)
+            while frames[0] <= self._frame - needed * self._window:
+                frames.popleft()
+            if len(frames) >= needed and marker_id not in self._confirmed:
+                self._confirmed.add(marker_id)
+                new.append(marker_id)
+        return new
+
+
+class MarkerStream:
+    """Detects in image after image; what was seen in one is expected in the next."""
+
+    def __init__(self, settings: StreamSettings) -> None:
         self.statistics = Statistics()
         self._confirmation = Confirmation(settings.known_frames, settings.unknown_frames)
         self._expected: list[Array] = []
@@ -92,7 +144,7 @@ class DetectionWatch:
         """All ids confirmed so far."""
         return self._confirmation.confirmed
 
-    def adopt(self, settings: WatchSettings) -> None:
+    def adopt(self, settings: StreamSettings) -> None:
         """Go on with other settings; confirmed ids stay so, unless the dictionary changes.
 
         Raises:
@@ -107,31 +159,31 @@ class DetectionWatch:
         )
         self._settings, self._detector = settings, detector
 
-    def look(self, picture: Picture, camera: CameraModel) -> tuple[list[Sighting], list[int]]:
-        """Detect in the next picture.
+    def look(self, image: ImageArray, camera: CameraModel) -> tuple[list[Sighting], list[int]]:
+        """Detect in the next image.
 
         Returns:
             What it shows, and the ids that it confirms for the first time.
 
         Raises:
-            ValueError: The picture is not as a detector takes it.
+            ValueError: The image is not as a detector takes it.
         """
         start = time.perf_counter()
-        detections = self._detector.detect(picture, self._expected)
+        detections = self._detector.detect(image, self._expected)
         self._expected = [np.array(detection.corners) for detection in detections]
-        new = self._confirmation.picture((each.marker_id, each.known) for each in detections)
+        new = self._confirmation.image((each.marker_id, each.known) for each in detections)
         confirmed = self._confirmation.confirmed
         sightings = []
         for detection in detections:
             size = self._settings.sizes.get(detection.marker_id, self._settings.size)
             pose = pose_of(detection.corners, size, camera)
             sightings.append(Sighting(detection, pose, size, detection.marker_id in confirmed))
-        self.statistics.pictures += 1
+        self.statistics.images += 1
         self.statistics.seconds += time.perf_counter() - start
         return sightings, new
 
     def refuse(self, error: str) -> None:
-        """Take note of a picture that could not be used."""
+        """Take note of an image that could not be used."""
         self.statistics.refused += 1
         self.statistics.last_error = error
 

@@ -1,4 +1,4 @@
-"""What a picture needs before its markers are read: stretched when dark, smoothed when noisy."""
+"""What an image needs before its markers are read: stretched when dark, smoothed when noisy."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-Grey = npt.NDArray[np.uint8]
+from surveillance_perception.detection.image_sampling import Grey
 
 _DARK_LEVEL = 90
 _STRETCHED_LEVEL = 200.0
@@ -22,8 +22,8 @@ _MEDIAN_TO_DEVIATION = 1.0 / (6.0 * 0.6745)
 
 
 @dataclass(frozen=True)
-class PreparedPicture:
-    """A picture as the detector works on it.
+class PreparedImage:
+    """An image as the detector works on it.
 
     Attributes:
         grey: (height, width) stretched grey levels.
@@ -36,38 +36,38 @@ class PreparedPicture:
     noise: float
 
 
-def prepare(picture: npt.NDArray[np.uint8]) -> PreparedPicture:
-    """Prepare a picture of grey levels (height, width) or BGR (height, width, 3).
+def prepare(image: npt.NDArray[np.uint8]) -> PreparedImage:
+    """Prepare an image of grey levels (height, width) or BGR (height, width, 3).
 
     Raises:
-        ValueError: The picture is empty, not of 8 bits, or of another shape.
+        ValueError: The image is empty, not of 8 bits, or of another shape.
     """
-    grey = grey_of(picture)
+    grey = grey_of(image)
     brightest = _quantile(grey, 0.99)
     if brightest < _DARK_LEVEL:
         gain = min(_STRETCHED_LEVEL / max(brightest, 1), _LARGEST_GAIN)
         grey = cv2.convertScaleAbs(grey, alpha=gain)
     noise = _noise(grey)
     if noise <= _QUIET:
-        return PreparedPicture(grey, grey, noise)
+        return PreparedImage(grey, grey, noise)
     smooth = cv2.GaussianBlur(grey, (0, 0), _SMOOTHING)
-    return PreparedPicture(grey, smooth, noise / (2.0 * _SMOOTHING * np.sqrt(np.pi)))
+    return PreparedImage(grey, smooth, noise / (2.0 * _SMOOTHING * np.sqrt(np.pi)))
 
 
-def grey_of(picture: npt.NDArray[np.uint8]) -> Grey:
-    """Grey levels of a grey or BGR picture.
+def grey_of(image: npt.NDArray[np.uint8]) -> Grey:
+    """Grey levels of a grey or BGR image.
 
     Raises:
-        ValueError: The picture is empty, not of 8 bits, or of another shape.
+        ValueError: The image is empty, not of 8 bits, or of another shape.
     """
-    if picture.dtype != np.uint8:
-        raise ValueError(f'pictures must have 8 bits a channel, got {picture.dtype}')
-    if picture.ndim == 3 and picture.shape[2] == 3 and picture.size:
-        return np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
-    if picture.ndim != 2 or not picture.size:
-        shape = 'x'.join(str(side) for side in picture.shape)
-        raise ValueError(f'a picture of shape {shape} is neither grey nor BGR')
-    return np.ascontiguousarray(picture)
+    if image.dtype != np.uint8:
+        raise ValueError(f'images must have 8 bits a channel, got {image.dtype}')
+    if image.ndim == 3 and image.shape[2] == 3 and image.size:
+        return np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
+    if image.ndim != 2 or not image.size:
+        shape = 'x'.join(str(side) for side in image.shape)
+        raise ValueError(f'an image of shape {shape} is neither grey nor BGR')
+    return np.ascontiguousarray(image)
 
 
 def _quantile(grey: Grey, share: float) -> int:
@@ -76,7 +76,7 @@ def _quantile(grey: Grey, share: float) -> int:
 
 
 def _noise(grey: Grey) -> float:
-    """Deviation of the noise, from strips of 8 rows: a fifth of the picture is enough."""
+    """Deviation of the noise, from strips of 8 rows: a fifth of the image is enough."""
     starts = range(0, grey.shape[0] - 7, 40)
     strips = [
         cv2.filter2D(grey[start : start + 8], cv2.CV_32F, _SECOND_DIFFERENCE)[1:-1]

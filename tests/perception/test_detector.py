@@ -1,4 +1,4 @@
-"""Known ids in rendered pictures, and pictures that are no pictures."""
+"""Known ids in rendered images, and images that are no images."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ import pytest
 from surveillance_perception.detection.camera_model import CameraModel
 from surveillance_perception.detection.detector import DetectorSettings, MarkerDetector
 from surveillance_perception.detection.dictionaries import DICTIONARY_NAMES, dictionary_named
-from surveillance_perception.detection.marker_scene import (
+from surveillance_perception.testing.marker_scene import (
     BACKDROPS,
     Degradation,
     Panel,
     backdrop_of,
-    corners_in_picture,
-    picture_of,
+    corners_in_image,
+    image_of,
 )
 
 CAMERA = CameraModel.from_field_of_view(640, 480, math.radians(60))
@@ -29,7 +29,7 @@ DETECTOR = MarkerDetector(DetectorSettings(known_ids=KNOWN))
 def seen(panels, degradation=None, backdrop='clouds', seed=1, dictionary=DICTIONARY):
     generator = np.random.default_rng(seed)
     scene = backdrop_of(backdrop, CAMERA, generator)
-    return picture_of(
+    return image_of(
         panels, CAMERA, dictionary, scene, degradation or Degradation(blur=0.8), generator
     )
 
@@ -58,7 +58,7 @@ def test_marker_is_found_where_it_is(distance, degrees):
     panel = Panel(14, distance, math.radians(degrees), roll=0.05, offset=(12.3, -20.7))
     detections = found(DETECTOR.detect(seen([panel])))
     assert set(detections) == {14}
-    truth = corners_in_picture(panel, CAMERA)
+    truth = corners_in_image(panel, CAMERA)
     assert np.abs(detections[14].corners - truth).max() < 0.6
     assert 0.0 < detections[14].confidence <= 1.0
 
@@ -75,7 +75,7 @@ def test_marker_is_found_where_it_is(distance, degrees):
     ],
     ids=['blurred', 'moving', 'dark', 'bright', 'uneven', 'noisy'],
 )
-def test_marker_is_found_in_a_poor_picture(degradation):
+def test_marker_is_found_in_a_poor_image(degradation):
     panel = Panel(16, 3.0, 0.4, offset=(-40.0, 30.0))
     assert set(found(DETECTOR.detect(seen([panel], degradation)))) == {16}
 
@@ -84,10 +84,10 @@ def test_marker_is_found_in_a_poor_picture(degradation):
 def test_corners_begin_at_the_markers_own_top_left(quarter):
     panel = Panel(11, 2.0, 0.3, roll=quarter * math.pi / 2 + 0.1)
     detection = found(DETECTOR.detect(seen([panel])))[11]
-    assert np.abs(detection.corners - corners_in_picture(panel, CAMERA)).max() < 0.5
+    assert np.abs(detection.corners - corners_in_image(panel, CAMERA)).max() < 0.5
 
 
-def test_all_markers_of_a_picture_are_found_also_two_of_one_id():
+def test_all_markers_of_a_image_are_found_also_two_of_one_id():
     panels = [Panel(11 + k % 4, 2.0 + k * 0.4, offset=(-240.0 + 80 * k, 40.0)) for k in range(7)]
     ids = sorted(each.marker_id for each in DETECTOR.detect(seen(panels)))
     assert ids == sorted(panel.marker_id for panel in panels)
@@ -110,19 +110,19 @@ def test_no_known_id_is_seen_where_there_is_none(backdrop):
 def test_markers_of_another_dictionary_are_not_known_ids(other):
     dictionary = dictionary_named(other)
     for marker_id in range(6):
-        picture = seen([Panel(marker_id, 2.5, 0.3)], seed=marker_id, dictionary=dictionary)
-        assert not [each for each in DETECTOR.detect(picture) if each.known]
+        image = seen([Panel(marker_id, 2.5, 0.3)], seed=marker_id, dictionary=dictionary)
+        assert not [each for each in DETECTOR.detect(image) if each.known]
 
 
-def test_colour_and_grey_pictures_show_the_same():
+def test_colour_and_grey_images_show_the_same():
     grey = seen([Panel(15, 3.0, 0.5)])
     colour = cv2.cvtColor(grey, cv2.COLOR_GRAY2BGR)
     assert [each.marker_id for each in DETECTOR.detect(colour)] == [15]
 
 
-def test_marker_expected_from_the_picture_before_is_found_again():
+def test_marker_expected_from_the_image_before_is_found_again():
     panel = Panel(12, 4.0, 0.4)
-    truth = corners_in_picture(panel, CAMERA)
+    truth = corners_in_image(panel, CAMERA)
     assert set(found(DETECTOR.detect(seen([panel]), [truth + 1.0]))) == {12}
 
 
@@ -131,12 +131,12 @@ def test_every_dictionary_of_opencv_is_read(name):
     dictionary = dictionary_named(name)
     detector = MarkerDetector(DetectorSettings(dictionary=name))
     marker_id = 5
-    picture = seen([Panel(marker_id, 1.5, 0.4)], dictionary=dictionary)
-    assert marker_id in found(detector.detect(picture))
+    image = seen([Panel(marker_id, 1.5, 0.4)], dictionary=dictionary)
+    assert marker_id in found(detector.detect(image))
 
 
 @pytest.mark.parametrize(
-    ('picture', 'reason'),
+    ('image', 'reason'),
     [
         (np.zeros((0, 0), np.uint8), '0x0'),
         (np.zeros((4, 4, 2), np.uint8), '4x4x2'),
@@ -144,15 +144,15 @@ def test_every_dictionary_of_opencv_is_read(name):
         (np.zeros((4, 4), np.float64), 'float64'),
     ],
 )
-def test_what_is_no_picture_is_refused_in_one_line(picture, reason):
+def test_what_is_no_image_is_refused_in_one_line(image, reason):
     with pytest.raises(ValueError, match=reason) as error:
-        DETECTOR.detect(picture)
+        DETECTOR.detect(image)
     assert '\n' not in str(error.value)
 
 
 @pytest.mark.parametrize('shape', [(1, 1), (2, 700), (5, 5), (30, 30)])
 @pytest.mark.parametrize('level', [0, 255])
-def test_tiny_and_empty_pictures_show_nothing(shape, level):
+def test_tiny_and_empty_images_show_nothing(shape, level):
     assert DETECTOR.detect(np.full(shape, level, np.uint8)) == []
 
 

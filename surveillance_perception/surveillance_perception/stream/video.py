@@ -1,4 +1,4 @@
-"""Pictures one after the other: from a webcam, a video file or a folder."""
+"""Images one after the other: from a webcam, a video file or a folder."""
 
 from __future__ import annotations
 
@@ -9,49 +9,49 @@ from typing import Protocol
 import cv2
 import numpy as np
 
-from surveillance_perception.stream.picture_files import (
-    PICTURE_SUFFIXES,
-    Picture,
-    PictureError,
-    read_picture,
+from surveillance_perception.stream.image_files import (
+    IMAGE_SUFFIXES,
+    ImageArray,
+    ImageError,
+    read_image,
 )
 
 _SILENT = 0
 
 
 class FrameSource(Protocol):
-    """Where pictures come from.
+    """Where images come from.
 
     Attributes:
-        rate: Pictures a second that the source itself has; 0 when it has none.
+        rate: Images a second that the source itself has; 0 when it has none.
     """
 
     rate: float
 
-    def frames(self) -> Iterator[Picture | PictureError]:
-        """Each picture (height, width, 3) BGR in turn, or why one cannot be read."""
+    def frames(self) -> Iterator[ImageArray | ImageError]:
+        """Each image (height, width, 3) BGR in turn, or why one cannot be read."""
 
     def close(self) -> None:
         """Let go of the source."""
 
 
 def open_source(source: str) -> FrameSource:
-    """Open a webcam by its number, a video file, a picture or a folder of pictures.
+    """Open a webcam by its number, a video file, an image or a folder of images.
 
     Raises:
-        PictureError: There is no such thing, or it holds no pictures.
+        ImageError: There is no such thing, or it holds no images.
     """
     if source.isdigit():
         return _Capture(int(source), f'camera {source}')
     path = Path(source)
     if path.is_dir():
-        files = sorted(each for each in path.iterdir() if each.suffix.lower() in PICTURE_SUFFIXES)
+        files = sorted(each for each in path.iterdir() if each.suffix.lower() in IMAGE_SUFFIXES)
         if not files:
-            raise PictureError(f'{path} holds no pictures ({", ".join(PICTURE_SUFFIXES)})')
+            raise ImageError(f'{path} holds no images ({", ".join(IMAGE_SUFFIXES)})')
         return _Files(files)
     if not path.exists():
-        raise PictureError(f'{source}: no such video file or folder of pictures')
-    if path.suffix.lower() in PICTURE_SUFFIXES:
+        raise ImageError(f'{source}: no such video file or folder of images')
+    if path.suffix.lower() in IMAGE_SUFFIXES:
         return _Files([path])
     return _Capture(str(path), f'video {path}')
 
@@ -62,11 +62,11 @@ class _Files:
     def __init__(self, files: list[Path]) -> None:
         self._files = files
 
-    def frames(self) -> Iterator[Picture | PictureError]:
+    def frames(self) -> Iterator[ImageArray | ImageError]:
         for path in self._files:
             try:
-                yield read_picture(path)
-            except PictureError as error:
+                yield read_image(path)
+            except ImageError as error:
                 yield error
 
     def close(self) -> None:
@@ -84,15 +84,15 @@ class _Capture:
         self._capture = cv2.VideoCapture(source)
         set_level(level)
         if not self._capture.isOpened():
-            raise PictureError(f'{what} cannot be opened')
+            raise ImageError(f'{what} cannot be opened')
         self.rate = float(self._capture.get(cv2.CAP_PROP_FPS))
         if not 0.0 < self.rate < 1000.0:
             self.rate = 0.0
         if isinstance(source, int):
-            # a camera keeps its own time: reading blocks until the next picture
+            # a camera keeps its own time: reading blocks until the next image
             self.rate = 0.0
 
-    def frames(self) -> Iterator[Picture | PictureError]:
+    def frames(self) -> Iterator[ImageArray | ImageError]:
         while True:
             good, frame = self._capture.read()
             if not good:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from surveillance_perception.detection.dictionaries import MarkerCodes
-from surveillance_perception.detection.picture_sampling import Array, Patches, PicturePyramid
+from surveillance_perception.detection.image_sampling import Array, ImagePyramid, Patches
 from surveillance_perception.detection.template_fit import Footprint, Indices, TemplateFit
 
 _ROUGH_ITERATIONS = 6
@@ -24,7 +24,7 @@ class Readings:
     """What candidates most likely show; arrays run over candidates.
 
     Attributes:
-        homographies: (m, 3, 3) from marker coordinates to pixels, aligned with the picture.
+        homographies: (m, 3, 3) from marker coordinates to pixels, aligned with the image.
         entries: (m,) index of the best code.
         correlation: (m,) of the whole patch with that code, -1 to 1.
         inner: (m,) of the code's own cells only.
@@ -40,11 +40,11 @@ class Readings:
 
 
 class MarkerReader:
-    """Reads codes from pictures.
+    """Reads codes from images.
 
     Args:
         codes: The codes to choose from.
-        blur: Standard deviation in pixels of the lens's blur in a sharp picture.
+        blur: Standard deviation in pixels of the lens's blur in a sharp image.
     """
 
     def __init__(self, codes: MarkerCodes, blur: float) -> None:
@@ -52,7 +52,7 @@ class MarkerReader:
         self._blur = blur
         self._fit = TemplateFit(codes)
 
-    def read(self, pyramid: PicturePyramid, homographies: Array) -> Readings:
+    def read(self, pyramid: ImagePyramid, homographies: Array) -> Readings:
         """Read candidates (m, 3, 3); those that show nothing like a marker are left out."""
         fit = self._fit
         blur = np.full((len(homographies), 2), self._blur)
@@ -81,7 +81,7 @@ class MarkerReader:
         return Readings(aligned, entries[:, 0], correlation[:, 0], inner, lead)
 
     def _score(
-        self, pyramid: PicturePyramid, homographies: Array, blur: Array
+        self, pyramid: ImagePyramid, homographies: Array, blur: Array
     ) -> tuple[Indices, Patches, Patches, Footprint]:
         levels = self._fit.levels(homographies)
         patches = self._fit.sample(pyramid, homographies, levels)

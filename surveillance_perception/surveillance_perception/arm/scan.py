@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from surveillance_perception.arm.driver import ArmDriver, ArmError
+from surveillance_perception.arm.driver import ArmDriver, ArmMotionError
 from surveillance_perception.arm.kinematics import UnreachableError, direction_of, look_at
 from surveillance_perception.arm.trajectory import TrajectoryError
 from surveillance_perception.arm.view_coverage import View, coverage, views_covering
@@ -21,7 +21,7 @@ class ScanPlan:
     Attributes:
         horizontal: The camera's horizontal field of view, rad.
         vertical: The vertical one, rad.
-        overlap: Share of the picture's angles at its edge that does not count.
+        overlap: Share of the image's angles at its edge that does not count.
         lowest: Lowest elevation, rad.
         highest: Highest elevation, rad.
         views: The views that show it all, in order.
@@ -44,7 +44,7 @@ class ScanPlan:
         object.__setattr__(self, 'views', tuple(views))
 
     def covered(self, views: list[View]) -> float:
-        """Share of the asked directions that lie in the pictures of some views."""
+        """Share of the asked directions that lie in the images of some views."""
         return coverage(views, self.horizontal, self.vertical, self.lowest, self.highest)
 
 
@@ -92,7 +92,7 @@ def scan(
         tell(index, view, False)
         try:
             driver.move(positions, ended)
-        except (ArmError, TrajectoryError) as error:
+        except (ArmMotionError, TrajectoryError) as error:
             outcome.failure = f'view {index + 1} of {len(plan.views)}: {error}'
             break
         tell(index, view, True)

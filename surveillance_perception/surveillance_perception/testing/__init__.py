@@ -1,0 +1,1 @@
+"""Rendered images of markers with known truth, for tests and benchmarks."""
