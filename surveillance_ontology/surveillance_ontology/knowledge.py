@@ -77,6 +77,16 @@ class Knowledge:
         """The values asserted now for a data property of an individual, as they are written."""
         return tuple(self._told.literals.get((prop, individual), ()))
 
+    def asserted_objects(self, prop: str, individual: str) -> Iterable[str]:
+        """What an individual is asserted to be related to by an object property."""
+        return tuple(
+            axiom.object
+            for axiom in self._told.about.get(individual, ())
+            if type(axiom) is ObjectPropertyAssertion
+            and axiom.prop == prop
+            and axiom.subject == individual
+        )
+
     def is_known(self, kind: str, iri: str) -> bool:
         """Whether an asserted axiom declares or uses the entity as this kind."""
         return any((kind, iri) in entities_of(axiom) for axiom in self._told.about.get(iri, ()))
@@ -190,13 +200,7 @@ class Knowledge:
         engine = self._usable
         known = None if engine is None else engine.program.objects.get(prop)
         if engine is None or known is None or self._told.added:
-            found = {
-                axiom.object
-                for axiom in self._told.about.get(individual, ())
-                if type(axiom) is ObjectPropertyAssertion
-                and axiom.prop == prop
-                and axiom.subject == individual
-            }
+            found = set(self.asserted_objects(prop, individual))
             if engine is None or known is None:
                 return found
         else:

@@ -190,6 +190,19 @@ def test_object_properties(ask: Ask) -> None:
     assert ask('QUERY IND OBJECTPROP', 'A').queried_objects == [iri('near')]
 
 
+def test_set_leaves_one_value_whatever_was_there(ask: Ask) -> None:
+    for other in ('A', 'B'):
+        ask('ADD OBJECTPROP IND', 'near', 'X', other)
+        ask('ADD DATAPROP IND', 'p', 'X', 'LONG', '1' if other == 'A' else '2')
+    assert ask('SET OBJECTPROP IND', 'near', 'X', 'C').success
+    assert ask('SET OBJECTPROP IND', 'near', 'X', 'C').success
+    assert names(ask('QUERY OBJECTPROP IND', 'near', 'X')) == ['C']
+    assert ask('SET DATAPROP IND', 'p', 'X', 'LONG', '2').success
+    assert ask('QUERY DATAPROP IND', 'p', 'X').queried_objects == ['"2"^^xsd:long']
+    refused = ask('SET DATAPROP IND', 'p', 'X', 'QUATERNION', '2')
+    assert (refused.success, refused.exit_code) == (False, 101)
+
+
 def test_renaming_changes_the_name_everywhere_and_merges(ask: Ask) -> None:
     ask('ADD IND CLASS', 'A', 'KIND')
     ask('ADD OBJECTPROP IND', 'near', 'A', 'B')

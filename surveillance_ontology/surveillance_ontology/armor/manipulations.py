@@ -284,6 +284,38 @@ def _replace_objectprop(_: Reference, prop: str, ind: str, new: str, old: str) -
 
 
 @manipulation(
+    'SET DATAPROP IND',
+    *(DAT, IND, TYPE, VALUE),
+    native=False,
+    summary='Makes a value the only one asserted for a data property of an individual, whatever '
+    'it had.',
+    type_error_succeeds=False,
+    verb='set for',
+)
+def _set_dataprop(ref: Reference, prop: str, ind: str, value: Literal) -> list[Change]:
+    old = [one for one in ref.kb.asserted_values(prop, ind) if one != value]
+    return [
+        *(RemoveAxiom(DataPropertyAssertion(prop, ind, one)) for one in old),
+        AddAxiom(DataPropertyAssertion(prop, ind, value)),
+    ]
+
+
+@manipulation(
+    'SET OBJECTPROP IND',
+    *(OBJ, IND, _OTHER),
+    native=False,
+    summary='Makes a relation the only one asserted for an object property of an individual, '
+    'whatever it had.',
+)
+def _set_objectprop(ref: Reference, prop: str, ind: str, other: str) -> list[Change]:
+    old = [one for one in ref.kb.asserted_objects(prop, ind) if one != other]
+    return [
+        *(RemoveAxiom(ObjectPropertyAssertion(prop, ind, one)) for one in old),
+        AddAxiom(ObjectPropertyAssertion(prop, ind, other)),
+    ]
+
+
+@manipulation(
     'RENAME IND',
     *_renamed(Read.INDIVIDUAL),
     summary='Gives an individual another name everywhere; merges it with one that has the name.',
