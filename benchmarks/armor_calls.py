@@ -118,10 +118,9 @@ def inside(rounds: int) -> list[Row]:
 
 
 def _service_rows(label: str, store: Any, rounds: int) -> list[Row]:
-    from surveillance_ontology.armor.client import ArmorClient
-    from surveillance_ontology.armor.in_process import InProcessTransport
+    from surveillance_ontology.armor.access import DATA
+    from surveillance_ontology.armor.client import ArmorClient, InProcessTransport
     from surveillance_ontology.armor.service import ArmorService
-    from surveillance_ontology.armor.settings import DATA
     from surveillance_ontology.map_building import MapBuilding
     from surveillance_runtime.place import read_place
 

@@ -24,12 +24,11 @@ from surveillance_ontology.armor import client
 from surveillance_ontology.armor.client import (
     ArmorServiceCallError,
     ArmorServiceInternalError,
+    Batch,
     name_in,
     value_in,
 )
-from surveillance_ontology.armor.fact_set import FactSet
-from surveillance_ontology.armor.facts import ShortFact
-from surveillance_ontology.armor.operations import Batch
+from surveillance_ontology.armor.facts import FactSet, ShortFact
 from surveillance_ontology.armor.protocol import DirectiveRequest, DirectiveResponse, ListResponse
 from surveillance_ontology.conversions import (
     changes_from_ros,

@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from surveillance_ontology.armor.journal import JournalError
+from surveillance_ontology.armor.access import DATA, Settings
 from surveillance_ontology.armor.service import ArmorService
-from surveillance_ontology.armor.settings import DATA, Settings
-from surveillance_ontology.armor.store import Store
+from surveillance_ontology.armor.store import JournalError, Store
 from surveillance_runtime.field_parameters import Described, declare_fields
 from surveillance_runtime.node import PatrolNode, StartError
 

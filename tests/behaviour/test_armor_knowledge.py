@@ -9,10 +9,13 @@ import pytest
 from surveillance_behaviour.peers.armor_knowledge import ArmorKnowledge
 from surveillance_behaviour.peers.ports import InterruptedWaitError, LostRobotError, PeerError
 from surveillance_fsm import Interrupt
-from surveillance_ontology.armor.client import ArmorClient, ArmorServiceCallError
-from surveillance_ontology.armor.in_process import InProcessTransport
+from surveillance_ontology.armor.access import DATA
+from surveillance_ontology.armor.client import (
+    ArmorClient,
+    ArmorServiceCallError,
+    InProcessTransport,
+)
 from surveillance_ontology.armor.service import ArmorService
-from surveillance_ontology.armor.settings import DATA
 from surveillance_ontology.map_building import MapBuilding
 from surveillance_runtime.place import read_place
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+from surveillance_ontology.armor.access import DATA
 from surveillance_ontology.armor.client import ArmorClient
 from surveillance_ontology.armor.protocol import DirectiveRequest, DirectiveResponse
 from surveillance_ontology.armor.service import ArmorService
-from surveillance_ontology.armor.settings import DATA
 
 IRI = 'http://bnc/exp-rob-lab/2022-23'
 FIXTURES = Path(__file__).parent / 'fixtures'

@@ -9,12 +9,10 @@ from hypothesis import strategies as st
 
 from surveillance_interfaces.msg import ArmorDirectiveRes
 from surveillance_ontology.armor.change_feed import LARGE, ChangeFeed
-from surveillance_ontology.armor.changes import decode, encode
-from surveillance_ontology.armor.client import ArmorClient
-from surveillance_ontology.armor.fact_set import FactSet
-from surveillance_ontology.armor.facts import ShortFact, parse_fact
-from surveillance_ontology.armor.in_process import InProcessTransport
+from surveillance_ontology.armor.client import ArmorClient, InProcessTransport
+from surveillance_ontology.armor.facts import FactSet, ShortFact, parse_fact
 from surveillance_ontology.armor.service import ArmorService
+from surveillance_ontology.armor.store import decode, encode
 from surveillance_ontology.conversions import (
     changes_from_ros,
     changes_to_ros,

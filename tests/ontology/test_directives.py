@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from surveillance_ontology.armor.directives.table import TABLE
 from surveillance_ontology.armor.service import ArmorService
-from surveillance_ontology.armor.table import TABLE
 
 from .seven_rooms import IRI, ONTOLOGY, Ask, asker, names
 

@@ -6,12 +6,9 @@ import inspect
 import re
 from pathlib import Path
 
-from surveillance_ontology.armor.client_manipulation import Manipulation
-from surveillance_ontology.armor.client_query import Query
-from surveillance_ontology.armor.client_utilities import Utils
+from surveillance_ontology.armor.access import Settings
+from surveillance_ontology.armor.client import Manipulation, Operation, Query, Utils
 from surveillance_ontology.armor.documentation import updated
-from surveillance_ontology.armor.operations import Operation
-from surveillance_ontology.armor.settings import Settings
 
 MANUAL = (Path(__file__).parents[2] / 'docs' / 'armor.md').read_text(encoding='utf-8')
 

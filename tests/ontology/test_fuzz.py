@@ -15,11 +15,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, rule, run_state_machine_as_test
 
+from surveillance_ontology.armor.access import Settings
+from surveillance_ontology.armor.directives.table import TABLE
 from surveillance_ontology.armor.protocol import DirectiveRequest, DirectiveResponse
 from surveillance_ontology.armor.service import ArmorService
-from surveillance_ontology.armor.settings import Settings
 from surveillance_ontology.armor.store import Store
-from surveillance_ontology.armor.table import TABLE
 
 from .seven_rooms import FIXTURES
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from surveillance_ontology.armor.journal import Journal, JournalError
+from surveillance_ontology.armor.store import Journal, JournalError
 
 
 def reopened(directory: Path) -> list[object]:

@@ -9,9 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from surveillance_ontology.armor.client import ArmorClient, ArmorServiceCallError
-from surveillance_ontology.armor.in_process import InProcessTransport
-from surveillance_ontology.armor.operations import Batch
+from surveillance_ontology.armor.client import (
+    ArmorClient,
+    ArmorServiceCallError,
+    Batch,
+    InProcessTransport,
+)
 from surveillance_ontology.armor.protocol import (
     DirectiveRequest,
     DirectiveResponse,

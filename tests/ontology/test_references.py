@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
+from surveillance_ontology.armor.access import DATA, Settings
 from surveillance_ontology.armor.protocol import DirectiveRequest
 from surveillance_ontology.armor.service import ArmorService
-from surveillance_ontology.armor.settings import DATA, Settings
 
 from .seven_rooms import FIXTURES, IRI, ONTOLOGY, Ask, asker, names
 

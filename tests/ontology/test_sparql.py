@@ -9,11 +9,14 @@ from pathlib import Path
 
 import pytest
 
-from surveillance_ontology.armor.client import ArmorClient, ArmorServiceInternalError
-from surveillance_ontology.armor.in_process import InProcessTransport
+from surveillance_ontology.armor.access import Settings
+from surveillance_ontology.armor.client import (
+    ArmorClient,
+    ArmorServiceInternalError,
+    InProcessTransport,
+)
 from surveillance_ontology.armor.service import ArmorService
-from surveillance_ontology.armor.settings import Settings
-from surveillance_ontology.armor.sparql import Graph, SparqlEngine, SparqlTimeoutError
+from surveillance_ontology.armor.sparql_engine import Graph, SparqlEngine, SparqlTimeoutError
 
 from .seven_rooms import IRI, asker, build_seven_rooms
 
@@ -187,9 +190,9 @@ def test_a_service_that_closes_stops_its_queries(service: ArmorService, built: A
         target=lambda: answers.append(asker(service)('QUERY SPARQL', ENDLESS).error_description)
     )
     thread.start()
-    while not service.sparql.is_busy():
+    while not service.session.sparql.is_busy():
         thread.join(0.01)
-    service.sparql.close()
+    service.session.sparql.close()
     thread.join(10)
     assert answers == ['QUERY SPARQL: the server stops']
     assert not asker(service)('QUERY SPARQL', 'SELECT * { ?a ?b ?c }').success

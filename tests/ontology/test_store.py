@@ -14,12 +14,11 @@ from pathlib import Path
 
 import pytest
 
-from surveillance_ontology.armor.journal import Journal, JournalError
+from surveillance_ontology.armor.access import Settings
 from surveillance_ontology.armor.protocol import DirectiveRequest
 from surveillance_ontology.armor.reference import Reference
 from surveillance_ontology.armor.service import ArmorService
-from surveillance_ontology.armor.settings import Settings
-from surveillance_ontology.armor.store import Store
+from surveillance_ontology.armor.store import Journal, JournalError, Store
 
 from .seven_rooms import IRI, ONTOLOGY, Ask, asker, names
 

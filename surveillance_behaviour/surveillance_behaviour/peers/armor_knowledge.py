@@ -21,10 +21,10 @@ from surveillance_behaviour.peers.ports import (
 from surveillance_ontology.armor.client import (
     ArmorClient,
     ArmorServiceCallError,
+    Transport,
     name_in,
     value_in,
 )
-from surveillance_ontology.armor.operations import Transport
 from surveillance_ontology.armor.protocol import DirectiveResponse
 
 ROBOT = 'Robot1'

@@ -5,33 +5,639 @@
     client.utils.sync_buffered_reasoner()
     client.query.objectprop_b2_ind('canReach', 'Robot1')         # ['C1', 'C2']
 
-Every method can also be awaited: ``await client.query.ind_b2_class.call_async('ROOM')``. The client
-for ROS is `surveillance_ontology.armor_client.ArmorClient`; this module knows no ROS.
+Each method can be called in two ways: blocking, or with ``await``:
+
+    client.query.ind_b2_class('ROOM')                    # blocks; from a thread
+    await client.query.ind_b2_class.call_async('ROOM')   # in a callback of a node
+
+A method decorated with `operation` is a generator: it yields the directives it wants carried out
+and receives their responses, and what it returns is the result. How the directives travel is the
+business of the client's `Transport`. The client for ROS is
+`surveillance_ontology.armor_client.ArmorClient`; this module knows no ROS.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import json
+import re
+from collections.abc import Callable, Generator, Iterable, Sequence
+from functools import update_wrapper
+from typing import Any, Concatenate, Generic, ParamSpec, Protocol, TypeVar, overload
 
-from surveillance_ontology.armor.client_manipulation import Manipulation
-from surveillance_ontology.armor.client_query import Query, name_in, value_in
-from surveillance_ontology.armor.client_utilities import Utils
-from surveillance_ontology.armor.operations import (
-    ArmorServiceCallError,
-    ArmorServiceInternalError,
-    Steps,
-    Transport,
-    operation,
+from surveillance_ontology.armor.facts import ShortFact, parse_fact
+from surveillance_ontology.armor.protocol import (
+    DirectiveRequest,
+    DirectiveResponse,
+    ExitCode,
+    ListResponse,
 )
-from surveillance_ontology.armor.protocol import DirectiveRequest, DirectiveResponse, ListResponse
+from surveillance_ontology.armor.rendering import parse_rendered
+from surveillance_ontology.owl.vocabulary import local_name
 
-__all__ = [
-    'ArmorClient',
-    'ArmorServiceCallError',
-    'ArmorServiceInternalError',
-    'name_in',
-    'value_in',
-]
+P = ParamSpec('P')
+R = TypeVar('R')
+S = TypeVar('S', bound='HasTransport')
+
+Batch = Sequence[DirectiveRequest]
+Steps = Generator[DirectiveRequest | Batch, Any, R]
+"""What an operation is: it yields a directive (and is sent its response) or a batch of them."""
+
+
+class ArmorServiceCallError(Exception):
+    """The server could not be reached, or did not answer in time."""
+
+
+class ArmorServiceInternalError(Exception):
+    """The server refused a directive.
+
+    Attributes:
+        exit_code: ARMOR's exit code.
+    """
+
+    def __init__(self, message: str, exit_code: int | str) -> None:
+        super().__init__(message)
+        self.exit_code = ExitCode(int(exit_code))
+
+
+class Transport(Protocol):
+    """Brings directives to a server.
+
+    Every method raises `ArmorServiceCallError` when no answer comes.
+    """
+
+    def call(self, request: DirectiveRequest) -> DirectiveResponse:
+        """Carry out one directive and block until the answer."""
+
+    def call_list(self, requests: Batch) -> ListResponse:
+        """Carry out a batch and block until the answer."""
+
+    async def call_async(self, request: DirectiveRequest) -> DirectiveResponse:
+        """Carry out one directive."""
+
+    async def call_list_async(self, requests: Batch) -> ListResponse:
+        """Carry out a batch."""
+
+
+class HasTransport(Protocol):
+    """What owns operations."""
+
+    @property
+    def transport(self) -> Transport:
+        """Where the directives go."""
+
+
+class BoundOperation(Generic[P, R]):
+    """An operation of one client."""
+
+    def __init__(self, owner: HasTransport, steps: Callable[..., Steps[R]]) -> None:
+        self._owner = owner
+        self._steps = steps
+        update_wrapper(self, steps)
+
+    def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R:
+        """Block until the result; never in a callback of the node that spins."""
+        steps = self._steps(self._owner, *args, **kwargs)
+        transport = self._owner.transport
+        answer: Any = None
+        try:
+            while True:
+                wanted = steps.send(answer)
+                if isinstance(wanted, DirectiveRequest):
+                    answer = transport.call(wanted)
+                else:
+                    answer = transport.call_list(wanted)
+        except StopIteration as end:
+            result: R = end.value
+            return result
+
+    async def call_async(self, *args: P.args, **kwargs: P.kwargs) -> R:
+        """Give the result to ``await``."""
+        steps = self._steps(self._owner, *args, **kwargs)
+        transport = self._owner.transport
+        answer: Any = None
+        while True:
+            try:
+                wanted = steps.send(answer)
+            except StopIteration as end:
+                result: R = end.value
+                return result
+            if isinstance(wanted, DirectiveRequest):
+                answer = await transport.call_async(wanted)
+            else:
+                answer = await transport.call_list_async(wanted)
+
+
+class Operation(Generic[S, P, R]):
+    """The descriptor behind `operation`."""
+
+    def __init__(self, steps: Callable[Concatenate[S, P], Steps[R]]) -> None:
+        self._steps = steps
+        self.__doc__ = steps.__doc__
+
+    @overload
+    def __get__(self, owner: None, kind: type[S]) -> Operation[S, P, R]: ...
+    @overload
+    def __get__(self, owner: S, kind: type[S] | None = None) -> BoundOperation[P, R]: ...
+    def __get__(
+        self, owner: S | None, kind: type[S] | None = None
+    ) -> Operation[S, P, R] | BoundOperation[P, R]:
+        if owner is None:
+            return self
+        return BoundOperation(owner, self._steps)
+
+
+def operation(steps: Callable[Concatenate[S, P], Steps[R]]) -> Operation[S, P, R]:
+    """Make a generator method callable in both ways."""
+    return Operation(steps)
+
+
+class RequestMaker(HasTransport, Protocol):
+    """The client that parts belong to."""
+
+    reference_name: str
+
+    def request(self, words: str, *args: str) -> DirectiveRequest:
+        """Make a directive."""
+
+
+class ClientPart:
+    """A group of operations of one client."""
+
+    def __init__(self, client: RequestMaker) -> None:
+        self.client = client
+
+    @property
+    def transport(self) -> Transport:
+        """Where the directives go."""
+        return self.client.transport
+
+    def request(self, words: str, *args: str) -> DirectiveRequest:
+        """Make a directive of the client."""
+        return self.client.request(words, *args)
+
+
+def checked(response: DirectiveResponse) -> DirectiveResponse:
+    """Pass a response on if it is a success.
+
+    Raises:
+        ArmorServiceInternalError: It is not.
+    """
+    if not response.success:
+        raise ArmorServiceInternalError(response.error_description, response.exit_code)
+    return response
+
+
+_IN_BRACKETS = re.compile(r'<([^<>]*)>')
+
+
+def name_in(rendered: str) -> str:
+    """The local name in ``<iri#name>``; a text of another form as it is."""
+    match = _IN_BRACKETS.fullmatch(rendered)
+    return local_name(match[1]) if match else rendered
+
+
+def value_in(rendered: str) -> str:
+    """The value in ``"1665579740"^^xsd:long``.
+
+    Raises:
+        ValueError: Not of that form.
+    """
+    return parse_rendered(rendered).lexical
+
+
+class Manipulation(ClientPart):
+    """Directives that change the ontology.
+
+    All return whether the ontology is consistent; with buffering, as of the last reasoning. All
+    raise `ArmorServiceCallError` and `ArmorServiceInternalError`. Values are given as text.
+    """
+
+    def _change(self, words: str, *args: str) -> Steps[bool]:
+        response: DirectiveResponse = checked((yield self.request(words, *args)))
+        return response.is_consistent
+
+    def _change_all(self, requests: Sequence[DirectiveRequest]) -> Steps[bool]:
+        if not requests:
+            return True
+        answer: ListResponse = yield requests
+        for response in answer.responses:
+            checked(response)
+        return answer.is_consistent
+
+    @operation
+    def add_ind(self, ind_name: str) -> Steps[bool]:
+        """Make an individual known."""
+        return (yield from self._change('ADD IND', ind_name))
+
+    @operation
+    def add_ind_to_class(self, ind_name: str, class_name: str) -> Steps[bool]:
+        """Assert that an individual is of a class."""
+        return (yield from self._change('ADD IND CLASS', ind_name, class_name))
+
+    @operation
+    def add_class(self, class_name: str, super_class_name: str = '') -> Steps[bool]:
+        """Make a class known, below another if one is given."""
+        if super_class_name:
+            return (yield from self._change('ADD CLASS CLASS', class_name, super_class_name))
+        return (yield from self._change('ADD CLASS', class_name))
+
+    @operation
+    def disj_inds(self, ind_names: Iterable[str]) -> Steps[bool]:
+        """State that individuals are different."""
+        return (yield from self._change('DISJOINT IND', *ind_names))
+
+    @operation
+    def disj_inds_of_class(self, class_name: str) -> Steps[bool]:
+        """State that the instances of a class, as of the last reasoning, are different."""
+        return (yield from self._change('DISJOINT IND CLASS', class_name))
+
+    @operation
+    def disj_classes(self, class_names: Iterable[str]) -> Steps[bool]:
+        """State that no two classes share an instance."""
+        return (yield from self._change('DISJOINT CLASS', *class_names))
+
+    @operation
+    def disj_subclasses(self, class_name: str) -> Steps[bool]:
+        """State that no two subclasses of a class share an instance."""
+        return (yield from self._change('DISJOINT CLASS CLASS', class_name))
+
+    @operation
+    def make_equivalent(self, class_name: str) -> Steps[bool]:
+        """Turn what a class is a subclass of into its definition."""
+        return (yield from self._change('MAKE EQUIVALENT CLASS', class_name))
+
+    @operation
+    def add_min_cardinality(
+        self, class_name: str, objectprop_name: str, cardinality: int, value_class_name: str
+    ) -> Steps[bool]:
+        """State that instances of a class have so many values of a property at least."""
+        args = (class_name, objectprop_name, str(cardinality), value_class_name)
+        return (yield from self._change('ADD CARDINALITY MIN', *args))
+
+    @operation
+    def add_objectprop_to_ind(
+        self, objectprop_name: str, ind_name: str, value_obj_name: str
+    ) -> Steps[bool]:
+        """Relate an individual to another."""
+        args = (objectprop_name, ind_name, value_obj_name)
+        return (yield from self._change('ADD OBJECTPROP IND', *args))
+
+    @operation
+    def add_dataprop_to_ind(
+        self, dataprop_name: str, ind_name: str, value_type: str, value: str
+    ) -> Steps[bool]:
+        """Add a value to a data property of an individual; ``value_type`` as LONG, STRING, ..."""
+        args = (dataprop_name, ind_name, value_type, value)
+        return (yield from self._change('ADD DATAPROP IND', *args))
+
+    @operation
+    def add_batch_dataprop_to_ind(
+        self, ind_name: str, properties: Iterable[Sequence[str]]
+    ) -> Steps[bool]:
+        """Add values, each ``[property, type, value]``, in one batch."""
+        return (yield from self._change_all(self._dataprops('ADD', ind_name, properties)))
+
+    @operation
+    def replace_objectprop_b2_ind(
+        self, objectprop_name: str, ind_name: str, new_value: str, old_value: str
+    ) -> Steps[bool]:
+        """Relate an individual to a new one instead of an old one."""
+        args = (objectprop_name, ind_name, new_value, old_value)
+        return (yield from self._change('REPLACE OBJECTPROP IND', *args))
+
+    @operation
+    def replace_dataprop_b2_ind(
+        self, dataprop_name: str, ind_name: str, value_type: str, new_value: str, old_value: str
+    ) -> Steps[bool]:
+        """Put a new value in the place of an old one; both bare or as queries return them."""
+        args = (dataprop_name, ind_name, value_type, new_value, old_value)
+        return (yield from self._change('REPLACE DATAPROP IND', *args))
+
+    @operation
+    def replace_one_dataprop_b2_ind(
+        self, dataprop_name: str, ind_name: str, value_type: str, new_value: str
+    ) -> Steps[bool]:
+        """Put a value in the place of the only one there is, or add it when there is none.
+
+        Raises:
+            ArmorServiceInternalError: 206, there are several values.
+        """
+        query = self.request('QUERY DATAPROP IND', dataprop_name, ind_name)
+        old = checked((yield query)).queried_objects
+        _check_single(old, dataprop_name, ind_name)
+        if not old:
+            args = (dataprop_name, ind_name, value_type, new_value)
+            return (yield from self._change('ADD DATAPROP IND', *args))
+        args = (dataprop_name, ind_name, value_type, new_value)
+        return (yield from self._change('REPLACE DATAPROP IND', *args, old[0]))
+
+    @operation
+    def replace_one_objectprop_b2_ind(
+        self, objectprop_name: str, ind_name: str, new_value: str
+    ) -> Steps[bool]:
+        """Relate to a new individual instead of the only one there is, or add it without any.
+
+        Raises:
+            ArmorServiceInternalError: 206, there are several.
+        """
+        query = self.request('QUERY OBJECTPROP IND', objectprop_name, ind_name)
+        old = checked((yield query)).queried_objects
+        _check_single(old, objectprop_name, ind_name)
+        if not old:
+            args = (objectprop_name, ind_name, new_value)
+            return (yield from self._change('ADD OBJECTPROP IND', *args))
+        args = (objectprop_name, ind_name, new_value)
+        return (yield from self._change('REPLACE OBJECTPROP IND', *args, old[0]))
+
+    @operation
+    def remove_ind(self, ind_name: str) -> Steps[bool]:
+        """Remove an individual with all that is asserted of it."""
+        return (yield from self._change('REMOVE IND', ind_name))
+
+    @operation
+    def remove_ind_from_class(self, ind_name: str, class_name: str) -> Steps[bool]:
+        """Retract that an individual is of a class."""
+        return (yield from self._change('REMOVE IND CLASS', ind_name, class_name))
+
+    @operation
+    def remove_class(self, class_name: str, super_class_name: str = '') -> Steps[bool]:
+        """Remove a class, or only that it is below another."""
+        if super_class_name:
+            return (yield from self._change('REMOVE CLASS CLASS', class_name, super_class_name))
+        return (yield from self._change('REMOVE CLASS', class_name))
+
+    @operation
+    def remove_dataprop_from_ind(
+        self, dataprop_name: str, ind_name: str, value_type: str, value: str
+    ) -> Steps[bool]:
+        """Retract a value of a data property."""
+        args = (dataprop_name, ind_name, value_type, value)
+        return (yield from self._change('REMOVE DATAPROP IND', *args))
+
+    @operation
+    def remove_batch_dataprop_to_ind(
+        self, ind_name: str, properties: Iterable[Sequence[str]]
+    ) -> Steps[bool]:
+        """Retract values, each ``[property, type, value]``, in one batch."""
+        return (yield from self._change_all(self._dataprops('REMOVE', ind_name, properties)))
+
+    @operation
+    def remove_objectprop_from_ind(
+        self, objectprop_name: str, ind_name: str, value_obj_name: str
+    ) -> Steps[bool]:
+        """Retract a relation."""
+        args = (objectprop_name, ind_name, value_obj_name)
+        return (yield from self._change('REMOVE OBJECTPROP IND', *args))
+
+    @operation
+    def rename_ind(self, old_name: str, new_name: str) -> Steps[bool]:
+        """Give an individual another name."""
+        return (yield from self._change('RENAME IND', old_name, new_name))
+
+    @operation
+    def rename_class(self, old_name: str, new_name: str) -> Steps[bool]:
+        """Give a class another name."""
+        return (yield from self._change('RENAME CLASS', old_name, new_name))
+
+    @operation
+    def rename_dataprop(self, old_name: str, new_name: str) -> Steps[bool]:
+        """Give a data property another name."""
+        return (yield from self._change('RENAME DATAPROP', old_name, new_name))
+
+    @operation
+    def rename_objectprop(self, old_name: str, new_name: str) -> Steps[bool]:
+        """Give an object property another name."""
+        return (yield from self._change('RENAME OBJECTPROP', old_name, new_name))
+
+    def _dataprops(
+        self, command: str, ind_name: str, properties: Iterable[Sequence[str]]
+    ) -> list[DirectiveRequest]:
+        return [
+            self.request(f'{command} DATAPROP IND', prop, ind_name, value_type, value)
+            for prop, value_type, value in properties
+        ]
+
+
+def _check_single(values: list[str], prop: str, ind: str) -> None:
+    if len(values) > 1:
+        raise ArmorServiceInternalError(
+            f'{prop} of {ind} has {len(values)} values, expected one: {", ".join(values)}',
+            ExitCode.SEVERAL_VALUES,
+        )
+
+
+class Query(ClientPart):
+    """Directives that ask. All raise `ArmorServiceCallError` and `ArmorServiceInternalError`."""
+
+    def _objects(self, words: str, *args: str) -> Steps[list[str]]:
+        response: DirectiveResponse = checked((yield self.request(words, *args)))
+        return response.queried_objects
+
+    def _names(self, with_uri: bool, words: str, *args: str) -> Steps[list[str]]:
+        objects = yield from self._objects(words, *args)
+        return objects if with_uri else [name_in(rendered) for rendered in objects]
+
+    @operation
+    def ind_b2_class(self, class_name: str, with_URI: bool = False) -> Steps[list[str]]:  # noqa: N803
+        """Individuals of a class: names, or ``<iri#name>`` when asked for."""
+        return (yield from self._names(with_URI, 'QUERY IND CLASS', class_name))
+
+    @operation
+    def objectprop_b2_ind(
+        self,
+        objectprop_name: str,
+        ind_name: str,
+        with_URI: bool = False,  # noqa: N803
+    ) -> Steps[list[str]]:
+        """Individuals that an individual is related to: names, or ``<iri#name>``."""
+        args = (objectprop_name, ind_name)
+        return (yield from self._names(with_URI, 'QUERY OBJECTPROP IND', *args))
+
+    @operation
+    def dataprop_b2_ind(self, dataprop_name: str, ind_name: str) -> Steps[list[str]]:
+        """Values of a data property, as ``"1665579740"^^xsd:long``; see `value_in`."""
+        return (yield from self._objects('QUERY DATAPROP IND', dataprop_name, ind_name))
+
+    @operation
+    def check_ind_exists(self, ind_name: str) -> Steps[bool]:
+        """Tell whether an individual is of any class."""
+        response: DirectiveResponse = yield self.request('QUERY IND', ind_name)
+        if not response.success and response.exit_code != ExitCode.OK:
+            checked(response)
+        return response.success and bool(response.queried_objects)
+
+    @operation
+    def class_of_ind(self, ind_name: str, with_URI: bool = False) -> Steps[list[str]]:  # noqa: N803
+        """All classes of an individual: names, or ``<iri#name>``."""
+        return (yield from self._names(with_URI, 'QUERY CLASS IND', ind_name, 'false'))
+
+    @operation
+    def bottom_class_of_ind(self, ind_name: str) -> Steps[str | None]:
+        """Name of a class of an individual that has no subclass; None when there is none."""
+        names = yield from self._objects('QUERY CLASS IND', ind_name, 'true')
+        return names[0] if names else None
+
+    @operation
+    def subclasses(self, class_name: str, with_URI: bool = False) -> Steps[list[str]]:  # noqa: N803
+        """Classes below a class: names, or ``<iri#name>``; without owl:Nothing."""
+        objects = yield from self._objects('QUERY CLASS CLASS', class_name)
+        below = [rendered for rendered in objects if rendered.startswith('<')]
+        return below if with_URI else [name_in(rendered) for rendered in below]
+
+    @operation
+    def restrictions(self, class_name: str) -> Steps[list[str]]:
+        """Definitions of a class as text."""
+        return (yield from self._objects('QUERY CLASS RESTRICTIONS', class_name))
+
+    @operation
+    def dataprops_of_ind(self, ind_name: str, with_URI: bool = False) -> Steps[list[str]]:  # noqa: N803
+        """Data properties that have a value for an individual."""
+        return (yield from self._names(with_URI, 'QUERY IND DATAPROP', ind_name))
+
+    @operation
+    def objectprops_of_ind(self, ind_name: str, with_URI: bool = False) -> Steps[list[str]]:  # noqa: N803
+        """Object properties that have a value for an individual."""
+        return (yield from self._names(with_URI, 'QUERY IND OBJECTPROP', ind_name))
+
+    @operation
+    def sparql(self, query: str, timeout_ms: int = 0) -> Steps[list[dict[str, str]]]:
+        """Run a SPARQL SELECT over asserted and derived facts.
+
+        Args:
+            query: The query with its prefixes.
+            timeout_ms: Longest time in milliseconds; 0 leaves it to the server.
+
+        Returns:
+            One dictionary of variable and value for each row, without the unbound variables.
+        """
+        objects = yield from self._objects('QUERY SPARQL ROWS', query, str(timeout_ms))
+        return [json.loads(row) for row in objects]
+
+    @operation
+    def facts(self, pattern: str) -> Steps[list[ShortFact]]:
+        """Asserted and derived facts that match a pattern such as ``canReach(Robot1, ?)``."""
+        parse_fact(pattern)
+        objects = yield from self._objects('QUERY FACT', pattern)
+        return [parse_fact(text) for text in objects]
+
+    @operation
+    def facts_by_origin(self, pattern: str) -> Steps[tuple[list[ShortFact], list[ShortFact]]]:
+        """Facts that match a pattern: all of them, and those of them that are asserted."""
+        parse_fact(pattern)
+        rows = [
+            self.request('QUERY FACT', pattern),
+            self.request('QUERY FACT', pattern, 'true'),
+        ]
+        answer: ListResponse = yield rows
+        every, asserted = (
+            [parse_fact(text) for text in checked(response).queried_objects]
+            for response in answer.responses
+        )
+        return every, asserted
+
+    @operation
+    def explain(self, fact: str) -> Steps[tuple[str, str] | None]:
+        """Why a fact such as ``URGENT(R3)`` holds: a sentence and a tree; None when it does not."""
+        parse_fact(fact)
+        response: DirectiveResponse = yield self.request('QUERY EXPLAIN', fact)
+        if not response.success and response.exit_code == ExitCode.OK:
+            return None
+        sentence, tree = checked(response).queried_objects
+        return sentence, tree
+
+    @operation
+    def explain_inconsistency(self) -> Steps[tuple[str, str] | None]:
+        """Why the ontology contradicts itself; None when it does not."""
+        objects = yield from self._objects('QUERY EXPLAIN INCONSISTENCY')
+        return (objects[0], objects[1]) if objects else None
+
+
+class Utils(ClientPart):
+    """Directives about references, files and logging."""
+
+    def _do(self, words: str, *args: str) -> Steps[None]:
+        checked((yield self.request(words, *args)))
+
+    @operation
+    def apply_buffered_changes(self) -> Steps[bool]:
+        """Apply buffered manipulations; whether the ontology was consistent at the last REASON."""
+        response: DirectiveResponse = checked((yield self.request('APPLY')))
+        return response.is_consistent
+
+    @operation
+    def sync_buffered_reasoner(self) -> Steps[bool]:
+        """Apply buffered manipulations and reason; whether the ontology is consistent."""
+        response: DirectiveResponse = checked((yield self.request('REASON')))
+        return response.is_consistent
+
+    @operation
+    def save_ref_with_inferences(self, filepath: str) -> Steps[None]:
+        """Save with the derived facts."""
+        yield from self._do('SAVE INFERENCE', filepath)
+
+    @operation
+    def save(self, filepath: str, inference: bool = False) -> Steps[None]:
+        """Save, with the derived facts if asked for; an empty path is the file that was loaded."""
+        yield from self._do('SAVE INFERENCE' if inference else 'SAVE', filepath)
+
+    @operation
+    def load_ref_from_file(
+        self,
+        owl_file_path: str,
+        iri: str,
+        buffered_manipulation: bool = False,
+        reasoner: str = 'PELLET',
+        buffered_reasoner: bool = False,
+        mounted: bool = False,
+    ) -> Steps[None]:
+        """Load an ontology; nothing happens when the reference is loaded already."""
+        flags = (str(buffered_manipulation), reasoner, str(buffered_reasoner))
+        words = 'LOAD FILE MOUNTED' if mounted else 'LOAD FILE'
+        yield from self._do(words, owl_file_path, iri, *flags)
+
+    @operation
+    def drop_ref(self) -> Steps[None]:
+        """Forget the reference."""
+        yield from self._do('DROP')
+
+    @operation
+    def mount_on_ref(self) -> Steps[None]:
+        """Let only this client change the ontology."""
+        yield from self._do('MOUNT')
+
+    @operation
+    def unmount_from_ref(self) -> Steps[None]:
+        """End `mount_on_ref`."""
+        yield from self._do('UNMOUNT')
+
+    @operation
+    def get_all_refs(self) -> Steps[list[str]]:
+        """Names of all references."""
+        response: DirectiveResponse = checked((yield self.request('GET ALL REFS')))
+        return response.queried_objects
+
+    @operation
+    def get_ref_client(self, reference_name: str = '') -> Steps[str | None]:
+        """The client mounted on a reference (the own one if none is named); None when nobody is."""
+        name = reference_name or self.client.reference_name
+        response: DirectiveResponse = checked((yield self.request('GET REF CLIENT', name)))
+        mounted = response.queried_objects[0]
+        return None if mounted == 'none' else mounted
+
+    @operation
+    def set_log_to_terminal(self, switch: bool) -> Steps[None]:
+        """Switch the server's log on its console."""
+        yield from self._do(f'LOG SCREEN {"ON" if switch else "OFF"}')
+
+    @operation
+    def set_log_to_file(self, switch: bool, filepath: str = '') -> Steps[None]:
+        """Switch the server's log to a file."""
+        if switch:
+            if not filepath:
+                raise ArmorServiceCallError('set_log_to_file: expected the path of a file')
+            yield from self._do('LOG FILE ON', filepath)
+        else:
+            yield from self._do('LOG FILE OFF')
 
 
 class ArmorClient:
@@ -78,3 +684,36 @@ class ArmorClient:
         """Carry out directives in order, with no other client's in between."""
         answer: ListResponse = yield requests
         return answer
+
+
+class DirectiveExecutor(Protocol):
+    """A directive service of this process: `service.ArmorService`."""
+
+    def execute(self, request: DirectiveRequest) -> DirectiveResponse:
+        """Carry out one directive."""
+
+    def execute_list(self, requests: Batch) -> ListResponse:
+        """Carry out a batch."""
+
+
+class InProcessTransport:
+    """Brings directives to a service in this process."""
+
+    def __init__(self, service: DirectiveExecutor) -> None:
+        self._service = service
+
+    def call(self, request: DirectiveRequest) -> DirectiveResponse:
+        """Carry out one directive."""
+        return self._service.execute(request)
+
+    def call_list(self, requests: Batch) -> ListResponse:
+        """Carry out a batch."""
+        return self._service.execute_list(requests)
+
+    async def call_async(self, request: DirectiveRequest) -> DirectiveResponse:
+        """Carry out one directive."""
+        return self._service.execute(request)
+
+    async def call_list_async(self, requests: Batch) -> ListResponse:
+        """Carry out a batch."""
+        return self._service.execute_list(requests)

@@ -11,10 +11,9 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 
-from surveillance_ontology.armor import service  # noqa: F401 - fills the table
+from surveillance_ontology.armor.directives import TABLE, Kind
 from surveillance_ontology.armor.protocol import ExitCode
 from surveillance_ontology.armor.rendering import TYPES
-from surveillance_ontology.armor.table import TABLE, Kind
 
 BEGIN = '<!-- begin: written by surveillance_ontology.armor.documentation -->'
 END = '<!-- end -->'

@@ -1,20 +1,87 @@
-"""A loaded ontology under its reference name: buffers, who is mounted on it, and its lock."""
+"""Loaded ontologies under their reference names: changes, buffers, who is mounted, locks.
+
+A change is a value: it waits in a buffer, is applied, and goes into the journal.
+"""
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import threading
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from surveillance_ontology.armor.changes import Change, apply_all
+from surveillance_ontology.armor.protocol import DirectiveError
+from surveillance_ontology.armor.rendering import shown
 from surveillance_ontology.knowledge_base import KnowledgeBase
+from surveillance_ontology.owl.axioms import Axiom
+from surveillance_ontology.reasoner.java_reasoning import JavaKnowledgeBase
 
 LONG_BACKLOG = 500
 """Changes since the last reasoning from which on the next counts as slow."""
 NOBODY = 'none'
 """How ARMOR says that no client is mounted; a client of this name counts as none."""
+
+
+NATIVE = ('', 'PELLET', 'NATIVE')
+"""Names of the reasoner of this package; PELLET is what ARMOR's clients send."""
+JAVA = {'HERMIT': 'hermit', 'OPENLLET': 'pellet', 'PELLET_JAVA': 'pellet'}
+"""Names of the Java reasoners, see `java_reasoning`."""
+
+
+@dataclass(frozen=True, slots=True)
+class AddAxiom:
+    """Assert an axiom; nothing happens when it is asserted already."""
+
+    axiom: Axiom
+
+
+@dataclass(frozen=True, slots=True)
+class RemoveAxiom:
+    """Retract an axiom; nothing happens when it is not asserted."""
+
+    axiom: Axiom
+
+
+@dataclass(frozen=True, slots=True)
+class RenameEntity:
+    """Give an entity another IRI everywhere; merges with an entity that has it already."""
+
+    kind: str
+    old: str
+    new: str
+
+
+@dataclass(frozen=True, slots=True)
+class RemoveEntity:
+    """Retract whatever is asserted of an entity."""
+
+    kind: str
+    iri: str
+
+
+Change = AddAxiom | RemoveAxiom | RenameEntity | RemoveEntity
+
+
+def apply_all(kb: KnowledgeBase, changes: Iterable[Change]) -> None:
+    """Carry out changes in order; retractions and the assertions behind them are one batch."""
+    removed: list[Axiom] = []
+    added: list[Axiom] = []
+    for change in changes:
+        if isinstance(change, AddAxiom):
+            added.append(change.axiom)
+            continue
+        if added or not isinstance(change, RemoveAxiom):
+            kb.change(added, removed)
+            added, removed = [], []
+        if isinstance(change, RemoveAxiom):
+            removed.append(change.axiom)
+        elif isinstance(change, RenameEntity):
+            kb.rename(change.kind, change.old, change.new)
+        else:
+            kb.remove_entity(change.kind, change.iri)
+    kb.change(added, removed)
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +104,12 @@ class Origin:
     def file(self) -> Path | None:
         """The file that SAVE without a path writes to, None when it came from the web."""
         return Path(self.path) if self.path and '://' not in self.path else None
+
+
+def knowledge_base(base: str, axioms: Iterable[Axiom], reasoner: str) -> KnowledgeBase:
+    """Make a knowledge base with the reasoner of a name; the native one for unknown names."""
+    kind = JAVA.get(reasoner.upper())
+    return JavaKnowledgeBase(base, axioms, kind) if kind else KnowledgeBase(base, axioms)
 
 
 @dataclass(slots=True)
@@ -130,3 +203,68 @@ class Reference:
         if not self.buffered_reasoner:
             self.kb.reason()
             self.backlog, self.heavy = 0, False
+
+
+class Registry:
+    """References by name; threads may share it."""
+
+    def __init__(self) -> None:
+        self._references: dict[str, Reference] = {}
+        self._lock = threading.Lock()
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._references
+
+    def names(self) -> list[str]:
+        """All names, sorted."""
+        return sorted(self._references)
+
+    def get(self, name: str) -> Reference | None:
+        """Find a reference, None when there is none of the name."""
+        return self._references.get(name)
+
+    def find(self, name: str) -> Reference:
+        """Find a reference.
+
+        Raises:
+            DirectiveError: 205, naming those there are.
+        """
+        ref = self._references.get(name)
+        if ref is None:
+            loaded = ', '.join(map(shown, self.names()[:10])) or 'none'
+            raise DirectiveError(f'unknown reference {shown(name)}; loaded: {loaded}')
+        return ref
+
+    @contextlib.contextmanager
+    def locked(self, name: str) -> Iterator[Reference]:
+        """Hold a reference's lock.
+
+        Raises:
+            DirectiveError: 205, there is no such reference.
+        """
+        while True:
+            ref = self.find(name)
+            with ref.lock:
+                if not ref.dropped:
+                    yield ref
+                    return
+
+    @contextlib.contextmanager
+    def held(self, names: Iterable[str]) -> Iterator[list[Reference]]:
+        """Hold the locks of those references that there are, in an order that excludes deadlock."""
+        with contextlib.ExitStack() as locks:
+            found = [ref for name in sorted(names) if (ref := self._references.get(name))]
+            for ref in found:
+                locks.enter_context(ref.lock)
+            yield found
+
+    def add(self, ref: Reference) -> None:
+        """Enter a reference under its name."""
+        with self._lock:
+            self._references[ref.name] = ref
+
+    def remove(self, ref: Reference) -> None:
+        """Take a reference out; whoever holds it sees that it is dropped."""
+        ref.dropped = True
+        with self._lock:
+            self._references.pop(ref.name, None)

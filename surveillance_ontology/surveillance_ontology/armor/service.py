@@ -11,21 +11,11 @@ Nothing that a client sends makes it raise.
 from __future__ import annotations
 
 import contextlib
-import threading
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
-from surveillance_ontology.armor import (  # noqa: F401 - the modules fill the table
-    manipulations,
-    queries,
-    sparql_queries,
-    utilities,
-)
-from surveillance_ontology.armor.changes import Change
-from surveillance_ontology.armor.directive_log import DirectiveLog
-from surveillance_ontology.armor.journal import JournalError
-from surveillance_ontology.armor.loading import load_document
-from surveillance_ontology.armor.paths import SafePaths
+from surveillance_ontology.armor.access import Settings
+from surveillance_ontology.armor.directives import Directive, Kind, look_up
 from surveillance_ontology.armor.protocol import (
     DirectiveError,
     DirectiveRequest,
@@ -33,20 +23,13 @@ from surveillance_ontology.armor.protocol import (
     ExitCode,
     ListResponse,
 )
-from surveillance_ontology.armor.reference import NOBODY, Reference
-from surveillance_ontology.armor.registry import Registry
+from surveillance_ontology.armor.reference import Change, Reference, Registry
 from surveillance_ontology.armor.rendering import shown
-from surveillance_ontology.armor.settings import Settings
-from surveillance_ontology.armor.sparql import SparqlEngine
-from surveillance_ontology.armor.store import Store
-from surveillance_ontology.armor.table import Directive, Kind, look_up
-from surveillance_ontology.documents.writing import OntologyWriteError, write_ontology
-from surveillance_ontology.knowledge_changes import Changes
+from surveillance_ontology.armor.session import Session, Watcher
+from surveillance_ontology.armor.store import JournalError, Store
 from surveillance_ontology.reasoner.java_reasoning import JavaReasonerError
 
 LONG_ARGUMENTS = 1000
-Watcher = Callable[[str, Changes | None], None]
-"""Told of a reference's name and what changed in it; None: it was loaded or dropped."""
 
 
 class ArmorService:
@@ -69,17 +52,20 @@ class ArmorService:
         warn: Callable[[str], None] = print,
         store: Store | None = None,
     ) -> None:
-        self.settings = settings or Settings()
-        self.paths = SafePaths(self.settings.directories, self.settings.read_only_directories)
-        self.log = DirectiveLog(screen)
-        self.sparql = SparqlEngine()
-        self._warn = warn
-        self.references = Registry()
-        self._loading = threading.Lock()
-        self._watchers: list[Watcher] = []
+        self.session = Session(settings or Settings(), screen, warn, store)
         self._store = store
         for ref in store.recover() if store else ():
-            self._register(ref)
+            self.session.register(ref)
+
+    @property
+    def settings(self) -> Settings:
+        """What is allowed."""
+        return self.session.settings
+
+    @property
+    def references(self) -> Registry:
+        """What is loaded."""
+        return self.session.references
 
     def execute(self, request: DirectiveRequest) -> DirectiveResponse:
         """Carry out one directive; never raises for what a client sent."""
@@ -99,13 +85,13 @@ class ArmorService:
         except Exception as error:
             problem = f'{request.words}: internal error, {type(error).__name__}: {error}'
             problem = ' '.join(problem.split())
-            self._warn(problem)
+            self.session.warn(problem)
             response = _refusal(problem)
         ref = self.references.get(request.reference_name)
         if ref is not None:
             response.is_consistent = ref.kb.consistent
-        if self.log.enabled:
-            self.log.write(request, response)
+        if self.session.log.enabled:
+            self.session.log.write(request, response)
         return response
 
     def execute_at_once(self, request: DirectiveRequest) -> DirectiveResponse | None:
@@ -153,7 +139,7 @@ class ArmorService:
                     self._undo(names)
                 except JournalError as worse:
                     problem = f'done, but lost at the next start: {error}; going back: {worse}'
-                    self._warn(problem)
+                    self.session.warn(problem)
                 return ListResponse(False, False, [_refusal(problem)])
         return ListResponse(
             success=all(response.success for response in responses),
@@ -163,10 +149,7 @@ class ArmorService:
 
     def close(self) -> None:
         """End helper processes and close files."""
-        self.sparql.close()
-        if self._store:
-            self._store.close()
-        self.log.close()
+        self.session.close()
 
     def _undo(self, names: Iterable[str]) -> None:
         """Bring references back to what the store has of them."""
@@ -176,12 +159,12 @@ class ArmorService:
             kept, ref = durable.get(name), self.references.get(name)
             if kept is not None and ref is not None:
                 ref.restore(kept)
-                self._follow(ref)
+                self.session.follow(ref)
             elif kept is not None:
-                self._register(kept)
+                self.session.register(kept)
             elif ref is not None:
                 self.references.remove(ref)
-            self._tell(name, None)
+            self.session.tell(name, None)
 
     def watch(self, watcher: Watcher) -> Callable[[], None]:
         """Tell a watcher of every change of asserted and derived facts.
@@ -191,130 +174,7 @@ class ArmorService:
         Returns:
             A function that ends the watching.
         """
-        self._watchers.append(watcher)
-        return lambda: self._watchers.remove(watcher)
-
-    def load(
-        self,
-        request: DirectiveRequest,
-        source: str,
-        iri: str,
-        buffered: bool,
-        reasoner: str,
-        lazy: bool,
-        *,
-        web: bool = False,
-    ) -> DirectiveResponse:
-        """Do LOAD; see the table."""
-        name = request.reference_name
-        again = DirectiveResponse(error_description=f'{name} is loaded already')
-        if self._rebuffer(name, buffered):
-            return again
-        with self._loading:
-            if name not in self.references:
-                ref, notes = load_document(
-                    name, source, iri, reasoner, self.paths, self.settings, web=web
-                )
-                ref.buffered_manipulation, ref.buffered_reasoner = buffered, lazy
-                if self._store:
-                    self._store.loaded(ref)
-                self._register(ref)
-                for note in notes:
-                    self._warn(f'{name}: {note}')
-                return DirectiveResponse(error_description='; '.join(notes))
-        self._rebuffer(name, buffered)
-        return again
-
-    def _rebuffer(self, name: str, buffered: bool) -> bool:
-        if name not in self.references:
-            return False
-        with contextlib.suppress(DirectiveError), self.references.locked(name) as ref:
-            if self._store and ref.buffered_manipulation != buffered:
-                self._store.buffered(name, buffered)
-            ref.buffer(buffered)
-            return True
-        return False
-
-    def _register(self, ref: Reference) -> None:
-        self._follow(ref)
-        self.references.add(ref)
-        self._tell(ref.name, None)
-
-    def _follow(self, ref: Reference) -> None:
-        ref.kb.subscribe(lambda changes: self._tell(ref.name, changes))
-
-    def _tell(self, name: str, changes: Changes | None) -> None:
-        for watcher in tuple(self._watchers):
-            watcher(name, changes)
-
-    def drop(self, name: str) -> None:
-        """Do DROP."""
-        with contextlib.suppress(DirectiveError), self.references.locked(name) as ref:
-            if self._store:
-                self._store.dropped(name)
-            self.references.remove(ref)
-            self._tell(name, None)
-
-    def mount(self, request: DirectiveRequest) -> DirectiveResponse:
-        """Do MOUNT.
-
-        Raises:
-            DirectiveError: 203, the reference is unknown or another client is mounted.
-        """
-        client, name = request.client_name, request.reference_name
-        if name not in self.references:
-            raise DirectiveError(
-                f'{client} cannot be mounted on {name}. Unknown reference.', ExitCode.MOUNT_REFUSED
-            )
-        with self.references.locked(name) as ref:
-            if not ref.is_free_for(client):
-                raise DirectiveError(
-                    f'{client} cannot be mounted on {name}. '
-                    'Another client is already mounted on it.',
-                    ExitCode.MOUNT_REFUSED,
-                )
-            note = f'{client} is mounted already' if ref.mounted == client != NOBODY else ''
-            if self._store and ref.mounted != client:
-                self._store.mounted(name, client)
-            ref.mounted = client
-        return DirectiveResponse(error_description=note)
-
-    def unmount(self, request: DirectiveRequest) -> DirectiveResponse:
-        """Do UNMOUNT.
-
-        Raises:
-            DirectiveError: 205, there is no such reference.
-        """
-        with self.references.locked(request.reference_name) as ref:
-            if ref.mounted != request.client_name:
-                note = f'{request.client_name} is not mounted on {ref.name}'
-                return DirectiveResponse(error_description=note)
-            if self._store:
-                self._store.mounted(ref.name, NOBODY)
-            ref.mounted = NOBODY
-        return DirectiveResponse()
-
-    def save(self, name: str, path: str, *, inferences: bool) -> None:
-        """Do SAVE and SAVE INFERENCE.
-
-        Raises:
-            DirectiveError: 205, the path is not allowed or cannot be written.
-        """
-        with self.references.locked(name) as ref:
-            target = path or str(ref.origin.file or '')
-            if not target:
-                raise DirectiveError(
-                    f'SAVE: {name} was loaded from {ref.origin.path}; expected a path'
-                )
-            axioms = list(ref.kb.axioms())
-            if inferences:
-                axioms = list(dict.fromkeys([*axioms, *ref.kb.facts()]))
-            origin = ref.origin
-        form = 'ntriples' if target.endswith('.nt') else origin.format
-        try:
-            write_ontology(axioms, ref.kb.iri, self.paths.to_write(target), form, origin.prefixes)
-        except OntologyWriteError as error:
-            raise DirectiveError(f'SAVE: {error}') from None
+        return self.session.watch(watcher)
 
     def _execute(self, request: DirectiveRequest) -> DirectiveResponse:
         if not request.reference_name:
@@ -326,10 +186,12 @@ class ArmorService:
         if directive.kind is Kind.UTILITY:
             _check_name(request.reference_name)
             values = directive.read(request.args, '')
-            return _response(directive.run(self, request, *values))
+            return _response(directive.run(self.session, request, *values))
         if directive.slow:
             ref = self.references.find(request.reference_name)
-            return _response(directive.run(self, ref, *self._values(directive, request, ref)))
+            return _response(
+                directive.run(self.session, ref, *self._values(directive, request, ref))
+            )
         ref = self.references.find(request.reference_name)
         with ref.lock:
             if ref.dropped:
@@ -339,7 +201,7 @@ class ArmorService:
             self._change(directive, request, ref)
         if self._store:
             self._store.compact_if_large(
-                lambda: self.references.held(self.references.names()), self._warn
+                lambda: self.references.held(self.references.names()), self.session.warn
             )
         return DirectiveResponse()
 

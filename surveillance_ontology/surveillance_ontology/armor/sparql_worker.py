@@ -3,20 +3,26 @@
 It reads requests from standard input and writes answers to standard output, each a line of JSON. A
 request has a graph, which follows it as N-Triples and is kept for the queries that come next, or a
 query.
+
+Oxigraph keeps numbers and times by value and forgets how they were written: ``"7"^^xsd:long`` comes
+back as ``"7"^^xsd:integer``. Answers have to show what was asserted. Where a value is written in
+one way only, that is it. Where it is written in several ways, the triple that it was found in
+decides, as far as the query and the row tell which that was.
 """
 
 from __future__ import annotations
 
 import json
+import re
 import resource
 import signal
 import sys
+from collections.abc import Iterable, Mapping
 from typing import Any, BinaryIO
 
 import pyoxigraph
 
-from surveillance_ontology.armor.sparql import OUT_OF_MEMORY
-from surveillance_ontology.armor.written_forms import WrittenForms
+from surveillance_ontology.armor.sparql_engine import OUT_OF_MEMORY
 
 MOST_SHOWN = 160
 """Characters of the engine's own words about a query."""
@@ -77,6 +83,127 @@ def _term(term: Any) -> tuple[str, str, str]:
     if isinstance(term, pyoxigraph.NamedNode):
         return term.value, '', ''
     return str(term), '', ''
+
+
+_XSD = 'http://www.w3.org/2001/XMLSchema#'
+_COMPUTED = re.compile(r'\bAS\s+[?$](\w+)', re.IGNORECASE)
+_PREFIX = re.compile(r'\bPREFIX\s+([\w.-]*):\s*<([^<>]*)>', re.IGNORECASE)
+_NAME = re.compile(r'<([^<>\s]*)>|([\w.-]*):([\w.-]*\w)')
+_BEFORE = r'(\S+)\s+[?$]{}\b'
+_VARIABLE = re.compile(r'[?$](\w+)')
+
+_Places = list[tuple[str, str]]
+"""Subjects and predicates of the triples in which a form stands."""
+
+
+class WrittenForms:
+    """The written forms of the literals of one graph.
+
+    Args:
+        quads: The graph as it was parsed.
+    """
+
+    def __init__(self, quads: Iterable[Any]) -> None:
+        literals = [quad for quad in quads if _may_be_rewritten(quad.object)]
+        kept = _kept_forms({quad.object for quad in literals})
+        forms: dict[Any, set[Any]] = {}
+        for written, form in kept.items():
+            forms.setdefault(form, set()).add(written)
+        self._only = {
+            form: next(iter(written)) for form, written in forms.items() if len(written) == 1
+        }
+        self._several: dict[Any, dict[Any, _Places]] = {
+            form: {literal: [] for literal in sorted(written, key=str)}
+            for form, written in forms.items()
+            if len(written) > 1
+        }
+        if self._several:
+            for quad in literals:
+                places = self._several.get(kept[quad.object])
+                if places is not None:
+                    places[quad.object].append((_iri(quad.subject), quad.predicate.value))
+
+    def reader(self, query: str) -> Reader:
+        """What reads the rows of one query."""
+        return Reader(self._only, self._several, query)
+
+
+class Reader:
+    """Gives back the written forms in the rows of one query.
+
+    Values that the query computes (``AS ?n``) are left as they are.
+    """
+
+    def __init__(
+        self, only: Mapping[Any, Any], several: Mapping[Any, dict[Any, _Places]], query: str
+    ) -> None:
+        self._only = only
+        self._several = several
+        self._query = query
+        self._computed = set(_COMPUTED.findall(query))
+        self._prefixes = dict(_PREFIX.findall(query))
+        self._mentioned = set(self._names(query)) if several else set()
+        self._before: dict[str, list[str]] = {}
+
+    def written(self, variable: str, row: Mapping[str, Any]) -> Any:
+        """A variable's value in a row as it was written."""
+        term = row[variable]
+        if variable in self._computed or not isinstance(term, pyoxigraph.Literal):
+            return term
+        several = self._several.get(term)
+        if several is None:
+            return self._only.get(term, term)
+        predicates = self._predicates(variable, row)
+        near = self._mentioned | {_iri(value) for value in row.values()}
+        found = _narrowed(several, lambda place: place[1] in predicates)
+        found = _narrowed(found, lambda place: place[0] in near and place[1] in predicates)
+        return next(iter(_narrowed(found, lambda place: place[0] in near)))
+
+    def _predicates(self, variable: str, row: Mapping[str, Any]) -> set[str]:
+        """The properties whose value the variable may be."""
+        before = self._before.get(variable)
+        if before is None:
+            pattern = _BEFORE.format(re.escape(variable))
+            before = self._before[variable] = re.findall(pattern, self._query)
+        bound = (row.get(name) for words in before for name in _VARIABLE.findall(words))
+        named = {name for words in before for name in self._names(words)}
+        return named | {_iri(term) for term in bound if term is not None}
+
+    def _names(self, text: str) -> Iterable[str]:
+        for iri, prefix, local in _NAME.findall(text):
+            yield iri or self._prefixes.get(prefix, prefix + ':') + local
+
+
+def _narrowed(forms: dict[Any, _Places], fits: Any) -> dict[Any, _Places]:
+    """The forms that stand in a place that fits, with these places; all where none does."""
+    found = {
+        form: kept for form, places in forms.items() if (kept := [p for p in places if fits(p)])
+    }
+    return found or forms
+
+
+def _kept_forms(literals: Iterable[Any]) -> dict[Any, Any]:
+    """For each literal the form in which a store gives it back."""
+    numbered = list(literals)
+    store, mark = pyoxigraph.Store(), pyoxigraph.NamedNode('urn:mark')
+    store.bulk_extend(
+        pyoxigraph.Quad(pyoxigraph.NamedNode(f'urn:number:{number}'), mark, literal)
+        for number, literal in enumerate(numbered)
+    )
+    return {numbered[int(quad.subject.value.rpartition(':')[2])]: quad.object for quad in store}
+
+
+def _may_be_rewritten(term: Any) -> bool:
+    return (
+        isinstance(term, pyoxigraph.Literal)
+        and not term.language
+        and term.datatype.value.startswith(_XSD)
+        and term.datatype.value != _XSD + 'string'
+    )
+
+
+def _iri(term: Any) -> str:
+    return term.value if isinstance(term, pyoxigraph.NamedNode) else ''
 
 
 def main() -> None:

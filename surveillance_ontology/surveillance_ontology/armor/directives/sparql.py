@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING
 
+from surveillance_ontology.armor.directives.table import query, text
 from surveillance_ontology.armor.protocol import DirectiveError, DirectiveResponse
 from surveillance_ontology.armor.reference import Reference
 from surveillance_ontology.armor.rendering import shown
-from surveillance_ontology.armor.sparql import Binding, Graph, SparqlError, SparqlTimeoutError
-from surveillance_ontology.armor.table import query, text
+from surveillance_ontology.armor.session import Session
+from surveillance_ontology.armor.sparql_engine import (
+    Binding,
+    Graph,
+    SparqlError,
+    SparqlTimeoutError,
+)
 from surveillance_ontology.documents.writing import ontology_bytes
 from surveillance_ontology.owl.axioms import (
     Axiom,
@@ -19,9 +24,6 @@ from surveillance_ontology.owl.axioms import (
 )
 from surveillance_ontology.owl.entities import entities_of
 from surveillance_ontology.owl.vocabulary import XSD
-
-if TYPE_CHECKING:
-    from surveillance_ontology.armor.service import ArmorService
 
 _SUMMARY = (
     'A SELECT query, whole or in three parts that are joined as they are (prefixes, select, '
@@ -43,8 +45,8 @@ _DIFFERS = (
     summary=_SUMMARY + 'All rows in one text: `{x=iri, v=5^^datatype}, {...}`.',
     differs=_DIFFERS,
 )
-def _sparql(service: ArmorService, ref: Reference, *parts: str) -> DirectiveResponse:
-    rows = _select(service, ref, parts)
+def _sparql(session: Session, ref: Reference, *parts: str) -> DirectiveResponse:
+    rows = _select(session, ref, parts)
     texts = [', '.join(f'{b.variable}={_value(b)}' for b in row) for row in rows]
     return DirectiveResponse(queried_objects=[', '.join(f'{{{text}}}' for text in texts)])
 
@@ -57,8 +59,8 @@ def _sparql(service: ArmorService, ref: Reference, *parts: str) -> DirectiveResp
     summary=_SUMMARY + 'The rows one after the other as pairs of variable and value.',
     differs=_DIFFERS,
 )
-def _sparql_formatted(service: ArmorService, ref: Reference, *parts: str) -> DirectiveResponse:
-    rows = _select(service, ref, parts)
+def _sparql_formatted(session: Session, ref: Reference, *parts: str) -> DirectiveResponse:
+    rows = _select(session, ref, parts)
     pairs = [(bound.variable, _value(bound)) for row in rows for bound in row]
     return DirectiveResponse(sparql_queried_objects=pairs)
 
@@ -72,8 +74,8 @@ def _sparql_formatted(service: ArmorService, ref: Reference, *parts: str) -> Dir
     summary=_SUMMARY + 'One JSON object for each row, variable to value; a variable that the row '
     'leaves unbound is left out, which the other two forms cannot show.',
 )
-def _sparql_rows(service: ArmorService, ref: Reference, *parts: str) -> DirectiveResponse:
-    rows = _select(service, ref, parts)
+def _sparql_rows(session: Session, ref: Reference, *parts: str) -> DirectiveResponse:
+    rows = _select(session, ref, parts)
     objects = [json.dumps({b.variable: _value(b) for b in row}, ensure_ascii=False) for row in rows]
     return DirectiveResponse(queried_objects=objects)
 
@@ -86,22 +88,22 @@ def _value(bound: Binding) -> str:
     return f'{bound.value}^^{bound.datatype}'
 
 
-def _select(service: ArmorService, ref: Reference, parts: tuple[str, ...]) -> list[list[Binding]]:
+def _select(session: Session, ref: Reference, parts: tuple[str, ...]) -> list[list[Binding]]:
     if len(parts) > 4:
         raise DirectiveError(f'QUERY SPARQL: expected 1 to 4 arguments, got {len(parts)}')
     *texts, last = parts if len(parts) in (2, 4) else (*parts, '0')
-    limit = service.settings.sparql_timeout
+    limit = session.settings.sparql_timeout
     asked = _milliseconds(last) / 1000
     seconds = min(asked, limit) if asked > 0 else limit
-    derived = service.settings.sparql_derived
+    derived = session.settings.sparql_derived
     try:
-        return service.sparql.select(
+        return session.sparql.select(
             (ref.serial, ref.revision, derived),
             lambda: _graph(ref, derived),
             ''.join(texts),
             seconds,
             limit,
-            service.settings.sparql_rows,
+            session.settings.sparql_rows,
         )
     except SparqlTimeoutError:
         raise DirectiveError(

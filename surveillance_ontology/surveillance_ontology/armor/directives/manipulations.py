@@ -6,15 +6,7 @@ entities come into being by being named.
 
 from __future__ import annotations
 
-from surveillance_ontology.armor.changes import (
-    AddAxiom,
-    Change,
-    RemoveAxiom,
-    RemoveEntity,
-    RenameEntity,
-)
-from surveillance_ontology.armor.reference import Reference
-from surveillance_ontology.armor.table import (
+from surveillance_ontology.armor.directives.table import (
     CLS,
     DAT,
     IND,
@@ -26,6 +18,14 @@ from surveillance_ontology.armor.table import (
     Argument,
     Read,
     manipulation,
+)
+from surveillance_ontology.armor.reference import (
+    AddAxiom,
+    Change,
+    Reference,
+    RemoveAxiom,
+    RemoveEntity,
+    RenameEntity,
 )
 from surveillance_ontology.owl.axioms import (
     ClassAssertion,

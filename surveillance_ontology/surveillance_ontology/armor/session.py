@@ -1,0 +1,84 @@
+"""What directives act on: the references, the store, files, logs, and who is told of changes.
+
+The service hands it to the directives; it knows neither of them.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+
+from surveillance_ontology.armor.access import SafePaths, Settings
+from surveillance_ontology.armor.directive_log import DirectiveLog
+from surveillance_ontology.armor.reference import Reference, Registry
+from surveillance_ontology.armor.sparql_engine import SparqlEngine
+from surveillance_ontology.armor.store import Store
+from surveillance_ontology.knowledge_changes import Changes
+
+Watcher = Callable[[str, Changes | None], None]
+"""Told of a reference's name and what changed in it; None: it was loaded or dropped."""
+
+
+class Session:
+    """The state of one directive service.
+
+    Args:
+        settings: What is allowed.
+        screen: Writes a line of LOG SCREEN.
+        warn: Told in one line of what went wrong inside and of what a client should know.
+        store: Makes references durable.
+
+    Attributes:
+        settings: What is allowed.
+        paths: Which files may be read and written.
+        log: The log of directives.
+        sparql: Runs SPARQL queries.
+        references: What is loaded.
+        loading: Held while an ontology is loaded.
+        warn: Writes a line for the operator.
+        store: Makes references durable; None: they end with the process.
+    """
+
+    def __init__(
+        self,
+        settings: Settings,
+        screen: Callable[[str], None],
+        warn: Callable[[str], None],
+        store: Store | None,
+    ) -> None:
+        self.settings = settings
+        self.paths = SafePaths(settings.directories, settings.read_only_directories)
+        self.log = DirectiveLog(screen)
+        self.sparql = SparqlEngine()
+        self.references = Registry()
+        self.loading = threading.Lock()
+        self.warn = warn
+        self.store = store
+        self._watchers: list[Watcher] = []
+
+    def watch(self, watcher: Watcher) -> Callable[[], None]:
+        """Tell a watcher of every change; return a function that ends the watching."""
+        self._watchers.append(watcher)
+        return lambda: self._watchers.remove(watcher)
+
+    def register(self, ref: Reference) -> None:
+        """Make a reference known under its name."""
+        self.follow(ref)
+        self.references.add(ref)
+        self.tell(ref.name, None)
+
+    def follow(self, ref: Reference) -> None:
+        """Tell the watchers of the changes of a reference's knowledge base."""
+        ref.kb.subscribe(lambda changes: self.tell(ref.name, changes))
+
+    def tell(self, name: str, changes: Changes | None) -> None:
+        """Tell the watchers of a change."""
+        for watcher in tuple(self._watchers):
+            watcher(name, changes)
+
+    def close(self) -> None:
+        """End helper processes and close files."""
+        self.sparql.close()
+        if self.store:
+            self.store.close()
+        self.log.close()
