@@ -5,7 +5,7 @@
 
 `ArmorService` takes a `DirectiveRequest` and returns a `DirectiveResponse`; it never raises.
 `ArmorClient` builds directives and reads answers over any transport. The node and the ROS transport
-stand outside, in `surveillance_ontology.armor_server_node` and `surveillance_ontology.armor_client`.
+stand outside: `surveillance_ontology.armor_server_node`, `surveillance_ontology.armor_client`.
 
 Modules, from the bottom: `protocol` (requests, answers), `rendering` and `facts` (texts),
 `reference` (a loaded ontology), `store` (what outlives the process), `access` (limits and files),
