@@ -374,9 +374,10 @@ def fuzz(name: str, count: int, seed: int, most: int, folder: Path, place: Path)
                         report.deaths.append(f'does not start: {process.tail()}')
                         return report
                     time.sleep(0.1)
-                time.sleep(0.5)
                 fuzzer.learn_names(name)
-                targets = fuzzer.targets(name)
+                if not (targets := fuzzer.targets(name)):
+                    report.deaths.append(f'takes nothing: {process.tail()}')
+                    return report
                 report.targets = len(targets)
                 fuzzer.run(process, targets, count - report.sent, report)
                 if process.process.poll() is None:
