@@ -1,1 +1,61 @@
-"""OWL ontology service with ARMOR's interface, its reasoner, and the map builder."""
+"""OWL ontologies in plain Python: reading, reasoning, explaining; and an ARMOR service over ROS.
+
+    from surveillance_ontology import KnowledgeBase, read_ontology
+
+    document = read_ontology('map.owl', iri)
+    kb = KnowledgeBase(iri, document.axioms)
+    kb.reason()
+    kb.instances(iri + '#URGENT')
+
+What is exported here needs neither ROS nor Java. Each name is imported when it is first used. The
+axioms themselves are in `surveillance_ontology.owl`.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from surveillance_ontology.documents.reading import (
+        OntologyDocument,
+        OntologyFileError,
+        read_ontology,
+    )
+    from surveillance_ontology.documents.writing import (
+        OntologyWriteError,
+        ontology_bytes,
+        write_ontology,
+    )
+    from surveillance_ontology.knowledge_base import Changes, KnowledgeBase
+    from surveillance_ontology.reasoner.explanation import Explanation
+
+_HOME = {
+    'Changes': 'knowledge_base',
+    'Explanation': 'reasoner.explanation',
+    'KnowledgeBase': 'knowledge_base',
+    'OntologyDocument': 'documents.reading',
+    'OntologyFileError': 'documents.reading',
+    'OntologyWriteError': 'documents.writing',
+    'ontology_bytes': 'documents.writing',
+    'read_ontology': 'documents.reading',
+    'write_ontology': 'documents.writing',
+}
+__all__ = [
+    'Changes',
+    'Explanation',
+    'KnowledgeBase',
+    'OntologyDocument',
+    'OntologyFileError',
+    'OntologyWriteError',
+    'ontology_bytes',
+    'read_ontology',
+    'write_ontology',
+]
+
+
+def __getattr__(name: str) -> Any:
+    home = _HOME.get(name)
+    if home is None:
+        raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
+    return getattr(importlib.import_module(f'{__name__}.{home}'), name)

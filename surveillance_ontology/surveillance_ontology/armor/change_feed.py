@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from surveillance_ontology.armor.service import ArmorService
-from surveillance_ontology.knowledge_changes import Changes
+from surveillance_ontology.knowledge_base import Changes
 from surveillance_ontology.owl.axioms import Axiom
 
 LARGE = 2000

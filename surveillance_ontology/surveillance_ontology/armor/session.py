@@ -13,7 +13,7 @@ from surveillance_ontology.armor.directive_log import DirectiveLog
 from surveillance_ontology.armor.reference import Reference, Registry
 from surveillance_ontology.armor.sparql_engine import SparqlEngine
 from surveillance_ontology.armor.store import Store
-from surveillance_ontology.knowledge_changes import Changes
+from surveillance_ontology.knowledge_base import Changes
 
 Watcher = Callable[[str, Changes | None], None]
 """Told of a reference's name and what changed in it; None: it was loaded or dropped."""

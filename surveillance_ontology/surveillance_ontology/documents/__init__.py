@@ -1,1 +1,6 @@
-"""Ontology documents: reading them into axioms and writing axioms as documents."""
+"""Ontology documents: reading them into axioms and writing axioms as documents.
+
+- `reading`, `writing`: the entry points, `read_ontology` and `write_ontology`;
+- `rdf_xml`, `ntriples`, `foreign_formats`: syntaxes to triples;
+- `mapping`, `nodes`: triples to axioms; `triples`: axioms to triples.
+"""

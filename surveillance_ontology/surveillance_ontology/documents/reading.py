@@ -6,11 +6,11 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from surveillance_ontology.bulk_building import uncollected
 from surveillance_ontology.documents import foreign_formats
 from surveillance_ontology.documents.mapping import Mapping
 from surveillance_ontology.documents.ntriples import parse_ntriples
 from surveillance_ontology.documents.rdf_xml import Graph, RdfSyntaxError, parse_rdf_xml
+from surveillance_ontology.owl.assertions import uncollected
 from surveillance_ontology.owl.axioms import Axiom
 
 _NTRIPLES = re.compile(rb'<[^\s<>]*>\s+[<_]')

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import gc
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 
 from surveillance_ontology.owl.axioms import (
     Annotation,
@@ -133,3 +135,16 @@ def _is_schema(axiom: Axiom) -> bool:
     if isinstance(axiom, SubClassOf):
         return axiom.sup != THING
     return not isinstance(axiom, Declaration | Annotation)
+
+
+@contextmanager
+def uncollected() -> Iterator[None]:
+    """Switches the cyclic garbage collector off for a while, where it is on."""
+    if not gc.isenabled():
+        yield
+        return
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.enable()

@@ -10,32 +10,409 @@ reaches.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator, Mapping
 
 from surveillance_ontology.owl.axioms import (
+    Assertion,
     Axiom,
+    ClassAssertion,
+    DataPropertyAssertion,
+    Declaration,
     DifferentIndividuals,
+    NegativeDataPropertyAssertion,
+    NegativeObjectPropertyAssertion,
+    ObjectPropertyAssertion,
     SameIndividual,
 )
-from surveillance_ontology.owl.vocabulary import local_name
-from surveillance_ontology.reasoner.clauses import Fact, Predicate, Program
-from surveillance_ontology.reasoner.identification import Identification
-from surveillance_ontology.reasoner.translation import individuals_of
+from surveillance_ontology.owl.entities import entities_of
+from surveillance_ontology.owl.expressions import ClassExpression, Literal
+from surveillance_ontology.owl.vocabulary import NOTHING, THING, local_name
+from surveillance_ontology.reasoner.clauses import Fact, Predicate, Premises, Program
+from surveillance_ontology.reasoner.datatypes import Value, literal_of, value_of
+from surveillance_ontology.reasoner.difference import Difference
+from surveillance_ontology.reasoner.equality import Equality, Merge
+from surveillance_ontology.reasoner.network import Network
+from surveillance_ontology.reasoner.proofs import ProofSearch
 
+Conflict = tuple[str, str]
+Classes = Mapping[str, Iterable[str]]
 _MOST_VALUES = 20_000
 
 
-class Engine(Identification):
+class Engine:
     """Keeps the consequences of a program and a changing set of assertions.
+
+    Facts are stored under the name of the individual that represents all individuals known to be
+    the same. A class of equal individuals is split as soon as anything that could have justified
+    it goes; its members' assertions are then stated again under their own names, and what still
+    makes them equal merges them again.
 
     Args:
         program: What to run; its predicates hold the facts and belong to this engine.
         about: Gives the assertions that mention an individual (as of the current `update`).
+
+    Attributes:
+        equality: Who stands for whom.
+        difference: Who is known to be different.
+        spelling: A literal for each value, as some assertion wrote it.
+        asserted: How many assertions state each fact.
+        conflicts: Pairs that must be the same, and are different.
+        proofs: Searches why a fact holds.
+        changed: Where a log of one update is wanted: facts that came, went or changed their
+            standing, with whether they were derived (and not asserted) before.
+        renamed: Whether an individual came to stand for another, or ceased to, since this was
+            reset.
     """
 
     def __init__(self, program: Program, about: Callable[[str], Iterable[Axiom]]) -> None:
-        super().__init__(program, about)
+        self.program = program
+        self.about = about
+        self.equality = Equality()
+        self.spelling: dict[Value, Literal] = {}
+        self._values: dict[Literal, Value] = {}
+        self.difference = Difference(program)
+        self.asserted: dict[Fact, int] = {}
+        self._queue: list[Fact] = []
+        self._overdeleted: list[Fact] = []
+        self._requests: dict[Merge, None] = {}
+        self.conflicts: dict[Conflict, Merge] = {}
+        self._touched: dict[str, None] = {}
+        self._removed: dict[Fact, None] = {}
+        self._split_happened = False
+        self.proofs = ProofSearch(self.asserted)
+        self.changed: dict[Fact, bool] | None = None
+        self.renamed = False
+        self._network = Network(
+            program,
+            self.equality.representative,
+            self.difference,
+            self._queue.append,
+            self._overdeleted.append,
+            self._request,
+        )
+        self._nothing = program.nothing
+        self._nothing.supports.append((self._conflict_supports, 'one individual, yet different'))
+        program.same.supports.append((self._same_supports, None))
+        for index in self._network.thresholds:
+            index.proves = self.proofs.proves
+        self._flushes = [index.flush for index in self._network.thresholds]
+        for predicate in dict.fromkeys(program.predicates()):
+            self._attach_touching(predicate)
         self._start()
+
+    # --- assertions as facts ---
+
+    def value(self, literal: Literal) -> Value:
+        """The literal's value, remembered."""
+        values = self._values
+        value = values.get(literal)
+        if value is None:
+            if len(values) > 200_000:
+                values.clear()
+                self.spelling.clear()
+            value = values[literal] = value_of(literal)
+            self.spelling.setdefault(value, literal)
+        return value
+
+    def fact_of(self, axiom: Axiom) -> Fact | None:
+        """The fact an assertion states, in representatives; None for assertions of another kind."""
+        names = self.equality.representative
+        kind = type(axiom)
+        if kind is DataPropertyAssertion:
+            subject = axiom.subject  # type: ignore[attr-defined]
+            value = self.value(axiom.literal)  # type: ignore[attr-defined]
+            return self.program.data(axiom.prop), names.get(subject, subject), value  # type: ignore[attr-defined]
+        if kind is ObjectPropertyAssertion:
+            subject, target = axiom.subject, axiom.object  # type: ignore[attr-defined]
+            prop = self.program.object(axiom.prop)  # type: ignore[attr-defined]
+            return prop, names.get(subject, subject), names.get(target, target)
+        if isinstance(axiom, ClassAssertion):
+            individual = names.get(axiom.individual, axiom.individual)
+            if axiom.cls == THING:
+                return None
+            if axiom.cls == NOTHING:
+                return self.program.nothing, individual
+            if isinstance(axiom.cls, str):
+                return self.program.cls(axiom.cls), individual
+            label = self.program.labels.get(axiom.cls)
+            return None if label is None else (label, individual)
+        if isinstance(axiom, NegativeObjectPropertyAssertion):
+            negative = self.program.negatives[self.program.object(axiom.prop)]
+            pair = names.get(axiom.subject, axiom.subject), names.get(axiom.object, axiom.object)
+            return (negative, *pair)
+        if isinstance(axiom, NegativeDataPropertyAssertion):
+            negative = self.program.negatives[self.program.data(axiom.prop)]
+            return negative, names.get(axiom.subject, axiom.subject), self.value(axiom.literal)
+        return None
+
+    def current(self, fact: Fact) -> Fact:
+        """The fact with every individual under its representative's name."""
+        names = self.equality.representative
+        if not names:
+            return fact
+        if len(fact) == 2:
+            return fact[0], names.get(fact[1], fact[1])
+        predicate, x, y = fact
+        return predicate, names.get(x, x), y if predicate.kind == 'data' else names.get(y, y)
+
+    def states(self, axiom: Axiom) -> bool:
+        """Whether an assertion is among those that were made."""
+        individuals = axiom.individuals if isinstance(axiom, SameIndividual) else None
+        name = next(iter(individuals)) if individuals else next(iter(individuals_of(axiom)))
+        return axiom in self.about(name)
+
+    @staticmethod
+    def needs_of(
+        axioms: Iterable[Axiom],
+    ) -> tuple[list[ClassExpression], list[tuple[str, str]]]:
+        """The complex classes and the negated properties (kind, IRI) that assertions use."""
+        expressions: dict[ClassExpression, None] = {}
+        negated: dict[tuple[str, str], None] = {}
+        for axiom in axioms:
+            if isinstance(axiom, ClassAssertion) and not isinstance(axiom.cls, str):
+                expressions[axiom.cls] = None
+            elif isinstance(axiom, NegativeObjectPropertyAssertion):
+                negated['object', axiom.prop] = None
+            elif isinstance(axiom, NegativeDataPropertyAssertion):
+                negated['data', axiom.prop] = None
+        return list(expressions), list(negated)
+
+    def understands(self, axiom: Axiom) -> bool:
+        """Whether the program was made for a complex class or negated property that an assertion
+        uses.
+        """
+        if isinstance(axiom, ClassAssertion):
+            return isinstance(axiom.cls, str) or axiom.cls in self.program.labels
+        if isinstance(axiom, NegativeObjectPropertyAssertion):
+            return self.program.object(axiom.prop) in self.program.negatives
+        if isinstance(axiom, NegativeDataPropertyAssertion):
+            return self.program.data(axiom.prop) in self.program.negatives
+        return True
+
+    def take_spelling(self, other: Engine) -> None:
+        """Writes derived values as another engine did."""
+        self._values.update(other._values)
+        self.spelling.update(other.spelling)
+
+    @property
+    def consistent(self) -> bool:
+        """Whether no contradiction is derived."""
+        return not self._nothing.members
+
+    # --- touching ---
+
+    def _attach_touching(self, predicate: Predicate) -> None:
+        if not predicate.touching:
+            return
+        touch = self._touched.setdefault
+        forget = self._touch_before_removal
+        if predicate.kind == 'class':
+            predicate.on_insert.append(lambda x: touch(x))
+            predicate.on_delete.append(forget)
+            return
+        if 1 in predicate.touching:
+            predicate.on_insert.append(lambda x, y: touch(x))
+            predicate.on_delete.append(lambda x, y: forget(x))
+        if 2 in predicate.touching:
+            predicate.on_insert.append(lambda x, y: touch(y))
+            predicate.on_delete.append(lambda x, y: forget(y))
+
+    def _related_by_difference(self, individual: str) -> list[str]:
+        """The individual and those whose difference from others may rest on its own."""
+        found = [individual]
+        if self._network.touch_related:
+            for one in found:
+                for related in self._network.touch_related:
+                    found += [other for other in related(one) if other not in found]
+        return found
+
+    def _touch_before_removal(self, individual: str) -> None:
+        for one in self._related_by_difference(individual):
+            for touch in self._network.touch_delete:
+                touch(one)
+            if self.conflicts:
+                for pair in [pair for pair in self.conflicts if one in pair]:
+                    self._withdraw_conflict(pair)
+
+    # --- single facts ---
+
+    def _assert(self, fact: Fact, fresh: list[Fact]) -> None:
+        asserted = self.asserted
+        count = asserted.get(fact)
+        if count is not None:
+            asserted[fact] = count + 1
+            return
+        asserted[fact] = 1
+        if self.changed is not None:
+            self.changed.setdefault(fact, fact[0].holds(fact))
+        if not fact[0].holds(fact):
+            fact[0].insert(fact)
+            fresh.append(fact)
+
+    def _unassert(self, fact: Fact) -> None:
+        count = self.asserted.get(fact, 0)
+        if count > 1:
+            self.asserted[fact] = count - 1
+        elif count:
+            del self.asserted[fact]
+            if self.changed is not None:
+                self.changed.setdefault(fact, False)
+            self._overdeleted.append(fact)
+
+    def _take(self, fact: Fact) -> None:
+        predicate, arguments = fact[0], fact[1:]
+        for fire in predicate.on_delete:
+            fire(*arguments)
+        predicate.discard(fact)
+        self._removed[fact] = None
+        if self.changed is not None:
+            self.changed.setdefault(fact, True)
+        if self.conflicts:
+            for pair in [p for p, merge in self.conflicts.items() if fact in merge.premises]:
+                self._withdraw_conflict(pair)
+
+    def _follows(self, fact: Fact) -> bool:
+        """Whether one step derives a fact from what holds."""
+        for support, _ in fact[0].supports:
+            for premises in support(*fact[1:]):
+                if all(self._holds(premise) for premise in premises):
+                    return True
+        return False
+
+    def _holds(self, fact: Fact) -> bool:
+        if fact[0] is self.program.different:
+            return self.difference.different(fact[1], fact[2])
+        if fact[0] is self.program.same:
+            return (fact[1], fact[2]) in self.conflicts
+        holds: bool = fact[0].holds(fact)
+        return holds
+
+    def _facts_about(self, individual: str) -> Iterator[Fact]:
+        for predicate in dict.fromkeys(self.program.predicates()):
+            if predicate.kind == 'class':
+                if individual in predicate.members:
+                    yield predicate, individual
+                continue
+            for y in predicate.succ.get(individual, ()):
+                yield predicate, individual, y
+            if predicate.kind != 'data':
+                for x in predicate.pred.get(individual, ()):
+                    if x != individual:
+                        yield predicate, x, individual
+
+    # --- individuals that must be the same ---
+
+    def _request(self, x: str, y: str, origin: Axiom | None, premises: Premises) -> None:
+        self._requests[Merge(x, y, origin, premises)] = None
+
+    def _withdraw_conflict(self, pair: Conflict, again: bool = True) -> None:
+        merge = self.conflicts.pop(pair)
+        self._overdeleted.append((self._nothing, self.equality.find(pair[0])))
+        if again:
+            self._requests[merge] = None
+
+    def _conflict_supports(self, x: str) -> Iterator[Premises]:
+        find = self.equality.find
+        for first, second in self.conflicts:
+            if find(first) == x:
+                different = (self.program.different, x, find(second))
+                yield ((self.program.same, first, second), different)
+
+    def _same_supports(self, first: str, second: str) -> Iterator[Premises]:
+        merge = self.conflicts.get((first, second))
+        if merge is not None:
+            yield tuple(map(self.current, merge.premises))
+
+    def _state_same(self, axiom: SameIndividual) -> None:
+        first, *others = sorted(axiom.individuals)
+        for other in others:
+            self._requests[Merge(first, other, axiom, ())] = None
+
+    def _run_requests(self) -> None:
+        pending = tuple(self._requests)
+        self._requests.clear()
+        equality = self.equality
+        for merge in pending:
+            origin = merge.origin
+            if isinstance(origin, SameIndividual) and origin not in self.about(merge.first):
+                continue
+            x, y = equality.find(merge.first), equality.find(merge.second)
+            if x == y or not all(self._holds(self.current(fact)) for fact in merge.premises):
+                continue
+            if self.difference.different(x, y):
+                self.conflicts[merge.first, merge.second] = merge
+                self._queue.append((self._nothing, x))
+                continue
+            self._merge(merge)
+
+    def _merge(self, merge: Merge) -> None:
+        self.renamed = True
+        kept, gone = self.equality.join(merge)
+        self.difference.merge(kept, self.equality.members[kept])
+        moved = list(self._facts_about(gone))
+        for fact in moved:
+            for fire in fact[0].on_delete:
+                fire(*fact[1:])
+            fact[0].discard(fact)
+            if self.changed is not None:
+                self.changed.setdefault(fact, fact not in self.asserted)
+            self._queue.append(fact)
+        # Nothing ceased to hold: what the removal hooks named holds of the representative.
+        self._overdeleted.clear()
+        for place, fact in enumerate(self._queue):
+            current = self.current(fact)
+            if current != fact:
+                self._queue[place] = current
+                count = self.asserted.pop(fact, 0)
+                if count:
+                    known = self.asserted.get(current, 0)
+                    if self.changed is not None and not known:
+                        self.changed.setdefault(current, current[0].holds(current))
+                    self.asserted[current] = known + count
+        for index in self._network.thresholds:
+            index.settle()
+        for run in self._network.naming:
+            run()
+        self._touched[kept] = None
+
+    def _split(self, representative: str, fresh: list[Fact]) -> None:
+        """Takes away everything about a class of individuals, and states its members' assertions
+        again.
+        """
+        if representative not in self.equality.members:
+            return
+        self.renamed = self._split_happened = True
+        facts = list(self._facts_about(representative))
+        for fact in facts:
+            if self.asserted.pop(fact, None) and self.changed is not None:
+                self.changed.setdefault(fact, False)
+        others: dict[str, None] = {}
+        for fact in facts:
+            others.update(dict.fromkeys(self.equality.dependents(fact)))
+            self._take(fact)
+        members = self.equality.split(representative)
+        self.difference.split(representative)
+        for pair in [pair for pair in self.conflicts if not members.isdisjoint(pair)]:
+            self._overdeleted.append((self._nothing, representative))
+            self._withdraw_conflict(pair)
+        self.proofs.reset()
+        axioms: dict[Axiom, None] = {}
+        for member in sorted(members):
+            self._touched[member] = None
+            for axiom in self.about(member):
+                if is_about_individuals(axiom):
+                    axioms[axiom] = None
+        for axiom in axioms:
+            if isinstance(axiom, SameIndividual):
+                self._state_same(axiom)
+            stated = self.fact_of(axiom)
+            if stated is not None and not members.isdisjoint(_individuals_in(stated)):
+                self._assert(stated, fresh)
+            if self.program.uses_thing:
+                for individual in individuals_of(axiom) & members:
+                    self._assert((self.program.thing, individual), fresh)
+        for other in others:
+            self._split(other, fresh)
 
     def _start(self) -> None:
         for fire in self._network.initial:
@@ -99,8 +476,8 @@ class Engine(Identification):
         for fact in fresh:
             for early in fact[0].early:
                 early(*fact[1:])
-        if self._doomed or self._removed:
-            self._remove_doomed(fresh)
+        if self._overdeleted or self._removed:
+            self._overdelete(fresh)
         for fact in fresh:
             if fact[0].holds(fact):
                 for fire in fact[0].on_insert:
@@ -143,10 +520,10 @@ class Engine(Identification):
 
     # --- removal ---
 
-    def _remove_doomed(self, fresh: list[Fact]) -> None:
-        doomed, asserted, proves = self._doomed, self.asserted, self.proofs.proves
-        while doomed:
-            fact = doomed.pop()
+    def _overdelete(self, fresh: list[Fact]) -> None:
+        overdeleted, asserted, proves = self._overdeleted, self.asserted, self.proofs.proves
+        while overdeleted:
+            fact = overdeleted.pop()
             if not fact[0].holds(fact):
                 continue
             if self.equality.members:
@@ -257,3 +634,96 @@ class Engine(Identification):
                     done.add(one)
                     for touch in touch_insert:
                         touch(one)
+
+
+def individuals_of(axiom: Axiom) -> set[str]:
+    """The individuals that an axiom mentions."""
+    return {name for kind, name in entities_of(axiom) if kind == 'individual'}
+
+
+def is_about_individuals(axiom: Axiom) -> bool:
+    """Whether an axiom is an assertion; the declaration of an individual is one."""
+    return isinstance(axiom, Assertion) or (
+        isinstance(axiom, Declaration) and axiom.kind == 'individual'
+    )
+
+
+def _individuals_in(fact: Fact) -> tuple[str, ...]:
+    return fact[1:2] if fact[0].kind == 'data' else fact[1:]
+
+
+def is_public(predicate: Predicate) -> bool:
+    """Whether a predicate is a named class or property rather than internal."""
+    return isinstance(predicate.expression, str)
+
+
+class FactView:
+    """Reads an engine's facts."""
+
+    def __init__(self, engine: Engine) -> None:
+        self._engine = engine
+
+    def literal(self, value: Value) -> Literal:
+        """A literal for a value: as some assertion writes it, else in its most general datatype."""
+        return self._engine.spelling.get(value) or literal_of(value)
+
+    def public(self, fact: Fact, classes: Classes) -> Iterator[Axiom]:
+        """A stored fact as assertions, one for each combination of names."""
+        predicate = fact[0]
+        name = predicate.expression
+        subjects = classes.get(fact[1]) or (fact[1],)
+        if predicate.kind == 'class':
+            for subject in subjects:
+                yield ClassAssertion(name, subject)
+        elif predicate.kind == 'data':
+            for subject in subjects:
+                yield DataPropertyAssertion(name, subject, self.literal(fact[2]))
+        else:
+            for subject in subjects:
+                for target in classes.get(fact[2]) or (fact[2],):
+                    yield ObjectPropertyAssertion(name, subject, target)
+
+    def stored(self) -> Iterator[Fact]:
+        """Every stored fact of a named class or property."""
+        program = self._engine.program
+        for table in (program.classes, program.objects, program.datas):
+            for predicate in table.values():
+                yield from predicate.facts()
+
+    def derived(self) -> Iterator[Axiom]:
+        """Every fact that holds and is not asserted, equality of individuals included."""
+        engine = self._engine
+        classes = engine.equality.members
+        if not classes:
+            asserted = engine.asserted
+            for fact in self.stored():
+                if fact not in asserted:
+                    yield from self.public(fact, classes)
+            return
+        for fact in self.stored():
+            if fact[0].kind == 'data':
+                yield from self._derived_values(fact)
+                continue
+            for axiom in self.public(fact, classes):
+                if not engine.states(axiom):
+                    yield axiom
+        for members in classes.values():
+            same = SameIndividual(frozenset(members))
+            if not engine.states(same):
+                yield same
+
+    def _derived_values(self, fact: Fact) -> Iterator[Axiom]:
+        """Assertions of a value for the names under which no assertion gives it."""
+        engine = self._engine
+        predicate, representative, value = fact
+        for subject in engine.equality.same(representative):
+            for axiom in engine.about(subject):
+                if (
+                    isinstance(axiom, DataPropertyAssertion)
+                    and axiom.prop == predicate.expression
+                    and axiom.subject == subject
+                    and engine.value(axiom.literal) == value
+                ):
+                    break
+            else:
+                yield DataPropertyAssertion(predicate.expression, subject, self.literal(value))

@@ -5,6 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from surveillance_ontology.owl import axioms as ax
+from surveillance_ontology.owl import expressions as ex
+from surveillance_ontology.owl.axiom_text import axiom_text, expression_text, literal_text
+from surveillance_ontology.owl.axioms import Axiom, Rule
+from surveillance_ontology.owl.vocabulary import local_name
+from surveillance_ontology.reasoner.clauses import Fact
+from surveillance_ontology.reasoner.datatypes import Value
+from surveillance_ontology.reasoner.engine import Engine, FactView
+from surveillance_ontology.reasoner.equality import Merge
+from surveillance_ontology.reasoner.proofs import Proof
+from surveillance_ontology.reasoner.swrl_builtins import builtin
+
 
 @dataclass(frozen=True)
 class Explanation:
@@ -47,3 +59,248 @@ class Explanation:
             return f'{self.fact_text} because {self.because}'
         listed = texts[0] if len(texts) == 1 else ', '.join(texts[:-1]) + ' and ' + texts[-1]
         return f'{self.fact_text} because {listed} ({self.because})'
+
+
+_SIGNS = {
+    'add': '+',
+    'subtract': '-',
+    'multiply': '*',
+    'divide': '/',
+    'greaterThan': '>',
+    'greaterThanOrEqual': '>=',
+    'lessThan': '<',
+    'lessThanOrEqual': '<=',
+    'equal': '=',
+    'notEqual': '!=',
+}
+
+
+class Reasons:
+    """Explains what one engine holds."""
+
+    def __init__(self, engine: Engine) -> None:
+        self._engine = engine
+        self._view = FactView(engine)
+
+    # --- questions ---
+
+    def of_fact(self, axiom: Axiom) -> Explanation | None:
+        """Why an assertion holds; None when it does not."""
+        engine = self._engine
+        if isinstance(axiom, ax.SameIndividual):
+            first, *others = sorted(axiom.individuals)
+            if any(engine.equality.find(first) != engine.equality.find(name) for name in others):
+                return None
+            parts = [part for name in others for part in self._sameness(first, name)]
+            return parts[0] if len(parts) == 1 else self._joined(axiom_text(axiom), parts)
+        if isinstance(axiom, ax.DifferentIndividuals):
+            names = sorted(engine.equality.find(name) for name in axiom.individuals)
+            pairs = [
+                (engine.program.different, one, other)
+                for place, one in enumerate(names)
+                for other in names[place + 1 :]
+            ]
+            if not all(engine.difference.different(one, other) for _, one, other in pairs):
+                return None
+            proofs = [engine.proofs.find(pair) for pair in pairs]
+            parts = [self._explained(proof) for proof in proofs if proof is not None]
+            return parts[0] if len(parts) == 1 else self._joined(axiom_text(axiom), parts)
+        fact = engine.fact_of(axiom)
+        if fact is None or not fact[0].holds(fact):
+            return None
+        proof = engine.proofs.find(fact)
+        if proof is None:
+            return None
+        explanation = self._explained(proof)
+        text = axiom_text(axiom)
+        if text == explanation.fact_text or isinstance(axiom, ax.DataPropertyAssertion):
+            return explanation
+        same = self._renamings(axiom, fact)
+        return self._joined(text, [explanation, *same]) if same else explanation
+
+    def of_inconsistency(self) -> Explanation | None:
+        """Why the facts contradict each other; None when they do not."""
+        engine = self._engine
+        nothing = engine.program.nothing
+        for name in sorted(nothing.members):
+            proof = engine.proofs.find((nothing, name))
+            if proof is not None:
+                found = self._explained(proof)
+                return Explanation(
+                    'the ontology is inconsistent', found.kind, found.because, found.premises
+                )
+        return None
+
+    # --- proofs ---
+
+    def _explained(self, proof: Proof) -> Explanation:
+        text = self.text(proof.fact)
+        if proof.asserted:
+            return self._assertion(proof.fact, text)
+        predicate = proof.fact[0]
+        if predicate is self._engine.program.different and not proof.premises:
+            return self._stated_difference(proof.fact, text)
+        if predicate is self._engine.program.same:
+            return self._merge(self._engine.conflicts[proof.fact[1], proof.fact[2]])
+        premises: list[Explanation] = []
+        for premise in proof.premises:
+            premises += self._premise(premise)
+        origin = proof.origin
+        unique = tuple(dict.fromkeys(premises))
+        if isinstance(origin, Rule):
+            name = f'the rule {origin.label}' if origin.label else f'the rule {axiom_text(origin)}'
+            return Explanation(text, 'rule', name, unique, self._calculation(origin, proof))
+        if isinstance(origin, Axiom):
+            because = axiom_text(origin)
+        elif isinstance(origin, str):
+            because = origin
+        elif predicate is self._engine.program.different:
+            because = 'otherwise there would be a contradiction'
+        else:
+            because = 'the class hierarchy'
+        return Explanation(text, 'axiom', because, unique)
+
+    def _premise(self, proof: Proof) -> list[Explanation]:
+        """A premise; an unnamed class in between gives way to its own premises."""
+        expression = proof.fact[0].expression
+        unnamed = expression is not None and not isinstance(expression, str)
+        if unnamed and proof.premises and not proof.asserted:
+            return [part for premise in proof.premises for part in self._premise(premise)]
+        return [self._explained(proof)]
+
+    def _assertion(self, fact: Fact, text: str) -> Explanation:
+        engine = self._engine
+        names = [name for name in fact[1:] if isinstance(name, str)]
+        for name in names:
+            for other in sorted(engine.equality.same(name)):
+                for axiom in engine.about(other):
+                    if isinstance(axiom, ax.Assertion) and engine.fact_of(axiom) == fact:
+                        written = Explanation(axiom_text(axiom), 'asserted')
+                        same = self._renamings(axiom, fact)
+                        if not same:
+                            return (
+                                written if fact[0].kind == 'data' else Explanation(text, 'asserted')
+                            )
+                        return self._joined(text, [written, *same])
+        return Explanation(text, 'asserted')
+
+    def _renamings(self, axiom: Axiom, fact: Fact) -> list[Explanation]:
+        """Why the individuals an assertion names are those of the fact."""
+        if isinstance(axiom, ax.ClassAssertion):
+            written: tuple[str, ...] = (axiom.individual,)
+        elif isinstance(axiom, ax.ObjectPropertyAssertion):
+            written = (axiom.subject, axiom.object)
+        elif isinstance(axiom, ax.DataPropertyAssertion):
+            written = (axiom.subject,)
+        else:
+            return []
+        parts: list[Explanation] = []
+        for name, current in zip(written, fact[1:], strict=False):
+            if name != current:
+                parts += self._sameness(name, current)
+        return parts
+
+    def _stated_difference(self, fact: Fact, text: str) -> Explanation:
+        engine = self._engine
+        _, x, y = fact
+        axiom = engine.difference.stating(engine.equality.same(x), engine.equality.same(y))
+        if axiom is None:
+            return Explanation(text, 'asserted')
+        return Explanation(text, 'axiom', axiom_text(axiom))
+
+    def _sameness(self, first: str, second: str) -> list[Explanation]:
+        return [self._merge(merge) for merge in self._engine.equality.path(first, second)]
+
+    def _merge(self, merge: Merge) -> Explanation:
+        text = f'{local_name(merge.first)} is the same as {local_name(merge.second)}'
+        if isinstance(merge.origin, ax.SameIndividual):
+            return Explanation(text, 'asserted')
+        premises = [Explanation(self.text(fact), 'asserted') for fact in merge.premises]
+        kind = 'rule' if isinstance(merge.origin, Rule) else 'axiom'
+        because = axiom_text(merge.origin) if merge.origin else 'at most one is allowed'
+        return Explanation(text, kind, because, tuple(premises))
+
+    def _joined(self, text: str, parts: list[Explanation]) -> Explanation:
+        return Explanation(text, 'axiom', 'the same individual under another name', tuple(parts))
+
+    # --- words ---
+
+    def text(self, fact: Fact) -> str:
+        """A fact in words."""
+        predicate = fact[0]
+        program = self._engine.program
+        subject = local_name(fact[1])
+        if predicate is program.nothing:
+            return f'{subject} is contradictory'
+        if predicate is program.different:
+            return f'{subject} is different from {local_name(fact[2])}'
+        if predicate.kind == 'class':
+            name = predicate.expression
+            return f'{subject} is {expression_text(name) if name is not None else predicate.name}'
+        name = local_name(predicate.name)
+        if predicate.kind == 'data':
+            return f'{subject} {name} {literal_text(self._view.literal(fact[2]))}'
+        return f'{subject} {name} {local_name(fact[2])}'
+
+    def _calculation(self, rule: Rule, proof: Proof) -> str:
+        """The rule's built-ins with the values they were applied to, '' for a rule without."""
+        computed = [atom for atom in rule.body if isinstance(atom, ex.BuiltinAtom)]
+        if not computed:
+            return ''
+        values: dict[object, Value] = {}
+        texts: dict[object, str] = {}
+        sources = [atom for atom in rule.body if isinstance(atom, ex.DataPropertyAtom)]
+        facts = [premise.fact for premise in proof.premises]
+        for source in sources:
+            for fact in facts:
+                if fact[0].expression == source.prop and source.second not in values:
+                    values[source.second] = fact[2]
+                    shown = literal_text(self._view.literal(fact[2]))
+                    texts[source.second] = f'{local_name(source.prop)} {shown}'
+        parts: list[str] = []
+        pending = list(computed)
+        while pending:
+            ready = [
+                atom
+                for atom in pending
+                if all(isinstance(a, ex.Literal) or a in values for a in atom.arguments[1:])
+            ]
+            if not ready:
+                break
+            for atom in ready:
+                pending.remove(atom)
+                self._calculate(atom, values, texts, parts)
+        return ' and '.join(parts)
+
+    def _calculate(
+        self,
+        atom: ex.BuiltinAtom,
+        values: dict[object, Value],
+        texts: dict[object, str],
+        parts: list[str],
+    ) -> None:
+        name = local_name(atom.builtin)
+        shown: list[str] = []
+        for argument in atom.arguments:
+            if isinstance(argument, ex.Literal):
+                values[argument] = self._engine.value(argument)
+                texts[argument] = literal_text(argument)
+            shown.append(texts.get(argument, ''))
+        sign = _SIGNS.get(name)
+        first = atom.arguments[0]
+        if first not in values:
+            known = builtin(name, len(atom.arguments))
+            results = (
+                known[1](*(values[a] for a in atom.arguments[1:])) if known and known[1] else ()
+            )
+            for result in results:
+                values[first] = result
+                calculation = (
+                    f' {sign} '.join(shown[1:]) if sign else f'{name}({", ".join(shown[1:])})'
+                )
+                texts[first] = f'{calculation} = {literal_text(self._view.literal(result))}'
+                break
+        elif sign and len(shown) == 2:
+            parts.append(f'{shown[0]} {sign} {shown[1]}')
+        else:
+            parts.append(f'{name}({", ".join(shown)})')

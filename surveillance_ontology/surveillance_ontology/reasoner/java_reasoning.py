@@ -17,9 +17,7 @@ from dataclasses import replace
 from typing import Any
 
 from surveillance_ontology.documents.writing import ontology_bytes
-from surveillance_ontology.knowledge import Fact
-from surveillance_ontology.knowledge_base import KnowledgeBase
-from surveillance_ontology.knowledge_changes import Changes
+from surveillance_ontology.knowledge_base import Changes, Fact, KnowledgeBase
 from surveillance_ontology.owl.axioms import (
     Axiom,
     ClassAssertion,

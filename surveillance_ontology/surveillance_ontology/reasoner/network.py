@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 from surveillance_ontology.owl.axioms import Axiom
+from surveillance_ontology.reasoner.cardinality import AtLeastCounter, AtMostCounter, KeyWatcher
 from surveillance_ontology.reasoner.clauses import (
     Clause,
     Constant,
@@ -18,7 +19,6 @@ from surveillance_ontology.reasoner.clauses import (
     Program,
     SameAtom,
 )
-from surveillance_ontology.reasoner.counting import AtLeastCounter, AtMostCounter, KeyWatcher
 from surveillance_ontology.reasoner.difference import (
     AsymmetricEvidence,
     Difference,
@@ -32,8 +32,7 @@ from surveillance_ontology.reasoner.joins import (
     compile_support,
     compile_trigger,
 )
-from surveillance_ontology.reasoner.rule_halves import split_rule
-from surveillance_ontology.reasoner.thresholds import ThresholdIndex
+from surveillance_ontology.reasoner.threshold_rules import ThresholdIndex, split_rule
 
 Emit = Callable[[Fact], None]
 MergeRequest = Callable[[str, str, Axiom | None, Premises], None]
@@ -58,13 +57,13 @@ class Network:
         program: Program,
         representative: dict[str, str],
         difference: Difference,
-        push: Emit,
-        doom: Emit,
+        enqueue: Emit,
+        overdelete: Emit,
         merge: MergeRequest,
     ) -> None:
         self._program = program
         self._difference = difference
-        self._push, self._doom, self._merge = push, doom, merge
+        self._enqueue, self._overdelete, self._merge = enqueue, overdelete, merge
         self._context = JoinContext(representative, difference.different, program.different)
         self.initial: list[Callable[[], None]] = []
         self.naming: list[Callable[[], None]] = []
@@ -75,12 +74,14 @@ class Network:
         self.counters: list[AtMostCounter] = []
         program.different.supports.append((difference.premises, None))
         for at_least in program.at_least:
-            counter = AtLeastCounter(at_least, difference, push, doom)
+            counter = AtLeastCounter(at_least, difference, enqueue, overdelete)
             if not counter.is_data:
                 self.touch_insert.append(counter.touch_insert)
                 self.touch_delete.append(counter.touch_delete)
         for at_most in sorted(program.at_most, key=lambda condition: condition.label is not None):
-            watcher = AtMostCounter(at_most, difference, program.nothing, push, doom, merge)
+            watcher = AtMostCounter(
+                at_most, difference, program.nothing, enqueue, overdelete, merge
+            )
             self.counters.append(watcher)
             if not watcher.is_data:
                 self.touch_insert.append(watcher.touch_insert)
@@ -99,9 +100,9 @@ class Network:
         if isinstance(head, SameAtom):
             self._attach_same(clause, head)
             return
-        halves = split_rule(clause)
-        if halves is not None:
-            index = ThresholdIndex(clause, halves, self._context, self._push, self._doom)
+        split = split_rule(clause)
+        if split is not None:
+            index = ThresholdIndex(clause, split, self._context, self._enqueue, self._overdelete)
             self.thresholds.append(index)
             return
         context, body = self._context, clause.body
@@ -111,21 +112,21 @@ class Network:
                 triggered = True
                 predicate = atom.predicate
                 predicate.on_insert.append(
-                    compile_trigger(context, body, atom, atom.terms, head, self._push, False)
+                    compile_trigger(context, body, atom, atom.terms, head, self._enqueue, False)
                 )
                 predicate.on_delete.append(
-                    compile_trigger(context, body, atom, atom.terms, head, self._doom, True)
+                    compile_trigger(context, body, atom, atom.terms, head, self._overdelete, True)
                 )
             elif isinstance(atom, DifferentAtom):
                 for term in atom.terms:
                     self.touch_insert.append(
-                        compile_trigger(context, body, None, (term,), head, self._push, False)
+                        compile_trigger(context, body, None, (term,), head, self._enqueue, False)
                     )
                     self.touch_delete.append(
-                        compile_trigger(context, body, None, (term,), head, self._doom, True)
+                        compile_trigger(context, body, None, (term,), head, self._overdelete, True)
                     )
         if not triggered or _names_individual(clause):
-            run = compile_trigger(context, body, None, (), head, self._push, False)
+            run = compile_trigger(context, body, None, (), head, self._enqueue, False)
             self.naming.append(run)
             if not triggered:
                 self.initial.append(run)
@@ -169,18 +170,18 @@ class Network:
         marked = list(dict.fromkeys(marked))
         if not marked:
             return
-        nothing, push, doom = program.nothing, self._push, self._doom
+        nothing, enqueue, overdelete = program.nothing, self._enqueue, self._overdelete
         for predicate in marked:
             others = sorted(predicate.disjoint, key=lambda other: other.name)
 
             def gain(x: str, others: list[Predicate] = others) -> None:
                 for other in others:
                     if x in other.members:
-                        push((nothing, x))
+                        enqueue((nothing, x))
 
             def lose(x: str) -> None:
                 if x in nothing.members:
-                    doom((nothing, x))
+                    overdelete((nothing, x))
 
             predicate.on_insert.append(gain)
             predicate.on_delete.append(lose)

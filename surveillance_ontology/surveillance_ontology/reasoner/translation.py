@@ -1,147 +1,880 @@
-"""Assertions as stored facts."""
+"""Translates axioms into Horn clauses and counting conditions.
+
+A class expression that cannot be written in a clause's body (a cardinality, `only`, a complement)
+becomes a label: a predicate that holds of what is known to belong to the expression. What no Horn
+clause can express is reported, with the axiom, in `Program.unsupported`.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from itertools import product
+from typing import Any
 
-from surveillance_ontology.owl.axioms import (
-    Assertion,
-    Axiom,
-    ClassAssertion,
-    DataPropertyAssertion,
-    Declaration,
-    NegativeDataPropertyAssertion,
-    NegativeObjectPropertyAssertion,
-    ObjectPropertyAssertion,
-    SameIndividual,
+from surveillance_ontology.owl import axioms as ax
+from surveillance_ontology.owl import expressions as ex
+from surveillance_ontology.owl.axiom_text import axiom_text, expression_text
+from surveillance_ontology.owl.axioms import Axiom
+from surveillance_ontology.owl.expressions import ClassExpression, Literal, PropertyExpression
+from surveillance_ontology.owl.vocabulary import NOTHING, SWRLB, THING, TOP_LITERAL, local_name
+from surveillance_ontology.reasoner.clauses import (
+    AtLeast,
+    AtMost,
+    BodyAtom,
+    Clause,
+    ComputedAtom,
+    Constant,
+    DifferentAtom,
+    Existential,
+    HeadAtom,
+    Key,
+    Predicate,
+    PredicateAtom,
+    Program,
+    RangeAtom,
+    SameAtom,
+    Term,
+    property_atom,
 )
-from surveillance_ontology.owl.entities import entities_of
-from surveillance_ontology.owl.expressions import ClassExpression, Literal
-from surveillance_ontology.owl.vocabulary import NOTHING, THING
-from surveillance_ontology.reasoner.clauses import Fact, Program
-from surveillance_ontology.reasoner.datatypes import Value, value_of
-from surveillance_ontology.reasoner.equality import Equality
+from surveillance_ontology.reasoner.datatypes import Test, Value, includes, range_test, value_of
+from surveillance_ontology.reasoner.swrl_builtins import builtin
+
+_POSITIVE = (
+    ex.ObjectSomeValuesFrom,
+    ex.ObjectMinCardinality,
+    ex.ObjectHasValue,
+    ex.ObjectHasSelf,
+    ex.ObjectOneOf,
+    ex.DataSomeValuesFrom,
+    ex.DataMinCardinality,
+    ex.DataHasValue,
+)
+
+
+def negated(expression: ClassExpression) -> ClassExpression:
+    """The complement, with negation pushed inwards."""
+    if isinstance(expression, str):
+        if expression == THING:
+            return NOTHING
+        return THING if expression == NOTHING else ex.ObjectComplementOf(expression)
+    if isinstance(expression, ex.ObjectComplementOf):
+        return normal(expression.operand)
+    if isinstance(expression, ex.ObjectIntersectionOf):
+        return ex.ObjectUnionOf(tuple(map(negated, expression.operands)))
+    if isinstance(expression, ex.ObjectUnionOf):
+        return ex.ObjectIntersectionOf(tuple(map(negated, expression.operands)))
+    if isinstance(expression, ex.ObjectSomeValuesFrom):
+        return ex.ObjectAllValuesFrom(expression.prop, negated(expression.filler))
+    if isinstance(expression, ex.ObjectAllValuesFrom):
+        return ex.ObjectSomeValuesFrom(expression.prop, negated(expression.filler))
+    if isinstance(expression, ex.ObjectMinCardinality):
+        if expression.n == 0:
+            return NOTHING
+        return ex.ObjectMaxCardinality(expression.n - 1, expression.prop, expression.filler)
+    if isinstance(expression, ex.ObjectMaxCardinality):
+        return ex.ObjectMinCardinality(expression.n + 1, expression.prop, expression.filler)
+    if isinstance(expression, ex.DataSomeValuesFrom):
+        return ex.DataMaxCardinality(0, expression.prop, expression.range)
+    if isinstance(expression, ex.DataAllValuesFrom):
+        return ex.DataSomeValuesFrom(expression.prop, ex.DataComplementOf(expression.range))
+    if isinstance(expression, ex.DataMinCardinality):
+        if expression.n == 0:
+            return NOTHING
+        return ex.DataMaxCardinality(expression.n - 1, expression.prop, expression.range)
+    if isinstance(expression, ex.DataMaxCardinality):
+        return ex.DataMinCardinality(expression.n + 1, expression.prop, expression.range)
+    if isinstance(expression, ex.ObjectExactCardinality):
+        few = ex.ObjectMinCardinality(expression.n + 1, expression.prop, expression.filler)
+        if expression.n == 0:
+            return few
+        less = ex.ObjectMaxCardinality(expression.n - 1, expression.prop, expression.filler)
+        return ex.ObjectUnionOf((few, less))
+    if isinstance(expression, ex.DataExactCardinality):
+        more = ex.DataMinCardinality(expression.n + 1, expression.prop, expression.range)
+        if expression.n == 0:
+            return more
+        fewer = ex.DataMaxCardinality(expression.n - 1, expression.prop, expression.range)
+        return ex.ObjectUnionOf((more, fewer))
+    return ex.ObjectComplementOf(expression)
+
+
+def normal(expression: ClassExpression) -> ClassExpression:
+    """The expression with complements pushed inwards and no nested intersections or unions."""
+    if isinstance(expression, ex.ObjectComplementOf):
+        pushed = negated(expression.operand)
+        return pushed if pushed == expression else normal(pushed)
+    if isinstance(expression, (ex.ObjectIntersectionOf, ex.ObjectUnionOf)):
+        kind = type(expression)
+        flat: list[ClassExpression] = []
+        for operand in map(normal, expression.operands):
+            flat += operand.operands if isinstance(operand, kind) else (operand,)
+        flat = list(dict.fromkeys(flat))
+        return flat[0] if len(flat) == 1 else kind(tuple(flat))
+    return expression
+
+
+def is_positive(expression: ClassExpression) -> bool:
+    """Whether facts that hold can show membership, so that a clause body can state it."""
+    if isinstance(expression, str):
+        return True
+    if isinstance(expression, (ex.ObjectIntersectionOf, ex.ObjectUnionOf)):
+        return all(map(is_positive, expression.operands))
+    if isinstance(expression, (ex.ObjectSomeValuesFrom, ex.ObjectMinCardinality)):
+        return is_positive(normal(expression.filler))
+    return isinstance(expression, _POSITIVE)
+
+
+_Directed = tuple[str, bool]
+
+
+def directed(prop: PropertyExpression) -> _Directed:
+    """A property as (IRI, whether inverted)."""
+    return (prop, False) if isinstance(prop, str) else (prop.prop, True)
+
+
+class PropertyHierarchy:
+    """The reflexive and transitive closure of the stated property inclusions."""
+
+    def __init__(self, axioms: Iterable[Axiom]) -> None:
+        self._above: dict[_Directed, set[_Directed]] = {}
+        self._functional: set[_Directed] = set()
+        for axiom in axioms:
+            if isinstance(axiom, (ax.SubObjectPropertyOf, ax.SubDataPropertyOf)):
+                self._edge(directed(axiom.sub), directed(axiom.sup))
+            elif isinstance(axiom, (ax.EquivalentObjectProperties, ax.EquivalentDataProperties)):
+                for sub in axiom.props:
+                    for sup in axiom.props:
+                        self._edge(directed(sub), directed(sup))
+            elif isinstance(axiom, ax.InverseObjectProperties):
+                first, (name, inverted) = directed(axiom.first), directed(axiom.second)
+                self._edge(first, (name, not inverted))
+                self._edge((name, not inverted), first)
+            elif isinstance(axiom, ax.SymmetricObjectProperty):
+                name, inverted = directed(axiom.prop)
+                self._edge((name, inverted), (name, not inverted))
+            elif isinstance(axiom, (ax.FunctionalObjectProperty, ax.FunctionalDataProperty)):
+                self._functional.add(directed(axiom.prop))
+            elif isinstance(axiom, ax.InverseFunctionalObjectProperty):
+                name, inverted = directed(axiom.prop)
+                self._functional.add((name, not inverted))
+
+    def _edge(self, sub: _Directed, sup: _Directed) -> None:
+        self._above.setdefault(sub, set()).add(sup)
+        self._above.setdefault((sub[0], not sub[1]), set()).add((sup[0], not sup[1]))
+
+    def above(self, prop: PropertyExpression) -> set[_Directed]:
+        """The property and everything it is included in."""
+        found = {directed(prop)}
+        pending = list(found)
+        while pending:
+            for sup in self._above.get(pending.pop(), ()):
+                if sup not in found:
+                    found.add(sup)
+                    pending.append(sup)
+        return found
+
+    def is_functional(self, prop: PropertyExpression) -> bool:
+        """Whether an individual has at most one value, by this property or one above it."""
+        return not self._functional.isdisjoint(self.above(prop))
+
+    def is_functional_as(self, prop: _Directed) -> bool:
+        """Whether this very property, read in this direction, is stated to be functional."""
+        return prop in self._functional
+
+
+Body = tuple[BodyAtom, ...]
+_X, _Y, _Z = 0, 1, 2
+
+
+class UnsupportedError(Exception):
+    """Part of an axiom is outside the fragment; the text says which."""
+
+
+class _Outside:
+    """The complement of a test, comparable so that equal conditions fall together."""
+
+    __slots__ = ('_test',)
+
+    def __init__(self, test: Test) -> None:
+        self._test = test
+
+    def __call__(self, value: Value) -> bool:
+        return not self._test(value)
+
+
+class _Terms:
+    """Numbers a rule's variables; tells individuals from values."""
+
+    def __init__(self, translation: Translation) -> None:
+        self._translation = translation
+        self._numbers: dict[ex.Variable, int] = {}
+        self.individuals: set[int] = set()
+        self.values: set[int] = set()
+
+    def individual(self, argument: ex.IndividualArgument) -> Term:
+        if isinstance(argument, ex.Variable):
+            number = self._number(argument)
+            self.individuals.add(number)
+            return number
+        return Constant(argument)
+
+    def value(self, argument: ex.DataArgument) -> Term:
+        if isinstance(argument, ex.Variable):
+            number = self._number(argument)
+            self.values.add(number)
+            return number
+        if not isinstance(argument, Literal):
+            raise UnsupportedError(f'{argument} stands where a literal or a variable is expected')
+        return Constant(value_of(argument), True)
+
+    def _number(self, variable: ex.Variable) -> int:
+        number = self._numbers.get(variable)
+        if number is None:
+            number = self._numbers[variable] = self._translation.fresh()
+        return number
+
+
+def _computed(atom: ex.BuiltinAtom, terms: _Terms) -> ComputedAtom:
+    name = atom.builtin.removeprefix(SWRLB)
+    known = builtin(name, len(atom.arguments)) if atom.builtin.startswith(SWRLB) else None
+    if known is None:
+        count = len(atom.arguments)
+        raise UnsupportedError(
+            f'the built-in {local_name(atom.builtin)} with {count} arguments is not supported'
+        )
+    holds, solve = known
+    return ComputedAtom(name, holds, solve, tuple(map(terms.value, atom.arguments)))
 
 
 class Translation:
-    """Turns assertions into facts of a program, each individual under its representative's name.
+    """Builds a `Program` from axioms that are not assertions.
 
     Args:
-        program: Whose predicates the facts are of.
-        about: Gives the assertions that mention an individual, as of now.
+        axioms: The ontology's axioms; assertions and annotations among them are passed over.
+        asserted: Complex class expressions that individuals are asserted to belong to.
+        negated: Properties with negative assertions, as pairs (kind, IRI), kind 'object' or 'data'.
+        abstract: Whether values may be stand-ins ('some', range) for an unknown value in a range.
 
     Attributes:
-        equality: Who stands for whom.
-        spelling: A literal for each value, as some assertion wrote it.
+        program: The result.
+        hierarchy: The property inclusions.
     """
 
-    def __init__(self, program: Program, about: Callable[[str], Iterable[Axiom]]) -> None:
-        self.program = program
-        self.about = about
-        self.equality = Equality()
-        self.spelling: dict[Value, Literal] = {}
-        self._values: dict[Literal, Value] = {}
-
-    def value(self, literal: Literal) -> Value:
-        """The literal's value, remembered."""
-        values = self._values
-        value = values.get(literal)
-        if value is None:
-            if len(values) > 200_000:
-                values.clear()
-                self.spelling.clear()
-            value = values[literal] = value_of(literal)
-            self.spelling.setdefault(value, literal)
-        return value
-
-    def fact_of(self, axiom: Axiom) -> Fact | None:
-        """The fact an assertion states, in representatives; None for assertions of another kind."""
-        names = self.equality.representative
-        kind = type(axiom)
-        if kind is DataPropertyAssertion:
-            subject = axiom.subject  # type: ignore[attr-defined]
-            value = self.value(axiom.literal)  # type: ignore[attr-defined]
-            return self.program.data(axiom.prop), names.get(subject, subject), value  # type: ignore[attr-defined]
-        if kind is ObjectPropertyAssertion:
-            subject, target = axiom.subject, axiom.object  # type: ignore[attr-defined]
-            prop = self.program.object(axiom.prop)  # type: ignore[attr-defined]
-            return prop, names.get(subject, subject), names.get(target, target)
-        if isinstance(axiom, ClassAssertion):
-            individual = names.get(axiom.individual, axiom.individual)
-            if axiom.cls == THING:
-                return None
-            if axiom.cls == NOTHING:
-                return self.program.nothing, individual
-            if isinstance(axiom.cls, str):
-                return self.program.cls(axiom.cls), individual
-            label = self.program.labels.get(axiom.cls)
-            return None if label is None else (label, individual)
-        if isinstance(axiom, NegativeObjectPropertyAssertion):
-            negative = self.program.negatives[self.program.object(axiom.prop)]
-            pair = names.get(axiom.subject, axiom.subject), names.get(axiom.object, axiom.object)
-            return (negative, *pair)
-        if isinstance(axiom, NegativeDataPropertyAssertion):
-            negative = self.program.negatives[self.program.data(axiom.prop)]
-            return negative, names.get(axiom.subject, axiom.subject), self.value(axiom.literal)
-        return None
-
-    def current(self, fact: Fact) -> Fact:
-        """The fact with every individual under its representative's name."""
-        names = self.equality.representative
-        if not names:
-            return fact
-        if len(fact) == 2:
-            return fact[0], names.get(fact[1], fact[1])
-        predicate, x, y = fact
-        return predicate, names.get(x, x), y if predicate.kind == 'data' else names.get(y, y)
-
-    def states(self, axiom: Axiom) -> bool:
-        """Whether an assertion is among those that were made."""
-        individuals = axiom.individuals if isinstance(axiom, SameIndividual) else None
-        name = next(iter(individuals)) if individuals else next(iter(individuals_of(axiom)))
-        return axiom in self.about(name)
-
-    @staticmethod
-    def needs_of(
+    def __init__(
+        self,
         axioms: Iterable[Axiom],
-    ) -> tuple[list[ClassExpression], list[tuple[str, str]]]:
-        """The complex classes and the negated properties (kind, IRI) that assertions use."""
-        expressions: dict[ClassExpression, None] = {}
-        negated: dict[tuple[str, str], None] = {}
-        for axiom in axioms:
-            if isinstance(axiom, ClassAssertion) and not isinstance(axiom.cls, str):
-                expressions[axiom.cls] = None
-            elif isinstance(axiom, NegativeObjectPropertyAssertion):
-                negated['object', axiom.prop] = None
-            elif isinstance(axiom, NegativeDataPropertyAssertion):
-                negated['data', axiom.prop] = None
-        return list(expressions), list(negated)
+        asserted: Iterable[ClassExpression] = (),
+        negated: Iterable[tuple[str, str]] = (),
+        abstract: bool = False,
+    ) -> None:
+        tbox = [axiom for axiom in axioms if not isinstance(axiom, (ax.Assertion, ax.Annotation))]
+        self.program = Program()
+        self._abstract = abstract
+        self._variables = _Y
+        self._described: set[ClassExpression] = set()
+        self._recognised: set[ClassExpression] = set()
+        self._complements: dict[str, Predicate] = {}
+        self._origin: Axiom | None = None
+        self._context = 'the ontology'
+        self._datatypes = {
+            axiom.datatype: axiom.range
+            for axiom in tbox
+            if isinstance(axiom, ax.DatatypeDefinition)
+        }
+        self.hierarchy = PropertyHierarchy(tbox)
+        for axiom in tbox:
+            self._origin = axiom
+            self._attempt(self._axiom, axiom)
+        self._origin = None
+        for expression in asserted:
+            self._context = f'assertions of {expression_text(expression)}'
+            self._attempt(self.label_asserted, expression)
+        for kind, iri in negated:
+            self._negate(kind, iri)
+        self._complement_labels()
+        if any(
+            isinstance(clause.head, PredicateAtom)
+            and clause.head.predicate is self.program.different
+            for clause in self.program.clauses
+        ):
+            self.contradict((self._differs(_X, _X),), _X)
 
-    def understands(self, axiom: Axiom) -> bool:
-        """Whether the program was made for a complex class or negated property that an assertion
-        uses.
+    def _attempt(self, add: Callable[..., object], *parts: Any) -> None:
+        """Adds what can be added of an axiom; the rest is reported."""
+        try:
+            add(*parts)
+        except UnsupportedError as reason:
+            subject = self._context if self._origin is None else axiom_text(self._origin)
+            text = f'{subject}: {reason}'
+            if text not in self.program.unsupported:
+                self.program.unsupported.append(text)
+
+    # --- clauses ---
+
+    def fresh(self) -> int:
+        self._variables += 1
+        return self._variables
+
+    def clause(self, body: Body, head: HeadAtom) -> None:
+        program = self.program
+        bound = {term for atom in body for term in atom.terms if isinstance(term, int)}
+        loose = [term for term in head.terms if isinstance(term, int) and term not in bound]
+        for term in dict.fromkeys(loose):
+            program.uses_thing = True
+            body = (*body, PredicateAtom(program.thing, (term,)))
+        program.clauses.append(Clause(tuple(dict.fromkeys(body)), head, self._origin))
+
+    def _label(self, expression: ClassExpression) -> Predicate:
+        if isinstance(expression, str):
+            if expression == THING:
+                self.program.uses_thing = True
+                return self.program.thing
+            return self.program.nothing if expression == NOTHING else self.program.cls(expression)
+        label = self.program.labels.get(expression)
+        if label is None:
+            label = Predicate('class', expression_text(expression), expression)
+            self.program.labels[expression] = label
+        return label
+
+    def _recognise(self, expression: ClassExpression) -> Predicate:
+        """A label that holds of everything known to belong to the expression."""
+        label = self._label(expression)
+        if not isinstance(expression, str) and expression not in self._recognised:
+            self._recognised.add(expression)
+            for body in self.bodies(expression, _X):
+                if body != (PredicateAtom(label, (_X,)),):
+                    self.clause(body, PredicateAtom(label, (_X,)))
+        return label
+
+    def _filler(self, expression: ClassExpression) -> Predicate | None:
+        expression = normal(expression)
+        return None if expression == THING else self._recognise(expression)
+
+    def _direction(self, prop: ex.PropertyExpression) -> tuple[Predicate, bool]:
+        if isinstance(prop, str):
+            return self.program.object(prop), False
+        return self.program.object(prop.prop), True
+
+    def test(self, data_range: ex.DataRange) -> Test | None:
+        """The test of a range, None where it admits every value."""
+        data_range = self._defined(data_range, ())
+        if data_range == TOP_LITERAL:
+            return None
+        test = range_test(data_range)
+        if test is None:
+            raise UnsupportedError(f'the data range {expression_text(data_range)} is not supported')
+        if not self._abstract:
+            return test
+
+        def abstract_test(value: Value) -> bool:
+            if isinstance(value, tuple) and value[0] == 'some':
+                return includes(data_range, value[1])
+            return test(value)
+
+        return abstract_test
+
+    def _defined(self, data_range: ex.DataRange, seen: tuple[str, ...]) -> ex.DataRange:
+        if isinstance(data_range, str):
+            definition = self._datatypes.get(data_range)
+            if definition is None:
+                return data_range
+            if data_range in seen:
+                raise UnsupportedError(
+                    f'the datatype {local_name(data_range)} is defined by itself'
+                )
+            return self._defined(definition, (*seen, data_range))
+        if isinstance(data_range, (ex.DataIntersectionOf, ex.DataUnionOf)):
+            kind = type(data_range)
+            return kind(tuple(self._defined(operand, seen) for operand in data_range.operands))
+        if isinstance(data_range, ex.DataComplementOf):
+            return ex.DataComplementOf(self._defined(data_range.operand, seen))
+        return data_range
+
+    # --- antecedents ---
+
+    def bodies(self, expression: ClassExpression, x: Term) -> list[Body]:
+        """Bodies each of which makes `x` a member."""
+        expression = normal(expression)
+        if isinstance(expression, str):
+            if expression == THING:
+                return [()]
+            if expression == NOTHING:
+                return [(PredicateAtom(self.program.nothing, (x,)),)]
+            return [(PredicateAtom(self.program.cls(expression), (x,)),)]
+        if isinstance(expression, ex.ObjectIntersectionOf):
+            parts = [self.bodies(operand, x) for operand in expression.operands]
+            return [tuple(atom for part in parts for atom in part) for parts in product(*parts)]
+        if isinstance(expression, ex.ObjectUnionOf):
+            return [body for operand in expression.operands for body in self.bodies(operand, x)]
+        if isinstance(expression, ex.ObjectOneOf):
+            return [(SameAtom((x, Constant(name))),) for name in expression.individuals]
+        if isinstance(expression, ex.ObjectHasValue):
+            return [(self.property(expression.prop, x, Constant(expression.individual)),)]
+        if isinstance(expression, ex.ObjectHasSelf):
+            return [(self.property(expression.prop, x, x),)]
+        if isinstance(expression, ex.DataHasValue):
+            value = Constant(value_of(expression.literal), True)
+            return [(PredicateAtom(self.program.data(expression.prop), (x, value)),)]
+        if isinstance(expression, ex.ObjectSomeValuesFrom):
+            return self._related(expression.prop, expression.filler, x)
+        if isinstance(expression, ex.DataSomeValuesFrom):
+            return [self._valued(expression.prop, expression.range, x)]
+        return self._labelled_bodies(expression, x)
+
+    def property(self, prop: ex.PropertyExpression, x: Term, y: Term) -> PredicateAtom:
+        return property_atom(self.program, prop, x, y)
+
+    def _related(self, prop: ex.PropertyExpression, filler: ClassExpression, x: Term) -> list[Body]:
+        y = self.fresh()
+        return [(self.property(prop, x, y), *body) for body in self.bodies(filler, y)]
+
+    def _valued(self, prop: str, data_range: ex.DataRange, x: Term) -> Body:
+        v = self.fresh()
+        atom = PredicateAtom(self.program.data(prop), (x, v))
+        test = self.test(data_range)
+        return (atom,) if test is None else (atom, RangeAtom(test, (v,)))
+
+    def _labelled_bodies(self, expression: ClassExpression, x: Term) -> list[Body]:
+        """Bodies for an expression that needs a label beside them."""
+        functional = self.hierarchy.is_functional
+        if isinstance(expression, ex.ObjectMinCardinality):
+            if expression.n == 0:
+                return [()]
+            if expression.n == 1:
+                return self._related(expression.prop, expression.filler, x)
+        elif isinstance(expression, ex.DataMinCardinality):
+            if expression.n == 0:
+                return [()]
+            if expression.n == 1:
+                return [self._valued(expression.prop, expression.range, x)]
+        elif isinstance(expression, (ex.ObjectMaxCardinality, ex.DataMaxCardinality)) and (
+            expression.n >= 1 and functional(expression.prop)
+        ):
+            return [()]
+        label = self._label(expression)
+        bodies: list[Body] = [(PredicateAtom(label, (x,)),)]
+        if isinstance(expression, (ex.ObjectMinCardinality, ex.DataMinCardinality)):
+            self._count(label, expression)
+        elif isinstance(expression, ex.ObjectExactCardinality):
+            parts = (expression.n, expression.prop, expression.filler)
+            if expression.n >= 1 and functional(expression.prop):
+                return bodies + self.bodies(ex.ObjectMinCardinality(*parts), x)
+        elif isinstance(expression, ex.DataExactCardinality):
+            values = (expression.n, expression.prop, expression.range)
+            if expression.n >= 1 and functional(expression.prop):
+                return bodies + self.bodies(ex.DataMinCardinality(*values), x)
+        elif isinstance(expression, ex.ObjectAllValuesFrom):
+            if normal(expression.filler) == THING:
+                return [()]
+            if functional(expression.prop):
+                return bodies + self._related(expression.prop, expression.filler, x)
+        elif isinstance(expression, ex.DataAllValuesFrom):
+            if functional(expression.prop):
+                return [*bodies, self._valued(expression.prop, expression.range, x)]
+        elif isinstance(expression, ex.ObjectComplementOf) and isinstance(expression.operand, str):
+            self._complements[expression.operand] = label
+        return bodies
+
+    def _count(
+        self, label: Predicate, expression: ex.ObjectMinCardinality | ex.DataMinCardinality
+    ) -> None:
+        """Has a label recognised by counting."""
+        if expression in self._recognised:
+            return
+        self._recognised.add(expression)
+        filler: Predicate | Test | None
+        if isinstance(expression, ex.ObjectMinCardinality):
+            prop, inverse = self._direction(expression.prop)
+            filler = self._filler(expression.filler)
+        else:
+            prop, inverse = self.program.data(expression.prop), False
+            filler = self.test(expression.range)
+        condition = AtLeast(label, expression.n, prop, inverse, filler, self._origin)
+        self.program.at_least.append(condition)
+
+    # --- consequents ---
+
+    def imply(self, body: Body, expression: ClassExpression, x: Term) -> None:
+        """Adds the clauses by which the body makes `x` a member."""
+        expression = normal(expression)
+        if isinstance(expression, str):
+            if expression == NOTHING:
+                self.contradict(body, x)
+            elif expression != THING:
+                self.clause(body, PredicateAtom(self.program.cls(expression), (x,)))
+        elif isinstance(expression, ex.ObjectIntersectionOf):
+            for operand in expression.operands:
+                self._attempt(self.imply, body, operand, x)
+        elif isinstance(expression, ex.ObjectUnionOf):
+            self._imply_union(body, expression, x)
+        elif isinstance(expression, ex.ObjectOneOf):
+            if len(expression.individuals) != 1:
+                raise UnsupportedError(
+                    'which of several individuals it is would need reasoning by cases'
+                )
+            self.clause(body, SameAtom((x, Constant(expression.individuals[0]))))
+        elif isinstance(expression, ex.ObjectHasValue):
+            self.clause(body, self.property(expression.prop, x, Constant(expression.individual)))
+        elif isinstance(expression, ex.ObjectHasSelf):
+            self.clause(body, self.property(expression.prop, x, x))
+        elif isinstance(expression, ex.DataHasValue):
+            value = Constant(value_of(expression.literal), True)
+            self.clause(body, PredicateAtom(self.program.data(expression.prop), (x, value)))
+        else:
+            label = self._label(expression)
+            if body != (PredicateAtom(label, (x,)),):
+                self.clause(body, PredicateAtom(label, (x,)))
+            if expression not in self._described:
+                self._described.add(expression)
+                self._describe(label, expression)
+
+    def contradict(self, body: Body, x: Term) -> None:
+        self.clause(body, PredicateAtom(self.program.nothing, (x,)))
+
+    def _imply_union(self, body: Body, expression: ex.ObjectUnionOf, x: Term) -> None:
+        positive: list[ClassExpression] = []
+        for operand in expression.operands:
+            opposite = negated(operand)
+            if is_positive(opposite) and not is_positive(operand):
+                alternatives = self.bodies(opposite, x)
+                if len(alternatives) != 1:
+                    raise UnsupportedError('a union on the right side needs reasoning by cases')
+                body = (*body, *alternatives[0])
+            else:
+                positive.append(operand)
+        if len(positive) > 1:
+            raise UnsupportedError('a union on the right side needs reasoning by cases')
+        self.imply(body, positive[0] if positive else NOTHING, x)
+
+    def _describe(self, label: Predicate, expression: ClassExpression) -> None:
+        """What membership in a labelled expression implies."""
+        x, body = _X, (PredicateAtom(label, (_X,)),)
+        program = self.program
+        if isinstance(expression, (ex.ObjectSomeValuesFrom, ex.ObjectMinCardinality)):
+            n = expression.n if isinstance(expression, ex.ObjectMinCardinality) else 1
+            filler = normal(expression.filler)
+            if n == 1 and isinstance(filler, ex.ObjectOneOf) and len(filler.individuals) == 1:
+                self.clause(
+                    body, self.property(expression.prop, x, Constant(filler.individuals[0]))
+                )
+            elif n > 0:
+                prop, inverse = self._direction(expression.prop)
+                program.existentials.append(Existential(label, n, prop, inverse, filler))
+                if n == 1 and self.hierarchy.is_functional(expression.prop):
+                    y = self.fresh()
+                    self.imply((*body, self.property(expression.prop, x, y)), filler, y)
+        elif isinstance(expression, (ex.DataSomeValuesFrom, ex.DataMinCardinality)):
+            n = expression.n if isinstance(expression, ex.DataMinCardinality) else 1
+            data = program.data(expression.prop)
+            if n > 0:
+                self.test(expression.range)
+                value_range = self._defined(expression.range, ())
+                program.existentials.append(Existential(label, n, data, False, value_range))
+            if n > 0 and self.hierarchy.is_functional(expression.prop):
+                self.only(body, expression.prop, expression.range)
+        elif isinstance(expression, ex.ObjectAllValuesFrom):
+            y = self.fresh()
+            self.imply((*body, self.property(expression.prop, x, y)), expression.filler, y)
+        elif isinstance(expression, ex.DataAllValuesFrom):
+            self.only(body, expression.prop, expression.range)
+        elif isinstance(expression, ex.ObjectMaxCardinality):
+            prop, inverse = self._direction(expression.prop)
+            if expression.n == 0:
+                for related in self._related(expression.prop, expression.filler, x):
+                    self.contradict((*body, *related), x)
+            else:
+                filler_label = self._filler(expression.filler)
+                program.at_most.append(
+                    AtMost(label, expression.n, prop, inverse, filler_label, self._origin)
+                )
+        elif isinstance(expression, ex.DataMaxCardinality):
+            data = program.data(expression.prop)
+            if expression.n == 0:
+                self.contradict((*body, *self._valued(expression.prop, expression.range, x)), x)
+            else:
+                test = self.test(expression.range)
+                program.at_most.append(AtMost(label, expression.n, data, False, test, self._origin))
+        elif isinstance(expression, ex.ObjectExactCardinality):
+            parts = (expression.n, expression.prop, expression.filler)
+            self.imply(body, ex.ObjectMinCardinality(*parts), x)
+            self.imply(body, ex.ObjectMaxCardinality(*parts), x)
+        elif isinstance(expression, ex.DataExactCardinality):
+            values = (expression.n, expression.prop, expression.range)
+            self.imply(body, ex.DataMinCardinality(*values), x)
+            self.imply(body, ex.DataMaxCardinality(*values), x)
+        elif isinstance(expression, ex.ObjectComplementOf):
+            if isinstance(expression.operand, str):
+                self._disjoint(label, program.cls(expression.operand))
+            else:
+                for other in self.bodies(expression.operand, x):
+                    self.contradict((*body, *other), x)
+
+    def only(self, body: Body, prop: str, data_range: ex.DataRange) -> None:
+        test = self.test(data_range)
+        if test is not None:
+            v = self.fresh()
+            atom = PredicateAtom(self.program.data(prop), (_X, v))
+            self.contradict((*body, atom, RangeAtom(_Outside(test), (v,))), _X)
+
+    def _disjoint(self, first: Predicate, second: Predicate) -> None:
+        if first is second:
+            self.contradict((PredicateAtom(first, (_X,)),), _X)
+        else:
+            first.disjoint.add(second)
+            second.disjoint.add(first)
+
+    def _differs(self, x: Term, y: Term) -> PredicateAtom:
+        return PredicateAtom(self.program.different, (x, y))
+
+    def _negate(self, kind: str, iri: str) -> None:
+        """A predicate for negative assertions, which contradict the positive."""
+        program = self.program
+        prop = program.object(iri) if kind == 'object' else program.data(iri)
+        negative = program.negatives[prop] = Predicate(kind, f'not {local_name(iri)}')
+        body = (PredicateAtom(prop, (_X, _Y)), PredicateAtom(negative, (_X, _Y)))
+        self.contradict(body, _X)
+
+    def label_asserted(self, expression: ClassExpression) -> Predicate:
+        """The label of an expression that individuals are asserted to belong to, with what it
+        implies.
         """
-        if isinstance(axiom, ClassAssertion):
-            return isinstance(axiom.cls, str) or axiom.cls in self.program.labels
-        if isinstance(axiom, NegativeObjectPropertyAssertion):
-            return self.program.object(axiom.prop) in self.program.negatives
-        if isinstance(axiom, NegativeDataPropertyAssertion):
-            return self.program.data(axiom.prop) in self.program.negatives
-        return True
+        label = self._label(expression)
+        self.imply((PredicateAtom(label, (_X,)),), expression, _X)
+        return label
 
-    def take_spelling(self, other: Translation) -> None:
-        """Writes derived values as another engine did."""
-        self._values.update(other._values)
-        self.spelling.update(other.spelling)
+    def _complement_labels(self) -> None:
+        """What is disjoint from a class belongs to its complement, where the complement is asked
+        for.
+        """
+        for iri, label in self._complements.items():
+            for other in self.program.cls(iri).disjoint:
+                if other is not label:
+                    head = PredicateAtom(label, (_X,))
+                    self.program.clauses.append(Clause((PredicateAtom(other, (_X,)),), head))
 
+    # --- axioms ---
 
-def individuals_of(axiom: Axiom) -> set[str]:
-    """The individuals that an axiom mentions."""
-    return {name for kind, name in entities_of(axiom) if kind == 'individual'}
+    def _axiom(self, axiom: Axiom) -> None:
+        if isinstance(axiom, ax.SubClassOf):
+            self._sub_class(axiom.sub, axiom.sup)
+        elif isinstance(axiom, ax.EquivalentClasses):
+            for sub in axiom.classes:
+                for sup in axiom.classes:
+                    if sub is not sup:
+                        self._attempt(self._sub_class, sub, sup)
+        elif isinstance(axiom, ax.DisjointClasses):
+            self._all_disjoint(axiom.classes)
+        elif isinstance(axiom, ax.DisjointUnion):
+            self._all_disjoint(axiom.classes)
+            for part in axiom.classes:
+                self._attempt(self._sub_class, part, axiom.cls)
+            self._attempt(self._sub_class, axiom.cls, ex.ObjectUnionOf(axiom.classes))
+        elif isinstance(axiom, ax.Rule):
+            self._rule(axiom)
+        elif isinstance(axiom, ax.Import):
+            raise UnsupportedError('imports are not followed')
+        elif isinstance(axiom, ax.HasKey):
+            self._key(axiom)
+        elif not isinstance(axiom, (ax.Declaration, ax.DatatypeDefinition)):
+            self._property_axiom(axiom)
 
+    def _sub_class(self, sub: ClassExpression, sup: ClassExpression) -> None:
+        sub, sup = normal(sub), normal(sup)
+        if isinstance(sub, ex.ObjectUnionOf):
+            for operand in sub.operands:
+                self._attempt(self._sub_class, operand, sup)
+            return
+        opposite = sup.operand if isinstance(sup, ex.ObjectComplementOf) else None
+        if isinstance(sub, str) and isinstance(opposite, str):
+            self._disjoint(self._label(sub), self._label(opposite))
+        for body in self.bodies(sub, _X):
+            self.imply(body, sup, _X)
 
-def is_about_individuals(axiom: Axiom) -> bool:
-    """Whether an axiom is an assertion; the declaration of an individual is one."""
-    return isinstance(axiom, Assertion) or (
-        isinstance(axiom, Declaration) and axiom.kind == 'individual'
-    )
+    def _all_disjoint(self, classes: tuple[ClassExpression, ...]) -> None:
+        labels = [self._recognise(normal(expression)) for expression in classes]
+        for position, first in enumerate(labels):
+            for second in labels[position + 1 :]:
+                self._disjoint(first, second)
+
+    def _key(self, axiom: ax.HasKey) -> None:
+        props = [self._direction(prop) for prop in axiom.object_props]
+        props += [(self.program.data(prop), False) for prop in axiom.data_props]
+        if props:
+            cls = self._filler(axiom.cls)
+            self.program.keys.append(Key(cls, tuple(props), axiom))
+
+    # --- property axioms ---
+
+    def _property_axiom(self, axiom: Axiom) -> None:
+        """Adds the clauses of one property axiom to the self's program."""
+        program, clause, prop = self.program, self.clause, self.property
+        if isinstance(axiom, ax.SubObjectPropertyOf):
+            clause((prop(axiom.sub, _X, _Y),), prop(axiom.sup, _X, _Y))
+        elif isinstance(axiom, ax.SubPropertyChainOf):
+            body = tuple(prop(part, place, place + 1) for place, part in enumerate(axiom.chain))
+            clause(body, prop(axiom.sup, 0, len(axiom.chain)))
+        elif isinstance(axiom, ax.EquivalentObjectProperties):
+            for sub in axiom.props:
+                for sup in axiom.props:
+                    if sub != sup:
+                        clause((prop(sub, _X, _Y),), prop(sup, _X, _Y))
+        elif isinstance(axiom, ax.InverseObjectProperties):
+            clause((prop(axiom.first, _X, _Y),), prop(axiom.second, _Y, _X))
+            clause((prop(axiom.second, _X, _Y),), prop(axiom.first, _Y, _X))
+        elif isinstance(axiom, ax.SymmetricObjectProperty):
+            clause((prop(axiom.prop, _X, _Y),), prop(axiom.prop, _Y, _X))
+        elif isinstance(axiom, ax.TransitiveObjectProperty):
+            clause((prop(axiom.prop, _X, _Y), prop(axiom.prop, _Y, _Z)), prop(axiom.prop, _X, _Z))
+        elif isinstance(axiom, ax.ReflexiveObjectProperty):
+            clause((), prop(axiom.prop, _X, _X))
+        elif isinstance(axiom, ax.IrreflexiveObjectProperty):
+            name = axiom.prop if isinstance(axiom.prop, str) else axiom.prop.prop
+            program.irreflexive.append(program.object(name))
+            self.contradict((prop(axiom.prop, _X, _X),), _X)
+        elif isinstance(axiom, ax.AsymmetricObjectProperty):
+            name = axiom.prop if isinstance(axiom.prop, str) else axiom.prop.prop
+            program.asymmetric.append(program.object(name))
+            self.contradict((prop(axiom.prop, _X, _Y), prop(axiom.prop, _Y, _X)), _X)
+        elif isinstance(axiom, ax.DisjointObjectProperties):
+            for place, first in enumerate(axiom.props):
+                for second in axiom.props[place + 1 :]:
+                    one, two = prop(first, _X, _Y), prop(second, _X, _Y)
+                    pair = (one.predicate, one.terms[0] == _Y, two.predicate, two.terms[0] == _Y)
+                    program.disjoint_properties.append(pair)
+                    self.contradict((one, two), _X)
+        elif isinstance(axiom, (ax.FunctionalObjectProperty, ax.InverseFunctionalObjectProperty)):
+            atom = prop(axiom.prop, _X, _Y)
+            inverse = (atom.terms[0] == _Y) != isinstance(axiom, ax.InverseFunctionalObjectProperty)
+            program.at_most.append(AtMost(None, 1, atom.predicate, inverse, None, axiom))
+        elif isinstance(axiom, ax.ObjectPropertyDomain):
+            self.imply((prop(axiom.prop, _X, _Y),), axiom.domain, _X)
+        elif isinstance(axiom, ax.ObjectPropertyRange):
+            self.imply((prop(axiom.prop, _X, _Y),), axiom.range, _Y)
+        elif isinstance(axiom, ax.SubDataPropertyOf):
+            self._imply_data(axiom.sub, axiom.sup)
+        elif isinstance(axiom, ax.EquivalentDataProperties):
+            for data_sub in axiom.props:
+                for data_sup in axiom.props:
+                    if data_sub != data_sup:
+                        self._imply_data(data_sub, data_sup)
+        elif isinstance(axiom, ax.DisjointDataProperties):
+            for place, name in enumerate(axiom.props):
+                for other in axiom.props[place + 1 :]:
+                    one = PredicateAtom(program.data(name), (_X, _Y))
+                    two = PredicateAtom(program.data(other), (_X, _Y))
+                    program.disjoint_properties.append((one.predicate, False, two.predicate, False))
+                    self.contradict((one, two), _X)
+        elif isinstance(axiom, ax.FunctionalDataProperty):
+            program.at_most.append(AtMost(None, 1, program.data(axiom.prop), False, None, axiom))
+        elif isinstance(axiom, ax.DataPropertyDomain):
+            body = (PredicateAtom(program.data(axiom.prop), (_X, _Y)),)
+            self.imply(body, axiom.domain, _X)
+        elif isinstance(axiom, ax.DataPropertyRange):
+            self.only((), axiom.prop, axiom.range)
+
+    def _imply_data(self, sub: str, sup: str) -> None:
+        program = self.program
+        body = (PredicateAtom(program.data(sub), (_X, _Y)),)
+        self.clause(body, PredicateAtom(program.data(sup), (_X, _Y)))
+
+    # --- rules ---
+
+    def _rule(self, rule: ax.Rule) -> None:
+        """Adds the clauses of one rule to the self's program."""
+        program, terms = self.program, _Terms(self)
+        alternatives: list[list[tuple[BodyAtom, ...]]] = []
+        for atom in rule.body:
+            if isinstance(atom, ex.ClassAtom):
+                alternatives.append(self.bodies(atom.cls, terms.individual(atom.argument)))
+            elif isinstance(atom, ex.DataRangeAtom):
+                term, test = terms.value(atom.argument), self.test(atom.range)
+                if test is not None:
+                    alternatives.append([(RangeAtom(test, (term,)),)])
+            elif isinstance(atom, ex.ObjectPropertyAtom):
+                pair = terms.individual(atom.first), terms.individual(atom.second)
+                alternatives.append([(self.property(atom.prop, *pair),)])
+            elif isinstance(atom, ex.DataPropertyAtom):
+                data = program.data(atom.prop)
+                both = (terms.individual(atom.first), terms.value(atom.second))
+                alternatives.append([(PredicateAtom(data, both),)])
+            elif isinstance(atom, ex.SameIndividualAtom):
+                pair = terms.individual(atom.first), terms.individual(atom.second)
+                alternatives.append([(SameAtom(pair),)])
+            elif isinstance(atom, ex.DifferentIndividualsAtom):
+                pair = terms.individual(atom.first), terms.individual(atom.second)
+                alternatives.append([(DifferentAtom(pair),)])
+            else:
+                alternatives.append([(_computed(atom, terms),)])
+        for parts in product(*alternatives):
+            body = tuple(atom for part in parts for atom in part)
+            self._heads(rule, self._bound(body, terms), terms)
+
+    def _bound(self, body: tuple[BodyAtom, ...], terms: _Terms) -> tuple[BodyAtom, ...]:
+        """The body with owl:Thing for individuals that nothing else binds.
+
+        Raises:
+            UnsupportedError: A value is bound by nothing.
+        """
+        program = self.program
+        bound: set[Term] = set()
+        for atom in body:
+            if isinstance(atom, PredicateAtom):
+                bound.update(atom.terms)
+        free = [
+            term
+            for atom in body
+            for term in atom.terms
+            if isinstance(term, int) and term in terms.individuals and term not in bound
+        ]
+        for term in dict.fromkeys(free):
+            program.uses_thing = True
+            body = (*body, PredicateAtom(program.thing, (term,)))
+            bound.add(term)
+        waiting = [atom for atom in body if isinstance(atom, (ComputedAtom, RangeAtom))]
+        progress = True
+        while waiting and progress:
+            progress = False
+            for atom in tuple(waiting):
+                unbound = [
+                    term for term in atom.terms if isinstance(term, int) and term not in bound
+                ]
+                first_only = unbound == [atom.terms[0]] and isinstance(atom, ComputedAtom)
+                if not unbound or (first_only and atom.solve is not None):  # type: ignore[union-attr]
+                    bound.update(atom.terms)
+                    waiting.remove(atom)
+                    progress = True
+        if waiting:
+            name = waiting[0].builtin if isinstance(waiting[0], ComputedAtom) else 'a data range'
+            raise UnsupportedError(f'an argument of {name} is bound by no other atom')
+        return body
+
+    def _heads(self, rule: ax.Rule, body: tuple[BodyAtom, ...], terms: _Terms) -> None:
+        program = self.program
+        bound = {term for atom in body for term in atom.terms if isinstance(term, int)}
+
+        def known(term: Term) -> Term:
+            if isinstance(term, int) and term not in bound:
+                raise UnsupportedError('a variable of the head does not stand in the body')
+            return term
+
+        if not rule.head:
+            subject = next((term for term in sorted(bound) if term in terms.individuals), None)
+            term: Term = Constant(NOTHING) if subject is None else subject
+            self.contradict(body, term)
+        for atom in rule.head:
+            if isinstance(atom, ex.ClassAtom):
+                self.imply(body, atom.cls, known(terms.individual(atom.argument)))
+            elif isinstance(atom, ex.ObjectPropertyAtom):
+                pair = known(terms.individual(atom.first)), known(terms.individual(atom.second))
+                self.clause(body, self.property(atom.prop, *pair))
+            elif isinstance(atom, ex.DataPropertyAtom):
+                both = (known(terms.individual(atom.first)), known(terms.value(atom.second)))
+                self.clause(body, PredicateAtom(program.data(atom.prop), both))
+            elif isinstance(atom, (ex.SameIndividualAtom, ex.DifferentIndividualsAtom)):
+                pair = known(terms.individual(atom.first)), known(terms.individual(atom.second))
+                if isinstance(atom, ex.SameIndividualAtom):
+                    self.clause(body, SameAtom(pair))
+                else:
+                    self.clause(body, PredicateAtom(program.different, pair))
+            else:
+                raise UnsupportedError('a built-in or data range in the head has no meaning here')

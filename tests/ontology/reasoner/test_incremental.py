@@ -10,8 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from surveillance_ontology.knowledge_base import KnowledgeBase
-from surveillance_ontology.knowledge_changes import Changes
+from surveillance_ontology.knowledge_base import Changes, KnowledgeBase
 from surveillance_ontology.owl.axioms import (
     Assertion,
     Axiom,

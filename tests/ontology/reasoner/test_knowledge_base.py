@@ -4,8 +4,7 @@ changes.
 
 from __future__ import annotations
 
-from surveillance_ontology.knowledge_base import KnowledgeBase
-from surveillance_ontology.knowledge_changes import Changes
+from surveillance_ontology.knowledge_base import Changes, KnowledgeBase
 from surveillance_ontology.owl.axioms import (
     AnnotationAssertion,
     ClassAssertion,

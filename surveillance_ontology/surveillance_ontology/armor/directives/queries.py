@@ -24,7 +24,7 @@ from surveillance_ontology.armor.protocol import DirectiveError, DirectiveRespon
 from surveillance_ontology.armor.reference import Reference
 from surveillance_ontology.armor.rendering import parse_entity, parse_rendered, render_entity
 from surveillance_ontology.armor.rendering import render_literal as _literal
-from surveillance_ontology.knowledge import Fact
+from surveillance_ontology.knowledge_base import Fact
 from surveillance_ontology.owl.axioms import (
     Axiom,
     ClassAssertion,

@@ -5,9 +5,9 @@ A rule such as
     now(?r, ?t), urgencyThreshold(?r, ?h), visitedAt(?l, ?v), subtract(?d, ?t, ?v), greaterThan(?d,
     ?h) -> URGENT(?l)
 
-falls into two halves that share no variable, linked by one linear comparison: here v < t - h. The
-half with the head's variables is kept sorted by its side of the comparison, its *key* (v); of the
-other half only the greatest side, its *reach* (t - h), matters. Heads of keys below the reach hold.
+is split into two parts that share no variable, linked by one linear comparison: here v < t - h. The
+part with the head's variables is kept sorted by its side of the comparison, its *key* (v); of the
+other part only the greatest side, its *reach* (t - h), matters. Heads of keys below the reach hold.
 When the reach moves, the keys between its old and its new place are all that is looked at.
 """
 
@@ -15,11 +15,14 @@ from __future__ import annotations
 
 from bisect import bisect_left, insort
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
 from surveillance_ontology.reasoner.clauses import (
+    BodyAtom,
     Clause,
+    ComputedAtom,
     Constant,
     Fact,
     PredicateAtom,
@@ -27,7 +30,129 @@ from surveillance_ontology.reasoner.clauses import (
     Term,
 )
 from surveillance_ontology.reasoner.joins import JoinContext, compile_call, compile_support
-from surveillance_ontology.reasoner.rule_halves import Halves, Linear
+
+_COMPARISONS = {
+    'greaterThan': (1, True),
+    'greaterThanOrEqual': (1, False),
+    'lessThan': (-1, True),
+    'lessThanOrEqual': (-1, False),
+}
+Linear = dict[Term | None, Fraction]
+
+
+@dataclass(frozen=True)
+class ComparisonSplit:
+    """A clause taken apart: its head holds where key < reach (or <=, when not `strict`)."""
+
+    keyed: tuple[BodyAtom, ...]
+    reaching: tuple[BodyAtom, ...]
+    key: Linear
+    reach: Linear
+    strict: bool
+    computed: tuple[ComputedAtom, ...]
+
+
+def _linear(term: Term, forms: dict[Term, Linear]) -> Linear:
+    if isinstance(term, Constant):
+        value = term.value
+        if isinstance(value, (int, Fraction)):
+            return {None: Fraction(value)}
+        raise ValueError
+    return forms.get(term, {term: Fraction(1)})
+
+
+def _sum(parts: list[tuple[int, Linear]]) -> Linear:
+    total: Linear = {}
+    for sign, part in parts:
+        for term, factor in part.items():
+            total[term] = total.get(term, Fraction(0)) + sign * factor
+    return {term: factor for term, factor in total.items() if factor}
+
+
+def split_rule(clause: Clause) -> ComparisonSplit | None:
+    """Takes a clause apart; None where it is not of this kind."""
+    head = clause.head
+    computed = tuple(atom for atom in clause.body if isinstance(atom, ComputedAtom))
+    facts = tuple(atom for atom in clause.body if not isinstance(atom, ComputedAtom))
+    comparisons = [atom for atom in computed if atom.builtin in _COMPARISONS]
+    if len(comparisons) != 1 or not isinstance(head, PredicateAtom):
+        return None
+    bound = {
+        term
+        for atom in facts
+        if isinstance(atom, PredicateAtom)
+        for term in atom.terms
+        if isinstance(term, int)
+    }
+    forms: dict[Term, Linear] = {}
+    try:
+        pending = [atom for atom in computed if atom is not comparisons[0]]
+        for _ in range(len(pending) + 1):
+            for atom in tuple(pending):
+                if all(isinstance(t, Constant) or t in bound or t in forms for t in atom.terms[1:]):
+                    form = _form(atom, forms)
+                    if form is None or atom.terms[0] in bound or atom.terms[0] in forms:
+                        return None
+                    forms[atom.terms[0]] = form
+                    pending.remove(atom)
+        if pending:
+            return None
+        comparison = comparisons[0]
+        sign, strict = _COMPARISONS[comparison.builtin]
+        left, right = (_linear(term, forms) for term in comparison.terms)
+    except ValueError:
+        return None
+    difference = _sum([(sign, left), (-sign, right)])  # holds where this is > 0 (or >= 0)
+    components = _components(facts)
+    linked = [
+        part
+        for part in components
+        if any(term in difference for atom in part for term in atom.terms)
+    ]
+    outputs = {term for term in head.terms if isinstance(term, int)}
+    keyed_parts = [
+        part for part in components if outputs & {term for atom in part for term in atom.terms}
+    ]
+    if len(components) != 2 or len(linked) != 2 or len(keyed_parts) != 1:
+        return None
+    keyed = keyed_parts[0]
+    reaching = next(part for part in components if part is not keyed)
+    own = {term for atom in keyed for term in atom.terms if isinstance(term, int)}
+    values = {
+        atom.terms[1]
+        for atom in keyed
+        if isinstance(atom, PredicateAtom) and atom.predicate.kind == 'data'
+    }
+    if not outputs or not outputs <= own or outputs & values - set(difference):
+        return None
+    key: Linear = {term: -factor for term, factor in difference.items() if term in own}
+    reach: Linear = {term: factor for term, factor in difference.items() if term not in own}
+    return ComparisonSplit(tuple(keyed), tuple(reaching), key, reach, strict, computed)
+
+
+def _form(atom: ComputedAtom, forms: dict[Term, Linear]) -> Linear | None:
+    rest = [_linear(term, forms) for term in atom.terms[1:]]
+    if atom.builtin == 'add':
+        return _sum([(1, part) for part in rest])
+    if atom.builtin == 'subtract':
+        return _sum([(1, rest[0]), (-1, rest[1])])
+    if atom.builtin in ('unaryMinus', 'unaryPlus'):
+        return _sum([(-1 if atom.builtin == 'unaryMinus' else 1, rest[0])])
+    return None
+
+
+def _components(atoms: tuple[BodyAtom, ...]) -> list[list[BodyAtom]]:
+    parts: list[tuple[set[Term], list[BodyAtom]]] = []
+    for atom in atoms:
+        terms: set[Term] = {term for term in atom.terms if isinstance(term, int)}
+        members = [atom]
+        for part in [part for part in parts if part[0] & terms]:
+            parts.remove(part)
+            terms |= part[0]
+            members = part[1] + members
+        parts.append((terms, members))
+    return [members for _, members in parts]
+
 
 Row = tuple[Any, ...]
 
@@ -51,22 +176,22 @@ class ThresholdIndex:
     def __init__(
         self,
         clause: Clause,
-        halves: Halves,
+        split: ComparisonSplit,
         context: JoinContext,
-        push: Callable[[Fact], None],
-        doom: Callable[[Fact], None],
+        enqueue: Callable[[Fact], None],
+        overdelete: Callable[[Fact], None],
     ) -> None:
         head = clause.head
         assert isinstance(head, PredicateAtom)
-        self.clause, self._halves = clause, halves
+        self.clause, self._split = clause, split
         self._predicate, self._terms = head.predicate, head.terms
-        self._push, self._doom = push, doom
-        self._strict = halves.strict
+        self._enqueue, self._overdelete = enqueue, overdelete
+        self._strict = split.strict
         outputs = [term for term in head.terms if isinstance(term, int)]
-        self._key_terms = tuple(dict.fromkeys([*outputs, *_variables(halves.key)]))
-        self._reach_terms = _variables(halves.reach)
-        self._key_of = _evaluator(halves.key, self._key_terms)
-        self._reach_of = _evaluator(halves.reach, self._reach_terms)
+        self._key_terms = tuple(dict.fromkeys([*outputs, *_variables(split.key)]))
+        self._reach_terms = _variables(split.reach)
+        self._key_of = _evaluator(split.key, self._key_terms)
+        self._reach_of = _evaluator(split.reach, self._reach_terms)
         self._keys: list[tuple[Any, Row]] = []
         self._keyed: dict[Row, Any] = {}
         self._reaches: list[tuple[Any, Row]] = []
@@ -76,23 +201,23 @@ class ThresholdIndex:
         self._unsorted: list[tuple[Any, Row]] = []
         self._lost: set[tuple[bool, Row]] = set()
         self._emitted: Any = None
-        for atom in halves.keyed:
+        for atom in split.keyed:
             if isinstance(atom, PredicateAtom):
-                predicate, body = atom.predicate, halves.keyed
+                predicate, body = atom.predicate, split.keyed
                 arguments = (context, body, atom, atom.terms, self._key_terms)
                 predicate.on_insert.append(compile_call(*arguments, self._gain_key))
                 predicate.on_delete.append(compile_call(*arguments, self._lose_key))
-        for atom in halves.reaching:
+        for atom in split.reaching:
             if isinstance(atom, PredicateAtom):
-                predicate, body = atom.predicate, halves.reaching
+                predicate, body = atom.predicate, split.reaching
                 arguments = (context, body, atom, atom.terms, self._reach_terms)
                 gain = compile_call(*arguments, self._gain_reach)
                 predicate.on_insert.append(gain)
                 predicate.early.append(gain)
                 predicate.on_delete.append(compile_call(*arguments, self._lose_reach))
-        self._key_support = compile_support(context, halves.keyed, head.terms, self._key_terms)
-        self._key_exists = compile_support(context, halves.keyed, self._key_terms)
-        self._reach_exists = compile_support(context, halves.reaching, self._reach_terms)
+        self._key_support = compile_support(context, split.keyed, head.terms, self._key_terms)
+        self._key_exists = compile_support(context, split.keyed, self._key_terms)
+        self._reach_exists = compile_support(context, split.reaching, self._reach_terms)
         self.proves: Callable[[Fact], bool] = lambda fact: True
         head.predicate.supports.append((self.supports, clause.origin))
 
@@ -182,7 +307,7 @@ class ThresholdIndex:
     def _emit(self, row: Row) -> None:
         fact = self._head(row)
         if not self._predicate.holds(fact):
-            self._push(fact)
+            self._enqueue(fact)
 
     # --- rows go ---
 
@@ -197,7 +322,7 @@ class ThresholdIndex:
             place = bisect_left(self._keys, (key, row))
             del self._keys[place]
         self._lost.add((True, row))
-        self._doom_head(row)
+        self._overdelete_head(row)
 
     def _lose_reach(self, *row: Any) -> None:
         reach = self._reaching.pop(row, None)
@@ -206,12 +331,12 @@ class ThresholdIndex:
                 self._odd_reaches.discard(row)
                 self._lost.add((False, row))
                 for keyed in (*self._keyed, *self._odd_keys):
-                    self._doom_head(keyed)
+                    self._overdelete_head(keyed)
             return
         del self._reaches[bisect_left(self._reaches, (reach, row))]
         self._lost.add((False, row))
         for keyed in self._odd_keys:
-            self._doom_head(keyed)
+            self._overdelete_head(keyed)
         if self._emitted is None:
             return
         left = self._proven_reach()
@@ -221,7 +346,7 @@ class ThresholdIndex:
             rows = self._keys[start : self._place(self._emitted)]
             self._emitted = left
             for _, keyed in rows:
-                self._doom_head(keyed)
+                self._overdelete_head(keyed)
 
     def _proven_reach(self) -> Any:
         """The greatest remaining reach whose facts have a proof, and so stay whatever goes."""
@@ -231,10 +356,10 @@ class ThresholdIndex:
                     return reach
         return None
 
-    def _doom_head(self, row: Row) -> None:
+    def _overdelete_head(self, row: Row) -> None:
         fact = self._head(row)
         if self._predicate.holds(fact):
-            self._doom(fact)
+            self._overdelete(fact)
 
     def settle(self) -> None:
         """After facts went: rows that still have an instance come back."""
@@ -267,7 +392,7 @@ class ThresholdIndex:
         """The comparison as the built-ins define it, for values that are not exact numbers."""
         values: dict[Term, Any] = dict(zip(self._key_terms, key_row, strict=True))
         values.update(zip(self._reach_terms, reach_row, strict=True))
-        pending = list(self._halves.computed)
+        pending = list(self._split.computed)
 
         def value(term: Term) -> Any:
             return term.value if isinstance(term, Constant) else values[term]

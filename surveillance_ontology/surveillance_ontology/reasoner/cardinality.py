@@ -101,10 +101,12 @@ class _Counter:
 class AtLeastCounter(_Counter):
     """Keeps the members of one `min n` expression."""
 
-    def __init__(self, condition: AtLeast, difference: Difference, push: Emit, doom: Emit) -> None:
+    def __init__(
+        self, condition: AtLeast, difference: Difference, enqueue: Emit, overdelete: Emit
+    ) -> None:
         super().__init__(condition, difference)
         self.head = condition.head
-        self._push, self._doom = push, doom
+        self._enqueue, self._overdelete = enqueue, overdelete
         self.prop.on_insert.append(self._subjects(self.gain))
         self.prop.on_delete.append(self._subjects(self.lose))
         if self.filler is not None:
@@ -122,12 +124,12 @@ class AtLeastCounter(_Counter):
         if len(values) >= self.n and (
             self.is_data or clique(values, self.n, self.difference.different) is not None
         ):
-            self._push((self.head, z))
+            self._enqueue((self.head, z))
 
     def lose(self, z: str) -> None:
         """Something that counted is about to go."""
         if z in self.head.members:
-            self._doom((self.head, z))
+            self._overdelete((self.head, z))
 
     def supports(self, z: str) -> Iterator[Premises]:
         """Facts by which `z` has enough."""
@@ -143,14 +145,14 @@ class AtMostCounter(_Counter):
         condition: AtMost,
         difference: Difference,
         nothing: Predicate,
-        push: Emit,
-        doom: Emit,
+        enqueue: Emit,
+        overdelete: Emit,
         merge: MergeRequest,
     ) -> None:
         super().__init__(condition, difference)
         self.label = condition.label
         self._nothing = nothing
-        self._push, self._doom, self._merge = push, doom, merge
+        self._enqueue, self._overdelete, self._merge = enqueue, overdelete, merge
         self.recheck: set[str] = set()
         self.prop.on_insert.append(self._subjects(self.gain))
         self.prop.on_delete.append(self._subjects(self.lose))
@@ -177,7 +179,7 @@ class AtMostCounter(_Counter):
         different = self.difference.different
         if self.is_data or clique(related, self.n + 1, different) is not None:
             if z not in self._nothing.members:
-                self._push((self._nothing, z))
+                self._enqueue((self._nothing, z))
             return
         for one, other in self._forced(related):
             self._merge(one, other, self.origin, self._label_fact(z) + self.facts(z, related))
@@ -202,7 +204,7 @@ class AtMostCounter(_Counter):
     def lose(self, z: str) -> None:
         """Something that counted is about to go."""
         if z in self._nothing.members:
-            self._doom((self._nothing, z))
+            self._overdelete((self._nothing, z))
             self.recheck.add(z)
 
     def _label_fact(self, z: str) -> Premises:

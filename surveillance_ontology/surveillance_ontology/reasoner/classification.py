@@ -29,8 +29,8 @@ from surveillance_ontology.reasoner.clauses import (
 )
 from surveillance_ontology.reasoner.datatypes import Value
 from surveillance_ontology.reasoner.engine import Engine
-from surveillance_ontology.reasoner.normalisation import Normaliser
-from surveillance_ontology.reasoner.simplification import simplify
+from surveillance_ontology.reasoner.simplify import simplify
+from surveillance_ontology.reasoner.translation import Translation
 
 _ROOT = '_:prototype'
 _MADE_UP = '_:made'
@@ -75,7 +75,7 @@ class Schema:
     ) -> None:
         tbox = [axiom for axiom in axioms if not isinstance(axiom, ax.Assertion)]
         asserted, negated = tuple(asserted), tuple(negated)
-        self.program = Normaliser(tbox, asserted, negated).program
+        self.program = Translation(tbox, asserted, negated).program
         self._above: dict[str, frozenset[str]] = {}
         self._impossible: set[str] = set()
         self._classes = [
@@ -84,7 +84,7 @@ class Schema:
             if isinstance(axiom, ax.Declaration) and axiom.kind == 'class'
         ]
         without_rules = [axiom for axiom in tbox if not isinstance(axiom, ax.Rule)]
-        prototypes = _Prototypes(Normaliser(without_rules, asserted, abstract=True))
+        prototypes = _Prototypes(Translation(without_rules, asserted, abstract=True))
         self._hierarchy(prototypes)
         self._exclusions(prototypes)
         labels = [self.program.labels[expression] for expression in asserted]
@@ -213,9 +213,9 @@ class Schema:
 class _Prototypes:
     """Tries out what members of classes must be."""
 
-    def __init__(self, normaliser: Normaliser) -> None:
-        self.program: Program = normaliser.program
-        self._hierarchy = normaliser.hierarchy
+    def __init__(self, translation: Translation) -> None:
+        self.program: Program = translation.program
+        self._hierarchy = translation.hierarchy
         fillers = [
             existential.filler
             for existential in self.program.existentials
@@ -224,7 +224,7 @@ class _Prototypes:
         labels: dict[object, Predicate] = {}
         for filler in fillers:
             if not isinstance(filler, str) and filler not in labels:
-                labels[filler] = normaliser.label_asserted(filler)  # type: ignore[arg-type]
+                labels[filler] = translation.label_asserted(filler)  # type: ignore[arg-type]
         self._labels = labels
         self._engine = Engine(self.program, lambda _: ())
 
