@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from geometry_msgs.msg import Point, PoseWithCovarianceStamped, Quaternion, Twist
+from geometry_msgs.msg import Point, PoseStamped, PoseWithCovarianceStamped, Quaternion, Twist
 from geometry_msgs.msg import Pose as PoseMessage
 from nav_msgs.msg import OccupancyGrid
+from nav_msgs.msg import Path as PathMessage
 from sensor_msgs.msg import BatteryState, LaserScan
 
 from surveillance_controllers.battery.model import Battery
@@ -36,6 +37,17 @@ def point_from(coordinates: Sequence[float] | Points) -> Point:
 def points_from_array(array: Points) -> list[Point]:
     """The rows of an array of shape (n, 2) or (n, 3) as points."""
     return [point_from(row) for row in array]
+
+
+def path_from_array(array: Points, stamp: Any) -> PathMessage:
+    """Return the rows of an array of shape (n, 2) or (n, 3), metres, as a path in the map frame."""
+    message = PathMessage()
+    message.header.frame_id, message.header.stamp = 'map', stamp
+    for row in array:
+        pose = PoseStamped(header=message.header)
+        pose.pose.position = point_from(row)
+        message.poses.append(pose)
+    return message
 
 
 def battery_state(battery: Battery, *, charging: bool) -> BatteryState:

@@ -1,7 +1,8 @@
 """The node `planner_controller`: computes paths.
 
 Actions: `compute_path` between two points, and `motion/planner` from where the robot is to a place,
-as equally spaced via points. Where a path comes from is the execution mode's matter: the operator
+as equally spaced via points. What was planned last is on the
+topic `plan`, latched, for viewers. Where a path comes from is the execution mode's matter: the operator
 (MANUAL), chance (RANDOM), or the map with its walls, doors and obstacles (SIMULATED).
 """
 
@@ -11,6 +12,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, TextIO
 
 import numpy as np
+from nav_msgs.msg import Path
 
 from surveillance_controllers import conversions
 from surveillance_controllers.controller_parameters import execution_mode, planner_settings
@@ -25,6 +27,7 @@ from surveillance_interfaces.action import ComputePath, Plan
 from surveillance_runtime.goals import GoalAborted, GoalRun, GoalServer
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
+from surveillance_runtime.qos import STATE_QOS
 
 if TYPE_CHECKING:
     from surveillance_controllers.planning.simulated_planning import SimulatedPlanning
@@ -52,6 +55,7 @@ class PlannerController(PatrolNode):
 
             timeout = self._settings.peer_timeout
             self._simulated = SimulatedPlanning(self, self._knowledge, timeout)
+        self._shown = self.create_publisher(Path, 'plan', STATE_QOS)
         GoalServer(self, ComputePath, 'compute_path', self._compute_path)
         GoalServer(self, Plan, 'motion/planner', self._plan)
         self.get_logger().info(f'{self._mode} mode')
@@ -71,6 +75,7 @@ class PlannerController(PatrolNode):
     def _compute_path(self, goal: Any, run: GoalRun) -> ComputePath.Result:
         start, end = conversions.array_from_points([goal.start, goal.goal])
         path = self._path(start, end, run, 'compute a path')
+        self._show(path)
         return ComputePath.Result(path=conversions.points_from_array(path))
 
     def _plan(self, goal: Any, run: GoalRun) -> Plan.Result:
@@ -89,6 +94,7 @@ class PlannerController(PatrolNode):
             path = np.array([start, target])
         else:
             path = self._path(start, target, run, f'plan the way to {goal.target}')
+        self._show(path)
         spacing = self._settings.spacing(polyline.length(path))
         via_points = conversions.points_from_array(polyline.equally_spaced(path, spacing))
         for count in range(1, len(via_points) + 1):
@@ -96,6 +102,10 @@ class PlannerController(PatrolNode):
             if not run.sleep(self._settings.via_point_delay):
                 break
         return Plan.Result(via_points=via_points)
+
+    def _show(self, path: Points) -> None:
+        stamp = self.get_clock().now().to_msg()
+        self._shown.publish(conversions.path_from_array(path, stamp))
 
     def _start(self, target: str, run: GoalRun) -> Points:
         if self._simulated is not None:

@@ -1,21 +1,52 @@
-"""From messages to what the views show; the only place of this package that knows both."""
+"""From messages to the values of a snapshot; the only place of this package that knows both.
+
+A message from the network may hold anything. What cannot be used raises `ValueError` with one line.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Pose as PoseMessage
 from nav_msgs.msg import OccupancyGrid
+from nav_msgs.msg import Path as PathMessage
+from numpy.typing import NDArray
+from sensor_msgs.msg import LaserScan, PointCloud2
 
-from surveillance_interfaces.msg import DoorStates, MissionStatus
-from surveillance_operator.map_raster import Grid, Pose
-from surveillance_operator.snapshot import Status
+from surveillance_behaviour.policy.situation import Decision
+from surveillance_interfaces.msg import Decision as DecisionMessage
+from surveillance_interfaces.msg import (
+    DoorStates,
+    FsmStructure,
+    FsmTransition,
+    MarkerDetectionArray,
+    MissionStatus,
+)
+from surveillance_operator.snapshot import (
+    Container,
+    Detection,
+    Grid,
+    Health,
+    Pose,
+    Status,
+    Transition,
+)
+from surveillance_runtime.point_clouds import points_from_cloud
 from surveillance_runtime.stamps import seconds_of
+
+MOST_CELLS = 16_000_000
+MOST_POINTS = 20_000
+MOST_NAMES = 10_000
+MOST_BEAMS = 180
+"""Of a scan with more beams every n-th is shown."""
 
 
 def status_from(message: MissionStatus) -> Status:
-    """What the machine does, as it was published."""
+    """Return what the machine does, as it was published."""
     return Status(
         since=seconds_of(message.stamp),
         machine=message.machine,
@@ -24,35 +55,199 @@ def status_from(message: MissionStatus) -> Status:
         heading_to=message.heading_to,
         waiting_for_help=message.waiting_for_help,
         text=message.text,
-        avoided=tuple(message.avoided),
+        avoided=_names(message.avoided, 'avoided'),
+    )
+
+
+def decision_from(message: DecisionMessage) -> Decision:
+    """Return a decision with the score of each candidate.
+
+    Raises:
+        ValueError: The scores are not as many as the candidates, or one is not a number.
+    """
+    names = _names(message.candidates, 'candidates')
+    if len(names) != len(message.scores):
+        raise ValueError(f'{len(message.scores)} scores came for {len(names)} candidates')
+    scores = {name: float(score) for name, score in zip(names, message.scores, strict=True)}
+    if wrong := [name for name, score in scores.items() if math.isnan(score)]:
+        raise ValueError(f'the score of {wrong[0]} is not a number')
+    return Decision(
+        time=seconds_of(message.stamp),
+        from_place=message.from_place,
+        place=message.place,
+        target=message.target,
+        rule=message.rule,
+        policy=message.policy,
+        reason=message.reason,
+        scores=scores,
     )
 
 
 def doors_from(message: DoorStates) -> dict[str, bool]:
-    """Whether each door is open, by name."""
-    states = {**dict.fromkeys(message.open, True), **dict.fromkeys(message.closed, False)}
-    return dict(sorted(states.items()))
+    """Return whether each door is open, by name."""
+    opened, closed = _names(message.open, 'open doors'), _names(message.closed, 'closed doors')
+    return dict(sorted({**dict.fromkeys(opened, True), **dict.fromkeys(closed, False)}.items()))
 
 
 def pose_from(message: PoseMessage) -> Pose:
-    """x, y in metres and yaw in radians of a pose."""
-    q = message.orientation
+    """Return x, y in metres and yaw in radians of a pose.
+
+    Raises:
+        ValueError: A coordinate is not finite.
+    """
+    q, at = message.orientation, message.position
     yaw = math.atan2(2 * (q.w * q.z + q.x * q.y), 1 - 2 * (q.y * q.y + q.z * q.z))
-    return message.position.x, message.position.y, yaw
+    if not all(map(math.isfinite, (at.x, at.y, yaw))):
+        raise ValueError(f'a pose at ({at.x:g}, {at.y:g}), yaw {yaw:g}: expected finite numbers')
+    return at.x, at.y, yaw
+
+
+def point_from(message: Any) -> tuple[float, float]:
+    """Return x and y of a point in metres.
+
+    Raises:
+        ValueError: A coordinate is not finite.
+    """
+    if not (math.isfinite(message.x) and math.isfinite(message.y)):
+        raise ValueError(f'a point at ({message.x:g}, {message.y:g}): expected finite numbers')
+    return message.x, message.y
+
+
+def percent_from(value: float) -> float:
+    """Return a battery level.
+
+    Raises:
+        ValueError: It is not from 0 to 100.
+    """
+    if not 0.0 <= value <= 100.0:
+        raise ValueError(f'a level of {value:g} %: expected 0 to 100')
+    return float(value)
 
 
 def grid_from(message: OccupancyGrid) -> Grid:
-    """A map.
+    """Return a map.
 
     Raises:
-        ValueError: It has no cells, not as many as it says, or is turned.
+        ValueError: It has no cells, not as many as it says, too many, or is turned.
     """
     info = message.info
-    cells = np.array(message.data, dtype=np.int8)
-    if not cells.size or cells.size != info.width * info.height or info.resolution <= 0:
+    count = len(message.data)
+    if not count or count != info.width * info.height or not 0 < info.resolution < math.inf:
         size = f'{info.width} x {info.height} of {info.resolution:g} m'
-        raise ValueError(f'{cells.size} cells came where it says {size}')
+        raise ValueError(f'{count} cells came where it says {size}')
+    if count > MOST_CELLS:
+        raise ValueError(f'a map of {count} cells: expected at most {MOST_CELLS}')
     x, y, yaw = pose_from(info.origin)
     if abs(yaw) > 1e-6:
         raise ValueError(f'it is turned by {yaw:.3f} rad, which is not drawn')
+    cells = np.array(message.data, dtype=np.int8)
     return Grid(cells.reshape(info.height, info.width), float(info.resolution), (x, y))
+
+
+def cloud_from(message: PointCloud2) -> NDArray[np.float64]:
+    """Return the points of a cloud that are finite, shape (n, 2), metres.
+
+    Raises:
+        ValueError: It has no x and y, or its sizes contradict each other.
+    """
+    count = message.width * message.height
+    if count > MOST_POINTS:
+        raise ValueError(f'a cloud of {count} points: expected at most {MOST_POINTS}')
+    if count * message.point_step > len(message.data):
+        raise ValueError(f'{len(message.data)} bytes came for {count} points')
+    points = points_from_cloud(message)
+    return points[np.isfinite(points).all(axis=1)]
+
+
+def path_from(message: PathMessage) -> NDArray[np.float64]:
+    """Return the points of a path, shape (n, 2), metres.
+
+    Raises:
+        ValueError: Too many points, or one is not finite.
+    """
+    if len(message.poses) > MOST_POINTS:
+        raise ValueError(f'a path of {len(message.poses)} points: expected at most {MOST_POINTS}')
+    points = [point_from(each.pose.position) for each in message.poses]
+    return np.array(points, dtype=float).reshape(-1, 2)
+
+
+def scan_from(message: LaserScan, pose: Pose) -> NDArray[np.float64]:
+    """Return where a lidar's beams end, seen from a pose, shape (n, 2), metres, map frame.
+
+    Beams that hit nothing are left out; the lidar is taken to sit in the robot's middle.
+
+    Raises:
+        ValueError: Its angles are not finite.
+    """
+    count = len(message.ranges)
+    if not (math.isfinite(message.angle_min) and math.isfinite(message.angle_increment)):
+        raise ValueError('a scan whose angles are not finite')
+    step = max(1, -(-min(count, MOST_POINTS) // MOST_BEAMS))
+    ranges = np.asarray(message.ranges[:MOST_POINTS:step], dtype=float)
+    angles = pose[2] + message.angle_min + message.angle_increment * step * np.arange(len(ranges))
+    with np.errstate(invalid='ignore'):
+        good = np.isfinite(ranges) & (ranges >= message.range_min) & (ranges < message.range_max)
+    ranges, angles = ranges[good], angles[good]
+    return np.stack([pose[0] + ranges * np.cos(angles), pose[1] + ranges * np.sin(angles)], axis=1)
+
+
+def containers_from(message: FsmStructure) -> tuple[Container, ...]:
+    """Return the containers of a state machine, outermost first."""
+    if len(message.containers) > MOST_NAMES:
+        raise ValueError(f'a state machine of {len(message.containers)} containers')
+    return tuple(
+        Container(
+            each.path,
+            each.kind,
+            _names(each.states, 'states'),
+            _names(each.initial_states, 'initial states'),
+            _names(each.outcomes, 'outcomes'),
+            tuple((edge.from_state, edge.outcome, edge.to_state) for edge in each.edges),
+        )
+        for each in message.containers
+    )
+
+
+def transition_from(message: FsmTransition) -> Transition:
+    """Return a transition of the state machine."""
+    duration = float(message.duration)
+    return Transition(
+        message.sequence,
+        seconds_of(message.stamp),
+        message.path,
+        message.from_state,
+        message.outcome,
+        message.to_state,
+        message.kind,
+        duration if math.isfinite(duration) else 0.0,
+    )
+
+
+def detections_from(message: MarkerDetectionArray) -> tuple[Detection, ...]:
+    """Return the markers of one image."""
+    return tuple(
+        Detection(each.id, each.known, each.confirmed, float(each.confidence))
+        for each in message.detections[:MOST_NAMES]
+    )
+
+
+def health_from(message: DiagnosticArray) -> dict[str, Health]:
+    """Return what each part reports, by name."""
+    time = seconds_of(message.header.stamp)
+    return {
+        each.name: Health(
+            each.level[0] if isinstance(each.level, bytes) else int(each.level),
+            each.message,
+            each.hardware_id,
+            tuple((value.key, value.value) for value in each.values[:50]),
+            time,
+        )
+        for each in message.status[:MOST_NAMES]
+    }
+
+
+def _names(names: Iterable[str], what: str) -> tuple[str, ...]:
+    found = tuple(names)
+    if len(found) > MOST_NAMES:
+        raise ValueError(f'{len(found)} {what}: expected at most {MOST_NAMES}')
+    return found

@@ -1,20 +1,60 @@
-"""What a watcher knows of a mission at one moment, and in words what changed between two."""
+"""What is known of a mission at one moment, and in words what changed between two moments.
+
+Every view shows a `Snapshot`: the terminal, the page, the recording's time line. It is immutable;
+`follow` gives the next one its events and its history.
+"""
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from surveillance_behaviour.policy.situation import Decision
-from surveillance_operator.map_raster import Grid, Pose
 
 NO_POINTS: NDArray[np.float64] = np.empty((0, 2))
 BATTERY_STEP = 10
 """Percent between two lines about the battery."""
+KEPT_EVENTS = 50
+HISTORY_SECONDS = 3600.0
+MOST_HISTORY = 5000
+"""How far back histories go, seconds of the mission's time, and their most entries."""
+
+Box = tuple[float, float, float, float]
+"""Left, bottom, right, top, metres."""
+Pose = tuple[float, float, float]
+"""x, y in metres and yaw in radians."""
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """A map.
+
+    Attributes:
+        cells: Occupancy in percent, -1 where it is not known; shape (rows, columns), south first.
+        resolution: Side of a cell, metres.
+        origin: Lower left corner, x and y in metres, map frame.
+    """
+
+    cells: NDArray[np.int8]
+    resolution: float
+    origin: tuple[float, float] = (0.0, 0.0)
+
+    @cached_property
+    def known(self) -> Box:
+        """What encloses all that is known, map frame; the whole map if nothing is."""
+        rows, columns = (np.flatnonzero((self.cells >= 0).any(axis=axis)) for axis in (1, 0))
+        if not rows.size:
+            rows, columns = (np.arange(size) for size in self.cells.shape)
+        x, y = self.origin
+        left, right = (x + self.resolution * float(edge) for edge in (columns[0], columns[-1] + 1))
+        bottom, top = (y + self.resolution * float(edge) for edge in (rows[0], rows[-1] + 1))
+        return left, bottom, right, top
 
 
 @dataclass(frozen=True)
@@ -41,13 +81,90 @@ class Status:
 
 
 @dataclass(frozen=True)
+class Container:
+    """One container of the state machine: its states, and the transitions between them.
+
+    Attributes:
+        path: E.g. `surveillance/PERFORM_ROOM_TASKS`.
+        kind: StateMachine, Concurrence, ...
+        states, initial, outcomes: Labels.
+        edges: From state, outcome, to state.
+    """
+
+    path: str
+    kind: str
+    states: tuple[str, ...]
+    initial: tuple[str, ...]
+    outcomes: tuple[str, ...]
+    edges: tuple[tuple[str, str, str], ...]
+
+
+@dataclass(frozen=True)
+class Transition:
+    """One transition of the state machine; see FsmTransition.msg."""
+
+    sequence: int
+    time: float
+    path: str
+    from_state: str
+    outcome: str
+    to_state: str
+    kind: str
+    duration: float
+
+
+@dataclass(frozen=True)
+class Detection:
+    """A marker in the camera's image."""
+
+    id: int
+    known: bool
+    confirmed: bool
+    confidence: float
+
+
+@dataclass(frozen=True)
+class Health:
+    """What one node reports on `/diagnostics`.
+
+    Attributes:
+        level: 0 is good, 1 a warning, 2 an error, 3 stale.
+        message: In words.
+        hardware: The hardware id.
+        values: Further figures by name.
+        time: When it came, seconds of the mission's time.
+    """
+
+    level: int
+    message: str
+    hardware: str
+    values: tuple[tuple[str, str], ...]
+    time: float
+
+
+@dataclass(frozen=True)
+class History:
+    """What happened in the last hour of the mission's time; oldest first, times in seconds.
+
+    Attributes:
+        visits: Time and place.
+        battery: Time and level in percent, at each change of a percent.
+        marks: Time, kind (recharge, failure, recovery, help) and words.
+    """
+
+    visits: tuple[tuple[float, str], ...] = ()
+    battery: tuple[tuple[float, float], ...] = ()
+    marks: tuple[tuple[float, str, str], ...] = ()
+
+
+@dataclass(frozen=True)
 class Change:
     """Something new in words.
 
     Attributes:
         text: In short.
         detail: What a log says, too.
-        routine: Whether the picture itself shows it anyway.
+        routine: Whether the views show it anyway.
     """
 
     text: str
@@ -63,9 +180,11 @@ class Snapshot:
         where: Where the watcher listens, in words.
         now: The mission's time, seconds.
         mode: The controllers' execution mode.
+        threshold, policy: The behaviour's parameters.
         nodes: The nodes that tell or answer anything of this, and what tells the processes of one
             apart that was started again.
         ended: Those that did and are gone.
+        restarts: How often a node was seen to start again.
         status: The latest `mission_status`, kept when its node ends.
         decision, number: The latest decision, and its number.
         battery, battery_low: Percent, and whether that is low.
@@ -77,17 +196,32 @@ class Snapshot:
         visited_at: When each place was visited last, seconds of the mission's time.
         urgent: The places that the ontology has as URGENT.
         pose: Where the robot is.
+        localised: Whether somebody estimates that from sensors.
         trail: Where it drove, shape (n, 2), metres, oldest first.
+        plan: The planned path, shape (n, 2), metres.
+        scan: What the lidar sees, shape (n, 2), metres, map frame.
         obstacles: What stands about, shape (n, 2), metres.
+        containers: The state machine, outermost container first.
+        active: Paths of the states that are active, outermost first.
+        paused: Whether the machine enters no further state.
+        transitions: The latest transitions.
+        detections: The markers of the latest image.
+        scan_progress: View and number of views of the arm's scan.
+        requests: What each controller in MANUAL mode announced last.
+        health: What the nodes report, by name.
         silent: Why nothing comes on a topic, where that is known.
         events: The latest changes with the time of the day, routine ones left out.
+        history: What happened in the last hour.
     """
 
     where: str = ''
     now: float = 0.0
     mode: str = ''
+    threshold: float | None = None
+    policy: str = ''
     nodes: Mapping[str, frozenset[str]] = field(default_factory=dict)
     ended: frozenset[str] = frozenset()
+    restarts: Mapping[str, int] = field(default_factory=dict)
     status: Status | None = None
     decision: Decision | None = None
     number: int = 0
@@ -101,14 +235,52 @@ class Snapshot:
     visited_at: Mapping[str, float] = field(default_factory=dict)
     urgent: frozenset[str] = frozenset()
     pose: Pose | None = None
+    localised: bool = False
     trail: NDArray[np.float64] = field(default_factory=lambda: NO_POINTS)
+    plan: NDArray[np.float64] = field(default_factory=lambda: NO_POINTS)
+    scan: NDArray[np.float64] = field(default_factory=lambda: NO_POINTS)
     obstacles: NDArray[np.float64] | None = None
+    containers: tuple[Container, ...] = ()
+    active: tuple[str, ...] = ()
+    paused: bool = False
+    transitions: tuple[Transition, ...] = ()
+    detections: tuple[Detection, ...] = ()
+    scan_progress: tuple[int, int] | None = None
+    requests: Mapping[str, str] = field(default_factory=dict)
+    health: Mapping[str, Health] = field(default_factory=dict)
     silent: Mapping[str, str] = field(default_factory=dict)
     events: tuple[tuple[str, str], ...] = ()
+    history: History = History()
+
+
+def follow(old: Snapshot, new: Snapshot, time_of_day: str) -> tuple[Snapshot, list[Change]]:
+    """Return `new` with its events, restarts and history, and what changed since `old`."""
+    told = list(changes(old, new))
+    events = [(time_of_day, each.text) for each in told if not each.routine]
+    more: dict[str, object] = {}
+    if events:
+        more['events'] = (*new.events, *events)[-KEPT_EVENTS:]
+    if new.nodes is not old.nodes and (again := restarted(old, new)):
+        more['restarts'] = {**new.restarts, **{n: new.restarts.get(n, 0) + 1 for n in again}}
+    history = _history(old, new)
+    if history != new.history:
+        more['history'] = history
+    return (replace(new, **more) if more else new), told  # type: ignore[arg-type]
+
+
+def restarted(old: Snapshot, new: Snapshot) -> list[str]:
+    """Return the nodes that came back, or of which a new process is there."""
+    back = old.ended & new.nodes.keys()
+    renewed = {
+        node
+        for node in old.nodes.keys() & new.nodes.keys()
+        if old.nodes[node] and new.nodes[node] - old.nodes[node]
+    }
+    return sorted(back | renewed)
 
 
 def changes(old: Snapshot, new: Snapshot) -> Iterator[Change]:
-    """What is new in a snapshot, one line each, as a log would tell it."""
+    """Yield what is new in a snapshot, one line each, as a log would tell it."""
     if new.status is not None and new.status != old.status:
         yield from _status_changes(old.status, new.status)
     if new.decision is not None and (new.decision, new.number) != (old.decision, old.number):
@@ -136,22 +308,30 @@ def changes(old: Snapshot, new: Snapshot) -> Iterator[Change]:
             yield Change(f'something stands at ({x:.1f}, {y:.1f})')
         elif had and not has:
             yield Change('nothing stands about any more')
+    if old.paused != new.paused:
+        yield Change('the state machine is paused' if new.paused else 'the state machine goes on')
+    yield from _node_changes(old, new)
+
+
+def decision_line(snapshot: Snapshot) -> str:
+    """Return the decision without its reason."""
+    decision = snapshot.decision
+    assert decision is not None
+    return f'decision {snapshot.number}: {decision.from_place} → {decision.place} [{decision.rule}]'
+
+
+def _node_changes(old: Snapshot, new: Snapshot) -> Iterator[Change]:
+    if old.nodes is new.nodes and old.ended is new.ended:
+        return
     if old.nodes and not new.nodes:
         yield Change('every node has ended: waiting for the next mission')
     elif gone := sorted(new.ended - old.ended):
         yield Change(f'{", ".join(gone)} ended')
     if back := sorted(old.ended & new.nodes.keys()):
         yield Change(f'{", ".join(back)} came back')
-    for node in sorted(old.nodes.keys() & new.nodes.keys()):
-        if old.nodes[node] and new.nodes[node] - old.nodes[node]:
+    for node in restarted(old, new):
+        if node not in old.ended:
             yield Change(f'{node} was started again')
-
-
-def decision_line(snapshot: Snapshot) -> str:
-    """The decision without its reason."""
-    decision = snapshot.decision
-    assert decision is not None
-    return f'decision {snapshot.number}: {decision.from_place} → {decision.place} [{decision.rule}]'
 
 
 def _status_changes(old: Status | None, new: Status) -> Iterator[Change]:
@@ -161,3 +341,48 @@ def _status_changes(old: Status | None, new: Status) -> Iterator[Change]:
         yield Change(f'{new.machine} {state}: {new.whereabouts}', routine=True)
     if new.text and (old is None or new.text != old.text):
         yield Change(new.text)
+
+
+def _history(old: Snapshot, new: Snapshot) -> History:
+    history = new.history
+    if (
+        new.visited_at is old.visited_at
+        and new.battery == old.battery
+        and new.transitions is old.transitions
+    ):
+        return history
+    visits = [
+        (at, place)
+        for place, at in new.visited_at.items()
+        if at > old.visited_at.get(place, -math.inf)
+    ]
+    battery = []
+    if new.battery is not None and (
+        not history.battery or abs(history.battery[-1][1] - new.battery) >= 1.0
+    ):
+        battery.append((new.now, new.battery))
+    last = old.transitions[-1].sequence if old.transitions else 0
+    # The sequence of a machine that was started again begins anew.
+    if new.transitions and new.transitions[-1].sequence < last:
+        last = 0
+    marks = [mark for each in new.transitions if each.sequence > last for mark in _marks(each)]
+    since = new.now - HISTORY_SECONDS
+    return History(
+        tuple(each for each in (*history.visits, *sorted(visits)) if each[0] >= since)[
+            -MOST_HISTORY:
+        ],
+        tuple(each for each in (*history.battery, *battery) if each[0] >= since)[-MOST_HISTORY:],
+        tuple(each for each in (*history.marks, *marks) if each[0] >= since)[-MOST_HISTORY:],
+    )
+
+
+def _marks(transition: Transition) -> Iterator[tuple[float, str, str]]:
+    """Yield the marks of a transition on the strips of time."""
+    if re.search('RECHARG|CHARGING', transition.to_state):
+        yield transition.time, 'recharge', transition.to_state
+    elif 'HELP' in transition.to_state:
+        yield transition.time, 'help', f'{transition.from_state} {transition.outcome}'
+    elif transition.outcome == 'failed':
+        yield transition.time, 'failure', f'{transition.from_state} failed'
+    elif transition.from_state == 'RECOVER':
+        yield transition.time, 'recovery', transition.outcome

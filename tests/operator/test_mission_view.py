@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from rich.console import Console
 
 from surveillance_behaviour.policy.situation import Decision
-from surveillance_operator import map_raster
-from surveillance_operator.map_raster import Frame, Grid, rasterise
-from surveillance_operator.snapshot import Snapshot, Status, changes
+from surveillance_operator.snapshot import Grid, Snapshot, Status, changes
+from surveillance_operator.watch import raster
+from surveillance_operator.watch.raster import Frame, rasterise
 from surveillance_operator.watch.view import MissionView
 
 STATUS = Status(95.0, 'surveillance', 'MOVE_TO_NEXT_ROOM', 'A', 'B', False, 'arrived in A', ())
@@ -72,10 +72,10 @@ def test_every_wall_is_in_the_picture_where_its_points_are(height, width, column
     assert 1 <= frame.rows <= rows
     picture = rasterise(grid, frame)
     assert picture.shape == (2 * frame.rows, frame.columns)
-    assert (picture == map_raster.WALL).any()
+    assert (picture == raster.WALL).any()
     # Of the pixels that a cell is in, the last one is its own: look at its lower right corner.
     corner = -3.0 + 0.1 * (at[1] + 1) - 1e-5, 5.0 + 0.1 * at[0] + 1e-5
-    assert picture[tuple(frame.pixels([corner])[0])] == map_raster.WALL
+    assert picture[tuple(frame.pixels([corner])[0])] == raster.WALL
 
 
 def test_a_picture_keeps_the_aspect_and_leaves_out_what_is_not_known():
@@ -85,7 +85,7 @@ def test_a_picture_keeps_the_aspect_and_leaves_out_what_is_not_known():
     assert grid.known == (50.0, 25.0, 90.0, 35.0)
     frame = Frame.around(grid.known, 40, 40)
     assert (frame.columns, frame.rows, frame.scale) == (40, 5, 1.0)
-    assert (rasterise(grid, frame) == map_raster.FREE).all()
+    assert (rasterise(grid, frame) == raster.FREE).all()
 
 
 @pytest.mark.parametrize(('width', 'height'), [(100, 30), (80, 24), (40, 30), (40, 12), (7, 3)])
@@ -161,8 +161,27 @@ def test_the_end_of_a_node_and_of_the_mission_is_announced():
 def test_what_does_not_fit_is_said_to_be_left_out():
     many = {f'R{number}': float(number) for number in range(60)}
     assert '… and more places' in shown(replace(whole(), visited_at=many))
-    wordy = replace(DECISION, reason='a reason ' * 40)
+    wordy = replace(DECISION, reason='a reason ' * 200)
     assert '…' in shown(replace(whole(), decision=wordy))
+
+
+def test_a_whole_reason_is_read_at_80_columns():
+    reason = ' '.join(f'clause {number} of the reason' for number in range(20))
+    text = shown(replace(whole(), decision=replace(DECISION, reason=reason)), 80, 50)
+    assert '…' not in text
+    assert 'clause 19' in text
+
+
+@pytest.mark.parametrize(
+    ('page', 'words'),
+    [('decision', 'B  '), ('nodes', '● up    robot_behavior'), ('events', '12:00:00 arrived in A')],
+)
+def test_a_key_shows_a_page(page, words):
+    console = Console(width=80, height=24, color_system=None)
+    snapshot = replace(whole(), decision=replace(DECISION, scores={'B': 1.5, 'C': 0.5}))
+    with console.capture() as capture:
+        console.print(MissionView(snapshot, page=page), end='')
+    assert words in capture.get()
 
 
 def test_a_node_that_is_started_again_is_told_though_the_killed_one_still_seems_there():

@@ -15,7 +15,7 @@ from surveillance_interfaces.action import FollowPath
 from surveillance_interfaces.msg import Decision, DoorStates, MissionStatus
 from surveillance_ontology.armor_server_node import ArmorServer
 from surveillance_ontology.ontology_map_builder_node import OntologyMapBuilder
-from surveillance_operator import mission_view_node
+from surveillance_operator import mission_feed
 from surveillance_operator.mission_view_node import MissionViewNode
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.point_clouds import cloud_from_points
@@ -42,7 +42,7 @@ class Planner(PatrolNode):
 
 @pytest.fixture(autouse=True)
 def _look_often(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(mission_view_node, 'LOOK_PERIOD', 0.05)
+    monkeypatch.setattr(mission_feed, 'LOOK_PERIOD', 0.05)
     return
 
 

@@ -1,30 +1,54 @@
-"""A mission as a picture of the terminal's size: the map, and beside or below it what goes on.
+"""The view of a mission in a terminal: the map, and beside or below it what goes on.
 
-Each part that nothing came for says so in its place.
+Each part that nothing came for says so in its place. Keys choose what is shown, see `KEYS`. Every
+mark has a character or a word of its own, so that none needs colours.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import contextlib
+import os
+import select
+import sys
+import termios
+import time
+import tty
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from itertools import zip_longest
 from textwrap import wrap
 
 import numpy as np
 from rich.console import Console, ConsoleOptions, RenderResult
+from rich.live import Live
 from rich.segment import Segment
 from rich.style import Style
 from rich.text import Text
 
-from surveillance_operator import map_raster
-from surveillance_operator.map_raster import Box, Canvas, Frame, rasterise
-from surveillance_operator.snapshot import Snapshot, decision_line
+from surveillance_operator.snapshot import Box, Snapshot, decision_line
+from surveillance_operator.watch import raster
+from surveillance_operator.watch.raster import Canvas, Frame, rasterise
+from surveillance_runtime.interrupt import Interrupt
 
 SIDE_BY_SIDE = 76
 """From this many columns on the panel stands beside the map, else below."""
 LEAST_PANEL = 40
 """Columns of the panel beside the map; it gets what the map does not need, too."""
-MOST_DECISION, MOST_EVENTS = 6, 10
+MOST_EVENTS = 10
 """Lines."""
+PERIOD = 0.2
+"""Seconds between two pictures."""
+SETTLING = 2.0
+"""How long a single picture waits for what is latched, once a mission was seen, seconds."""
+PLAIN_SIZE = 100, 40
+"""Columns and rows of a single picture where there is no terminal."""
+KEYS = {
+    'm': 'map',
+    'd': 'decision',
+    'n': 'nodes',
+    'e': 'events',
+}
+"""Keys that choose a page; `p` holds the picture, `q` ends."""
 BAR = 20
 MARGIN = 1.5
 """Around the places, where there is no map, metres."""
@@ -58,18 +82,27 @@ class MissionView:
     Args:
         snapshot: What is known.
         whole: Fill the terminal, down to its last line.
+        page: What to show, one of the values of `KEYS`.
+        note: Stands at the end of the first line.
     """
 
-    def __init__(self, snapshot: Snapshot, *, whole: bool = True) -> None:
+    def __init__(
+        self, snapshot: Snapshot, *, whole: bool = True, page: str = 'map', note: str = ''
+    ) -> None:
         self._snapshot = snapshot
         self._whole = whole
+        self._page = page
+        self._note = note
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         """The picture: as many lines as the terminal has, each as wide as it is."""
         width, height = options.max_width, options.height or console.height
         colours = console.color_system is not None and not console.no_color
         body = height - 1
-        if width >= SIDE_BY_SIDE:
+        if self._page != 'map':
+            lines = _wrapped(console, PAGES[self._page](self._snapshot), width)
+            rows = _rendered(console, options, lines[:body], width)
+        elif width >= SIDE_BY_SIDE:
             picture = draw_map(self._snapshot, width - LEAST_PANEL - 1, body, colours=colours)
             used = max(Segment.get_line_length(line) for line in picture)
             panel = self._panel(console, options, width - used - 1, body)
@@ -81,6 +114,8 @@ class MissionView:
             picture = draw_map(self._snapshot, width, max(3, body // 2), colours=colours)
             rows = [*picture, *self._panel(console, options, width, max(0, body - len(picture)))]
         title = header_line(self._snapshot)
+        if self._note:
+            title.append(f'· {self._note} ')
         title.pad_right(max(0, width - len(title)))
         header = _rendered(console, options, [title], width)
         rows = [*header, *rows][:height]
@@ -96,12 +131,13 @@ class MissionView:
     ) -> list[list[Segment]]:
         snapshot = self._snapshot
         fixed = [*_wrapped(console, state_lines(snapshot), width), battery_line(snapshot, width)]
+        doors = _wrapped(console, [doors_line(snapshot)], width)
         decision = _wrapped(console, decision_lines(snapshot), width)
-        most = min(MOST_DECISION, max(2, height // 6))
+        # The whole reason, as long as the longest waiting places and the last event stay.
+        most = max(2, height - len(fixed) - len(doors) - 5)
         if len(decision) > most:
             decision[most - 1].append('…')
-        fixed += decision[:most]
-        fixed += _wrapped(console, [doors_line(snapshot)], width)
+        fixed += [*decision[:most], *doors]
         places = place_lines(snapshot, width)
         told = snapshot.events[-MOST_EVENTS:]
         texts = [Text.assemble((at, DIM), ' ', text) for at, text in told]
@@ -182,6 +218,46 @@ def doors_line(snapshot: Snapshot) -> Text:
     )
 
 
+def decision_page(snapshot: Snapshot) -> list[Text]:
+    """The decision in full, with the score of each candidate."""
+    lines = decision_lines(snapshot)
+    decision = snapshot.decision
+    if decision is None:
+        return lines
+    lines.append(Text(f'policy {decision.policy}, target {decision.target}'))
+    for place, score in sorted(decision.scores.items(), key=lambda each: -each[1]):
+        chosen = ' ← chosen' if place == decision.place else ''
+        lines.append(Text(f'  {place:<12} {score:>12.3f}{chosen}'))
+    return lines
+
+
+def node_page(snapshot: Snapshot) -> list[Text]:
+    """The nodes: up or ended, how often started again, what they report."""
+    lines = []
+    for name in sorted({*snapshot.nodes, *snapshot.ended}):
+        up = name in snapshot.nodes
+        again = snapshot.restarts.get(name, 0)
+        words = f', started again {again} times' if again else ''
+        lines.append(Text(f'{"● up   " if up else "✗ ended"} {name}{words}', '' if up else URGENT))
+    for name, health in sorted(snapshot.health.items()):
+        level = ('ok', 'WARN', 'ERROR', 'STALE')[min(health.level, 3)]
+        lines.append(Text(f'  {level:<5} {name}: {health.message}'))
+    return lines or [_dim('no nodes')]
+
+
+def event_page(snapshot: Snapshot) -> list[Text]:
+    """The latest events, newest first."""
+    told = [Text.assemble((at, DIM), ' ', text) for at, text in reversed(snapshot.events)]
+    return told or [_dim('no events yet')]
+
+
+PAGES: dict[str, Callable[[Snapshot], list[Text]]] = {
+    'decision': decision_page,
+    'nodes': node_page,
+    'events': event_page,
+}
+
+
 def place_lines(snapshot: Snapshot, width: int) -> list[Text]:
     """Places by the time since their last visit, in as many columns as fit."""
     known = snapshot.visited_at
@@ -226,18 +302,18 @@ def draw_map(snapshot: Snapshot, columns: int, rows: int, *, colours: bool) -> L
         for first, second in snapshot.links:
             if {first, second} <= snapshot.positions.keys():
                 ends = snapshot.positions[first], snapshot.positions[second]
-                canvas.line(*ends, map_raster.LINK)
-    canvas.dots(snapshot.trail[:-RECENT], map_raster.OLD_TRAIL)
-    canvas.dots(snapshot.trail[-RECENT:], map_raster.TRAIL)
+                canvas.line(*ends, raster.LINK)
+    canvas.dots(snapshot.trail[:-RECENT], raster.OLD_TRAIL)
+    canvas.dots(snapshot.trail[-RECENT:], raster.TRAIL)
     for door, is_open in (snapshot.doors or {}).items():
         if door in snapshot.door_lines:
             x1, y1, x2, y2 = snapshot.door_lines[door]
-            kind = map_raster.OPEN_DOOR if is_open else map_raster.CLOSED_DOOR
+            kind = raster.OPEN_DOOR if is_open else raster.CLOSED_DOOR
             # Two lines, so that it is as thick as its wall where that takes two pixels.
             for aside in (-HALF_WALL, HALF_WALL):
                 canvas.line((x1 + aside, y1 + aside), (x2 + aside, y2 + aside), kind)
     if snapshot.obstacles is not None:
-        canvas.dots(snapshot.obstacles, map_raster.OBSTACLE)
+        canvas.dots(snapshot.obstacles, raster.OBSTACLE)
     if snapshot.grid is None:
         for x, y in snapshot.positions.values():
             canvas.mark(x, y, '○', LABEL)
@@ -294,3 +370,100 @@ def _rendered(
         line.no_wrap = True
         rendered.append(console.render_lines(line, narrow)[0])
     return rendered
+
+
+See = Callable[[], Snapshot]
+
+
+@dataclass
+class _Chosen:
+    """What the keys chose."""
+
+    page: str = 'map'
+    held: Snapshot | None = None
+    ended: bool = False
+
+    def press(self, key: str, seen: Snapshot) -> None:
+        """Obey a key; one that means nothing changes nothing."""
+        if key == 'q':
+            self.ended = True
+        elif key == 'p':
+            self.held = seen if self.held is None else None
+        elif key in KEYS:
+            self.page = 'map' if self.page == KEYS[key] else KEYS[key]
+
+
+def show_moving(see: See, stopping: Interrupt, console: Console) -> None:
+    """Draw on the terminal's other screen until `q` or told to stop; give the first one back."""
+    chosen = _Chosen()
+    note = 'q quit · p hold · d decision · n nodes · e events'
+    with (
+        _keyboard() as read_keys,
+        Live(console=console, screen=True, auto_refresh=False) as live,
+    ):
+        while not stopping.is_set() and not chosen.ended:
+            seen = chosen.held or see()
+            shown = 'HELD: p goes on' if chosen.held else note
+            live.update(MissionView(seen, page=chosen.page, note=shown), refresh=True)
+            for key in read_keys(PERIOD, stopping):
+                chosen.press(key, seen)
+
+
+@contextlib.contextmanager
+def _keyboard() -> Iterator[Callable[[float, Interrupt], str]]:
+    """Read single keys from the terminal; without one, only wait."""
+    try:
+        keyboard = sys.stdin.fileno()
+        before = termios.tcgetattr(keyboard)
+    except (OSError, ValueError, AttributeError, termios.error):
+
+        def wait(seconds: float, stopping: Interrupt) -> str:
+            stopping.wait(seconds)
+            return ''
+
+        yield wait
+        return
+    wake, waker = os.pipe()
+
+    def rouse() -> None:
+        os.write(waker, b'x')
+
+    def read(seconds: float, stopping: Interrupt) -> str:
+        remove = stopping.subscribe(rouse)
+        try:
+            ready = select.select([keyboard, wake], [], [], seconds)[0]
+            return os.read(keyboard, 64).decode(errors='ignore') if keyboard in ready else ''
+        except OSError:
+            return ''
+        finally:
+            remove()
+
+    tty.setcbreak(keyboard)
+    try:
+        yield read
+    finally:
+        termios.tcsetattr(keyboard, termios.TCSADRAIN, before)
+        os.close(wake)
+        os.close(waker)
+
+
+def show_once(see: See, stopping: Interrupt, console: Console, timeout: float) -> bool:
+    """Draw one picture once there is a mission; return whether there was one within the time."""
+    deadline = time.monotonic() + timeout
+    while see().status is None:
+        if time.monotonic() > deadline or stopping.wait(PERIOD / 4):
+            return False
+    settled = time.monotonic() + SETTLING
+    while not _is_complete(see()) and time.monotonic() < settled and not stopping.wait(PERIOD / 4):
+        pass
+    if not console.is_terminal:
+        console.size = PLAIN_SIZE
+    console.print(MissionView(see(), whole=False))
+    return True
+
+
+def _is_complete(snapshot: Snapshot) -> bool:
+    """Whether all that a simulated mission tells has come."""
+    parts = (snapshot.battery, snapshot.decision, snapshot.grid, snapshot.pose, snapshot.doors)
+    placed = snapshot.positions and snapshot.visited_at.keys() <= snapshot.positions.keys()
+    return None not in parts and bool(placed and snapshot.mode)

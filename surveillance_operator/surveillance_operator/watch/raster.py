@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from itertools import groupby
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from rich.segment import Segment
 from rich.style import Style
+
+from surveillance_operator.snapshot import Box, Grid, Pose
 
 UNKNOWN, FREE, WALL, LINK, OLD_TRAIL, TRAIL, OPEN_DOOR, CLOSED_DOOR, OBSTACLE = range(9)
 """What a pixel shows; those above `FREE` are drawn on the ground that the first two are."""
@@ -34,37 +36,6 @@ OCCUPIED = 65
 """From this on a cell is a wall, as nav2's map_server has it by default, percent."""
 
 ARROWS = '→↗↑↖←↙↓↘'
-
-Box = tuple[float, float, float, float]
-"""Left, bottom, right, top, metres."""
-Pose = tuple[float, float, float]
-"""x, y in metres and yaw in radians."""
-
-
-@dataclass(frozen=True, eq=False)
-class Grid:
-    """A map.
-
-    Attributes:
-        cells: Occupancy in percent, -1 where it is not known; shape (rows, columns), south first.
-        resolution: Side of a cell, metres.
-        origin: Lower left corner, x and y in metres, map frame.
-    """
-
-    cells: NDArray[np.int8]
-    resolution: float
-    origin: tuple[float, float] = (0.0, 0.0)
-
-    @cached_property
-    def known(self) -> Box:
-        """What encloses all that is known, map frame; the whole map if nothing is."""
-        rows, columns = (np.flatnonzero((self.cells >= 0).any(axis=axis)) for axis in (1, 0))
-        if not rows.size:
-            rows, columns = (np.arange(size) for size in self.cells.shape)
-        x, y = self.origin
-        left, right = (x + self.resolution * float(edge) for edge in (columns[0], columns[-1] + 1))
-        bottom, top = (y + self.resolution * float(edge) for edge in (rows[0], rows[-1] + 1))
-        return left, bottom, right, top
 
 
 @dataclass(frozen=True)
