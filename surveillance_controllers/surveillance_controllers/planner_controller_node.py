@@ -1,9 +1,9 @@
 """The node `planner_controller`: computes paths.
 
 Actions: `compute_path` between two points, and `motion/planner` from where the robot is to a place,
-as equally spaced via points. What was planned last is on the
-topic `plan`, latched, for viewers. Where a path comes from is the execution mode's matter: the operator
-(MANUAL), chance (RANDOM), or the map with its walls, doors and obstacles (SIMULATED).
+as equally spaced via points. What was planned last is on the topic `plan`, latched, for viewers.
+Where a path comes from is the execution mode's matter: the operator (MANUAL), chance (RANDOM), or
+the map with its walls, doors and obstacles (SIMULATED).
 """
 
 from __future__ import annotations
