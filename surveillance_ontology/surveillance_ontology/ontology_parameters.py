@@ -12,11 +12,18 @@ from surveillance_runtime.field_parameters import Described, declare_fields
 from surveillance_runtime.node import PatrolNode, StartError
 
 _SERVICE = {
+    'ontologies_folder': Described(
+        'The folder in which SAVE and LOG may write, and LOAD may read; empty: '
+        '~/.local/state/surveillance/ontologies.'
+    ),
     'directories': Described(
-        'Directories inside which LOAD, SAVE and LOG may read and write files.',
+        'Directories in which LOAD may read as well.',
         check=lambda value: None if value and all(value) else 'names of directories',
     ),
     'sparql_timeout': Described('Longest time a SPARQL query may take, seconds.', 0.01, 3600.0),
+    'overwrite_loaded': Described(
+        'Let SAVE without a path write over the file that was loaded, as ARMOR 2.2 does.'
+    ),
     'enforce_mount': Described(
         'Refuse changes by others while a client is mounted; ARMOR 2.2 does not.'
     ),

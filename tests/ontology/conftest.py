@@ -18,7 +18,11 @@ from .seven_rooms import FIXTURES, IRI, ONTOLOGY, Ask, asker
 def service(tmp_path: Path) -> Iterator[ArmorService]:
     """A service that may read and write in the test's directory and read the fixtures."""
     made = ArmorService(
-        Settings(directories=(tmp_path,), read_only_directories=(DATA, FIXTURES)),
+        Settings(
+            ontologies_folder=tmp_path,
+            read_only_directories=(DATA, FIXTURES),
+            overwrite_loaded=True,
+        ),
         screen=lambda _: None,
         warn=lambda _: None,
     )

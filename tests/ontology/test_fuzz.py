@@ -100,7 +100,7 @@ class Directives(RuleBasedStateMachine):
 
     def start(self) -> None:
         store = Store(self.directory / 'store', compact_from=5000)
-        limits = Settings(directories=(self.directory,), read_only_directories=(FIXTURES,))
+        limits = Settings(ontologies_folder=self.directory, read_only_directories=(FIXTURES,))
         self.service = ArmorService(limits, lambda _: None, self.no_internal_error, store)
 
     def no_internal_error(self, note: str) -> None:
@@ -149,15 +149,24 @@ class Directives(RuleBasedStateMachine):
     def load(self, client: str, reference: str, buffered: bool) -> None:
         args = ('four_classes.owl', BASE, str(buffered), '', 'false')
         path = str(FIXTURES / args[0])
-        assert self.send(client, reference, 'LOAD FILE', path, *args[1:]).success
+        answer = self.send(client, reference, 'LOAD FILE', path, *args[1:])
         model = self.models.setdefault(reference, Model(buffered))
+        if model.mounted not in ('none', client) and model.buffered != buffered:
+            assert answer.exit_code == 102
+            return
+        assert answer.success
         model.buffered = buffered
         if not buffered:
             model.flush()
 
-    @rule(reference=REFERENCES)
-    def drop(self, reference: str) -> None:
-        assert self.send('one', reference, 'DROP').success
+    @rule(client=CLIENTS, reference=REFERENCES)
+    def drop(self, client: str, reference: str) -> None:
+        answer = self.send(client, reference, 'DROP')
+        model = self.models.get(reference)
+        if model is not None and model.mounted not in ('none', client):
+            assert answer.exit_code == 102
+            return
+        assert answer.success
         self.models.pop(reference, None)
 
     @rule(client=CLIENTS, reference=REFERENCES)
@@ -347,7 +356,7 @@ TEXTS = st.one_of(
 def test_nothing_that_is_sent_makes_it_raise(directives: list[tuple[object, ...]]) -> None:
     notes: list[str] = []
     service = ArmorService(
-        Settings(directories=('/nonexistent',), read_only_directories=(FIXTURES,)),
+        Settings(ontologies_folder='/nonexistent', read_only_directories=(FIXTURES,)),
         warn=notes.append,
     )
     load = (str(FIXTURES / 'four_classes.owl'), BASE, 'false', '', 'false')

@@ -65,7 +65,7 @@ def test_hermit_derives_what_the_native_reasoner_does_not(tmp_path: Path) -> Non
     (tmp_path / 'u.owl').write_text(UNION)
 
     def start() -> ArmorService:
-        limits = Settings(directories=(tmp_path,), read_only_directories=(DATA, FIXTURES))
+        limits = Settings(ontologies_folder=tmp_path, read_only_directories=(DATA, FIXTURES))
         return ArmorService(limits, store=Store(tmp_path / 'store'))
 
     service = start()

@@ -89,7 +89,7 @@ def reach(armor: ArmorClient) -> list[str]:
 
 
 def test_directives_travel_both_ways(graph: Any, tmp_path: Path) -> None:
-    graph.add(ArmorServer, {'directories': [str(tmp_path)]})
+    graph.add(ArmorServer, {'ontologies_folder': str(tmp_path)})
     armor = ArmorClient(graph.node, 'test', 'map')
     build_seven_rooms(armor, True, False)
     assert reach(armor) == ['C1', 'C2']
@@ -380,7 +380,7 @@ def test_a_wrong_map_ends_the_builder_with_one_line(
 
 
 def test_an_ontology_that_cannot_be_loaded_ends_the_builder(graph: Any, tmp_path: Path) -> None:
-    graph.add(ArmorServer, {'directories': [str(tmp_path)]})
+    graph.add(ArmorServer, {'ontologies_folder': str(tmp_path)})
     broken = tmp_path / 'broken.owl'
     broken.write_text('<rdf:RDF>\n<oops')
     for path in (broken, tmp_path / 'none.owl'):

@@ -88,7 +88,7 @@ def test_a_client_called_none_is_not_mounted(ask: Ask) -> None:
 
 
 def test_mounting_can_be_left_unenforced(tmp_path: Path) -> None:
-    service = ArmorService(Settings(directories=(tmp_path,), enforce_mount=False))
+    service = ArmorService(Settings(ontologies_folder=tmp_path, enforce_mount=False))
     ask = asker(service)
     ask('LOAD FILE', ONTOLOGY, IRI, 'false', '', 'false')
     ask('MOUNT', client='a')
@@ -386,7 +386,7 @@ def test_the_web_when_it_is_allowed(tmp_path: Path) -> None:
     with ThreadingHTTPServer(('127.0.0.1', 0), handler) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()
         base = f'http://127.0.0.1:{server.server_address[1]}'
-        service = ArmorService(Settings(directories=(tmp_path,), allow_web=True))
+        service = ArmorService(Settings(ontologies_folder=tmp_path, allow_web=True))
         ask = asker(service)
         good = ask('LOAD WEB MOUNTED', f'{base}/surveillance.owl', IRI, 'false', '', 'false')
         assert good.success

@@ -2,18 +2,32 @@
 
 from __future__ import annotations
 
+import os
 import re
+import site
+import sys
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 from surveillance_ontology.armor.protocol import DirectiveError
 from surveillance_ontology.armor.rendering import shown
 
-DATA = Path(__file__).parent.parent / 'data'
+CODE = Path(__file__).resolve().parent.parent
+DATA = CODE / 'data'
 """The ontologies that come with this package."""
-_CONTROL = re.compile(r'[\x00-\x1f\x7f]')
+ONTOLOGY_ENDINGS = ('.nt', '.owl', '.owx', '.rdf', '.ttl', '.xml')
+LOG_ENDINGS = ('.log', '.txt')
 MAX_PATH = 4096
+_CONTROL = re.compile(r'[\x00-\x1f\x7f]')
+
+
+def state_folder() -> Path:
+    """Return where programs of this user keep what outlives them (XDG base directories)."""
+    home = os.environ.get('XDG_STATE_HOME', '')
+    # A relative path there is invalid and to be ignored, says the standard.
+    base = Path(home) if home.startswith('/') else Path.home() / '.local' / 'state'
+    return base / 'surveillance'
 
 
 @dataclass(frozen=True)
@@ -21,22 +35,31 @@ class Settings:
     """Choices of an `ArmorService`.
 
     Attributes:
-        directories: Where LOAD, SAVE and LOG may read and write.
-        read_only_directories: Where LOAD may read as well.
+        ontologies_folder: The only place where SAVE and LOG write, made when it is needed; LOAD
+            reads there too. A relative path of a directive stands for a file in it. Empty:
+            ``ontologies`` in `state_folder`.
+        directories: Where LOAD may read as well.
+        read_only_directories: Likewise; by default the ontologies of this package.
+        overwrite_loaded: SAVE without a path writes over the file that was loaded, as ARMOR does.
         enforce_mount: Refuse changes by other clients while one is mounted; ARMOR does not.
         narrow_doubles: Store DOUBLE as xsd:float, as ARMOR does.
         allow_web: Let LOAD WEB fetch documents.
         sparql_derived: SPARQL sees derived facts too; ARMOR shows it the asserted ones only.
         sparql_timeout: Longest time a SPARQL query may take, seconds, whatever it asks for.
         sparql_rows: Most rows of a SPARQL answer.
-        max_file_bytes: Largest document that is loaded.
+        max_file_bytes: Largest document that is loaded, and largest log of LOG FILE.
         max_arguments: Most arguments of one directive.
         max_characters: Most characters of all arguments of one directive together.
         max_batch: Most directives in a list.
+
+    Raises:
+        ValueError: ``ontologies_folder`` holds the program's code or lies in it.
     """
 
+    ontologies_folder: str | Path = ''
     directories: tuple[str | Path, ...] = ('.',)
-    read_only_directories: tuple[str | Path, ...] = field(default=(DATA,))
+    read_only_directories: tuple[str | Path, ...] = (DATA,)
+    overwrite_loaded: bool = False
     enforce_mount: bool = True
     narrow_doubles: bool = False
     allow_web: bool = False
@@ -48,63 +71,105 @@ class Settings:
     max_characters: int = 16 * 1024 * 1024
     max_batch: int = 100_000
 
+    def __post_init__(self) -> None:
+        folder = self.writable
+        if folder.is_relative_to(CODE) or any(code.is_relative_to(folder) for code in _code()):
+            raise ValueError(f'ontologies_folder: {folder} is a folder of code, expected another')
+
+    @property
+    def writable(self) -> Path:
+        """Where directives write, links resolved."""
+        folder = self.ontologies_folder or state_folder() / 'ontologies'
+        return Path(folder).expanduser().resolve()
+
+
+def _code() -> list[Path]:
+    """Folders in which Python looks for code."""
+    # The current directory is on the path of some programs, and holds the runs' folders of others.
+    named = [name for name in sys.path if name not in ('', '.')]
+    found = [Path(name).resolve() for name in [*named, *site.getsitepackages()]]
+    return [CODE, *(path for path in found if path.is_dir())]
+
 
 class SafePaths:
     """Resolves paths from directives and refuses what lies outside the allowed directories.
 
-    Symbolic links are resolved before the comparison, also those in the allowed directories.
+    Symbolic links are resolved before the comparison, also those in the allowed directories. Files
+    that are written end as ontologies or logs do, and no part of their path begins with a dot.
 
     Args:
-        directories: Where files may be read and written; a relative path of a directive stands for
-            a file in the first of them.
-        read_only: Where files may be read as well.
+        writable: Where files may be written, and read.
+        readable: Where files may be read as well.
     """
 
-    def __init__(
-        self, directories: Iterable[str | Path], read_only: Iterable[str | Path] = ()
-    ) -> None:
-        self._writable = tuple(Path(d).expanduser().resolve() for d in directories)
-        self._read_only = tuple(Path(d).expanduser().resolve() for d in read_only)
+    def __init__(self, writable: Path, readable: Iterable[str | Path] = ()) -> None:
+        self._writable = writable
+        self._readable = tuple(Path(d).expanduser().resolve() for d in readable)
 
     def to_read(self, text: str) -> Path:
-        """Resolve the path of a file to read.
+        """Resolve the path of a file to read; a relative one in the first directory that has it.
 
         Raises:
-            DirectiveError: Outside the allowed directories, or not a file.
+            DirectiveError: Outside the allowed directories, or not a regular file.
         """
-        path = self._resolved(text, (*self._writable, *self._read_only), 'read')
+        allowed = (self._writable, *self._readable)
+        candidates = [_resolved(base, text) for base in allowed]
+        path = next((path for path in candidates if path.exists()), candidates[0])
+        _check_inside(path, allowed, f'path {shown(text)} may not be read')
         if not path.is_file():
             what = 'is not a file' if path.exists() else 'does not exist'
             raise DirectiveError(f'path {shown(text)} {what}')
         return path
 
-    def to_write(self, text: str) -> Path:
+    def to_write(self, text: str, endings: tuple[str, ...]) -> Path:
         """Resolve the path of a file to write; its directory must exist.
 
+        Args:
+            text: The path as it came.
+            endings: What its name may end in.
+
         Raises:
-            DirectiveError: Outside the allowed directories, a directory, or in no directory.
+            DirectiveError: Outside the allowed directory, another ending, a name that begins with
+                a dot, something else than a regular file there, or in no directory.
         """
-        path = self._resolved(text, self._writable, 'written')
-        if path.is_dir():
-            raise DirectiveError(f'path {shown(text)} is a directory, expected a file')
+        path = _resolved(self._writable, text)
+        _check_inside(path, (self._writable,), f'path {shown(text)} may not be written')
+        if path.exists() and not path.is_file():
+            kind = 'a directory' if path.is_dir() else 'a device or pipe'
+            raise DirectiveError(f'path {shown(text)} is {kind}, expected a file')
+        if path.suffix.lower() not in endings:
+            expected = ', '.join(endings)
+            raise DirectiveError(
+                f'path {shown(text)} may not be written; expected a name that ends in {expected}'
+            )
+        if any(part.startswith('.') for part in path.relative_to(self._writable).parts):
+            raise DirectiveError(
+                f'path {shown(text)} may not be written; expected no name that begins with a dot'
+            )
+        try:
+            self._writable.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise DirectiveError(f'{self._writable}: {error.strerror}') from None
         if not path.parent.is_dir():
             raise DirectiveError(f'path {shown(text)}: directory {path.parent} does not exist')
         return path
 
-    def _resolved(self, text: str, allowed: tuple[Path, ...], verb: str) -> Path:
-        if not text:
-            raise DirectiveError('path is empty, expected a file')
-        if len(text) > MAX_PATH or _CONTROL.search(text):
-            raise DirectiveError(f'path {shown(text)} is not a path')
-        base = self._writable[0] if self._writable else Path.cwd()
-        try:
-            path = (base / Path(text).expanduser()).resolve()
-            path.exists()
-        except OSError as error:
-            raise DirectiveError(f'path {shown(text)}: {error.strerror}') from None
-        except (RuntimeError, ValueError) as error:
-            raise DirectiveError(f'path {shown(text)}: {error}') from None
-        if not any(path.is_relative_to(directory) for directory in allowed):
-            where = ', '.join(map(str, allowed)) or 'no directory'
-            raise DirectiveError(f'path {shown(text)} may not be {verb}; allowed is {where}')
-        return path
+
+def _check_inside(path: Path, allowed: tuple[Path, ...], problem: str) -> None:
+    if not any(path.is_relative_to(directory) for directory in allowed):
+        raise DirectiveError(f'{problem}; allowed is {", ".join(map(str, allowed))}')
+
+
+def _resolved(base: Path, text: str) -> Path:
+    if not text:
+        raise DirectiveError('path is empty, expected a file')
+    if len(text) > MAX_PATH or _CONTROL.search(text):
+        raise DirectiveError(f'path {shown(text)} is not a path')
+    try:
+        path = (base / Path(text).expanduser()).resolve()
+        path.exists()
+    except OSError as error:
+        raise DirectiveError(f'path {shown(text)}: {error.strerror}') from None
+    except (RuntimeError, ValueError) as error:
+        raise DirectiveError(f'path {shown(text)}: {error}') from None
+    return path

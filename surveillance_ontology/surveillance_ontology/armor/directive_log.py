@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import stat
 from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
@@ -12,6 +14,7 @@ from surveillance_ontology.armor.protocol import (
     DirectiveRequest,
     DirectiveResponse,
 )
+from surveillance_ontology.armor.rendering import one_line
 
 MAX_SHOWN = 200
 
@@ -21,10 +24,14 @@ class DirectiveLog:
 
     Args:
         screen: Writes one line to the console.
+        max_bytes: How large the file may become; it is closed then.
     """
 
-    def __init__(self, screen: Callable[[str], None] = print) -> None:
+    def __init__(
+        self, screen: Callable[[str], None] = print, max_bytes: int = 64 * 1024 * 1024
+    ) -> None:
         self._screen = screen
+        self._max_bytes = max_bytes
         self._file: TextIO | None = None
         self.on_screen = False
 
@@ -37,12 +44,17 @@ class DirectiveLog:
         """Append to a file from now on, instead of an earlier one.
 
         Raises:
-            DirectiveError: The file cannot be opened.
+            DirectiveError: It cannot be opened, or is a link, a device or a pipe.
         """
+        flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK
         try:
-            file = path.open('a', encoding='utf-8', errors='backslashreplace')
+            descriptor = os.open(path, flags | os.O_CLOEXEC, 0o644)
         except OSError as error:
             raise DirectiveError(f'{path}: {error.strerror}') from None
+        file = os.fdopen(descriptor, 'a', encoding='utf-8', errors='backslashreplace')
+        if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+            file.close()
+            raise DirectiveError(f'{path}: expected a file')
         self.close()
         self._file = file
 
@@ -53,8 +65,8 @@ class DirectiveLog:
             self._file = None
 
     def write(self, request: DirectiveRequest, response: DirectiveResponse) -> None:
-        """Write a directive with its answer."""
-        shown = ', '.join(_cut(arg) for arg in request.args[:20])
+        """Write a directive with its answer, as one line whatever they hold."""
+        shown = ', '.join(one_line(arg, MAX_SHOWN) for arg in request.args[:20])
         if len(request.args) > 20:
             shown += f', ... ({len(request.args)} arguments)'
         answer = 'ok' if response.success else f'exit code {response.exit_code}'
@@ -62,22 +74,30 @@ class DirectiveLog:
             answer += f': {response.error_description}'
         objects = response.queried_objects
         if objects:
-            answer += f' {[_cut(item) for item in objects[:20]]}'
-        line = (
-            f'{request.client_name!r} on {request.reference_name!r}: {request.words} [{shown}] '
-            f'-> {answer}{"" if response.is_consistent else " (inconsistent)"}'
+            answer += f' {[one_line(item, MAX_SHOWN) for item in objects[:20]]}'
+        client, name, words = (
+            one_line(text, MAX_SHOWN)
+            for text in (request.client_name, request.reference_name, request.words)
+        )
+        line = one_line(
+            f'{client!r} on {name!r}: {words} [{shown}] '
+            f'-> {answer}{"" if response.is_consistent else " (inconsistent)"}',
+            limit=20_000,
         )
         if self.on_screen:
             self._screen(line)
         if self._file is not None:
-            stamp = datetime.now(UTC).isoformat(timespec='milliseconds')
-            try:
-                self._file.write(f'{stamp} {line}\n')
-                self._file.flush()
-            except OSError as error:
-                self._screen(f'directive log: {error.strerror}; the log file is closed')
-                self._file = None
+            self._append(self._file, line)
 
-
-def _cut(text: str) -> str:
-    return text if len(text) <= MAX_SHOWN else text[: MAX_SHOWN - 3] + '...'
+    def _append(self, file: TextIO, line: str) -> None:
+        stamp = datetime.now(UTC).isoformat(timespec='milliseconds')
+        try:
+            file.write(f'{stamp} {line}\n')
+            file.flush()
+            full = os.fstat(file.fileno()).st_size >= self._max_bytes
+            reason = f'{self._max_bytes} bytes are reached' if full else ''
+        except OSError as error:
+            reason = str(error.strerror)
+        if reason:
+            self._screen(f'directive log: {reason}; the log file is closed')
+            self.close()

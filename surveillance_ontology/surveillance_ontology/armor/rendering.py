@@ -216,6 +216,18 @@ def _shortest(number: float) -> str:
     return repr(number)
 
 
+def one_line(text: str, limit: int = 2000) -> str:
+    """Return a text for a log: control characters escaped, cut when it is long.
+
+    Without it a client could write lines of its own into a log, or commands to a terminal.
+    """
+    if len(text) > limit:
+        text = text[: limit - 3] + '...'
+    if text.isprintable():
+        return text
+    return ''.join(char if char.isprintable() else repr(char)[1:-1] for char in text)
+
+
 def shown(text: str, limit: int = 80) -> str:
     """A text in quotes for a message, cut when it is long."""
     return repr(text) if len(text) <= limit else repr(text[: limit - 3]) + '...'

@@ -24,7 +24,7 @@ from surveillance_ontology.armor.protocol import (
     ListResponse,
 )
 from surveillance_ontology.armor.reference import Change, Reference, Registry
-from surveillance_ontology.armor.rendering import shown
+from surveillance_ontology.armor.rendering import one_line, shown
 from surveillance_ontology.armor.session import Session, Watcher
 from surveillance_ontology.armor.store import JournalError, Store
 from surveillance_ontology.reasoner.java_reasoning import JavaReasonerError
@@ -84,9 +84,10 @@ class ArmorService:
             response = _refusal(f'{request.words}: {error}; native derivations only')
         except Exception as error:
             problem = f'{request.words}: internal error, {type(error).__name__}: {error}'
-            problem = ' '.join(problem.split())
             self.session.warn(problem)
             response = _refusal(problem)
+        if not response.error_description.isprintable():
+            response.error_description = one_line(response.error_description)
         ref = self.references.get(request.reference_name)
         if ref is not None:
             response.is_consistent = ref.kb.consistent
@@ -206,12 +207,7 @@ class ArmorService:
         return DirectiveResponse()
 
     def _change(self, directive: Directive, request: DirectiveRequest, ref: Reference) -> None:
-        if self.settings.enforce_mount and not ref.is_free_for(request.client_name):
-            raise DirectiveError(
-                f'{request.client_name} cannot connect to {ref.name}. '
-                'Another client is already mounted on it.',
-                ExitCode.REFERENCE_BUSY,
-            )
+        self.session.check_free(ref, request.client_name)
         if directive.kind is Kind.CONTROL:
             if self._store and ref.queue:
                 self._store.flushed(ref.name)

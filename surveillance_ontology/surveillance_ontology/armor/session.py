@@ -10,7 +10,9 @@ from collections.abc import Callable
 
 from surveillance_ontology.armor.access import SafePaths, Settings
 from surveillance_ontology.armor.directive_log import DirectiveLog
+from surveillance_ontology.armor.protocol import DirectiveError, ExitCode
 from surveillance_ontology.armor.reference import Reference, Registry
+from surveillance_ontology.armor.rendering import one_line
 from surveillance_ontology.armor.sparql_engine import SparqlEngine
 from surveillance_ontology.armor.store import Store
 from surveillance_ontology.knowledge_base import Changes
@@ -35,7 +37,6 @@ class Session:
         sparql: Runs SPARQL queries.
         references: What is loaded.
         loading: Held while an ontology is loaded.
-        warn: Writes a line for the operator.
         store: Makes references durable; None: they end with the process.
     """
 
@@ -47,14 +48,20 @@ class Session:
         store: Store | None,
     ) -> None:
         self.settings = settings
-        self.paths = SafePaths(settings.directories, settings.read_only_directories)
-        self.log = DirectiveLog(screen)
+        self.paths = SafePaths(
+            settings.writable, (*settings.directories, *settings.read_only_directories)
+        )
+        self.log = DirectiveLog(screen, settings.max_file_bytes)
         self.sparql = SparqlEngine()
         self.references = Registry()
         self.loading = threading.Lock()
-        self.warn = warn
+        self._warn = warn
         self.store = store
         self._watchers: list[Watcher] = []
+
+    def warn(self, text: str) -> None:
+        """Write a line for the operator."""
+        self._warn(one_line(text))
 
     def watch(self, watcher: Watcher) -> Callable[[], None]:
         """Tell a watcher of every change; return a function that ends the watching."""
@@ -75,6 +82,18 @@ class Session:
         """Tell the watchers of a change."""
         for watcher in tuple(self._watchers):
             watcher(name, changes)
+
+    def check_free(self, ref: Reference, client: str) -> None:
+        """Check that no other client is mounted on a reference.
+
+        Raises:
+            DirectiveError: 102, there is one.
+        """
+        if self.settings.enforce_mount and not ref.is_free_for(client):
+            raise DirectiveError(
+                f'{client} cannot connect to {ref.name}. Another client is already mounted on it.',
+                ExitCode.REFERENCE_BUSY,
+            )
 
     def close(self) -> None:
         """End helper processes and close files."""

@@ -5,9 +5,15 @@ from __future__ import annotations
 import contextlib
 import urllib.error
 import urllib.request
+from collections.abc import Iterator
 from typing import Any
 
-from surveillance_ontology.armor.access import SafePaths, Settings
+from surveillance_ontology.armor.access import (
+    LOG_ENDINGS,
+    ONTOLOGY_ENDINGS,
+    SafePaths,
+    Settings,
+)
 from surveillance_ontology.armor.directives.table import control, flag, text, utility
 from surveillance_ontology.armor.protocol import (
     DirectiveError,
@@ -48,9 +54,10 @@ _LOAD_SUMMARY = (
     'loaded already stays as it is, except for the first flag.'
 )
 _LOAD_DIFFERS = (
-    'Only files in the allowed directories. A file that cannot be loaded leaves no reference '
-    'behind. What the reasoner does not support is named in the description. Switching buffering '
-    'off applies what waits.'
+    'Only files in the ontologies folder and the directories that may be read. A file that cannot '
+    'be loaded leaves no reference behind. While another client is mounted, refused with 102 if it '
+    'were to change the first flag. What the reasoner does not support is named in the '
+    'description. Switching buffering off applies what waits.'
 )
 _WEB_DIFFERS = 'Refused unless the parameter allow_web is set.'
 
@@ -100,25 +107,92 @@ def _load_web_mounted(
     return response
 
 
-@utility('DROP', summary='Forgets the reference; success also when there is none.')
-def _do_drop(session: Session, request: DirectiveRequest) -> DirectiveResponse:
-    _drop(session, request.reference_name)
+def _load(
+    session: Session,
+    request: DirectiveRequest,
+    source: str,
+    iri: str,
+    buffered: bool,
+    reasoner: str,
+    lazy: bool,
+    *,
+    web: bool = False,
+) -> DirectiveResponse:
+    name = request.reference_name
+    again = DirectiveResponse(error_description=f'{name} is loaded already')
+    if _rebuffer(session, request, buffered):
+        return again
+    with session.loading:
+        if name not in session.references:
+            ref, notes = _read_document(
+                name, source, iri, reasoner, session.paths, session.settings, web=web
+            )
+            ref.buffered_manipulation, ref.buffered_reasoner = buffered, lazy
+            if session.store:
+                session.store.loaded(ref)
+            session.register(ref)
+            for note in notes:
+                session.warn(f'{name}: {note}')
+            return DirectiveResponse(error_description='; '.join(notes))
+    _rebuffer(session, request, buffered)
+    return again
+
+
+def _rebuffer(session: Session, request: DirectiveRequest, buffered: bool) -> bool:
+    """Give a loaded reference the buffering of a further LOAD; False when there is none."""
+    with _if_loaded(session, request.reference_name) as ref:
+        if ref is None:
+            return False
+        if ref.buffered_manipulation != buffered:
+            session.check_free(ref, request.client_name)
+            if session.store:
+                session.store.buffered(ref.name, buffered)
+            ref.buffer(buffered)
+    return True
+
+
+@contextlib.contextmanager
+def _if_loaded(session: Session, name: str) -> Iterator[Reference | None]:
+    """Hold a reference's lock; None when there is no such reference."""
+    with contextlib.ExitStack() as held:
+        try:
+            ref = held.enter_context(session.references.locked(name))
+        except DirectiveError:
+            yield None
+            return
+        yield ref
+
+
+@utility(
+    'DROP',
+    summary='Forgets the reference; success also when there is none.',
+    differs='Refused with 102 while another client is mounted.',
+)
+def _drop(session: Session, request: DirectiveRequest) -> DirectiveResponse:
+    with _if_loaded(session, request.reference_name) as ref:
+        if ref is not None:
+            session.check_free(ref, request.client_name)
+            if session.store:
+                session.store.dropped(ref.name)
+            session.references.remove(ref)
+            session.tell(ref.name, None)
     return DirectiveResponse()
 
 
 @utility(
     'SAVE',
     text('path', ''),
-    summary='Writes the asserted axioms in the format that was loaded; an empty path stands for '
-    'the file that was loaded.',
-    differs='Written beside the file and renamed, so that a crash leaves the old file whole. '
+    summary='Writes the asserted axioms in the format that was loaded, to a file below the '
+    'ontologies folder that ends as ontologies do.',
+    differs='Without a path it is refused unless the parameter overwrite_loaded is set: ARMOR '
+    'writes over the file that was loaded. Refused with 102 while another client is mounted. '
+    'Written beside the file and renamed, so that a crash leaves the old file whole. '
     'Turtle is written as N-Triples, OWL/XML as RDF/XML; a path that ends in .nt gets N-Triples, '
     'which hold names that RDF/XML cannot.',
     slow=True,
 )
-def _do_save(session: Session, request: DirectiveRequest, path: str) -> DirectiveResponse:
-    _save(session, request.reference_name, path, inferences=False)
-    return DirectiveResponse()
+def _save(session: Session, request: DirectiveRequest, path: str) -> DirectiveResponse:
+    return _write(session, request, path, inferences=False)
 
 
 @utility(
@@ -129,8 +203,36 @@ def _do_save(session: Session, request: DirectiveRequest, path: str) -> Directiv
     slow=True,
 )
 def _save_inference(session: Session, request: DirectiveRequest, path: str) -> DirectiveResponse:
-    _save(session, request.reference_name, path, inferences=True)
+    return _write(session, request, path, inferences=True)
+
+
+def _write(
+    session: Session, request: DirectiveRequest, path: str, *, inferences: bool
+) -> DirectiveResponse:
+    with session.references.locked(request.reference_name) as ref:
+        session.check_free(ref, request.client_name)
+        target = session.paths.to_write(path or _loaded_file(session, ref), ONTOLOGY_ENDINGS)
+        axioms = list(ref.kb.axioms())
+        if inferences:
+            axioms = list(dict.fromkeys([*axioms, *ref.kb.facts()]))
+        origin = ref.origin
+    form = 'ntriples' if target.suffix.lower() == '.nt' else origin.format
+    try:
+        write_ontology(axioms, ref.kb.iri, target, form, origin.prefixes)
+    except OntologyWriteError as error:
+        raise DirectiveError(f'SAVE: {error}') from None
     return DirectiveResponse()
+
+
+def _loaded_file(session: Session, ref: Reference) -> str:
+    if not ref.origin.file:
+        raise DirectiveError(f'SAVE: {ref.name} was loaded from {ref.origin.path}; expected a path')
+    if not session.settings.overwrite_loaded:
+        raise DirectiveError(
+            f'SAVE: expected a path; the parameter overwrite_loaded permits writing over '
+            f'{ref.origin.file}, which was loaded'
+        )
+    return str(ref.origin.file)
 
 
 @utility(
@@ -140,13 +242,32 @@ def _save_inference(session: Session, request: DirectiveRequest, path: str) -> D
     differs='Enforced, unless the parameter enforce_mount is off; ARMOR reports 102 and carries '
     'the manipulation out.',
 )
-def _do_mount(session: Session, request: DirectiveRequest) -> DirectiveResponse:
-    return _mount(session, request)
+def _mount(session: Session, request: DirectiveRequest) -> DirectiveResponse:
+    client, name = request.client_name, request.reference_name
+    refusal = f'{client} cannot be mounted on {name}.'
+    with _if_loaded(session, name) as ref:
+        if ref is None:
+            raise DirectiveError(f'{refusal} Unknown reference.', ExitCode.MOUNT_REFUSED)
+        if not ref.is_free_for(client):
+            problem = f'{refusal} Another client is already mounted on it.'
+            raise DirectiveError(problem, ExitCode.MOUNT_REFUSED)
+        note = f'{client} is mounted already' if ref.mounted == client != NOBODY else ''
+        if session.store and ref.mounted != client:
+            session.store.mounted(name, client)
+        ref.mounted = client
+    return DirectiveResponse(error_description=note)
 
 
 @utility('UNMOUNT', summary='Ends MOUNT; a client that is not mounted changes nothing by it.')
-def _do_unmount(session: Session, request: DirectiveRequest) -> DirectiveResponse:
-    return _unmount(session, request)
+def _unmount(session: Session, request: DirectiveRequest) -> DirectiveResponse:
+    with session.references.locked(request.reference_name) as ref:
+        if ref.mounted != request.client_name:
+            note = f'{request.client_name} is not mounted on {ref.name}'
+            return DirectiveResponse(error_description=note)
+        if session.store:
+            session.store.mounted(ref.name, NOBODY)
+        ref.mounted = NOBODY
+    return DirectiveResponse()
 
 
 @utility('GET ALL REFS', summary='The names of all references.')
@@ -164,9 +285,14 @@ def _get_client(session: Session, _: DirectiveRequest, name: str) -> DirectiveRe
     return DirectiveResponse(queried_objects=[session.references.find(name).mounted])
 
 
-@utility('LOG FILE ON', text('path'), summary='Appends each directive with its answer to a file.')
+@utility(
+    'LOG FILE ON',
+    text('path'),
+    summary='Appends each directive with its answer to a file.',
+    differs='Only to .log and .txt files below the ontologies folder; closed at 64 MiB.',
+)
 def _log_file_on(session: Session, _: DirectiveRequest, path: str) -> DirectiveResponse:
-    session.log.open(session.paths.to_write(path))
+    session.log.open(session.paths.to_write(path, LOG_ENDINGS))
     return DirectiveResponse()
 
 
@@ -206,119 +332,6 @@ def _apply(ref: Reference) -> None:
 )
 def _reason(ref: Reference) -> None:
     ref.reason()
-
-
-def _load(
-    session: Session,
-    request: DirectiveRequest,
-    source: str,
-    iri: str,
-    buffered: bool,
-    reasoner: str,
-    lazy: bool,
-    *,
-    web: bool = False,
-) -> DirectiveResponse:
-    """Do LOAD; see the table."""
-    name = request.reference_name
-    again = DirectiveResponse(error_description=f'{name} is loaded already')
-    if _rebuffer(session, name, buffered):
-        return again
-    with session.loading:
-        if name not in session.references:
-            ref, notes = _read_document(
-                name, source, iri, reasoner, session.paths, session.settings, web=web
-            )
-            ref.buffered_manipulation, ref.buffered_reasoner = buffered, lazy
-            if session.store:
-                session.store.loaded(ref)
-            session.register(ref)
-            for note in notes:
-                session.warn(f'{name}: {note}')
-            return DirectiveResponse(error_description='; '.join(notes))
-    _rebuffer(session, name, buffered)
-    return again
-
-
-def _rebuffer(session: Session, name: str, buffered: bool) -> bool:
-    if name not in session.references:
-        return False
-    with contextlib.suppress(DirectiveError), session.references.locked(name) as ref:
-        if session.store and ref.buffered_manipulation != buffered:
-            session.store.buffered(name, buffered)
-        ref.buffer(buffered)
-        return True
-    return False
-
-
-def _drop(session: Session, name: str) -> None:
-    """Do DROP."""
-    with contextlib.suppress(DirectiveError), session.references.locked(name) as ref:
-        if session.store:
-            session.store.dropped(name)
-        session.references.remove(ref)
-        session.tell(name, None)
-
-
-def _mount(session: Session, request: DirectiveRequest) -> DirectiveResponse:
-    """Do MOUNT.
-
-    Raises:
-        DirectiveError: 203, the reference is unknown or another client is mounted.
-    """
-    client, name = request.client_name, request.reference_name
-    if name not in session.references:
-        raise DirectiveError(
-            f'{client} cannot be mounted on {name}. Unknown reference.', ExitCode.MOUNT_REFUSED
-        )
-    with session.references.locked(name) as ref:
-        if not ref.is_free_for(client):
-            raise DirectiveError(
-                f'{client} cannot be mounted on {name}. Another client is already mounted on it.',
-                ExitCode.MOUNT_REFUSED,
-            )
-        note = f'{client} is mounted already' if ref.mounted == client != NOBODY else ''
-        if session.store and ref.mounted != client:
-            session.store.mounted(name, client)
-        ref.mounted = client
-    return DirectiveResponse(error_description=note)
-
-
-def _unmount(session: Session, request: DirectiveRequest) -> DirectiveResponse:
-    """Do UNMOUNT.
-
-    Raises:
-        DirectiveError: 205, there is no such reference.
-    """
-    with session.references.locked(request.reference_name) as ref:
-        if ref.mounted != request.client_name:
-            note = f'{request.client_name} is not mounted on {ref.name}'
-            return DirectiveResponse(error_description=note)
-        if session.store:
-            session.store.mounted(ref.name, NOBODY)
-        ref.mounted = NOBODY
-    return DirectiveResponse()
-
-
-def _save(session: Session, name: str, path: str, *, inferences: bool) -> None:
-    """Do SAVE and SAVE INFERENCE.
-
-    Raises:
-        DirectiveError: 205, the path is not allowed or cannot be written.
-    """
-    with session.references.locked(name) as ref:
-        target = path or str(ref.origin.file or '')
-        if not target:
-            raise DirectiveError(f'SAVE: {name} was loaded from {ref.origin.path}; expected a path')
-        axioms = list(ref.kb.axioms())
-        if inferences:
-            axioms = list(dict.fromkeys([*axioms, *ref.kb.facts()]))
-        origin = ref.origin
-    form = 'ntriples' if target.endswith('.nt') else origin.format
-    try:
-        write_ontology(axioms, ref.kb.iri, session.paths.to_write(target), form, origin.prefixes)
-    except OntologyWriteError as error:
-        raise DirectiveError(f'SAVE: {error}') from None
 
 
 def _read_document(
