@@ -6,7 +6,7 @@ import sys
 if sys.version_info < (3, 11):  # noqa: UP036 - an older Python is told, not met with a traceback
     sys.exit('launch.py: Python 3.11, 3.12 or 3.13 is needed, this is ' + sys.version.split()[0])
 
-from launcher.commands import main
+from launcher.cli import main
 
 if __name__ == '__main__':
     sys.exit(main(sys.argv[1:]))

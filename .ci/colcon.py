@@ -19,7 +19,7 @@ from pathlib import Path
 CHECKOUT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(CHECKOUT))
 
-from launcher import graph  # noqa: E402
+from launcher import node_table  # noqa: E402
 from launcher.environment import PACKAGES, clean_environ  # noqa: E402
 from launcher.fingerprint import INTERFACES, requirements  # noqa: E402
 
@@ -82,7 +82,7 @@ def build(folder: Path, python: Path) -> None:
 def misplaced(install: Path) -> list[str]:
     """What is wrong with the executables."""
     wrong = []
-    for node in graph.NODES:
+    for node in node_table.NODES:
         executable = install / node.package / 'lib' / node.package / node.name
         if not os.access(executable, os.X_OK):
             wrong.append(f'{node.name} is not at {executable.relative_to(install.parent)}')
@@ -92,7 +92,7 @@ def misplaced(install: Path) -> list[str]:
 def broken(install: Path) -> list[str]:
     """Which executables do not run: each is given a wrong argument, which it has to name."""
     wrong = []
-    for node in graph.NODES:
+    for node in node_table.NODES:
         executable = install / node.package / 'lib' / node.package / node.name
         run_it = f'exec {executable} --ros-args --log-level odd'
         script = f'source {install}/local_setup.bash && {run_it}'

@@ -166,9 +166,9 @@ def through_ros(rounds: int) -> list[Row]:
     from surveillance_interfaces.srv import ReferenceName
     from surveillance_ontology.armor_client import ArmorClient
     from surveillance_runtime.calls import ServiceCaller
-    from surveillance_runtime.domains import claim_domain
     from surveillance_runtime.node import PatrolNode
     from surveillance_runtime.process import ExecutorThread
+    from surveillance_runtime.testing import claim_domain
 
     os.environ['ROS_DOMAIN_ID'] = str(claim_domain())
     with servers():

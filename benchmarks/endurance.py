@@ -37,8 +37,8 @@ from surveillance_interfaces.srv import (
 )
 from surveillance_ontology.armor_client import CHANGES_QOS, CHANGES_TOPIC
 from surveillance_runtime.calls import ServiceCaller
+from surveillance_runtime.conversions import seconds_of
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
-from surveillance_runtime.stamps import seconds_of
 
 LONGEST_WRONG = 2.0
 """Simulated seconds that the ontology may be wrong about the robot's place."""

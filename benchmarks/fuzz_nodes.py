@@ -50,8 +50,8 @@ from rclpy.node import Node  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
 
 from benchmarks.whole_stack import ros_arguments  # noqa: E402
-from launcher import graph  # noqa: E402
-from surveillance_runtime.domains import claim_domain  # noqa: E402
+from launcher import node_table  # noqa: E402
+from surveillance_runtime.testing import claim_domain  # noqa: E402
 
 STRANGE_FLOATS = (
     math.nan, math.inf, -math.inf, 1e308, -1e308, 5e-324, -0.0, 1e9, -1e9, 0.0, 1.0, -1.0,
@@ -197,7 +197,7 @@ class NodeProcess:
     """A node as a process, with its output counted."""
 
     def __init__(self, name: str, domain: int, folder: Path, place: Path) -> None:
-        node = graph.find(name)
+        node = node_table.find(name)
         start = f'import sys; from {node.module} import main; sys.exit(main())'
         words = [sys.executable, '-c', start, *ros_arguments(place, folder, {})]
         environ = {**os.environ, 'ROS_DOMAIN_ID': str(domain)}
@@ -420,7 +420,7 @@ def main(words: Sequence[str] | None = None) -> int:
     parser.add_argument('--keep', type=Path, help='folder for the logs (default: thrown away)')
     chosen = parser.parse_args(words)
     names = chosen.node or [
-        node.name for node in graph.NODES if node.name not in ('console', 'video_source')
+        node.name for node in node_table.NODES if node.name not in ('console', 'video_source')
     ]
     each = 100 if chosen.quick else max(1, chosen.messages // len(names))
     reports = []

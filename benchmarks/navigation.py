@@ -29,18 +29,17 @@ from scipy.sparse.csgraph import dijkstra
 from skimage.graph import MCP_Geometric
 from whole_stack import ROOT, Stack, ros_arguments
 
-from launcher import graph, mission
+from launcher import node_table, run
 from surveillance_controllers.geometry import polyline
 from surveillance_controllers.motion.driving import Drive
 from surveillance_controllers.motion.pilot import Pilot
 from surveillance_controllers.motion.scans import Scan
 from surveillance_controllers.planning.grid_map import GridMap
 from surveillance_controllers.planning.grid_planning import GridPlanner, PlanningParameters
-from surveillance_simulation import place_generation
-from surveillance_simulation.place_file import read_world
+from surveillance_runtime.place import generation as place_generation
+from surveillance_runtime.place import occupancy_grid
 from surveillance_simulation.robot.robot import Robot
-from surveillance_simulation.world import occupancy_grid
-from surveillance_simulation.world.world import World
+from surveillance_simulation.world.world import World, read_world
 
 Mask = npt.NDArray[np.bool_]
 
@@ -264,11 +263,11 @@ def processes(seconds: float) -> tuple[float, float, float]:
     import rclpy
     from geometry_msgs.msg import PoseStamped
 
-    from surveillance_runtime.domains import claim_domain
+    from surveillance_runtime.conversions import seconds_of
     from surveillance_runtime.node import PatrolNode
     from surveillance_runtime.process import ExecutorThread
     from surveillance_runtime.qos import SENSOR_QOS
-    from surveillance_runtime.stamps import seconds_of
+    from surveillance_runtime.testing import claim_domain
 
     domain = claim_domain()
     poses: list[tuple[float, float, float]] = []
@@ -288,10 +287,10 @@ def processes(seconds: float) -> tuple[float, float, float]:
     with tempfile.TemporaryDirectory() as folder:
         arguments = ros_arguments(ROOT / 'config' / 'seven_rooms.yaml', Path(folder))
         arguments += ['--log-level', 'fatal']
-        environ = mission.node_environ(mission.Run(domain=domain))
+        environ = run.node_environ(run.Run(domain=domain))
         try:
-            for each in graph.select('SIMULATED'):
-                words = mission.command([each], arguments, os.getpid())
+            for each in node_table.select('SIMULATED'):
+                words = run.command([each], arguments, os.getpid())
                 started.append(subprocess.Popen(words, env=environ))
             _await(lambda: poses and _driven(poses) > 1.0, 90.0)
             first, used, begun = len(poses), _cpu(started), time.monotonic()

@@ -24,7 +24,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from surveillance_runtime.domains import claim_domain
+from surveillance_runtime.testing import claim_domain
 
 CHECKOUT = Path(__file__).resolve().parent.parent
 BASE_PYTHON = str(getattr(sys, '_base_executable', sys.executable))

@@ -20,10 +20,10 @@ if str(ROOT) not in sys.path:
 
 import rclpy  # noqa: E402
 
-from launcher import graph  # noqa: E402
-from surveillance_runtime.domains import claim_domain  # noqa: E402
+from launcher import node_table  # noqa: E402
 from surveillance_runtime.node import PatrolNode  # noqa: E402
 from surveillance_runtime.process import ExecutorThread  # noqa: E402
+from surveillance_runtime.testing import claim_domain  # noqa: E402
 from surveillance_simulation.robot.robot import Robot  # noqa: E402
 from surveillance_simulation.simulator_node import Simulator  # noqa: E402
 
@@ -59,7 +59,7 @@ class Stack:
         self._spinner = ExecutorThread(self.context)
         options = {'context': self.context, 'cli_args': arguments, 'use_global_arguments': False}
         self.nodes: dict[str, PatrolNode] = {}
-        for node in graph.select('SIMULATED', only=nodes):
+        for node in node_table.select('SIMULATED', only=nodes):
             kind = getattr(importlib.import_module(node.module), node.class_name)
             self._add(node.name, kind(**options))
         self.observer = self._add('observer', PatrolNode('observer', **options))
@@ -112,7 +112,7 @@ def ros_arguments(
 
 def _own_parameters(parameters: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     sections: dict[str, dict[str, Any]] = {'/**': {'use_sim_time': True}}
-    for node in graph.NODES:
+    for node in node_table.NODES:
         sections[f'/**/{node.name}'] = {}
         if node.console:
             sections[f'/**/{node.name}'] = {'execution_mode': 'SIMULATED', 'console': False}

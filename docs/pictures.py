@@ -29,7 +29,7 @@ from sensor_msgs.msg import Image, JointState  # noqa: E402
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint  # noqa: E402
 from whole_stack import Stack  # noqa: E402
 
-from launcher import graph  # noqa: E402
+from launcher import node_table  # noqa: E402
 from surveillance_interfaces.srv import PlaceObstacle, SetDoor, SetMarker  # noqa: E402
 from surveillance_operator import map_command  # noqa: E402
 from surveillance_operator.watch.view import MissionView  # noqa: E402
@@ -69,7 +69,7 @@ def run() -> None:
 
 def watch() -> None:
     """Patrol with a closed door and an obstacle, and draw the terminal of whoever watches."""
-    nodes = [*(node.name for node in graph.select('SIMULATED')), 'mission_view']
+    nodes = [*(node.name for node in node_table.select('SIMULATED')), 'mission_view']
     stack = Stack(
         ROOT / 'config' / 'seven_rooms.yaml',
         {'simulator': {'speed': 4.0}, 'battery_controller': {'battery_initial_value': 70}},

@@ -9,8 +9,8 @@ import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from launcher.graph import Node
-from launcher.log import MergedLog
+from launcher.log_merge import MergedLog
+from launcher.node_table import Node
 from launcher.supervisor import Supervisor
 from surveillance_controllers.manual.console import Console
 from surveillance_controllers.manual.console_commands import BATTERY, MOTION, PLANNER, Grammar

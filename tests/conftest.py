@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import pytest
 
-from surveillance_runtime.domains import claim_domain
+from surveillance_runtime.testing import claim_domain
 
 T = TypeVar('T')
 

@@ -16,9 +16,8 @@ from surveillance_behaviour.policy.battery import BatteryLimits
 from surveillance_behaviour.policy.chooser import ChoiceSettings
 from surveillance_behaviour.policy.policies import POLICIES
 from surveillance_behaviour.policy.rules import DEFAULT_RULES, Rules
-from surveillance_runtime.field_parameters import Described, declare_fields
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.parameters import ParameterError
+from surveillance_runtime.parameters import Described, ParameterError, declare_fields
 
 _DAY = 86400.0
 _CHOICE = {

@@ -13,7 +13,7 @@ from surveillance_behaviour.peers.ports import Point
 from surveillance_behaviour.policy.situation import Decision
 from surveillance_interfaces.msg import Decision as DecisionMessage
 from surveillance_interfaces.msg import OntologyMap, OntologyPlace, RoomConnection
-from surveillance_runtime.stamps import seconds_of
+from surveillance_runtime.conversions import seconds_of
 
 
 def point_from(message: PointMessage) -> Point:

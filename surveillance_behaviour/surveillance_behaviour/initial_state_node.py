@@ -17,13 +17,13 @@ from surveillance_behaviour.map_from_markers.surroundings import LookingAround
 from surveillance_behaviour.map_from_markers.survey import PlaceNote, Survey, SurveyReport, notes_of
 from surveillance_interfaces.msg import OntologyMap
 from surveillance_interfaces.srv import ReferenceName
-from surveillance_runtime.awaited_work import AwaitedEvent
-from surveillance_runtime.calls import CallFailed, ServiceCaller
-from surveillance_runtime.field_parameters import Described, declare_fields
+from surveillance_runtime.calls import CallError, ServiceCaller
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.place_parameters import described_place
+from surveillance_runtime.parameters import Described, declare_fields
+from surveillance_runtime.place.parameters import described_place
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
+from surveillance_runtime.waiting import AwaitedEvent
 
 _BUILD_SECONDS = 20.0
 _LOOKING = {
@@ -135,7 +135,7 @@ class InitialState(PatrolNode):
     def _await_map(self) -> None:
         try:
             self._reference.call(ReferenceName.Request(), _BUILD_SECONDS, self.stopping)
-        except CallFailed as error:
+        except CallError as error:
             if not self.stopping.is_set():
                 self.get_logger().warn(f'the map is sent, but not known to be built: {error}')
 

@@ -23,11 +23,10 @@ from surveillance_behaviour.policy.rules import NowhereToGoError
 from surveillance_fsm import Interrupt
 from surveillance_interfaces.msg import MissionStatus
 from surveillance_interfaces.srv import Reason
-from surveillance_runtime.awaited_work import AwaitedWork
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
-from surveillance_runtime.waiting import ClockWait
+from surveillance_runtime.waiting import AwaitedWork, ClockWait
 
 
 class Reasoner(PatrolNode):

@@ -22,11 +22,10 @@ from surveillance_controllers.controller_parameters import battery_settings, exe
 from surveillance_controllers.manual import stimuli
 from surveillance_controllers.manual.console_commands import BATTERY, BATTERY_SET, ParsedCommand
 from surveillance_controllers.manual.operator_console import OperatorConsole
-from surveillance_runtime.awaited_work import AwaitedEvent
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
-from surveillance_runtime.waiting import ClockWait
+from surveillance_runtime.waiting import AwaitedEvent, ClockWait
 
 RECHARGE_STEPS = 50
 """Steps in which `recharge` fills an empty battery in MANUAL and RANDOM."""

@@ -8,8 +8,8 @@ from dataclasses import astuple, dataclass, field, replace
 from surveillance_controllers.battery.model import BatteryParameters
 from surveillance_controllers.geometry.polyline import Points
 from surveillance_controllers.geometry.poses import Pose
-from surveillance_runtime.field_parameters import Described, declare_fields
 from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.parameters import Described, declare_fields
 
 EXECUTION_MODES = ('MANUAL', 'RANDOM', 'SIMULATED')
 

@@ -20,7 +20,7 @@ from surveillance_ontology.armor_client import (
     name_in,
     value_in,
 )
-from surveillance_runtime.calls import CallFailed, ServiceCaller
+from surveillance_runtime.calls import CallError, ServiceCaller
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.waiting import Interrupt
 
@@ -216,5 +216,5 @@ def _carry_out(armor: ArmorClient, changes: list[DirectiveRequest]) -> None:
 def _answered() -> Iterator[None]:
     try:
         yield
-    except (CallFailed, ArmorServiceCallError, ArmorServiceInternalError) as error:
+    except (CallError, ArmorServiceCallError, ArmorServiceInternalError) as error:
         raise KnowledgeError(str(error)) from error

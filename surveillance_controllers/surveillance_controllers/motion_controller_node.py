@@ -24,7 +24,7 @@ from surveillance_controllers.map_knowledge import KnowledgeError, MapKnowledge
 from surveillance_controllers.motion.arrival import MotionFailed, nearest_place
 from surveillance_controllers.motion.stimulus_motion import glide
 from surveillance_interfaces.action import Control, FollowPath
-from surveillance_runtime.goals import GoalAborted, GoalRun, GoalServer
+from surveillance_runtime.action_server import GoalAbortedError, GoalRun, GoalServer
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
 
@@ -81,7 +81,7 @@ class MotionController(PatrolNode):
             end = self._move(path, run, report, 'follow a path')
         except MotionFailed as failure:
             position = conversions.point_from(path[0] if failure.end is None else failure.end)
-            raise GoalAborted(str(failure), FollowPath.Result(position=position)) from failure
+            raise GoalAbortedError(str(failure), FollowPath.Result(position=position)) from failure
         return FollowPath.Result(position=conversions.point_from(end))
 
     def _control(self, goal: Any, run: GoalRun) -> Control.Result:
@@ -105,7 +105,7 @@ class MotionController(PatrolNode):
             if isinstance(failure, MotionFailed):
                 end = failure.end
             point = conversions.point_from(path[0] if end is None else end)
-            raise GoalAborted(str(failure), Control.Result(reached_point=point)) from failure
+            raise GoalAbortedError(str(failure), Control.Result(reached_point=point)) from failure
         return Control.Result(reached_point=conversions.point_from(end))
 
     def _note_visit(self, goal: Points, end: Points, run: GoalRun) -> None:
@@ -137,9 +137,9 @@ def _checked(points: Sequence[Any]) -> Points:
     """The points of a goal as an array; aborts the goal when it has none that can be followed."""
     path = conversions.array_from_points(points)
     if len(path) == 0:
-        raise GoalAborted('no points, expected at least one')
+        raise GoalAbortedError('no points, expected at least one')
     if not np.isfinite(path).all():
-        raise GoalAborted('a point is not finite')
+        raise GoalAbortedError('a point is not finite')
     return path
 
 

@@ -24,7 +24,7 @@ from surveillance_controllers.manual.operator_console import OperatorConsole
 from surveillance_controllers.manual.operator_desk import OperatorDesk
 from surveillance_controllers.map_knowledge import KnowledgeError, MapKnowledge
 from surveillance_interfaces.action import ComputePath, Plan
-from surveillance_runtime.goals import GoalAborted, GoalRun, GoalServer
+from surveillance_runtime.action_server import GoalAbortedError, GoalRun, GoalServer
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
@@ -83,10 +83,10 @@ class PlannerController(PatrolNode):
             target = self._knowledge.position(goal.target, run.interrupt)
             start = self._start(goal.target, run)
         except KnowledgeError as error:
-            raise GoalAborted(f'no way to {goal.target!r}: {error}') from error
+            raise GoalAbortedError(f'no way to {goal.target!r}: {error}') from error
         for what, point in (('the robot', start), (f'place {goal.target!r}', target)):
             if not self._settings.environment.contains(point):
-                raise GoalAborted(
+                raise GoalAbortedError(
                     f'{what} is at {request_texts.point(point)}: expected within '
                     f'environment_size {self._settings.environment}'
                 )
@@ -115,7 +115,7 @@ class PlannerController(PatrolNode):
 
     def _path(self, start: Points, goal: Points, run: GoalRun, what: str) -> Points:
         if not (np.isfinite(start).all() and np.isfinite(goal).all()):
-            raise GoalAborted(
+            raise GoalAbortedError(
                 f'{what} from {request_texts.point(start)} to {request_texts.point(goal)}: '
                 'expected finite coordinates'
             )
@@ -126,7 +126,7 @@ class PlannerController(PatrolNode):
             text = request_texts.path_request(what, start, goal)
             between = self._desk.ask(text, run.interrupt)
             if between is None:
-                raise GoalAborted(f'{what}: withdrawn before the operator answered')
+                raise GoalAbortedError(f'{what}: withdrawn before the operator answered')
         else:
             between = stimuli.via_points(self._draw)
         return np.array([start, *between, goal])

@@ -35,7 +35,7 @@ from surveillance_ontology.conversions import (
     request_to_ros,
     response_from_ros,
 )
-from surveillance_runtime.calls import CallFailed, ServiceCaller
+from surveillance_runtime.calls import CallError, ServiceCaller
 from surveillance_runtime.waiting import Interrupt
 
 __all__ = [
@@ -85,7 +85,7 @@ class RosTransport:
         """Carry out one directive and block until the answer."""
         try:
             answer = self._single.call(_one(request), self.timeout, self._interrupt)
-        except CallFailed as error:
+        except CallError as error:
             raise ArmorServiceCallError(str(error)) from error
         return response_from_ros(answer.armor_response)
 
@@ -93,7 +93,7 @@ class RosTransport:
         """Carry out a batch and block until the answer."""
         try:
             answer = self._serial.call(_many(requests), self.timeout, self._interrupt)
-        except CallFailed as error:
+        except CallError as error:
             raise ArmorServiceCallError(str(error)) from error
         return _list_from_ros(answer)
 
@@ -101,7 +101,7 @@ class RosTransport:
         """Carry out one directive."""
         try:
             answer = await self._single.call_async(_one(request), self.timeout)
-        except CallFailed as error:
+        except CallError as error:
             raise ArmorServiceCallError(str(error)) from error
         return response_from_ros(answer.armor_response)
 
@@ -109,7 +109,7 @@ class RosTransport:
         """Carry out a batch."""
         try:
             answer = await self._serial.call_async(_many(requests), self.timeout)
-        except CallFailed as error:
+        except CallError as error:
             raise ArmorServiceCallError(str(error)) from error
         return _list_from_ros(answer)
 

@@ -19,10 +19,10 @@ from surveillance_ontology.armor.change_feed import ChangeFeed, NumberedChange
 from surveillance_ontology.armor_client import CHANGES_TOPIC
 from surveillance_ontology.conversions import changes_to_ros, fill_response, request_from_ros
 from surveillance_ontology.ontology_parameters import described_service
-from surveillance_runtime.awaited_work import AwaitedWork
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
+from surveillance_runtime.waiting import AwaitedWork
 
 PUBLISH_DELAY = 0.005
 """Seconds by which changes are told later, so that this delays no client's next directive."""

@@ -19,12 +19,12 @@ from surveillance_ontology.conversions import point_to_ros, position_from_ros, r
 from surveillance_ontology.map_building import ROBOT, MapBuilding
 from surveillance_ontology.map_keeper import MapKeeper, Reports
 from surveillance_ontology.ontology_parameters import builder_settings
-from surveillance_runtime.awaited_work import AwaitedEvent, AwaitedWork
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.place import Place
-from surveillance_runtime.place_parameters import described_place
+from surveillance_runtime.place.parameters import described_place
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
+from surveillance_runtime.waiting import AwaitedEvent, AwaitedWork
 
 SECONDS_PER_ROOM = 0.005
 """By which the longest wait grows with the map."""

@@ -8,8 +8,8 @@ from pathlib import Path
 from surveillance_ontology.armor.access import DATA, Settings
 from surveillance_ontology.armor.service import ArmorService
 from surveillance_ontology.armor.store import JournalError, Store
-from surveillance_runtime.field_parameters import Described, declare_fields
 from surveillance_runtime.node import PatrolNode, StartError
+from surveillance_runtime.parameters import Described, declare_fields
 
 _SERVICE = {
     'ontologies_folder': Described(

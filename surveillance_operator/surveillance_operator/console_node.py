@@ -25,7 +25,7 @@ from surveillance_controllers.manual.console_commands import (
     Grammar,
 )
 from surveillance_interfaces.srv import ConsoleCommand
-from surveillance_runtime.calls import CallFailed, ServiceCaller
+from surveillance_runtime.calls import CallError, ServiceCaller
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
@@ -99,7 +99,7 @@ class ConsoleNode(PatrolNode):
         request = ConsoleCommand.Request(line=line)
         try:
             answer = self._callers[controller].call(request, self._timeout, self.stopping)
-        except CallFailed as error:
+        except CallError as error:
             _tell(f'{controller} does not answer: {error}')
         else:
             _tell(answer.answer, controller)

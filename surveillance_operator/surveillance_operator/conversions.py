@@ -35,8 +35,7 @@ from surveillance_operator.snapshot import (
     Status,
     Transition,
 )
-from surveillance_runtime.point_clouds import points_from_cloud
-from surveillance_runtime.stamps import seconds_of
+from surveillance_runtime.conversions import points_from_cloud, seconds_of
 
 MOST_CELLS = 16_000_000
 MOST_POINTS = 20_000

@@ -11,11 +11,10 @@ from typing import NoReturn
 
 from surveillance_behaviour.mission import record as mission_record
 from surveillance_behaviour.policy.graph import PatrolGraph
-from surveillance_runtime.place import Place
+from surveillance_runtime.place import Place, read_place_file
+from surveillance_runtime.place.floor_plan import FloorPlan
+from surveillance_runtime.place.picture import Run, draw_place
 from surveillance_runtime.yaml_file import YamlFileError
-from surveillance_simulation.floor_plan import FloorPlan
-from surveillance_simulation.place_file import read_world
-from surveillance_simulation.place_picture import Run, draw_place
 from surveillance_simulation.world.textures import TextureError, marker_panel
 
 EXIT_BAD_INPUT = 2
@@ -126,20 +125,21 @@ def _parse(argv: Sequence[str]) -> argparse.Namespace:
 
 
 def _draw(options: argparse.Namespace) -> list[str]:
-    world = read_world(options.place)
-    for marker in world.plan.markers.values():
-        marker_panel(world.plan.marker_dictionary, marker.id, 'whole')
+    plan = read_place_file(options.place, walls=True).plan
+    assert plan is not None  # as walls were asked for
+    for marker in plan.markers.values():
+        marker_panel(plan.marker_dictionary, marker.id, 'whole')
     output: Path = options.output or Path(options.place.stem + '.png')
     if output.suffix.lower() not in _SUFFIXES:
         raise CommandError(f'{output}: expected a picture, one of *{", *".join(_SUFFIXES)}')
     run = None
-    lines = [f'{options.place}: {facts(world.plan)}']
+    lines = [f'{options.place}: {facts(plan)}']
     if options.record:
         events = mission_record.read(options.record)
-        run = run_of(events, world.plan.place, str(options.record))
+        run = run_of(events, plan.place, str(options.record))
         lines.append(f'{options.record}: {run.summary}')
     title = options.place.stem.replace('_', ' ')
-    picture = draw_place(world, title[:1].upper() + title[1:], facts(world.plan), run)
+    picture = draw_place(plan, title[:1].upper() + title[1:], facts(plan), run)
     try:
         picture.save(output)
     except OSError as error:

@@ -48,7 +48,7 @@ from surveillance_ontology.armor_client import ArmorClient, FactSubscription, va
 from surveillance_operator import conversions
 from surveillance_operator.polled_subscription import PolledSubscription
 from surveillance_operator.snapshot import NO_POINTS, Change, Pose, Snapshot, follow
-from surveillance_runtime.calls import CallFailed, ServiceCaller
+from surveillance_runtime.calls import CallError, ServiceCaller
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 
@@ -434,7 +434,7 @@ class _Facts:
                     await question()
                     if name != 'positions':
                         self._answered.add(name)
-                except CallFailed as error:
+                except CallError as error:
                     self._node.get_logger().debug(str(error))
         finally:
             self._asking = False
@@ -466,7 +466,7 @@ class _Facts:
         names = ['execution_mode', *listed.result.names]
         values = (await self._get.call_async(GetParameters.Request(names=names), TIMEOUT)).values
         if len(values) != len(names):
-            raise CallFailed(f'{PLANNER} gave {len(values)} of {len(names)} parameters')
+            raise CallError(f'{PLANNER} gave {len(values)} of {len(names)} parameters')
         lines = {
             name.removeprefix('doors.'): _door_line(*value.double_array_value)
             for name, value in zip(names[1:], values[1:], strict=True)

@@ -12,7 +12,7 @@ from rclpy.exceptions import InvalidNamespaceException
 from rclpy.validate_namespace import validate_namespace
 
 from surveillance_operator import mission_view_node
-from surveillance_runtime.domains import LAST_DOMAIN
+from surveillance_runtime.testing import LAST_DOMAIN
 
 EXIT_BAD_INPUT = 2
 

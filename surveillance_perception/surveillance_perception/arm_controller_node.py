@@ -27,13 +27,13 @@ from surveillance_perception.conversions import (
     scan_result_to_ros,
     trajectory_to_ros,
 )
-from surveillance_runtime.awaited_work import work_aside
-from surveillance_runtime.goals import GoalAborted, GoalRun, GoalServer
+from surveillance_runtime.action_server import GoalAbortedError, GoalRun, GoalServer
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
-from surveillance_runtime.rested_pictures import RestedPictures
 from surveillance_runtime.robot_arm import ARM
+from surveillance_runtime.settled_frames import SettledFrames
+from surveillance_runtime.waiting import work_aside
 
 _POSES = {
     MarkerRoutine.Request.LEFT: 'left',
@@ -67,7 +67,7 @@ class ArmController(PatrolNode):
             lambda msg: self._driver.report(msg.name, msg.position, msg.velocity),
             SENSOR_QOS,
         )
-        self._read = RestedPictures(self)
+        self._read = SettledFrames(self)
         self.create_subscription(Odometry, 'odom', self._on_odometry, SENSOR_QOS)
         self.create_service(MarkerRoutine, 'move_arm', self._on_move, callback_group=group)
         self.create_service(PointCamera, 'point_camera', self._on_point, callback_group=group)
@@ -115,7 +115,7 @@ class ArmController(PatrolNode):
         try:
             plan = scan_plan_from_ros(goal, settings.horizontal, settings.vertical)
         except ValueError as error:
-            raise GoalAborted(str(error)) from None
+            raise GoalAbortedError(str(error)) from None
 
         def tell(index: int, view: View, resting: bool) -> None:
             run.feedback(scan_feedback_to_ros(index, len(plan.views), view, resting))
@@ -130,7 +130,7 @@ class ArmController(PatrolNode):
             wake()
         result = scan_result_to_ros(outcome)
         if outcome.failure and not run.interrupt.is_set():
-            raise GoalAborted(f'scan ended at {outcome.failure}', result)
+            raise GoalAbortedError(f'scan ended at {outcome.failure}', result)
         return result
 
 

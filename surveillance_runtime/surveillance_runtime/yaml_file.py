@@ -2,7 +2,7 @@
 
 YAML's own readers take the last of two equal keys in silence, expand aliases without bound, and
 know no line once a value is read. Here the first two are errors, and every error names file and
-line.
+line. `read_yaml_file` reads any mapping, `read_parameter_file` the form of ROS parameter files.
 """
 
 from __future__ import annotations
@@ -155,3 +155,70 @@ def _kind(node: yaml.Node | None) -> str:
     if node is None:
         return 'nothing'
     return 'a list' if isinstance(node, yaml.SequenceNode) else 'a value'
+
+
+def read_parameter_file(path: str | Path, node: str = '/**') -> YamlFile:
+    """Read the parameters that a file gives to ``node``.
+
+    Args:
+        path: A ROS 2 parameter file (YAML).
+        node: The top-level key whose parameters are wanted; ``/**`` are those for every node.
+
+    Returns:
+        The parameters below ``ros__parameters``; dots in keys are resolved into nesting.
+
+    Raises:
+        YamlFileError: The file cannot be read, is not of a parameter file's form, or gives a
+            parameter twice.
+    """
+    file = read_yaml_file(path)
+    if node not in file.values:
+        found = ', '.join(file.values) or 'nothing'
+        raise file.error((), f"expected the top-level key '{node}', got {found}")
+    section = file.values[node]
+    if not isinstance(section, Mapping) or 'ros__parameters' not in section:
+        raise file.error_at((node,), f"expected 'ros__parameters:' below '{node}'")
+    start = (node, 'ros__parameters')
+    body = section['ros__parameters']
+    if not isinstance(body, Mapping):
+        raise file.error_at(start, "expected parameters below 'ros__parameters'")
+    nesting = _Nesting(file, start)
+    nesting.collect(body, start, nesting.values, ())
+    return YamlFile(file.path, nesting.values, nesting.lines)
+
+
+class _Nesting:
+    """Puts ``map.R1`` where ``map: {R1: ...}`` would stand."""
+
+    def __init__(self, file: YamlFile, start: KeyPath) -> None:
+        self.values: dict[str, Any] = {}
+        self.lines: dict[KeyPath, int] = {(): file.lines[start]}
+        self._file = file
+
+    def collect(
+        self, body: Mapping[str, Any], source: KeyPath, into: dict[str, Any], prefix: KeyPath
+    ) -> None:
+        for name, value in body.items():
+            line = self._file.lines[(*source, name)]
+            target, path = into, prefix
+            for part in name.split('.')[:-1]:
+                path = (*path, part)
+                target = self._below(target, path, line)
+            path = (*path, name.rpartition('.')[2])
+            if isinstance(value, Mapping):
+                self.collect(value, (*source, name), self._below(target, path, line), path)
+            elif path[-1] in target:
+                raise self._twice(path, line)
+            else:
+                self.lines[path] = line
+                target[path[-1]] = value
+
+    def _below(self, target: dict[str, Any], path: KeyPath, line: int) -> dict[str, Any]:
+        self.lines.setdefault(path, line)
+        inner = target.setdefault(path[-1], {})
+        if not isinstance(inner, dict):
+            raise self._twice(path, line)
+        return inner
+
+    def _twice(self, path: KeyPath, line: int) -> Exception:
+        return twice(self._file.path, path, line, self.lines[path])

@@ -15,13 +15,13 @@ from trajectory_msgs.msg import JointTrajectory
 
 from surveillance_interfaces.msg import DoorStates
 from surveillance_interfaces.srv import SetMarker
-from surveillance_runtime.stamps import seconds_of
+from surveillance_runtime.conversions import seconds_of
+from surveillance_runtime.place.floor_plan import Marker
+from surveillance_runtime.place.floor_plan import Pose as PlanePose
+from surveillance_runtime.place.occupancy_grid import Grid
 from surveillance_simulation.camera.model import Camera, Picture
-from surveillance_simulation.floor_plan import Marker
-from surveillance_simulation.floor_plan import Pose as PlanePose
 from surveillance_simulation.robot.arm_motion import TrajectoryPoint
 from surveillance_simulation.robot.lidar import LidarModel
-from surveillance_simulation.world.occupancy_grid import Grid
 from surveillance_simulation.world.world import World
 
 

@@ -14,16 +14,16 @@ from rclpy.clock import Clock as RclpyClock
 from rclpy.clock import ClockType
 from trajectory_msgs.msg import JointTrajectory
 
+from surveillance_runtime.conversions import seconds_of
 from surveillance_runtime.node import PatrolNode, StartError
+from surveillance_runtime.place import PlaceError
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
-from surveillance_runtime.stamps import seconds_of
 from surveillance_simulation import conversions, simulator_parameters
 from surveillance_simulation.camera.mujoco_rendering import MujocoMissing
 from surveillance_simulation.feeds.camera_feed import CameraFeed
 from surveillance_simulation.feeds.fault_services import FaultServices
 from surveillance_simulation.feeds.sensor_feed import SensorFeed
-from surveillance_simulation.floor_plan import WorldError
 from surveillance_simulation.pace import Pace
 from surveillance_simulation.robot.arm_motion import TrajectoryError
 from surveillance_simulation.robot.robot import Robot
@@ -44,7 +44,7 @@ class Simulator(PatrolNode):
         pace = simulator_parameters.pace(self)
         try:
             world = World.from_parameters(simulator_parameters.place(self))
-        except WorldError as error:
+        except PlaceError as error:
             raise StartError(f'simulator: {error}') from None
         self.robot = Robot(
             world,

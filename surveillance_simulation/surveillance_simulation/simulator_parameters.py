@@ -7,8 +7,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from surveillance_runtime.field_parameters import Described, declare_fields
 from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.parameters import Described, declare_fields
 from surveillance_simulation.camera.model import Camera, Conditions
 from surveillance_simulation.pace import PaceModel
 from surveillance_simulation.robot.base import BaseModel

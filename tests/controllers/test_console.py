@@ -24,7 +24,7 @@ from surveillance_controllers.manual.terminal_lines import TerminalLines, WordCo
 from surveillance_controllers.planner_controller_node import PlannerController
 from surveillance_interfaces.action import ComputePath
 from surveillance_operator.console_node import ConsoleNode
-from surveillance_runtime.goal_calls import GoalCaller
+from surveillance_runtime.calls import GoalCaller
 from surveillance_runtime.qos import STATE_QOS
 
 

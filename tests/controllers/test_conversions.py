@@ -14,7 +14,7 @@ from sensor_msgs.msg import BatteryState, LaserScan, PointCloud2
 from surveillance_controllers import conversions
 from surveillance_controllers.battery.model import Battery, BatteryParameters
 from surveillance_controllers.motion.path_following import Velocity
-from surveillance_runtime.point_clouds import cloud_from_points, points_from_cloud
+from surveillance_runtime.conversions import cloud_from_points, points_from_cloud
 
 NUMBER = st.floats(-1e4, 1e4)
 YAW = st.floats(-3.1, 3.1)

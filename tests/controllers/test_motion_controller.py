@@ -12,8 +12,7 @@ from std_msgs.msg import String
 from surveillance_controllers.motion_controller_node import MotionController
 from surveillance_interfaces.action import Control, FollowPath
 from surveillance_interfaces.srv import ConsoleCommand
-from surveillance_runtime.calls import Interrupted, ServiceCaller
-from surveillance_runtime.goal_calls import GoalCaller
+from surveillance_runtime.calls import CallInterruptedError, GoalCaller, ServiceCaller
 from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.waiting import Interrupt
 
@@ -67,7 +66,7 @@ def test_a_move_can_be_cancelled_on_its_way(graph: Any, in_background: Any) -> N
     assert caller.call(ConsoleCommand.Request(line='move 60 0'), 5.0).accepted
     graph.until(lambda: len(seen) > 2)
     cancel.set()
-    with pytest.raises(Interrupted):
+    with pytest.raises(CallInterruptedError):
         end()
     assert caller.call(ConsoleCommand.Request(line='status'), 5.0).answer.startswith('No request')
 

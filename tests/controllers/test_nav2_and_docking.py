@@ -16,8 +16,7 @@ import pytest
 from surveillance_controllers.motion import docking
 from surveillance_controllers.motion import nav2 as nav2_motion
 from surveillance_controllers.motion.arrival import MotionFailed
-from surveillance_runtime.calls import Unavailable
-from surveillance_runtime.goal_calls import GoalEnd
+from surveillance_runtime.calls import GoalEnd, UnavailableError
 from surveillance_runtime.node import StartError
 from surveillance_runtime.waiting import Interrupt
 
@@ -98,7 +97,7 @@ def test_nav2_is_sent_to_the_path_s_end_facing_along_it(
     ('end', 'text'),
     [
         (GoalEnd('aborted', None), 'Nav2 aborted the goal'),
-        (Unavailable('action navigate_to_pose: no server'), 'navigate_to_pose: no server'),
+        (UnavailableError('action navigate_to_pose: no server'), 'navigate_to_pose: no server'),
     ],
 )
 def test_what_nav2_cannot_do_fails_with_the_reason(

@@ -12,8 +12,7 @@ from std_msgs.msg import String
 from surveillance_controllers.planner_controller_node import PlannerController
 from surveillance_interfaces.action import ComputePath
 from surveillance_interfaces.srv import ConsoleCommand
-from surveillance_runtime.calls import Interrupted, ServiceCaller
-from surveillance_runtime.goal_calls import GoalCaller
+from surveillance_runtime.calls import CallInterruptedError, GoalCaller, ServiceCaller
 from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.waiting import Interrupt
 
@@ -73,7 +72,7 @@ def test_a_goal_can_be_cancelled_while_it_waits_for_the_operator(
     end = in_background(lambda: compute(graph, interrupt=cancel))
     graph.until(lambda: told)
     cancel.set()
-    with pytest.raises(Interrupted):
+    with pytest.raises(CallInterruptedError):
         end()
     graph.until(lambda: told[-1].data.startswith('The request was withdrawn'))
 

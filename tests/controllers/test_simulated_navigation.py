@@ -21,8 +21,7 @@ from surveillance_interfaces.srv import PlaceObstacle, PushRobot, SetDoor
 from surveillance_ontology.armor_client import ArmorClient
 from surveillance_ontology.armor_server_node import ArmorServer
 from surveillance_ontology.ontology_map_builder_node import OntologyMapBuilder
-from surveillance_runtime.calls import Interrupted, ServiceCaller
-from surveillance_runtime.goal_calls import GoalCaller
+from surveillance_runtime.calls import CallInterruptedError, GoalCaller, ServiceCaller
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 from surveillance_runtime.waiting import Interrupt
 from surveillance_simulation.simulator_node import Simulator
@@ -177,7 +176,7 @@ def test_the_robot_drives_on_without_the_ontology(world: World) -> None:
 def test_a_drive_that_is_cancelled_leaves_the_robot_standing(world: World) -> None:
     path = world.compute((10.0, 8.0)).result.path
     cancel = Interrupt()
-    with pytest.raises(Interrupted):
+    with pytest.raises(CallInterruptedError):
         world.follow(path, interrupt=cancel, on_feedback=lambda _: cancel.set())
     seen = len(world.truth)
     world.graph.until(lambda: len(world.truth) > seen + 5)

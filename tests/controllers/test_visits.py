@@ -16,8 +16,7 @@ from surveillance_interfaces.srv import ConsoleCommand
 from surveillance_ontology.armor_client import ArmorClient
 from surveillance_ontology.armor_server_node import ArmorServer
 from surveillance_ontology.ontology_map_builder_node import OntologyMapBuilder
-from surveillance_runtime.calls import ServiceCaller
-from surveillance_runtime.goal_calls import GoalCaller
+from surveillance_runtime.calls import GoalCaller, ServiceCaller
 from surveillance_runtime.qos import STATE_QOS
 
 

@@ -25,7 +25,7 @@ from surveillance_fsm.ros import (
     set_preempt_handler,
 )
 from surveillance_interfaces.action import FollowPath
-from surveillance_runtime.goals import GoalAborted, GoalServer
+from surveillance_runtime.action_server import GoalAbortedError, GoalServer
 from surveillance_runtime.node import PatrolNode
 
 from .states import Answer, Background, Waiter, began
@@ -352,7 +352,7 @@ def test_an_action_gets_its_goal_from_userdata_and_gives_its_result_back(graph):
 
 def test_an_aborted_goal_aborts(graph):
     def execute(goal, run):
-        raise GoalAborted('no path')
+        raise GoalAbortedError('no path')
 
     server = graph.add(PatrolNode, name='server')
     GoalServer(server, FollowPath, 'follow_path', execute)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from launcher import commands
+from launcher import cli
 
-commands.RUNS = Path(sys.argv[1])
-commands._enter = lambda argv: None
-sys.exit(commands.main(sys.argv[2:]))
+cli.RUNS = Path(sys.argv[1])
+cli._enter = lambda argv: None
+sys.exit(cli.main(sys.argv[2:]))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 
-from launcher.log import MergedLog
+from launcher.log_merge import MergedLog
 from launcher.supervisor import Program, Supervisor
 
 seconds = float(os.environ['SECONDS_TO_RUN']) if 'SECONDS_TO_RUN' in os.environ else None

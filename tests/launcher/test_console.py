@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from launcher.console import completions, route
-from launcher.graph import NODES
+from launcher.node_table import NODES
 
 CONTROLLERS = [node for node in NODES if node.console]
 

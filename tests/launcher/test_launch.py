@@ -14,7 +14,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.time import Time
 from rosgraph_msgs.msg import Clock as ClockMessage
 
-from launcher.graph import select
+from launcher.node_table import select
 from tests.launcher.conftest import ROOT, Started, gone
 
 PROCESS = str(Path(__file__).with_name('mission_process.py'))

@@ -6,8 +6,8 @@ import ast
 
 import pytest
 
-from launcher.graph import BEHAVIOURS, DEFAULT_MODE, MODES, select
-from launcher.mission import PLACES
+from launcher.node_table import BEHAVIOURS, DEFAULT_MODE, MODES, select
+from launcher.run import PLACES
 from tests.launcher.conftest import ROOT
 
 SOURCE = ROOT / 'surveillance_behaviour' / 'launch' / 'surveillance.launch.py'

@@ -10,7 +10,7 @@ from typing import Any
 from geometry_msgs.msg import Point
 
 from surveillance_interfaces.action import ComputePath, Control, FollowPath, Plan
-from surveillance_runtime.goals import GoalAborted, GoalRun, GoalServer
+from surveillance_runtime.action_server import GoalAbortedError, GoalRun, GoalServer
 from surveillance_runtime.node import PatrolNode
 
 GOOD = 'good'
@@ -64,7 +64,7 @@ class ScriptedMotion(PatrolNode):
             turn = script.pop(0) if script else GOOD
         self.played.append(turn)
         if turn == ABORTED:
-            raise GoalAborted('aborted by script')
+            raise GoalAbortedError('aborted by script')
         if turn == SILENT:
             run.interrupt.wait(30.0)
         return turn

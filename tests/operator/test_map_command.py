@@ -10,9 +10,9 @@ from PIL import Image
 
 from surveillance_behaviour.mission.record import MissionRecord
 from surveillance_operator import map_command
-from surveillance_simulation.canvas import Canvas, blend
-from surveillance_simulation.place_file import read_world
-from surveillance_simulation.place_picture import draw_place
+from surveillance_runtime.place.canvas import Canvas, blend
+from surveillance_runtime.place.picture import draw_place
+from surveillance_simulation.world.world import read_world
 
 CONFIG = Path(__file__).parents[2] / 'config'
 
@@ -63,7 +63,7 @@ def test_a_run_is_drawn_with_its_waits(
     assert map_command.main([str(place), '--record', str(record), '-o', str(output)]) == 0
     line = f'{record}: 1 min 0 s of patrol · 2 visits · 8 m driven · 0 recharges'
     assert line in capsys.readouterr().out
-    plain = draw_place(read_world(place), 'x', 'y')
+    plain = draw_place(read_world(place).plan, 'x', 'y')
     with Image.open(output) as picture:
         assert picture.size[0] > plain.size[0]
 
@@ -121,10 +121,12 @@ def test_bad_input_is_one_line_and_exit_code_2(
 
 def test_closed_doors_and_obstacles_change_the_picture() -> None:
     world = read_world(CONFIG / 'seven_rooms.yaml')
-    before = np.asarray(draw_place(world, 'a', 'b'), dtype=int)
+    before = np.asarray(draw_place(world.plan, 'a', 'b'), dtype=int)
     world.set_door('D5', False)
     world.place_obstacle('box', 4.0, 8.0, 0.3)
-    after = np.asarray(draw_place(world, 'a', 'b'), dtype=int)
+    closed, discs = world.closed_doors, world.discs.tolist()
+    drawn = draw_place(world.plan, 'a', 'b', closed=closed, obstacles=discs)
+    after = np.asarray(drawn, dtype=int)
     rows, columns = np.nonzero(np.abs(after - before).sum(axis=2) > 60)
     assert len(rows) > 200
     # Only around the door and the obstacle.

@@ -17,8 +17,8 @@ from surveillance_ontology.armor_server_node import ArmorServer
 from surveillance_ontology.ontology_map_builder_node import OntologyMapBuilder
 from surveillance_operator import mission_feed
 from surveillance_operator.mission_view_node import MissionViewNode
+from surveillance_runtime.conversions import cloud_from_points
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.point_clouds import cloud_from_points
 from surveillance_runtime.qos import STATE_QOS
 
 PLACE = {

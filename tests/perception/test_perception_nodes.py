@@ -32,8 +32,7 @@ from surveillance_perception.testing.marker_scene import (
     image_of,
 )
 from surveillance_perception.video_source_node import VideoSource
-from surveillance_runtime.calls import Interrupted, ServiceCaller
-from surveillance_runtime.goal_calls import GoalCaller
+from surveillance_runtime.calls import CallInterruptedError, GoalCaller, ServiceCaller
 from surveillance_runtime.node import StartError
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
@@ -321,7 +320,7 @@ def test_scan_rests_at_each_view_and_can_be_cancelled(graph: Any) -> None:
     assert [view.resting for view in views] == [False, True] * end.result.views
     assert len([each for each in rests if each.data]) >= end.result.views
     interrupt = Interrupt()
-    with pytest.raises(Interrupted):
+    with pytest.raises(CallInterruptedError):
         scan.run(
             goal, accept_timeout=10.0, interrupt=interrupt, on_feedback=lambda _: interrupt.set()
         )

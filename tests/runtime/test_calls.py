@@ -10,9 +10,14 @@ from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
 from surveillance_interfaces.action import FollowPath
-from surveillance_runtime.calls import Interrupted, ServiceCaller, TimedOut, Unavailable
-from surveillance_runtime.goal_calls import GoalCaller
-from surveillance_runtime.goals import GoalAborted, GoalServer
+from surveillance_runtime.action_server import GoalAbortedError, GoalServer
+from surveillance_runtime.calls import (
+    CallInterruptedError,
+    CallTimeoutError,
+    GoalCaller,
+    ServiceCaller,
+    UnavailableError,
+)
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.waiting import ClockWait, Interrupt
 
@@ -57,7 +62,7 @@ def test_service_call_brings_the_answer(graph, server):
 
 
 def test_service_call_ends_without_a_server(graph):
-    with pytest.raises(Unavailable, match='service nowhere: no server'):
+    with pytest.raises(UnavailableError, match='service nowhere: no server'):
         ServiceCaller(graph.node, Trigger, 'nowhere').call(Trigger.Request(), timeout=0.05)
 
 
@@ -82,9 +87,9 @@ def test_service_call_ends_by_interrupt_and_by_deadline(graph, server):
     end = in_thread(lambda: caller.call(Trigger.Request(), 20.0, interrupt))
     assert asked.wait(5)
     interrupt.set()
-    with pytest.raises(Interrupted):
+    with pytest.raises(CallInterruptedError):
         end()
-    with pytest.raises(TimedOut):
+    with pytest.raises(CallTimeoutError):
         caller.call(Trigger.Request(), timeout=0.2)
 
 
@@ -94,7 +99,9 @@ def test_service_call_notices_that_its_server_went_away(graph, server):
     end = in_thread(lambda: caller.call(Trigger.Request(), 60.0))
     assert asked.wait(5)
     graph.drop(server)
-    with pytest.raises(Unavailable, match='service ask: the server went away before it answered'):
+    with pytest.raises(
+        UnavailableError, match='service ask: the server went away before it answered'
+    ):
         end()
 
 
@@ -106,13 +113,13 @@ def test_service_call_notices_that_another_server_took_the_place_of_one_that_was
     end = in_thread(lambda: caller.call(Trigger.Request(), 60.0))
     assert asked.wait(5)
     never_answers(graph.add(PatrolNode, name='restarted'))
-    with pytest.raises(Unavailable, match='service ask: another server took the place'):
+    with pytest.raises(UnavailableError, match='service ask: another server took the place'):
         end()
 
 
 def test_service_call_has_a_patience_of_its_own_for_finding_the_server(graph):
     caller = ServiceCaller(graph.node, Trigger, 'nowhere')
-    with pytest.raises(Unavailable, match='service nowhere: no server'):
+    with pytest.raises(UnavailableError, match='service nowhere: no server'):
         caller.call(Trigger.Request(), timeout=60.0, discovery=0.05)
 
 
@@ -143,7 +150,7 @@ def test_awaited_call_times_out(graph, server):
     async def relay(_request, response):
         try:
             await inner.call_async(Trigger.Request(), timeout=0.1)
-        except TimedOut as error:
+        except CallTimeoutError as error:
             seen.append(str(error))
         return response
 
@@ -169,7 +176,7 @@ def test_goal_succeeds_with_feedback(graph, server):
 
 def test_goal_aborts_with_its_result(graph, server):
     def execute(goal, run):
-        raise GoalAborted('blocked by D1', FollowPath.Result(position=Point(x=0.5)))
+        raise GoalAbortedError('blocked by D1', FollowPath.Result(position=Point(x=0.5)))
 
     GoalServer(server, FollowPath, 'follow_path', execute)
     end = GoalCaller(graph.node, FollowPath, 'follow_path').run(follow(1), accept_timeout=5.0)
@@ -206,7 +213,7 @@ def test_interrupt_cancels_the_goal_on_the_server(graph, server):
     end = in_thread(lambda: caller.run(follow(1), accept_timeout=5.0, interrupt=interrupt))
     graph.until(lambda: runs)
     interrupt.set()
-    with pytest.raises(Interrupted):
+    with pytest.raises(CallInterruptedError):
         end()
     # An interrupt before the server's yes has arrived cancels the goal once it has.
     graph.until(lambda: runs[0].cancelled)
@@ -215,7 +222,7 @@ def test_interrupt_cancels_the_goal_on_the_server(graph, server):
 def test_result_deadline_cancels_the_goal(graph, server):
     runs = waiting_server(server)
     caller = GoalCaller(graph.node, FollowPath, 'follow_path')
-    with pytest.raises(TimedOut):
+    with pytest.raises(CallTimeoutError):
         caller.run(follow(1), accept_timeout=5.0, result_timeout=0.1)
     assert runs[0].cancelled
 
@@ -233,7 +240,7 @@ def test_newer_goal_takes_the_place_of_the_running_one(graph, server):
     assert end_of_first().status == 'aborted'
     graph.until(lambda: len(runs) == 2)
     interrupt.set()
-    with pytest.raises(Interrupted):
+    with pytest.raises(CallInterruptedError):
         end_of_second()
 
 
@@ -243,13 +250,13 @@ def test_server_that_goes_away_in_the_middle_is_noticed(graph, server):
     end = in_thread(lambda: caller.run(follow(1), accept_timeout=5.0))
     graph.until(lambda: runs)
     graph.drop(server)
-    with pytest.raises(Unavailable, match='went away'):
+    with pytest.raises(UnavailableError, match='went away'):
         end()
     runs[0].interrupt.set()
 
 
 def test_no_action_server(graph):
-    with pytest.raises(Unavailable, match='action nowhere: no server'):
+    with pytest.raises(UnavailableError, match='action nowhere: no server'):
         GoalCaller(graph.node, FollowPath, 'nowhere').run(follow(1), accept_timeout=0.05)
 
 

@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from surveillance_interfaces.srv import SetMarker
-from surveillance_runtime.stamps import seconds_of
+from surveillance_runtime.conversions import seconds_of
+from surveillance_runtime.place import occupancy_grid
 from surveillance_simulation import conversions
 from surveillance_simulation.camera.model import Camera
 from surveillance_simulation.robot.lidar import LidarModel
-from surveillance_simulation.world import occupancy_grid
 
 from .places import two_rooms
 

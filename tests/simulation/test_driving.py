@@ -13,10 +13,9 @@ from surveillance_controllers.motion.pilot import Pilot
 from surveillance_controllers.motion.scans import Scan
 from surveillance_controllers.planning.grid_map import GridMap
 from surveillance_controllers.planning.grid_planning import GridPlanner, NoPath
-from surveillance_simulation.place_file import read_world
+from surveillance_runtime.place import occupancy_grid
 from surveillance_simulation.robot.robot import Robot
-from surveillance_simulation.world import occupancy_grid
-from surveillance_simulation.world.world import World
+from surveillance_simulation.world.world import World, read_world
 
 from .places import CONFIG
 

@@ -9,9 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from surveillance_simulation.place_file import read_world
 from surveillance_simulation.robot.lidar import LidarModel, scan
-from surveillance_simulation.world.world import World
+from surveillance_simulation.world.world import World, read_world
 
 from .places import CONFIG, two_rooms
 

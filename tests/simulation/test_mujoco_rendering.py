@@ -12,7 +12,7 @@ from surveillance_simulation.camera import mujoco_rendering
 from surveillance_simulation.camera.model import Camera, Conditions, camera_pose, expose
 from surveillance_simulation.camera.mujoco_rendering import MujocoMissing, MujocoRenderer
 from surveillance_simulation.camera.rendering import Renderer
-from surveillance_simulation.place_file import read_world
+from surveillance_simulation.world.world import read_world
 
 from .places import CONFIG, two_rooms
 

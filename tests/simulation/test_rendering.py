@@ -8,12 +8,11 @@ import cv2
 import numpy as np
 import pytest
 
+from surveillance_runtime.place.floor_plan import Marker
 from surveillance_simulation.camera.model import Camera, Conditions, camera_pose, expose
 from surveillance_simulation.camera.rendering import Renderer, render
-from surveillance_simulation.floor_plan import Marker
-from surveillance_simulation.place_file import read_world
 from surveillance_simulation.world import textures
-from surveillance_simulation.world.world import World
+from surveillance_simulation.world.world import World, read_world
 
 from .places import CONFIG, two_rooms
 

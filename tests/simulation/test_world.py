@@ -8,12 +8,11 @@ import random
 import numpy as np
 import pytest
 
+from surveillance_runtime.place import generation as place_generation
+from surveillance_runtime.place import occupancy_grid
+from surveillance_runtime.place.floor_plan import Marker, PlaceError
 from surveillance_runtime.yaml_file import YamlFileError
-from surveillance_simulation import place_generation
-from surveillance_simulation.floor_plan import Marker, WorldError
-from surveillance_simulation.place_file import read_world
-from surveillance_simulation.world import occupancy_grid
-from surveillance_simulation.world.world import World
+from surveillance_simulation.world.world import World, read_world
 
 from .places import CONFIG, changed, two_rooms
 
@@ -110,7 +109,7 @@ def test_every_change_counts_up_the_version() -> None:
     ],
 )
 def test_a_wrong_change_is_refused_in_one_line(change, message: str) -> None:
-    with pytest.raises(WorldError) as caught:
+    with pytest.raises(PlaceError) as caught:
         change(two_rooms())
     assert str(caught.value).startswith(message)
     assert '\n' not in str(caught.value)
@@ -153,7 +152,7 @@ def test_a_wrong_change_is_refused_in_one_line(change, message: str) -> None:
     ],
 )
 def test_a_wrong_place_is_refused_in_one_line(parameters: dict, message: str) -> None:
-    with pytest.raises(WorldError) as caught:
+    with pytest.raises(PlaceError) as caught:
         World.from_parameters(parameters)
     assert message in str(caught.value)
     assert '\n' not in str(caught.value)

@@ -10,7 +10,7 @@ from surveillance_behaviour.conversions import place_note_from
 from surveillance_behaviour.map_from_markers.survey import Survey, SurveyReport
 from surveillance_interfaces.msg import MarkerDetectionArray
 from surveillance_interfaces.srv import RoomInformation
-from surveillance_runtime.calls import CallFailed, ServiceCaller
+from surveillance_runtime.calls import CallError, ServiceCaller
 from surveillance_runtime.node import PatrolNode
 
 _ANSWER_SECONDS = 5.0
@@ -64,7 +64,7 @@ class MarkerInquiry:
         log = self._node.get_logger()
         try:
             answer = self._room_info.call(request, _ANSWER_SECONDS, self._node.stopping)
-        except CallFailed as error:
+        except CallError as error:
             # it is asked for again when it is seen again
             self._taken.discard(marker_id)
             if not self._node.stopping.is_set():

@@ -7,10 +7,9 @@ from typing import Any
 
 from surveillance_interfaces.action import ScanSurroundings
 from surveillance_interfaces.srv import MarkerRoutine
-from surveillance_runtime.calls import CallFailed, ServiceCaller
-from surveillance_runtime.goal_calls import GoalCaller
+from surveillance_runtime.calls import CallError, GoalCaller, ServiceCaller
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.rested_pictures import RestedPictures
+from surveillance_runtime.settled_frames import SettledFrames
 from surveillance_runtime.waiting import ClockWait, Interrupt
 
 _ARM_SECONDS = 30.0
@@ -32,7 +31,7 @@ class RosEyes:
         self._wait = ClockWait(node)
         self._move = ServiceCaller(node, MarkerRoutine, 'move_arm')
         self._scan = GoalCaller(node, ScanSurroundings, 'scan_surroundings', cancel_timeout=1.0)
-        self._read = RestedPictures(node)
+        self._read = SettledFrames(node)
 
     def pose(self, number: int) -> None:
         """Take one of the arm's poses and look."""
@@ -57,7 +56,7 @@ class RosEyes:
         watcher = self._node.spawn(lambda: _watch(view_changed, ended, done), 'scan watch')
         try:
             self._scan.run(goal, accept_timeout=_ARM_SECONDS, interrupt=ended, on_feedback=told)
-        except CallFailed as error:
+        except CallError as error:
             if not ended.is_set():
                 self._complain(str(error))
         finally:
@@ -70,7 +69,7 @@ class RosEyes:
         request = MarkerRoutine.Request(pos=number)
         try:
             answer = self._move.call(request, _ARM_SECONDS, self._node.stopping)
-        except CallFailed as error:
+        except CallError as error:
             self._complain(str(error))
             return False
         if not answer.success:

@@ -8,8 +8,13 @@ from typing import Any
 
 from surveillance_behaviour.peers.ports import AwayError, InterruptedWaitError, PeerError
 from surveillance_fsm import Interrupt
-from surveillance_runtime.calls import CallFailed, Interrupted, ServiceCaller, Unavailable
-from surveillance_runtime.goal_calls import GoalCaller
+from surveillance_runtime.calls import (
+    CallError,
+    CallInterruptedError,
+    GoalCaller,
+    ServiceCaller,
+    UnavailableError,
+)
 
 ASK_AGAIN = 10.0
 """How long one question to a service that takes long waits for its answer, seconds."""
@@ -38,9 +43,9 @@ def call(
     """
     try:
         return caller.call(request, deadline, interrupt, discovery=discovery)
-    except Interrupted:
+    except CallInterruptedError:
         raise InterruptedWaitError from None
-    except CallFailed as error:
+    except CallError as error:
         raise _peer_error(caller.name, error) from None
 
 
@@ -94,15 +99,15 @@ def run(
             interrupt=interrupt,
             on_feedback=on_feedback,
         )
-    except Interrupted:
+    except CallInterruptedError:
         raise InterruptedWaitError from None
-    except CallFailed as error:
+    except CallError as error:
         raise _peer_error(caller.name, error) from None
     if end.status != 'succeeded':
         raise PeerError(caller.name, f'the goal was {end.status}')
     return end.result
 
 
-def _peer_error(name: str, error: CallFailed) -> PeerError:
-    kind = AwayError if isinstance(error, Unavailable) else PeerError
+def _peer_error(name: str, error: CallError) -> PeerError:
+    kind = AwayError if isinstance(error, UnavailableError) else PeerError
     return kind(name, str(error).partition(f'{name}: ')[2] or str(error))

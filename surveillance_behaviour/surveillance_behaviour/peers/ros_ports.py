@@ -27,8 +27,7 @@ from surveillance_interfaces.action import ComputePath, Control, FollowPath, Pla
 from surveillance_interfaces.srv import Reason, ReferenceName, RoomPosition
 from surveillance_ontology.armor_client import RosTransport
 from surveillance_runtime import waiting
-from surveillance_runtime.calls import ServiceCaller
-from surveillance_runtime.goal_calls import GoalCaller
+from surveillance_runtime.calls import GoalCaller, ServiceCaller
 from surveillance_runtime.node import PatrolNode
 
 

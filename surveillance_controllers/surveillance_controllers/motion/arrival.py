@@ -7,7 +7,7 @@ import numpy as np
 from surveillance_controllers.geometry.polyline import Points
 from surveillance_controllers.manual import request_texts
 from surveillance_controllers.map_knowledge import MapKnowledge
-from surveillance_runtime.goals import GoalRun
+from surveillance_runtime.action_server import GoalRun
 
 
 class MotionFailed(Exception):

@@ -15,9 +15,8 @@ from surveillance_controllers import conversions
 from surveillance_controllers.geometry.polyline import Points
 from surveillance_controllers.geometry.poses import Pose
 from surveillance_controllers.motion.arrival import MotionFailed
-from surveillance_runtime.calls import CallFailed
-from surveillance_runtime.goal_calls import GoalCaller
-from surveillance_runtime.goals import GoalRun
+from surveillance_runtime.action_server import GoalRun
+from surveillance_runtime.calls import CallError, GoalCaller
 from surveillance_runtime.node import PatrolNode, StartError
 
 
@@ -127,7 +126,7 @@ class DockingMotion:
     ) -> None:
         try:
             end = caller.run(goal, accept_timeout=self._timeout, interrupt=run.interrupt)
-        except CallFailed as error:
+        except CallError as error:
             raise MotionFailed(f'{what}: {error}', at) from error
         if end.status != 'succeeded' or not end.result.success:
             code = '' if end.result is None else f' (error code {end.result.error_code})'

@@ -17,9 +17,8 @@ from surveillance_controllers.controller_parameters import MotionSettings
 from surveillance_controllers.geometry.polyline import Points
 from surveillance_controllers.map_knowledge import MapKnowledge
 from surveillance_controllers.motion.arrival import MotionFailed, nearest_place
-from surveillance_runtime.calls import CallFailed
-from surveillance_runtime.goal_calls import GoalCaller
-from surveillance_runtime.goals import GoalRun
+from surveillance_runtime.action_server import GoalRun
+from surveillance_runtime.calls import CallError, GoalCaller
 from surveillance_runtime.node import PatrolNode, StartError
 
 
@@ -89,7 +88,7 @@ class Nav2Motion:
                 interrupt=run.interrupt,
                 on_feedback=on_feedback,
             )
-        except CallFailed as error:
+        except CallError as error:
             raise MotionFailed(str(error), position) from error
         if end.status != 'succeeded':
             raise MotionFailed(f'Nav2 {end.status} the goal', position)

@@ -26,10 +26,9 @@ from surveillance_controllers.motion.pilot import Pilot
 from surveillance_controllers.motion.tf_correction import TfCorrection
 from surveillance_controllers.planning.grid_planning import NoPath
 from surveillance_interfaces.msg import DoorStates
+from surveillance_runtime.conversions import cloud_from_points, seconds_of
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.point_clouds import cloud_from_points
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
-from surveillance_runtime.stamps import seconds_of
 from surveillance_runtime.waiting import Interrupt
 
 POSE_PERIOD = 0.19

@@ -13,9 +13,8 @@ from surveillance_controllers.geometry.poses import Pose
 from surveillance_controllers.motion.path_following import DriveParameters
 from surveillance_controllers.motion.place_regions import Segment, door_segment
 from surveillance_controllers.planning.grid_planning import PlanningParameters
-from surveillance_runtime.field_parameters import Described, declare_fields
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.parameters import ParameterError
+from surveillance_runtime.parameters import Described, ParameterError, declare_fields
 
 _RADIUS = 'SIMULATED: Radius of the robot, m.'
 _PLANNING = {

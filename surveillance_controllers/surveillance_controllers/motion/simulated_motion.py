@@ -19,9 +19,8 @@ from surveillance_controllers.motion.robot_base import RobotBase, RobotSilent
 from surveillance_controllers.motion.robot_parameters import RobotSettings
 from surveillance_controllers.planning.grid_planning import NoPath
 from surveillance_interfaces.action import ComputePath
-from surveillance_runtime.calls import CallFailed
-from surveillance_runtime.goal_calls import GoalCaller
-from surveillance_runtime.goals import GoalRun
+from surveillance_runtime.action_server import GoalRun
+from surveillance_runtime.calls import CallError, GoalCaller
 from surveillance_runtime.node import PatrolNode
 
 
@@ -121,7 +120,7 @@ class SimulatedMotion:
                 result_timeout=self._wait_for_peer,
                 interrupt=run.interrupt,
             )
-        except CallFailed as error:
+        except CallError as error:
             raise NoPath(str(error)) from error
         if end.status != 'succeeded':
             raise NoPath('the planner finds no other path')

@@ -12,7 +12,7 @@ from surveillance_controllers.geometry.polyline import Points
 
 
 class Pace(Protocol):
-    """Time as a goal's run gives it: `surveillance_runtime.goals.GoalRun` is one."""
+    """Time as a goal's run gives it: `surveillance_runtime.action_server.GoalRun` is one."""
 
     def now(self) -> float:
         """The time in seconds."""

@@ -13,7 +13,7 @@ from surveillance_controllers.map_knowledge import KnowledgeError, MapKnowledge
 from surveillance_controllers.motion.place_regions import Segment
 from surveillance_interfaces.msg import DoorStates
 from surveillance_interfaces.srv import SetDoor
-from surveillance_runtime.calls import CallFailed, ServiceCaller
+from surveillance_runtime.calls import CallError, ServiceCaller
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.waiting import Interrupt
@@ -96,7 +96,7 @@ class DoorWatch:
             self._knowledge.connect(self._node.stopping)
             for door in sorted(self._contacts ^ self._told):
                 self._tell(door, is_open=door not in self._contacts)
-        except (KnowledgeError, CallFailed):
+        except (KnowledgeError, CallError):
             return False
         return True
 

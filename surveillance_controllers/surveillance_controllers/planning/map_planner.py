@@ -17,8 +17,8 @@ from surveillance_controllers.geometry.polyline import Points
 from surveillance_controllers.geometry.poses import Pose
 from surveillance_controllers.planning.door_watch import DoorWatch
 from surveillance_controllers.planning.grid_planning import GridPlanner, NoPath, PlanningParameters
+from surveillance_runtime.conversions import points_from_cloud
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.point_clouds import points_from_cloud
 from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.waiting import Interrupt
 

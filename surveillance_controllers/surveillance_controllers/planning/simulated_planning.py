@@ -11,7 +11,7 @@ from surveillance_controllers.planning.door_watch import DoorWatch
 from surveillance_controllers.planning.grid_planning import NoPath
 from surveillance_controllers.planning.map_planner import MapPlanner
 from surveillance_controllers.planning.route_planning import NoRoute, route
-from surveillance_runtime.goals import GoalAborted, GoalRun
+from surveillance_runtime.action_server import GoalAbortedError, GoalRun
 from surveillance_runtime.node import PatrolNode
 
 
@@ -35,7 +35,7 @@ class SimulatedPlanning:
         """Where the robot is, shape (3,), once there is a route over doors from there to a place.
 
         Raises:
-            GoalAborted: There is no route.
+            GoalAbortedError: There is no route.
             KnowledgeError: Map or ontology do not answer.
         """
         place = self._knowledge.robot_place(run.interrupt)
@@ -44,7 +44,7 @@ class SimulatedPlanning:
         try:
             doors = route(rooms_of, self._doors.closed(rooms_of), place, target, positions)
         except NoRoute as error:
-            raise GoalAborted(str(error)) from error
+            raise GoalAbortedError(str(error)) from error
         self._node.get_logger().info(
             f'{place} to {target}: through {", ".join(doors) or "no door"}'
         )
@@ -55,9 +55,9 @@ class SimulatedPlanning:
         """The path between two points, shape (n, 3).
 
         Raises:
-            GoalAborted: There is none; the text says what blocks it.
+            GoalAbortedError: There is none; the text says what blocks it.
         """
         try:
             return self._map.plan(start, goal, self._timeout, run.interrupt)
         except NoPath as error:
-            raise GoalAborted(f'{what}: {error}') from error
+            raise GoalAbortedError(f'{what}: {error}') from error

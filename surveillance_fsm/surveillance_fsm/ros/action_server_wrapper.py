@@ -9,7 +9,7 @@ from typing import Any
 import surveillance_fsm as fsm
 from surveillance_fsm.active import ActiveContainer
 from surveillance_fsm.container import describe
-from surveillance_runtime.goals import GoalAborted, GoalRun, GoalServer
+from surveillance_runtime.action_server import GoalAbortedError, GoalRun, GoalServer
 from surveillance_runtime.node import PatrolNode
 
 
@@ -121,7 +121,7 @@ class ActionServerWrapper:
         try:
             outcome = container.execute(userdata)
         except fsm.SmachError as error:
-            raise GoalAborted(describe(error)) from error
+            raise GoalAbortedError(describe(error)) from error
         finally:
             remove()
             self._run = None
@@ -131,7 +131,7 @@ class ActionServerWrapper:
             return result
         if outcome in self._preempted and run.interrupt.is_set():
             return result
-        raise GoalAborted(f"'{container.get_name()}' ended with '{outcome}'", result)
+        raise GoalAbortedError(f"'{container.get_name()}' ended with '{outcome}'", result)
 
     def _result(self) -> Any:
         result = copy.copy(self.userdata[self._result_key])

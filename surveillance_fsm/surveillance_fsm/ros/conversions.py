@@ -16,7 +16,7 @@ from surveillance_interfaces.msg import (
     FsmStructure,
     FsmTransition,
 )
-from surveillance_runtime.stamps import seconds_of
+from surveillance_runtime.conversions import seconds_of
 
 
 def transition_message(transition: Transition, active: list[str], stamp: Any) -> FsmTransition:

@@ -15,7 +15,7 @@ from surveillance_fsm.ros.exchange import (
     UserCallback,
     seconds,
 )
-from surveillance_runtime.calls import CallFailed, Interrupted, ServiceCaller
+from surveillance_runtime.calls import CallError, CallInterruptedError, ServiceCaller
 
 
 class ServiceState(fsm.State):
@@ -101,9 +101,9 @@ class ServiceState(fsm.State):
             request = self._request.make(ud)
             response = self._caller.call(request, self._timeout, self.interrupt)
             return self._response.take(ud, self, response) or 'succeeded'
-        except Interrupted:
+        except CallInterruptedError:
             self.service_preempt()
             return 'preempted'
-        except (CallFailed, ExchangeError) as error:
+        except (CallError, ExchangeError) as error:
             fsm.logerr(f"Service '{self._caller.name}': {error}")
             return 'aborted'

@@ -17,8 +17,7 @@ from surveillance_fsm.ros.exchange import (
     seconds,
 )
 from surveillance_fsm.ros.pulse import ExecutorPulse
-from surveillance_runtime.calls import CallFailed, Interrupted
-from surveillance_runtime.goal_calls import GoalCaller
+from surveillance_runtime.calls import CallError, CallInterruptedError, GoalCaller
 
 _STATUS = {
     'succeeded': GoalStatus.STATUS_SUCCEEDED,
@@ -141,13 +140,13 @@ class SimpleActionState(fsm.State):
                 fsm.logerr(f"Action '{self._caller.name}': the server rejected the goal")
                 return 'aborted'
             outcome = self._result.take(ud, self, _STATUS[end.status], end.result)
-        except Interrupted:
+        except CallInterruptedError:
             if not self.preempt_requested():
                 fsm.logerr(f"Action '{self._caller.name}': the node's executor does not spin")
                 return 'aborted'
             self.service_preempt()
             return 'preempted'
-        except (CallFailed, ExchangeError) as error:
+        except (CallError, ExchangeError) as error:
             fsm.logerr(f"Action '{self._caller.name}': {error}")
             return 'aborted'
         if self.preempt_requested():

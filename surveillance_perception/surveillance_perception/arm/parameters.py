@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from surveillance_runtime.field_parameters import Described, declare_fields
 from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.parameters import Described, declare_fields
 from surveillance_runtime.robot_arm import Arm, Array
 
 _SCAN = {

@@ -10,8 +10,8 @@ from typing import Any
 from surveillance_perception.detection.detector import DetectorSettings, MarkerDetector
 from surveillance_perception.detection.dictionaries import DICTIONARY_NAMES
 from surveillance_perception.detection.marker_stream import StreamSettings, sizes_from
-from surveillance_runtime.field_parameters import Described, declare_fields
 from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.parameters import Described, declare_fields
 
 
 @dataclass(frozen=True)

@@ -13,10 +13,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from surveillance_runtime.place import boxes
+from surveillance_runtime.place.floor_plan import WALL_HEIGHT, WALL_THICKNESS, Door
 from surveillance_simulation.camera.model import Array, Camera
 from surveillance_simulation.camera.scene import DOOR_HEIGHT, OBSTACLE_HEIGHT, STATION_SIDE
-from surveillance_simulation.floor_plan import WALL_HEIGHT, WALL_THICKNESS, Door
-from surveillance_simulation.world import boxes, textures
+from surveillance_simulation.world import textures
 from surveillance_simulation.world.textures import Texture
 from surveillance_simulation.world.world import Panel, World
 

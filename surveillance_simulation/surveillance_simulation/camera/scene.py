@@ -9,9 +9,10 @@ from itertools import pairwise
 
 import numpy as np
 
+from surveillance_runtime.place import boxes
+from surveillance_runtime.place.floor_plan import WALL_HEIGHT, WALL_THICKNESS, Door
 from surveillance_simulation.camera.model import Array
-from surveillance_simulation.floor_plan import WALL_HEIGHT, WALL_THICKNESS, Door
-from surveillance_simulation.world import boxes, textures
+from surveillance_simulation.world import textures
 from surveillance_simulation.world.textures import TILE, Texture
 from surveillance_simulation.world.world import Obstacle, Panel, World
 

@@ -19,8 +19,8 @@ from surveillance_interfaces.srv import (
     SetMarker,
     SlipOdometry,
 )
+from surveillance_runtime.place import PlaceError
 from surveillance_simulation import conversions
-from surveillance_simulation.floor_plan import WorldError
 from surveillance_simulation.robot.robot import Robot
 from surveillance_simulation.world.textures import TextureError, marker_panel
 
@@ -65,7 +65,7 @@ class FaultServices:
                 with self._changing:
                     response.message = change(request)
                 response.success = True
-            except (WorldError, TextureError) as error:
+            except (PlaceError, TextureError) as error:
                 response.success, response.message = False, str(error)
             self._node.get_logger().info(response.message)
             if response.success:
@@ -98,7 +98,7 @@ class FaultServices:
 
     def _drain_battery(self, request: DrainBattery.Request) -> str:
         if not 0.0 <= request.percent <= 100.0:
-            raise WorldError(f'percent {request.percent:g}: expected 0 to 100')
+            raise PlaceError((), f'percent {request.percent:g}: expected 0 to 100')
         self._drained.publish(Float32(data=float(request.percent)))
         return f'battery drained by {request.percent:g} percent'
 
@@ -118,4 +118,4 @@ class FaultServices:
 
 def _check_finite(*numbers: float) -> None:
     if not all(map(math.isfinite, numbers)):
-        raise WorldError(f'expected finite numbers, got {", ".join(map(str, numbers))}')
+        raise PlaceError((), f'expected finite numbers, got {", ".join(map(str, numbers))}')

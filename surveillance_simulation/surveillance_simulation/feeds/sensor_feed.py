@@ -12,11 +12,11 @@ from std_msgs.msg import UInt32
 
 from surveillance_interfaces.msg import DoorStates
 from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.place import occupancy_grid
 from surveillance_runtime.qos import STATE_QOS
 from surveillance_simulation import conversions, simulator_parameters
 from surveillance_simulation.feeds.tf_feed import TfFeed
 from surveillance_simulation.robot.robot import Robot
-from surveillance_simulation.world import occupancy_grid
 
 SENSOR_DEPTH = 5
 """Sensors offer reliable delivery, so that subscribers of either kind are served (REP-2003)."""

@@ -10,8 +10,8 @@ from typing import Any
 from builtin_interfaces.msg import Time
 
 from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.place.floor_plan import Pose
 from surveillance_simulation import conversions
-from surveillance_simulation.floor_plan import Pose
 
 try:
     from tf2_msgs.msg import TFMessage

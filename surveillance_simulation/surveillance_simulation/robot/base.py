@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from surveillance_simulation.floor_plan import Pose
+from surveillance_runtime.place.floor_plan import Pose
 from surveillance_simulation.world.world import World
 
 _CONTACT = 1e-3

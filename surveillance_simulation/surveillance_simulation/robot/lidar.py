@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from surveillance_simulation.floor_plan import Pose
-from surveillance_simulation.world import boxes
+from surveillance_runtime.place import boxes
+from surveillance_runtime.place.floor_plan import Pose
 from surveillance_simulation.world.world import World
 
 _PARALLEL = 1e-12

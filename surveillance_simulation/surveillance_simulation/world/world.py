@@ -9,19 +9,19 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from surveillance_simulation.floor_plan import (
+from surveillance_runtime.place import PlaceError, boxes
+from surveillance_runtime.place.floor_plan import (
     WALL_THICKNESS,
     FloorPlan,
     Marker,
-    WorldError,
 )
-from surveillance_simulation.world import boxes
-from surveillance_simulation.world.occupancy_grid import FREE, Grid, regions
+from surveillance_runtime.place.regions import Regions
+from surveillance_runtime.yaml_file import read_parameter_file
 
 MARKER_STATES = ('whole', 'broken', 'covered')
 
@@ -54,6 +54,7 @@ class World:
 
     Attributes:
         plan: The place's unchanging geometry.
+        regions: Which room a point of it lies in.
         version: Counts the changes; whoever caches something drawn from the world compares it.
     """
 
@@ -61,7 +62,7 @@ class World:
         """Start with every door open and no obstacles.
 
         Raises:
-            WorldError: The walls do not fit the map: two places are one room, a door does not touch
+            PlaceError: The walls do not fit the map: two places are one room, a door does not touch
                 the place it leads into, or a position lies in a wall.
         """
         self.plan = plan
@@ -70,10 +71,7 @@ class World:
         self._obstacles: dict[str, Obstacle] = {}
         self._panels = {name: Panel(marker) for name, marker in plan.markers.items()}
         self._walls = boxes.boxes_around(plan.wall_pieces(), WALL_THICKNESS)
-        self._grid, self._labels = regions(plan)
-        self._places = self._seeded()
-        self._check_doors()
-        self._check_station()
+        self.regions = Regions(plan)
         self._refresh()
 
     @classmethod
@@ -84,7 +82,7 @@ class World:
             parameters: The mapping below `ros__parameters` in the place's file.
 
         Raises:
-            WorldError: The parameters describe no sound place.
+            PlaceError: The parameters describe no sound place.
         """
         return cls(FloorPlan.from_parameters(parameters))
 
@@ -117,7 +115,7 @@ class World:
         """Tell whether a door is open.
 
         Raises:
-            WorldError: There is no such door.
+            PlaceError: There is no such door.
         """
         self._known(door, self.plan.doors, 'door')
         return door not in self._closed
@@ -126,7 +124,7 @@ class World:
         """Open or close a door.
 
         Raises:
-            WorldError: There is no such door.
+            PlaceError: There is no such door.
         """
         self._known(door, self.plan.doors, 'door')
         if is_open:
@@ -139,14 +137,16 @@ class World:
         """Put a cylinder into the place, or move the one of this name.
 
         Raises:
-            WorldError: A number is not finite, or the radius is not between 1 cm and 5 m.
+            PlaceError: A number is not finite, or the radius is not between 1 cm and 5 m.
         """
         if not name:
-            raise WorldError("obstacle '': expected a name")
+            raise PlaceError((), "obstacle '': expected a name")
         if not (math.isfinite(x) and math.isfinite(y)):
-            raise WorldError(f"obstacle '{name}' at ({x:g}, {y:g}): expected two numbers in metres")
+            raise PlaceError(
+                (), f"obstacle '{name}' at ({x:g}, {y:g}): expected two numbers in metres"
+            )
         if not 0.01 <= radius <= 5.0:
-            raise WorldError(f"obstacle '{name}': radius {radius:g} m: expected 0.01 to 5 m")
+            raise PlaceError((), f"obstacle '{name}': radius {radius:g} m: expected 0.01 to 5 m")
         self._obstacles[name] = Obstacle(name, x, y, radius)
         self._refresh()
 
@@ -154,7 +154,7 @@ class World:
         """Take an obstacle away.
 
         Raises:
-            WorldError: There is no such obstacle.
+            PlaceError: There is no such obstacle.
         """
         self._known(name, self._obstacles, 'obstacle')
         del self._obstacles[name]
@@ -164,11 +164,13 @@ class World:
         """Make a marker whole, break or cover it.
 
         Raises:
-            WorldError: There is no such marker or state.
+            PlaceError: There is no such marker or state.
         """
         self._known(name, self._panels, 'marker')
         if state not in MARKER_STATES:
-            raise WorldError(f"marker state '{state}': expected one of {', '.join(MARKER_STATES)}")
+            raise PlaceError(
+                (), f"marker state '{state}': expected one of {', '.join(MARKER_STATES)}"
+            )
         self._panels[name] = replace(self._panels[name], state=state)
         self.version += 1
 
@@ -176,12 +178,13 @@ class World:
         """Hang a marker up, or move the one of this name; it is whole.
 
         Raises:
-            WorldError: A number is not finite, the id is negative or the size not positive.
+            PlaceError: A number is not finite, the id is negative or the size not positive.
         """
         numbers = (marker.x, marker.y, marker.z, marker.yaw, marker.size)
         if not all(map(math.isfinite, numbers)) or marker.size <= 0 or marker.id < 0:
-            raise WorldError(
-                f"marker '{marker.name}': {marker}: expected finite numbers, id >= 0 and size > 0"
+            raise PlaceError(
+                (),
+                f"marker '{marker.name}': {marker}: expected finite numbers, id >= 0 and size > 0",
             )
         self._panels[marker.name] = Panel(marker)
         self.version += 1
@@ -200,66 +203,7 @@ class World:
 
     def place_at(self, x: float, y: float) -> str | None:
         """Return the place that a point (metres) lies in, None outside of every place."""
-        row, column = self._grid.cell_of(x, y)
-        if not self._grid.contains(row, column):
-            return None
-        return self._places.get(int(self._labels[row, column]))
-
-    def regions(self) -> tuple[Grid, dict[str, npt.NDArray[np.bool_]]]:
-        """Return the grid with every door closed, and on it the cells (rows, columns) per place."""
-        masks = {name: self._labels == label for label, name in self._places.items()}
-        return self._grid, masks
-
-    def _seeded(self) -> dict[int, str]:
-        places: dict[int, str] = {}
-        outside = int(self._labels[0, 0])
-        for place, (x, y, _) in self.plan.place.positions.items():
-            where = ('room_positions', place)
-            row, column = self._grid.cell_of(x, y)
-            inside = self._grid.contains(row, column)
-            label = int(self._labels[row, column]) if inside else outside
-            if label == outside:
-                raise WorldError(f'({x:g}, {y:g}) lies outside: expected walls all around', *where)
-            if self._grid.cells[row, column] != FREE:
-                raise WorldError(
-                    f'({x:g}, {y:g}) lies in a wall or a door: expected free space', *where
-                )
-            if label in places:
-                raise WorldError(
-                    f"'{place}' and '{places[label]}' are one room: "
-                    f'expected a wall between their positions',
-                    *where,
-                )
-            places[label] = place
-        return places
-
-    def _check_doors(self) -> None:
-        for place, doors in self.plan.place.rooms.items():
-            for name in doors:
-                door = self.plan.doors[name]
-                across = (-math.sin(door.yaw), math.cos(door.yaw))
-                sides = {
-                    self.place_at(door.x + step * across[0], door.y + step * across[1])
-                    for step in (-WALL_THICKNESS, WALL_THICKNESS)
-                }
-                if place not in sides:
-                    found = ' and '.join(sorted(side or 'outside' for side in sides))
-                    raise WorldError(
-                        f"stands between {found}: expected it at '{place}', as the map says",
-                        'doors',
-                        name,
-                    )
-
-    def _check_station(self) -> None:
-        x, y, _ = self.plan.station
-        place = self.place_at(x, y)
-        allowed = self.plan.place.recharge_rooms or tuple(self.plan.place.rooms)
-        if place not in allowed:
-            raise WorldError(
-                f'({x:g}, {y:g}) lies in {place or "no place"}: '
-                f'expected a point in {" or ".join(allowed)}',
-                'station',
-            )
+        return self.regions.room_at(x, y)
 
     def _refresh(self) -> None:
         panels = boxes.boxes_around(
@@ -275,4 +219,17 @@ class World:
     def _known(name: str, names: Mapping[str, object], kind: str) -> None:
         if name not in names:
             known = ', '.join(names) or 'none'
-            raise WorldError(f"there is no {kind} '{name}': expected one of {known}")
+            raise PlaceError((), f"there is no {kind} '{name}': expected one of {known}")
+
+
+def read_world(path: str | Path) -> World:
+    """Return the world that a place's file describes.
+
+    Raises:
+        YamlFileError: The file cannot be read, or describes no sound place; one line.
+    """
+    file = read_parameter_file(path)
+    try:
+        return World.from_parameters(file.values)
+    except PlaceError as error:
+        raise file.error(error.where, error.problem) from None

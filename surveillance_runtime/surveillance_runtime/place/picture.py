@@ -1,23 +1,23 @@
 """A place as a picture: its rooms, walls, doors, markers and graph, and a run through it.
 
-The picture is drawn from the world alone; what a run added (the driven ways, how long each place
-waited) comes as `Run`.
+The picture is drawn from the floor plan alone; what a run added (the driven ways, how long each
+place waited) comes as `Run`.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
 from PIL import Image
 
-from surveillance_simulation.canvas import Canvas, blend
-from surveillance_simulation.floor_plan import WALL_THICKNESS, Door, Marker
-from surveillance_simulation.world import boxes
-from surveillance_simulation.world.world import World
+from surveillance_runtime.place import boxes
+from surveillance_runtime.place.canvas import Canvas, blend
+from surveillance_runtime.place.floor_plan import WALL_THICKNESS, Door, FloorPlan, Marker
+from surveillance_runtime.place.regions import Regions
 
 _PAPER, _INK, _SOFT = '#fbfaf7', '#2f3742', '#7d8794'
 _ROOM, _CORRIDOR, _HOME = '#f6ecd9', '#e3ebf3', '#dff0dc'
@@ -45,31 +45,42 @@ class Run:
     summary: str = ''
 
 
-def draw_place(world: World, title: str, facts: str, run: Run | None = None) -> Image.Image:
+def draw_place(
+    plan: FloorPlan,
+    title: str,
+    facts: str,
+    run: Run | None = None,
+    *,
+    closed: Collection[str] = (),
+    obstacles: Iterable[Sequence[float]] = (),
+) -> Image.Image:
     """Return the picture of a place.
 
     Args:
-        world: The place; closed doors and obstacles are drawn as they are now.
+        plan: The place.
         title: Its name.
         facts: One line about it.
         run: A run through it, if there was one.
+        closed: Names of the doors drawn closed.
+        obstacles: x, y and radius of each, metres.
     """
-    west, south, east, north = world.plan.bounds
+    west, south, east, north = plan.bounds
     scale = min(64.0, _LONGEST_SIDE / max(east - west, north - south))
     right = _PANEL + 50 if run and run.waits else 40
     # Wide enough for the words above and the signs below, however small the place is.
     right += max(0, math.ceil(560 - (east - west) * scale))
-    canvas = Canvas(world.plan.bounds, scale, (40, 96, right, 86), _PAPER)
+    canvas = Canvas(plan.bounds, scale, (40, 96, right, 86), _PAPER)
     canvas.text((40, 22), title, 26, _INK)
     canvas.text((40, 58), facts if run is None else run.summary, 15, _SOFT)
-    picture = _Picture(canvas, world)
+    picture = _Picture(canvas, plan)
     picture.floors(run)
     if run is None:
         picture.graph()
     picture.walls()
-    picture.doors()
+    picture.doors(closed)
     picture.markers()
-    picture.obstacles()
+    for x, y, radius in obstacles:
+        canvas.disc((x, y), radius * scale, _CLOSED)
     if run is not None:
         canvas.traces(run.driven, _DRIVEN, max(1.5, scale / 26), 0.34)
     picture.station()
@@ -81,15 +92,15 @@ def draw_place(world: World, title: str, facts: str, run: Run | None = None) -> 
 
 
 class _Picture:
-    def __init__(self, canvas: Canvas, world: World) -> None:
+    def __init__(self, canvas: Canvas, plan: FloorPlan) -> None:
         self._canvas = canvas
-        self._world = world
-        self._plan = world.plan
-        self._place = world.plan.place
+        self._regions = Regions(plan)
+        self._plan = plan
+        self._place = plan.place
         self._size = min(15.0, max(9.0, canvas.scale / 3.4))
 
     def floors(self, run: Run | None) -> None:
-        grid, masks = self._world.regions()
+        grid, masks = self._regions.grid, self._regions.masks()
         longest = max(run.waits.values(), default=0.0) if run else 0.0
         for name, mask in masks.items():
             colour = self._floor_colour(name)
@@ -129,11 +140,11 @@ class _Picture:
                 corner = np.array([[*end, 1.0, 0.0, half, half]])
                 self._canvas.polygon(boxes.corners(corner)[0].tolist(), _WALL)
 
-    def doors(self) -> None:
+    def doors(self, closed: Collection[str]) -> None:
         for door in self._plan.doors.values():
             thin = max(1.0, self._canvas.scale / 40)
             first, last = door.ends
-            if not self._world.is_open(door.name):
+            if door.name in closed:
                 self._canvas.line([first, last], _CLOSED, thin * 3)
             else:
                 start = door.yaw + (0.0 if self._swings_left(door) else -math.pi / 2)
@@ -158,7 +169,7 @@ class _Picture:
     def _swings_left(self, door: Door) -> bool:
         """Whether the leaf opens to the left of the door's direction: into the smaller place."""
         left, right = (
-            self._world.place_at(
+            self._regions.room_at(
                 door.x - side * 0.2 * math.sin(door.yaw), door.y + side * 0.2 * math.cos(door.yaw)
             )
             for side in (1.0, -1.0)
@@ -177,8 +188,8 @@ class _Picture:
             self._canvas.line(way, _GRAPH, max(1.2, self._canvas.scale / 30), dash=(6, 4))
 
     def markers(self) -> None:
-        for panel in self._world.panels.values():
-            self._marker(panel.marker)
+        for marker in self._plan.markers.values():
+            self._marker(marker)
 
     def _marker(self, marker: Marker) -> None:
         side = max(4.0, self._canvas.scale * 0.09)
@@ -190,11 +201,6 @@ class _Picture:
         away = side + self._size * 0.9
         at = (x + away * math.cos(marker.yaw), y - away * math.sin(marker.yaw))
         self._canvas.text(at, str(marker.id), self._size * 0.8, _INK, anchor='mm')
-
-    def obstacles(self) -> None:
-        for obstacle in self._world.obstacles.values():
-            radius = obstacle.radius * self._canvas.scale
-            self._canvas.disc((obstacle.x, obstacle.y), radius, _CLOSED)
 
     def station(self) -> None:
         x, y, _ = self._plan.station
@@ -240,7 +246,7 @@ class _Picture:
         elif run.driven:
             self._stroke(x, y, _DRIVEN, dashed=False)
             x += self._word(x + 28, y, 'driven') + 46
-        if self._world.panels:
+        if self._plan.markers:
             canvas.box(x, y - 6, x + 12, y + 6, _INK)
             canvas.box(x + 3.5, y - 2.5, x + 8.5, y + 2.5, _PAPER)
             self._word(x + 20, y, 'marker')

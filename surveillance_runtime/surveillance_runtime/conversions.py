@@ -1,10 +1,16 @@
-"""Points in the plane as sensor_msgs/PointCloud2 and back."""
+"""Conversions of messages that several packages use: time stamps, points in the plane."""
 
 from __future__ import annotations
 
 import numpy as np
+from builtin_interfaces.msg import Duration, Time
 from numpy.typing import NDArray
 from sensor_msgs.msg import PointCloud2, PointField
+
+
+def seconds_of(stamp: Time | Duration) -> float:
+    """Return a stamp as seconds since the clock's start, or a duration in seconds."""
+    return float(stamp.sec + stamp.nanosec / 1e9)
 
 
 def cloud_from_points(points: NDArray[np.float64]) -> PointCloud2:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from launcher.log import MergedLog
+from launcher.log_merge import MergedLog
 
 
 @pytest.fixture

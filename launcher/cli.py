@@ -11,12 +11,12 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
-from launcher import graph, system
-from launcher.claims import claim
+from launcher import node_table, system
 from launcher.environment import CHECKOUT, Environment, SetupError, clean_environ
+from launcher.instance_lock import claim
 
 if TYPE_CHECKING:
-    from launcher.mission import Run
+    from launcher.run import Run
 
 CONFIG = CHECKOUT / 'config'
 RUNS = CHECKOUT / 'runs'
@@ -82,17 +82,17 @@ def _shared_options() -> argparse.ArgumentParser:
     parser = Parser(add_help=False)
     parser.add_argument(
         '--mode',
-        choices=graph.MODES,
+        choices=node_table.MODES,
         type=str.upper,
-        metavar='|'.join(graph.MODES),
+        metavar='|'.join(node_table.MODES),
         help='what stands in for the hardware: a simulated place, chance, or you at the console '
-        f'(default: {graph.DEFAULT_MODE})',
+        f'(default: {node_table.DEFAULT_MODE})',
     )
     parser.add_argument(
         '--behaviour',
-        choices=graph.BEHAVIOURS,
+        choices=node_table.BEHAVIOURS,
         default='surveillance',
-        metavar='|'.join(graph.BEHAVIOURS),
+        metavar='|'.join(node_table.BEHAVIOURS),
         help='surveillance knows its map, patrol learns it from markers (default: surveillance)',
     )
     parser.add_argument(
@@ -109,9 +109,9 @@ def _shared_options() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         '--log-level',
-        choices=graph.LOG_LEVELS,
+        choices=node_table.LOG_LEVELS,
         type=str.lower,
-        metavar='|'.join(graph.LOG_LEVELS),
+        metavar='|'.join(node_table.LOG_LEVELS),
         help='the least severity that the nodes print (default: info)',
     )
     parser.add_argument(
@@ -225,16 +225,16 @@ def _dispatch(argv: list[str]) -> int:
 
 def _run(argv: list[str]) -> int:
     options = make_parser().parse_args(argv)
-    graph.select('RANDOM', only=options.only, without=options.without)
+    node_table.select('RANDOM', only=options.only, without=options.without)
     _enter(['run', *argv])
-    from launcher.mission import run_mission
+    from launcher.run import run_mission
 
     return run_mission(wanted_run(options), CONFIG, RUNS)
 
 
 def wanted_run(options: argparse.Namespace) -> Run:
     """What the options of `run`, or those that `node` has of them, ask for."""
-    from launcher.mission import Run
+    from launcher.run import Run
 
     given = vars(options)
     renamed = {'map': 'place', 'params': 'parameters'}
@@ -261,9 +261,9 @@ def _node(argv: list[str]) -> int:
     )
     own, rest = _split(argv, '--ros-args')
     options = parser.parse_args(own)
-    node = graph.find(options.name)
+    node = node_table.find(options.name)
     _enter(['node', *argv])
-    from launcher.mission import command, node_environ, parameter_files, ros_arguments, ros_domain
+    from launcher.run import command, node_environ, parameter_files, ros_arguments, ros_domain
 
     run = wanted_run(options)
     run.check()
@@ -286,10 +286,10 @@ def _split(argv: list[str], word: str) -> tuple[list[str], list[str]]:
 
 def _list(argv: list[str]) -> int:
     Parser(prog='launch.py list', description='Names the nodes.').parse_args(argv)
-    width = max(len(node.name) for node in graph.NODES)
-    for package in dict.fromkeys(node.package for node in graph.NODES):
+    width = max(len(node.name) for node in node_table.NODES)
+    for package in dict.fromkeys(node.package for node in node_table.NODES):
         print(package)
-        for node in graph.NODES:
+        for node in node_table.NODES:
             if node.package == package:
                 print(f'  {node.name:<{width}}  {node.purpose}')
     return 0

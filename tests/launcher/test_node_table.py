@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from launcher.graph import DEFAULT_MODE, MODES, NODES, SelectionError, find, select
+from launcher.node_table import DEFAULT_MODE, MODES, NODES, SelectionError, find, select
 from tests.launcher.conftest import ROOT
 
 SEED = {

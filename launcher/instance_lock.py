@@ -13,10 +13,10 @@ import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 
-from launcher.graph import RUN_NODES, Node
+from launcher.node_table import RUN_NODES, Node
 
 
-class ClaimError(ValueError):
+class InstanceLockError(ValueError):
     """Somebody else runs these nodes: one line that says who and where."""
 
 
@@ -35,7 +35,7 @@ def claim(
         Descriptors that hold the claims as long as they are open.
 
     Raises:
-        ClaimError: some of them are claimed already; then none is claimed.
+        InstanceLockError: some of them are claimed already; then none is claimed.
     """
     folder = folder or Path(tempfile.gettempdir(), 'surveillance-nodes')
     held: list[int] = []
@@ -64,7 +64,7 @@ def claim(
         os.close(descriptor)
     who = f' (process {holder})' if holder else ''
     where = f'ROS domain {domain}' + (f', namespace {namespace}' if namespace else '')
-    raise ClaimError(
+    raise InstanceLockError(
         f'already running in {where}{who}: {", ".join(taken)}; '
         'expected another --domain or --namespace, or --without these'
     )

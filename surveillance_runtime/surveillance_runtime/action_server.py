@@ -13,16 +13,15 @@ from typing import Any
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.callback_groups import ReentrantCallbackGroup
 
-from surveillance_runtime.awaited_work import work_aside
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import ACTION_SERVER_QOS
-from surveillance_runtime.waiting import ClockWait, Interrupt
+from surveillance_runtime.waiting import ClockWait, Interrupt, work_aside
 
 RESULT_KEPT = 300
 """How long a server keeps the result of an ended goal, seconds of ROS time."""
 
 
-class GoalAborted(Exception):
+class GoalAbortedError(Exception):
     """Raised by an execute function to abort its goal.
 
     Args:
@@ -77,7 +76,7 @@ class GoalServer:
         node: The node that serves.
         action_type: The action's type.
         name: The action's name, relative to the node's namespace.
-        execute: Does the work of a goal; may raise `GoalAborted`.
+        execute: Does the work of a goal; may raise `GoalAbortedError`.
         accept: Looks at a goal request before it is accepted; default accepts all.
     """
 
@@ -164,7 +163,7 @@ class GoalServer:
         empty = self._action_type.Result()
         try:
             result = self._execute(request, run)
-        except GoalAborted as abort:
+        except GoalAbortedError as abort:
             return (empty if abort.result is None else abort.result), str(abort)
         except Exception as error:
             if run.interrupt.is_set():

@@ -1,7 +1,7 @@
 """The unchanging geometry of a place: walls, doors, markers, station, as its parameter file says.
 
 Walls and doors are boxes around a centre line. A wall runs through; each door cuts its opening out
-of the wall it lies on. Everything is checked when it is read: a `WorldError` is one line that names
+of the wall it lies on. Everything is checked when it is read: a `PlaceError` is one line that names
 the entry, its value and what was expected.
 """
 
@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from surveillance_runtime.place import Place, PlaceError, make_place
+from surveillance_runtime.place.rooms import Place, PlaceError, make_place
 
 Point = tuple[float, float]
 Pose = tuple[float, float, float]
@@ -26,20 +26,6 @@ FURTHEST = 1000.0
 LARGEST = 100_000.0
 """Area of the largest place, square metres: its map is held in memory cell by cell."""
 _ON_WALL = 0.03
-
-
-class WorldError(ValueError):
-    """A place's geometry, or a change to it, makes no sense; the message is one line.
-
-    Attributes:
-        where: The path of the parameter that is wrong, e.g. `('walls', 'south')`; may be empty.
-        problem: What was found there and what was expected.
-    """
-
-    def __init__(self, problem: str, *where: str) -> None:
-        super().__init__(f'{".".join(where)}: {problem}' if where else problem)
-        self.where = where
-        self.problem = problem
 
 
 @dataclass(frozen=True)
@@ -117,7 +103,7 @@ class FloorPlan:
             parameters: The mapping below `ros__parameters` in the place's file.
 
         Raises:
-            WorldError: An entry is missing, of the wrong shape or contradicts another.
+            PlaceError: An entry is missing, of the wrong shape or contradicts another.
         """
         walls = {}
         for name, (x1, y1, x2, y2) in _rows(parameters, 'walls', ('x1', 'y1', 'x2', 'y2')).items():
@@ -131,7 +117,9 @@ class FloorPlan:
         columns = ('id', 'x', 'y', 'z', 'yaw')
         for name, row in _rows(parameters, 'markers', columns, required=False).items():
             if row[0] != int(row[0]) or row[0] < 0:
-                raise WorldError(f'id {row[0]:g}: expected a whole number from 0', 'markers', name)
+                raise PlaceError(
+                    ('markers', name), f'id {row[0]:g}: expected a whole number from 0'
+                )
             markers[name] = Marker(name, int(row[0]), row[1], row[2], row[3], row[4], size)
         station = _row(parameters.get('station'), ('x', 'y', 'yaw'), 'station')
         plan = cls(
@@ -159,63 +147,58 @@ class FloorPlan:
     def _check(self) -> None:
         for wall in self.walls.values():
             if (furthest := max(map(abs, (*wall.start, *wall.end)))) > FURTHEST:
-                raise WorldError(
+                raise PlaceError(
+                    ('walls', wall.name),
                     f'reaches to {furthest:g} m: expected at most {FURTHEST:g} m',
-                    'walls',
-                    wall.name,
                 )
             if wall.length < WALL_THICKNESS:
-                raise WorldError(
+                raise PlaceError(
+                    ('walls', wall.name),
                     f'length {wall.length:g} m: expected at least the thickness of a wall, '
                     f'{WALL_THICKNESS:g} m',
-                    'walls',
-                    wall.name,
                 )
         west, south, east, north = self.bounds
         if (east - west) * (north - south) > LARGEST:
-            raise WorldError(
+            raise PlaceError(
+                ('walls',),
                 f'the place is {east - west:g} m by {north - south:g} m: expected at most '
                 f'{LARGEST:g} square metres',
-                'walls',
             )
         for door in self.doors.values():
             if not 0.3 <= door.width <= 20.0:
-                raise WorldError(
-                    f'width {door.width:g} m: expected 0.3 to 20 m', 'doors', door.name
+                raise PlaceError(
+                    ('doors', door.name), f'width {door.width:g} m: expected 0.3 to 20 m'
                 )
             if not self.walls_of(door):
-                raise WorldError(
+                raise PlaceError(
+                    ('doors', door.name),
                     f'({door.x:g}, {door.y:g}) with width {door.width:g} m lies on no wall: '
                     f'expected both its jambs on the centre line of one wall',
-                    'doors',
-                    door.name,
                 )
         for name, (first, _) in self.place.doors.items():
             if name not in self.doors:
-                raise WorldError(
-                    f"door '{name}' has no position: expected an entry doors.{name}", 'map', first
+                raise PlaceError(
+                    ('map', first), f"door '{name}' has no position: expected an entry doors.{name}"
                 )
         for name in self.doors.keys() - self.place.doors.keys():
-            raise WorldError('leads into no place: expected it in the map', 'doors', name)
+            raise PlaceError(('doors', name), 'leads into no place: expected it in the map')
         self._check_markers()
 
     def _check_markers(self) -> None:
         if self.marker_size <= 0:
-            raise WorldError(f'{self.marker_size:g} m: expected more than 0', 'marker_size')
+            raise PlaceError(('marker_size',), f'{self.marker_size:g} m: expected more than 0')
         seen: dict[int, str] = {}
         for name, marker in self.markers.items():
             if marker.id in seen:
-                raise WorldError(
+                raise PlaceError(
+                    ('markers', name),
                     f'id {marker.id} is that of {seen[marker.id]} already: expected each id once',
-                    'markers',
-                    name,
                 )
             seen[marker.id] = name
             if not 0.0 <= marker.z <= WALL_HEIGHT:
-                raise WorldError(
+                raise PlaceError(
+                    ('markers', name),
                     f'height {marker.z:g} m: expected 0 to {WALL_HEIGHT:g} m, as high as the walls',
-                    'markers',
-                    name,
                 )
 
     def walls_of(self, door: Door) -> list[Wall]:
@@ -270,16 +253,16 @@ def _distance_to_line(point: Point, wall: Wall) -> float:
 
 def _number(value: object, *where: str) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise WorldError(f'{value!r}: expected a number', *where)
+        raise PlaceError(where, f'{value!r}: expected a number')
     return float(value)
 
 
 def _row(value: object, columns: Sequence[str], *where: str) -> list[float]:
     expected = f'expected [{", ".join(columns)}]'
     if value is None:
-        raise WorldError(f'missing: {expected}', *where)
+        raise PlaceError(where, f'missing: {expected}')
     if isinstance(value, str) or not isinstance(value, Sequence) or len(value) != len(columns):
-        raise WorldError(f'{value!r}: {expected}', *where)
+        raise PlaceError(where, f'{value!r}: {expected}')
     return [_number(entry, *where) for entry in value]
 
 
@@ -291,23 +274,20 @@ def _rows(
         return {}
     if not isinstance(entries, Mapping) or not entries:
         expected = f'expected NAME: [{", ".join(columns)}] for each'
-        raise WorldError(f'missing or empty: {expected}', section)
+        raise PlaceError((section,), f'missing or empty: {expected}')
     return {str(name): _row(row, columns, section, str(name)) for name, row in entries.items()}
 
 
 def _name(value: object, *where: str) -> str:
     if not isinstance(value, str) or not value:
-        raise WorldError(f'{value!r}: expected a name', *where)
+        raise PlaceError(where, f'{value!r}: expected a name')
     return value
 
 
 def _place(parameters: Mapping[str, Any]) -> Place:
-    try:
-        return make_place(
-            parameters.get('map'),
-            parameters.get('room_positions'),
-            parameters.get('robot_room'),
-            parameters.get('recharge_rooms', ()),
-        )
-    except PlaceError as error:
-        raise WorldError(error.problem, *error.where) from None
+    return make_place(
+        parameters.get('map'),
+        parameters.get('room_positions'),
+        parameters.get('robot_room'),
+        parameters.get('recharge_rooms', ()),
+    )

@@ -12,7 +12,7 @@ from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.waiting import ClockWait, Interrupt
 
 
-class RestedPictures:
+class SettledFrames:
     """Counts the pictures that the marker detector has looked at.
 
     Args:

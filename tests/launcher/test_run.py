@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 import yaml
 
-from launcher.commands import CONFIG, make_parser, wanted_run
-from launcher.graph import DEFAULT_MODE
-from launcher.mission import (
+from launcher.cli import CONFIG, make_parser, wanted_run
+from launcher.node_table import DEFAULT_MODE
+from launcher.run import (
     Run,
     RunError,
     command,

@@ -15,9 +15,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from launcher import graph
-from launcher.claims import claim
-from launcher.log import ROS_FORMAT, MergedLog
+from launcher import node_table
+from launcher.instance_lock import claim
+from launcher.log_merge import ROS_FORMAT, MergedLog
 from launcher.supervisor import Program, Supervisor
 from surveillance_behaviour.mission import record as mission_record
 from surveillance_runtime.place import read_place
@@ -44,13 +44,13 @@ class Run:
     """What the command line asks for.
 
     Attributes:
-        mode: one of `graph.MODES`, or None for the default one.
-        behaviour: one of `graph.BEHAVIOURS`.
+        mode: one of `node_table.MODES`, or None for the default one.
+        behaviour: one of `node_table.BEHAVIOURS`.
         place: file that describes the place, None for the behaviour's own.
         parameters: further parameter file, None for none.
         composed: all nodes in one process.
-        only, without: names of nodes, see `graph.select`.
-        log_level: one of `graph.LOG_LEVELS`, None for ROS's own choice.
+        only, without: names of nodes, see `node_table.select`.
+        log_level: one of `node_table.LOG_LEVELS`, None for ROS's own choice.
         namespace: of all nodes, None for none.
         domain: ROS domain, None for the environment's.
         seconds: how long to run, None until stopped.
@@ -88,11 +88,11 @@ class Run:
         if self.parameters is not None:
             check_parameter_file(self.parameters)
 
-    def nodes(self) -> tuple[graph.Node, ...]:
-        chosen = graph.select(
-            self.mode or graph.DEFAULT_MODE, self.behaviour, self.only, self.without
+    def nodes(self) -> tuple[node_table.Node, ...]:
+        chosen = node_table.select(
+            self.mode or node_table.DEFAULT_MODE, self.behaviour, self.only, self.without
         )
-        return (*chosen, graph.find(graph.CONSOLE)) if self.one_console else chosen
+        return (*chosen, node_table.find(node_table.CONSOLE)) if self.one_console else chosen
 
     @property
     def one_console(self) -> bool:
@@ -116,8 +116,8 @@ def check_parameter_file(path: Path) -> None:
     for key, section in file.values.items():
         name = key.rsplit('/', 1)[-1]
         problem = ''
-        if name not in graph.BY_NAME and name not in ('*', '**'):
-            known = ', '.join(graph.BY_NAME)
+        if name not in node_table.BY_NAME and name not in ('*', '**'):
+            known = ', '.join(node_table.BY_NAME)
             problem = f'no node is called {key!r}, expected /** or one of {known}'
         elif not isinstance(section, dict) or not isinstance(section.get('ros__parameters'), dict):
             problem = f"expected 'ros__parameters:' with a mapping in {key!r}"
@@ -183,7 +183,7 @@ def node_environ(run: Run, logs: Path | None = None) -> dict[str, str]:
     return environ
 
 
-def command(nodes: Sequence[graph.Node], arguments: Sequence[str], parent: int) -> list[str]:
+def command(nodes: Sequence[node_table.Node], arguments: Sequence[str], parent: int) -> list[str]:
     """The command of one process that holds `nodes`; it ends with `parent`, unless that is 0."""
     # Nodes of one process are stopped from the last to the first: the one that uses the others
     # comes last.
@@ -215,7 +215,7 @@ def write_own_parameters(folder: Path, run: Run) -> Path:
     }
     # Without one that was asked for, the mode is what the parameter files say.
     if run.mode:
-        for node in graph.NODES:
+        for node in node_table.NODES:
             if node.console:
                 own[node.name] = {'execution_mode': run.mode, 'console': not run.one_console}
     return _write_parameters(folder / 'launch.yaml', own)
@@ -240,7 +240,7 @@ def run_mission(run: Run, config: Path, runs: Path) -> int:
         runs: where the run gets a folder of its own for its log, parameters and record.
 
     Raises:
-        RunError, graph.SelectionError, ClaimError: what was asked for cannot be run.
+        RunError, node_table.SelectionError, InstanceLockError: what was asked for cannot be run.
     """
     run.check()
     nodes = run.nodes()
@@ -268,7 +268,7 @@ def run_mission(run: Run, config: Path, runs: Path) -> int:
     names = [*(node.name for node in nodes), *([COMPOSED] if run.composed else [])]
     log = MergedLog(None, names, path=folder / 'launch.log')
     log.say(
-        f'{run.behaviour} in mode {run.mode or graph.DEFAULT_MODE}, '
+        f'{run.behaviour} in mode {run.mode or node_table.DEFAULT_MODE}, '
         f'place {files[1].name}, '
         f'ROS domain {ros_domain(run)}, files in {_short(folder)}'
     )

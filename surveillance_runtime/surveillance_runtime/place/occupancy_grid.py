@@ -6,12 +6,11 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 
-from surveillance_simulation.floor_plan import WALL_THICKNESS, FloorPlan
-from surveillance_simulation.world import boxes
+from surveillance_runtime.place import boxes
+from surveillance_runtime.place.floor_plan import WALL_THICKNESS, FloorPlan
 
 FREE = 0
 OCCUPIED = 100
@@ -70,6 +69,8 @@ def draw(
         closed_doors: Doors drawn as walls.
         margin: Width of the unknown border around the walls, metres.
     """
+    import cv2  # takes 0.2 s, and a node that only needs the rooms does without
+
     lines = plan.wall_pieces() + [plan.doors[name].ends for name in closed_doors]
     solid = _filled(plan, boxes.boxes_around(lines, WALL_THICKNESS), resolution, margin)
     free = (solid.cells == FREE).astype(np.uint8)
@@ -86,6 +87,8 @@ def regions(plan: FloorPlan, resolution: float = 0.05) -> tuple[Grid, npt.NDArra
     Regions are connected pieces of free space, numbered from 1; cells of walls and doors belong to
     the region nearest to them, so that a doorway is divided along its middle.
     """
+    import cv2  # see draw
+
     lines = plan.wall_pieces() + [door.ends for door in plan.doors.values()]
     grid = _filled(plan, boxes.boxes_around(lines, WALL_THICKNESS), resolution, margin=0.5)
     free = (grid.cells == FREE).astype(np.uint8)

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import pytest
 from rclpy.parameter import Parameter
 
-from surveillance_runtime.field_parameters import Described, declare_fields
-from surveillance_runtime.parameters import ParameterError
+from surveillance_runtime.parameters import Described, ParameterError, declare_fields
 
 
 @dataclass(frozen=True)

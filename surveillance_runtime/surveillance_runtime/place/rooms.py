@@ -12,10 +12,8 @@ import re
 from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
-from surveillance_runtime.parameter_file import read_parameter_file
 from surveillance_runtime.yaml_file import KeyPath
 
 PLACE_KEYS = ('map', 'room_positions', 'robot_room', 'recharge_rooms')
@@ -26,15 +24,15 @@ Position = tuple[float, float, float]
 
 
 class PlaceError(ValueError):
-    """A description that is not a place: one line, beginning with the parameter that is wrong.
+    """A description, or a change to it, is no sound place; one line that begins with the parameter.
 
     Attributes:
-        where: The parameter's path, e.g. ``('map', 'R1')``.
+        where: The parameter's path, e.g. ``('map', 'R1')``; may be empty.
         problem: What was found there and what was expected.
     """
 
     def __init__(self, where: KeyPath, problem: str) -> None:
-        super().__init__(f'{".".join(where)}: {problem}')
+        super().__init__(f'{".".join(where)}: {problem}' if where else problem)
         self.where = where
         self.problem = problem
 
@@ -200,32 +198,6 @@ def make_place(rooms: Any, room_positions: Any, robot_room: Any, recharge_rooms:
     place = Place(checked, positions, start, tuple(stations))
     _check_graph(place)
     return place
-
-
-def read_place(path: str | Path) -> Place:
-    """Read a place from its parameter file.
-
-    Raises:
-        YamlFileError: The file cannot be read, or what it describes is not a place; one line
-            with file and line number.
-    """
-    file = read_parameter_file(path)
-    for key in file.values:
-        if key not in PLACE_KEYS and key not in GEOMETRY_KEYS:
-            known = ', '.join((*PLACE_KEYS, *GEOMETRY_KEYS))
-            raise file.error((key,), f'unknown parameter, expected one of {known}')
-    for key in PLACE_KEYS[:3]:
-        if key not in file.values:
-            raise file.error((), f"parameter '{key}' is missing")
-    try:
-        return make_place(
-            file.values['map'],
-            file.values['room_positions'],
-            file.values['robot_room'],
-            file.values.get('recharge_rooms', []),
-        )
-    except PlaceError as error:
-        raise file.error(error.where, error.problem) from None
 
 
 def _rooms(rooms: Any) -> dict[str, tuple[str, ...]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 
-from surveillance_runtime.awaited_work import AwaitedEvent, AwaitedWork, work_aside
+from surveillance_runtime.waiting import AwaitedEvent, AwaitedWork, work_aside
 
 
 def awaited(graph, coroutine):

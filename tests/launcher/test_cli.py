@@ -5,8 +5,8 @@ import sys
 
 import pytest
 
-from launcher.commands import main, make_parser
-from launcher.graph import NODES
+from launcher.cli import main, make_parser
+from launcher.node_table import NODES
 from tests.launcher.conftest import ROOT
 
 
@@ -40,7 +40,7 @@ def test_a_wrong_command_line_is_one_line_and_exit_code_2(arguments, wrong, caps
 def test_an_encoding_without_the_character_and_a_closed_output_are_no_errors():
     environ = {'PYTHONPATH': str(ROOT), 'PYTHONIOENCODING': 'ascii', 'COLUMNS': '80'}
     for arguments in (['fl\u00fcg'], ['list']):
-        program = f'from launcher.commands import main; raise SystemExit(main({arguments!r}))'
+        program = f'from launcher.cli import main; raise SystemExit(main({arguments!r}))'
         for closing in ('', 'exec >&- 2>&-; '):
             script = f'{closing}exec "{sys.executable}" -c "{program}"'
             done = subprocess.run(['bash', '-c', script], env=environ, capture_output=True)
@@ -52,7 +52,7 @@ def test_a_folder_that_cannot_be_written_is_one_line(monkeypatch, capsys):
     def full(_argv):
         raise PermissionError(13, 'Permission denied', '/some/where')
 
-    monkeypatch.setattr('launcher.commands._dispatch', full)
+    monkeypatch.setattr('launcher.cli._dispatch', full)
     assert main([]) == 2
     assert capsys.readouterr().err == 'launch.py: /some/where: Permission denied\n'
 

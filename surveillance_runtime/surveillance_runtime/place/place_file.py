@@ -1,0 +1,84 @@
+"""A place's file, read and checked: its rooms always, its walls and doors where it has them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from surveillance_runtime.place.floor_plan import FloorPlan
+from surveillance_runtime.place.regions import Regions, check_passable
+from surveillance_runtime.place.rooms import (
+    GEOMETRY_KEYS,
+    PLACE_KEYS,
+    Place,
+    PlaceError,
+    make_place,
+)
+from surveillance_runtime.suggestions import nearest
+from surveillance_runtime.yaml_file import YamlFile, read_parameter_file
+
+ROBOT_RADIUS = 0.22
+"""Of the simulated robot, metres: the default of the simulator's `base.robot_radius`."""
+
+
+@dataclass(frozen=True)
+class PlaceFile:
+    """What a place's file describes.
+
+    Attributes:
+        file: The parameters with their lines.
+        place: The rooms, which doors join them, a point in each.
+        plan: Walls, doors and markers; None where the file has rooms only.
+    """
+
+    file: YamlFile
+    place: Place
+    plan: FloorPlan | None
+
+
+def read_place_file(
+    path: str | Path, robot_radius: float = ROBOT_RADIUS, *, walls: bool = False
+) -> PlaceFile:
+    """Read a place's file and check all that it says.
+
+    Args:
+        path: A parameter file whose section `/**` describes a place.
+        robot_radius: Of the robot that has to fit through the doors, metres.
+        walls: Whether walls and doors must be given, as a simulated place needs them.
+
+    Raises:
+        YamlFileError: The file cannot be read, or what it describes is no sound place; one line
+            with file and line number.
+    """
+    file = read_parameter_file(path)
+    known = (*PLACE_KEYS, *GEOMETRY_KEYS)
+    for key in file.values:
+        if key not in known:
+            raise file.error((key,), f'unknown parameter, expected {nearest(key, known)}')
+    for key in PLACE_KEYS[:3]:
+        if key not in file.values:
+            raise file.error((), f"parameter '{key}' is missing")
+    try:
+        place = make_place(
+            file.values['map'],
+            file.values['room_positions'],
+            file.values['robot_room'],
+            file.values.get('recharge_rooms', []),
+        )
+        plan = None
+        if walls or any(key in file.values for key in GEOMETRY_KEYS):
+            plan = FloorPlan.from_parameters(file.values)
+            Regions(plan)
+            check_passable(plan, robot_radius)
+    except PlaceError as error:
+        raise file.error(error.where, error.problem) from None
+    return PlaceFile(file, place, plan)
+
+
+def read_place(path: str | Path) -> Place:
+    """Read the rooms and doors of a place's file, with all checks of `read_place_file`.
+
+    Raises:
+        YamlFileError: See `read_place_file`.
+    """
+    return read_place_file(path).place

@@ -1,0 +1,147 @@
+"""Which room a point of a floor plan lies in, and whether walls, doors and rooms fit together.
+
+A floor plan says where walls stand and the map which rooms its doors join. `Regions` finds the
+rooms between the walls and compares; `check_passable` asks whether a robot gets everywhere.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from surveillance_runtime.place.floor_plan import WALL_THICKNESS, FloorPlan
+from surveillance_runtime.place.occupancy_grid import FREE, OCCUPIED, draw, regions
+from surveillance_runtime.place.rooms import PlaceError
+
+
+class Regions:
+    """The rooms of a floor plan as regions of a grid.
+
+    Args:
+        plan: The floor plan.
+
+    Raises:
+        PlaceError: The walls do not fit the map: two rooms are one, a door does not touch the room
+            it leads into, or a position lies in a wall.
+    """
+
+    def __init__(self, plan: FloorPlan) -> None:
+        self._plan = plan
+        self.grid, self._labels = regions(plan)
+        self._names = self._named()
+        self._check_doors()
+        self._check_station()
+
+    def room_at(self, x: float, y: float) -> str | None:
+        """Return the room that a point (metres) lies in, None outside of every room."""
+        row, column = self.grid.cell_of(x, y)
+        if not self.grid.contains(row, column):
+            return None
+        return self._names.get(int(self._labels[row, column]))
+
+    def masks(self) -> dict[str, npt.NDArray[np.bool_]]:
+        """Return the cells (rows, columns) of each room on `grid`, every door closed."""
+        return {name: self._labels == label for label, name in self._names.items()}
+
+    def _named(self) -> dict[int, str]:
+        names: dict[int, str] = {}
+        outside = int(self._labels[0, 0])
+        for room, (x, y, _) in self._plan.place.positions.items():
+            where = ('room_positions', room)
+            row, column = self.grid.cell_of(x, y)
+            inside = self.grid.contains(row, column)
+            label = int(self._labels[row, column]) if inside else outside
+            if label == outside:
+                raise PlaceError(where, f'({x:g}, {y:g}) lies outside: expected walls all around')
+            if self.grid.cells[row, column] != FREE:
+                raise PlaceError(
+                    where, f'({x:g}, {y:g}) lies in a wall or a door: expected free space'
+                )
+            if label in names:
+                raise PlaceError(
+                    where,
+                    f"'{room}' and '{names[label]}' are one room: "
+                    f'expected a wall between their positions',
+                )
+            names[label] = room
+        return names
+
+    def _check_doors(self) -> None:
+        for room, doors in self._plan.place.rooms.items():
+            for name in doors:
+                door = self._plan.doors[name]
+                across = (-math.sin(door.yaw), math.cos(door.yaw))
+                sides = {
+                    self.room_at(door.x + step * across[0], door.y + step * across[1])
+                    for step in (-WALL_THICKNESS, WALL_THICKNESS)
+                }
+                if room not in sides:
+                    found = ' and '.join(sorted(side or 'outside' for side in sides))
+                    raise PlaceError(
+                        ('doors', name),
+                        f"stands between {found}: expected it at '{room}', as the map says",
+                    )
+
+    def _check_station(self) -> None:
+        x, y, _ = self._plan.station
+        room = self.room_at(x, y)
+        allowed = self._plan.place.recharge_rooms or tuple(self._plan.place.rooms)
+        if room not in allowed:
+            raise PlaceError(
+                ('station',),
+                f'({x:g}, {y:g}) lies in {room or "no place"}: '
+                f'expected a point in {" or ".join(allowed)}',
+            )
+
+
+def check_passable(plan: FloorPlan, radius: float) -> None:
+    """Make sure that a round robot gets from its start through every door and into every room.
+
+    Args:
+        plan: A floor plan whose regions were checked.
+        radius: Of the robot, metres.
+
+    Raises:
+        PlaceError: A door is too narrow or stands full, or a room cannot be reached.
+    """
+    import cv2  # takes 0.2 s, and a node that only needs the rooms does without
+
+    for name, door in plan.doors.items():
+        if door.width <= 2 * radius:
+            raise PlaceError(
+                ('doors', name),
+                f'width {door.width:g} m: expected more than {2 * radius:g} m, '
+                f'as the robot is {2 * radius:g} m wide',
+            )
+    grid = draw(plan)
+    solid = (grid.cells != OCCUPIED).astype(np.uint8)
+    clearance = cv2.distanceTransform(solid, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) * grid.resolution
+    # A cell's centre may be half a cell farther from the wall than the wall's own surface.
+    fits = (clearance > radius - grid.resolution / 2).astype(np.uint8)
+    pieces = cv2.connectedComponents(fits, connectivity=8)[1]
+
+    def piece_at(x: float, y: float) -> int:
+        return int(pieces[grid.cell_of(x, y)])
+
+    for room, (x, y, _) in plan.place.positions.items():
+        if not piece_at(x, y):
+            raise PlaceError(
+                ('room_positions', room),
+                f'({x:g}, {y:g}) lies closer than {radius:g} m to a wall: '
+                'expected room for the robot',
+            )
+    for name, door in plan.doors.items():
+        if not piece_at(door.x, door.y):
+            raise PlaceError(
+                ('doors', name), f'a wall stands in it: expected {door.width:g} m free'
+            )
+    start = piece_at(*plan.start[:2])
+    for room, (x, y, _) in plan.place.positions.items():
+        if piece_at(x, y) != start:
+            raise PlaceError(
+                ('room_positions', room),
+                f'a robot of {2 * radius:g} m cannot drive there from {plan.place.start}: '
+                'expected no wall in the way',
+            )
