@@ -74,7 +74,10 @@ class ArmController(PatrolNode):
         GoalServer(self, ScanSurroundings, 'scan_surroundings', self._scan)
 
     def _on_odometry(self, message: Odometry) -> None:
-        self._base = (message.header.frame_id, base_pose_from_ros(message))
+        try:
+            self._base = (message.header.frame_id, base_pose_from_ros(message))
+        except ValueError as error:
+            self.get_logger().warn(str(error), throttle_duration_sec=60.0)
 
     async def _on_move(self, request: Any, response: Any) -> Any:
         def work() -> str:

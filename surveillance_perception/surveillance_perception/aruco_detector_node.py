@@ -20,15 +20,22 @@ from surveillance_perception.conversions import (
     image_from_any,
     image_to_ros,
     poses_to_ros,
+    transforms_to_ros,
 )
 from surveillance_perception.detection.annotation import annotated
-from surveillance_perception.detection.camera_model import CameraModel, camera_of
+from surveillance_perception.detection.camera_model import CameraModel
 from surveillance_perception.detection.marker_stream import MarkerStream
 from surveillance_perception.detection.parameters import DetectorParameters
 from surveillance_perception.stream.image_subscription import IMAGES_QOS, ImageSubscription, Latest
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
+
+try:
+    # the wheels on PyPI hold no tf2_msgs; an installed ROS 2 does
+    from tf2_msgs.msg import TFMessage
+except ImportError:
+    TFMessage = None
 
 IDS_QOS = QoSProfile(depth=200, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """Each id is sent once, so whoever comes late gets those that were sent before."""
@@ -44,7 +51,8 @@ class ArucoDetector(PatrolNode):
     def __init__(self, **node_options: Any) -> None:
         super().__init__('aruco_detector', **node_options)
         self._options = DetectorParameters(self, self._settings_changed)
-        self._camera: CameraModel | None = None
+        self._described: CameraModel | None = None
+        self._undescribed = True
         self._rest_since: Time | None = Time(clock_type=self.get_clock().clock_type)
         self._stale = False
         self.skipped = 0
@@ -56,6 +64,7 @@ class ArucoDetector(PatrolNode):
         )
         self._poses = self.create_publisher(PoseArray, 'aruco_detector/poses', 10)
         self._annotated = self.create_publisher(Image, 'aruco_detector/annotated', IMAGES_QOS)
+        self._transforms = None if TFMessage is None else self.create_publisher(TFMessage, 'tf', 10)
         self._diagnostics = self.create_publisher(DiagnosticArray, 'diagnostics', 10)
         topic = 'camera/rgb/image_raw'
         ImageSubscription(self, Image, topic, self._images.put)
@@ -82,10 +91,15 @@ class ArucoDetector(PatrolNode):
         self._stale = True
 
     def _on_camera_info(self, message: CameraInfo) -> None:
+        self._undescribed = False
         try:
-            self._camera = camera_from_ros(message)
+            self._described = camera_from_ros(message)
         except ValueError as error:
-            self.get_logger().warn(f'camera_info: {error}', throttle_duration_sec=10.0)
+            self._described = None
+            self.get_logger().warn(
+                f'camera_info refused, ids go on without poses: {error}',
+                throttle_duration_sec=60.0,
+            )
 
     def _on_rest(self, message: Bool) -> None:
         self._rest_since = self.get_clock().now() if message.data else None
@@ -95,14 +109,23 @@ class ArucoDetector(PatrolNode):
             if self._stale:
                 self._stale = False
                 self._adopt()
-            if self._options.only_at_rest and not self._taken_at_rest(message):
-                self.skipped += 1
-                continue
             try:
+                if self._options.only_at_rest and not self._taken_at_rest(message):
+                    self.skipped += 1
+                    continue
                 self._look(message)
             except ValueError as error:
-                self._watch.refuse(str(error))
-                self.get_logger().error(str(error), throttle_duration_sec=5.0)
+                self._refuse(str(error))
+            except Exception as error:
+                # whatever it was, it was this image's: the next one may be good
+                if self.stopping.is_set():
+                    return
+                self._refuse(f'{type(error).__name__}: {error}')
+
+    def _refuse(self, reason: str) -> None:
+        reason = ' '.join(reason.split())
+        self._watch.refuse(reason)
+        self.get_logger().error(reason, throttle_duration_sec=5.0)
 
     def _adopt(self) -> None:
         try:
@@ -117,15 +140,32 @@ class ArucoDetector(PatrolNode):
     def _look(self, message: Any) -> None:
         image = image_from_any(message, self._options.max_pixels)
         height, width = image.shape[:2]
-        camera = camera_of(width, height, self._camera, self._options.field_of_view)
-        sightings, new = self._watch.look(image, camera)
+        sightings, new = self._watch.look(image, self._camera_of(width, height))
         for marker_id in new:
             self._ids.publish(Int32(data=marker_id))
         self._detections.publish(detections_to_ros(message.header, sightings))
         self._poses.publish(poses_to_ros(message.header, sightings))
+        if self._transforms is not None:
+            transforms = transforms_to_ros(message.header, sightings)
+            self._transforms.publish(TFMessage(transforms=transforms))
         if self._annotated.get_subscription_count():
             drawn = annotated(image, (s.detection for s in sightings), self._watch.confirmed)
             self._annotated.publish(image_to_ros(drawn, message.header))
+
+    def _camera_of(self, width: int, height: int) -> CameraModel | None:
+        """The camera that took an image of this size; None when it is not known."""
+        if self._undescribed:
+            return CameraModel.from_field_of_view(width, height, self._options.field_of_view)
+        if self._described is None:
+            return None
+        camera = self._described.scaled_to(width, height)
+        if camera is None:
+            size = f'{self._described.width}x{self._described.height}'
+            self.get_logger().warn(
+                f'images have {width}x{height} pixels, camera_info {size}: ids go on without poses',
+                throttle_duration_sec=60.0,
+            )
+        return camera
 
     def _diagnose(self) -> None:
         further = {

@@ -6,12 +6,12 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from geometry_msgs.msg import Point, Pose, PoseArray, Quaternion
+from geometry_msgs.msg import Point, Pose, PoseArray, Quaternion, TransformStamped, Vector3
 from nav_msgs.msg import Odometry
+from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
@@ -22,22 +22,16 @@ from surveillance_interfaces.srv import RoomInformation
 from surveillance_perception.arm.scan import ScanOutcome, ScanPlan
 from surveillance_perception.arm.trajectory import ArmTrajectory
 from surveillance_perception.arm.view_coverage import View
-from surveillance_perception.detection.camera_model import CameraModel
+from surveillance_perception.detection.camera_model import DISTORTION_MODELS, CameraModel
 from surveillance_perception.detection.detector import Detection
 from surveillance_perception.detection.marker_stream import Sighting, Statistics
 from surveillance_perception.detection.pose import MarkerPose
 from surveillance_perception.marker_registry import MarkedPlace
-from surveillance_perception.stream.image_files import ImageArray, ImageError, decode_image
-
-_CHANNELS = {'mono8': 1, 'rgb8': 3, 'bgr8': 3, 'rgba8': 4, 'bgra8': 4}
-_TO_BGR = {
-    'rgb8': cv2.COLOR_RGB2BGR,
-    'rgba8': cv2.COLOR_RGBA2BGR,
-    'bgra8': cv2.COLOR_BGRA2BGR,
-}
+from surveillance_perception.stream.encodings import image_of_pixels, printable
+from surveillance_perception.stream.image_files import ImageArray, decode_image
 
 
-def image_from_ros(message: Any, max_pixels: int) -> ImageArray:
+def image_from_ros(message: Image, max_pixels: int) -> ImageArray:
     """A grey (height, width) or BGR (height, width, 3) image from an Image.
 
     Args:
@@ -46,35 +40,17 @@ def image_from_ros(message: Any, max_pixels: int) -> ImageArray:
 
     Raises:
         ImageError: The image is empty, too large, shorter than its size says, or in an encoding
-            other than mono8, rgb8, bgr8, rgba8 and bgra8.
+            that `stream.encodings` does not know.
     """
-    size = f'{message.width}x{message.height}'
-    channels = _CHANNELS.get(message.encoding)
-    if channels is None:
-        raise ImageError(
-            f"image encoded as '{message.encoding}', expected one of {', '.join(_CHANNELS)}"
-        )
-    if message.width == 0 or message.height == 0:
-        raise ImageError(f'image of {size} pixels is empty')
-    if message.width * message.height > max_pixels:
-        raise ImageError(f'image of {size} pixels is larger than {max_pixels} pixels')
-    if message.step < message.width * channels:
-        raise ImageError(
-            f'image has rows of {message.step} bytes, expected at least '
-            f'{message.width * channels} for {message.width} pixels of {message.encoding}'
-        )
-    expected = message.step * message.height
-    if len(message.data) < expected:
-        raise ImageError(
-            f'image of {size} pixels has {len(message.data)} bytes, expected {expected}'
-        )
-    rows = np.frombuffer(message.data, np.uint8, expected).reshape(message.height, message.step)
-    pixels = rows[:, : message.width * channels].reshape(message.height, message.width, channels)
-    if channels == 1:
-        return np.ascontiguousarray(pixels[:, :, 0])
-    if message.encoding in _TO_BGR:
-        return np.asarray(cv2.cvtColor(pixels, _TO_BGR[message.encoding]), dtype=np.uint8)
-    return np.ascontiguousarray(pixels)
+    return image_of_pixels(
+        message.encoding,
+        message.width,
+        message.height,
+        message.step,
+        message.data,
+        big_endian=bool(message.is_bigendian),
+        max_pixels=max_pixels,
+    )
 
 
 def image_from_compressed(message: CompressedImage, max_pixels: int) -> ImageArray:
@@ -83,11 +59,7 @@ def image_from_compressed(message: CompressedImage, max_pixels: int) -> ImageArr
     Raises:
         ImageError: The data is no image, or the image is larger than `max_pixels`.
     """
-    image = decode_image(bytes(message.data), 'compressed image')
-    if image.shape[0] * image.shape[1] > max_pixels:
-        size = f'{image.shape[1]}x{image.shape[0]}'
-        raise ImageError(f'image of {size} pixels is larger than {max_pixels} pixels')
-    return image
+    return decode_image(bytes(message.data), 'compressed image', max_pixels)
 
 
 def image_from_any(message: Image | CompressedImage, max_pixels: int) -> ImageArray:
@@ -109,20 +81,32 @@ def image_to_ros(image: npt.NDArray[np.uint8], header: Header) -> Image:
 
 
 def camera_from_ros(message: CameraInfo) -> CameraModel:
-    """The camera that a CameraInfo describes.
+    """The camera that a CameraInfo describes, as its images come: binned, and cut to its region.
 
     Raises:
-        ValueError: It describes no calibrated camera.
+        ValueError: It describes no calibrated camera, or one of a distortion model that is not
+            among `DISTORTION_MODELS`.
     """
     matrix = np.array(message.k, dtype=float).reshape(3, 3)
-    distortion = np.array(message.d if len(message.d) else np.zeros(5), dtype=float)
-    return CameraModel(message.width, message.height, matrix, distortion)
+    across, down = max(1, message.binning_x), max(1, message.binning_y)
+    region = message.roi
+    width, height = region.width or message.width, region.height or message.height
+    matrix[:2, 2] -= (region.x_offset, region.y_offset)
+    matrix[0] /= across
+    matrix[1] /= down
+    model = message.distortion_model or 'plumb_bob'
+    if model not in DISTORTION_MODELS:
+        raise ValueError(
+            f'distortion model {printable(model)}, expected one of {", ".join(DISTORTION_MODELS)}'
+        )
+    distortion = np.array(message.d, dtype=float)
+    return CameraModel(width // across, height // down, matrix, distortion, model)
 
 
 def camera_to_ros(camera: CameraModel, header: Header) -> CameraInfo:
     """A CameraInfo of a camera whose image is not rectified further."""
     message = CameraInfo(header=header, width=camera.width, height=camera.height)
-    message.distortion_model = 'plumb_bob'
+    message.distortion_model = camera.distortion_model
     message.d = camera.distortion.tolist()
     message.k = camera.matrix.ravel().tolist()
     message.r = np.eye(3).ravel().tolist()
@@ -146,6 +130,8 @@ def detection_to_ros(
     else:
         message.pose = pose_to_ros(pose)
         message.reprojection_error = pose.reprojection_error
+        message.pose_covariance = pose.covariance.ravel()
+        message.pose_ambiguity = pose.ambiguity
     return message
 
 
@@ -166,6 +152,23 @@ def poses_to_ros(header: Header, sightings: Iterable[Sighting]) -> PoseArray:
     return PoseArray(header=header, poses=poses)
 
 
+def transforms_to_ros(header: Header, sightings: Iterable[Sighting]) -> list[TransformStamped]:
+    """The poses of an image's confirmed markers as frames `marker_ID` of the camera's frame."""
+    transforms = []
+    for each in sightings:
+        if each.pose is None or not each.confirmed:
+            continue
+        pose = pose_to_ros(each.pose)
+        place = pose.position
+        transform = TransformStamped(
+            header=header, child_frame_id=f'marker_{each.detection.marker_id}'
+        )
+        transform.transform.translation = Vector3(x=place.x, y=place.y, z=place.z)
+        transform.transform.rotation = pose.orientation
+        transforms.append(transform)
+    return transforms
+
+
 def diagnostics_to_ros(
     name: str, stamp: Any, statistics: Statistics, further: Mapping[str, Any]
 ) -> DiagnosticArray:
@@ -179,6 +182,7 @@ def diagnostics_to_ros(
     figures = {
         'pictures': statistics.images,
         'refused': statistics.refused,
+        'candidates left out': statistics.left_out,
         'ms per image': f'{statistics.mean_milliseconds:.1f}',
         **further,
     }
@@ -231,17 +235,19 @@ def pose_to_ros(pose: MarkerPose) -> Pose:
 
 
 def base_pose_from_ros(message: Odometry) -> npt.NDArray[np.float64]:
-    """Transform (4, 4) from base_link to the frame of the odometry."""
+    """Transform (4, 4) from base_link to the frame of the odometry.
+
+    Raises:
+        ValueError: A number is not finite, or the orientation is zero.
+    """
     position, orientation = message.pose.pose.position, message.pose.pose.orientation
-    x, y, z, w = orientation.x, orientation.y, orientation.z, orientation.w
-    # rotation matrix of a unit quaternion
+    turn = np.array([orientation.x, orientation.y, orientation.z, orientation.w])
+    place = np.array([position.x, position.y, position.z])
+    if not np.isfinite(place).all() or not np.isfinite(turn).all() or not turn.any():
+        raise ValueError('odometry: position and orientation must be finite, the latter not zero')
     pose = np.eye(4)
-    pose[:3, :3] = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ]
-    pose[:3, 3] = (position.x, position.y, position.z)
+    pose[:3, :3] = Rotation.from_quat(turn).as_matrix()
+    pose[:3, 3] = place
     return pose
 
 

@@ -12,7 +12,7 @@ import cv2
 
 from surveillance_perception.detection.annotation import annotated
 from surveillance_perception.detection.detector import DetectorSettings, MarkerDetector
-from surveillance_perception.stream.image_files import ImageError, read_image
+from surveillance_perception.stream.image_files import read_image
 
 
 class _Parser(argparse.ArgumentParser):
@@ -31,7 +31,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         description='Find ArUco markers in images and write annotated copies.',
     )
     parser.add_argument('images', nargs='+', type=Path, metavar='IMAGE')
-    parser.add_argument('--dictionary', default='DICT_5X5_100', help='default: %(default)s')
+    parser.add_argument(
+        '--dictionary',
+        default='DICT_5X5_100',
+        help="one of OpenCV's, or a file in its form; default: %(default)s",
+    )
     parser.add_argument('--known', type=int, nargs='+', metavar='ID', help='ids that are expected')
     parser.add_argument(
         '--out', type=Path, metavar='FOLDER', help='for the annotated copies; default: beside each'
@@ -44,21 +48,22 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f'detect: {error}', file=sys.stderr)
         return 2
     failed = 0
+    written = {path.resolve() for path in options.images}
     for path in options.images:
         try:
-            _detect(detector, path, options.out)
-        except (ImageError, OSError) as error:
+            _detect(detector, path, options.out, written)
+        except (ValueError, OSError) as error:
             print(f'detect: {error}', file=sys.stderr)
             failed += 1
     return 1 if failed else 0
 
 
-def _detect(detector: MarkerDetector, path: Path, folder: Path | None) -> None:
+def _detect(detector: MarkerDetector, path: Path, folder: Path | None, written: set[Path]) -> None:
     image = read_image(path)
     detections = detector.detect(image)
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
-    target = (folder or path.parent) / f'{path.stem}_markers.png'
+    target = _target(path, folder or path.parent, written)
     encoded = cv2.imencode('.png', annotated(image, detections))[1]
     target.write_bytes(encoded.tobytes())
     count = f'{len(detections)} marker{"" if len(detections) == 1 else "s"}'
@@ -70,6 +75,16 @@ def _detect(detector: MarkerDetector, path: Path, folder: Path | None) -> None:
             f'  id {detection.marker_id:4d}  at ({x:.1f}, {y:.1f})'
             f'  confidence {detection.confidence:.2f}{note}'
         )
+
+
+def _target(path: Path, folder: Path, written: set[Path]) -> Path:
+    """Where the annotated copy goes: neither onto an image of this call nor onto another copy."""
+    target, number = folder / f'{path.stem}_markers.png', 1
+    while target.resolve() in written:
+        number += 1
+        target = folder / f'{path.stem}_markers_{number}.png'
+    written.add(target.resolve())
+    return target
 
 
 if __name__ == '__main__':

@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import math
+import resource
+import struct
+import zlib
 
 import cv2
 import numpy as np
 import pytest
+from geometry_msgs.msg import PoseWithCovariance
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from nav_msgs.msg import Odometry
 from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import Header
 
 from surveillance_perception import conversions
 from surveillance_perception.arm.trajectory import ArmState, motion_to
 from surveillance_perception.detection.camera_model import CameraModel
-from surveillance_perception.detection.pose import pose_of, quaternion_of
+from surveillance_perception.detection.pose import pose_of
 from surveillance_perception.stream.image_files import ImageError
 from surveillance_perception.testing.marker_scene import (
     Panel,
@@ -73,7 +78,8 @@ def wrong(**fields):
     ('message', 'reason'),
     [
         (Image(), "encoded as ''"),
-        (wrong(encoding='16UC1'), "encoded as '16UC1', expected one of mono8"),
+        (wrong(encoding='32FC1'), "encoded as '32FC1', expected one of mono8"),
+        (wrong(encoding='a\nb'), r"encoded as 'a\\nb', expected one of mono8"),
         (wrong(width=0), '0x3 pixels is empty'),
         (wrong(height=2**31), 'is larger than'),
         (wrong(height=4), 'has 45 bytes, expected 60'),
@@ -105,6 +111,67 @@ def test_camera_there_and_back():
         conversions.camera_from_ros(message)
 
 
+@pytest.mark.parametrize(
+    ('changes', 'reason'),
+    [
+        ({'d': [0.1, 0.2, 0.3]}, '3 distortion coefficients'),
+        ({'d': [0.1] * 6}, '6 distortion coefficients'),
+        ({'d': [float('nan')] * 5}, 'must be finite'),
+        ({'k': [500.0, 0.0, 320.0, 0.0, 500.0, 240.0, 0.0, 0.0, 0.0]}, 'must have the form'),
+        ({'distortion_model': 'thin\nprism'}, r"distortion model 'thin\\nprism', expected one of"),
+        ({'distortion_model': 'equidistant'}, 'expected 4 for equidistant'),
+        ({'width': 0}, 'no area'),
+    ],
+)
+def test_camera_info_that_fits_no_camera_is_refused_in_one_line(changes, reason):
+    message = conversions.camera_to_ros(CAMERA, Header())
+    for name, value in changes.items():
+        setattr(message, name, value)
+    with pytest.raises(ValueError, match=reason) as error:
+        conversions.camera_from_ros(message)
+    assert '\n' not in str(error.value)
+
+
+def test_camera_info_of_a_binned_region_describes_the_image_that_comes():
+    message = conversions.camera_to_ros(CAMERA, Header())
+    message.binning_x = message.binning_y = 2
+    message.roi.x_offset, message.roi.width = 100, 400
+    camera = conversions.camera_from_ros(message)
+    assert (camera.width, camera.height) == (200, 240)
+    assert camera.matrix[0, 0] == pytest.approx(CAMERA.matrix[0, 0] / 2)
+    assert camera.matrix[0, 2] == pytest.approx((CAMERA.matrix[0, 2] - 100) / 2)
+
+
+def test_compressed_image_that_says_it_is_huge_is_refused_before_it_is_decoded():
+    def chunk(kind, body):
+        check = struct.pack('>I', zlib.crc32(kind + body))
+        return struct.pack('>I', len(body)) + kind + body + check
+
+    head = struct.pack('>IIBBBBB', 30_000, 30_000, 8, 0, 0, 0, 0)
+    packer = zlib.compressobj(9)
+    rows = b''.join(packer.compress(bytes(30_001)) for _ in range(30_000)) + packer.flush()
+    data = b'\x89PNG\r\n\x1a\n' + chunk(b'IHDR', head) + chunk(b'IDAT', rows) + chunk(b'IEND', b'')
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    with pytest.raises(ImageError, match='far more than 1000000 pixels'):
+        conversions.image_from_compressed(CompressedImage(data=data), LIMIT)
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 100_000
+
+
+def test_odometry_that_is_no_number_is_refused():
+    message = Odometry()
+    with pytest.raises(ValueError, match='not zero'):
+        conversions.base_pose_from_ros(Odometry(pose=no_turn()))
+    message.pose.pose.position.x = math.nan
+    with pytest.raises(ValueError, match='finite'):
+        conversions.base_pose_from_ros(message)
+
+
+def no_turn():
+    pose = PoseWithCovariance()
+    pose.pose.orientation.w = 0.0
+    return pose
+
+
 @settings(max_examples=50, derandomize=True, deadline=None)
 @given(st.floats(0.5, 8.0), st.floats(-1.2, 1.2), st.floats(-3.1, 3.1), st.floats(-100, 100))
 def test_pose_of_exact_corners_is_exact(distance, turn, roll, offset):
@@ -119,21 +186,6 @@ def test_pose_of_exact_corners_is_exact(distance, turn, roll, offset):
     message = conversions.pose_to_ros(pose)
     x, y, z, w = (getattr(message.orientation, axis) for axis in 'xyzw')
     assert math.isclose(x * x + y * y + z * z + w * w, 1.0, rel_tol=1e-9)
-
-
-@settings(max_examples=50, derandomize=True, deadline=None)
-@given(st.tuples(*(st.floats(-3.1, 3.1) for _ in range(3))))
-def test_quaternion_turns_as_the_matrix_does(vector):
-    rotation = cv2.Rodrigues(np.array(vector))[0]
-    x, y, z, w = quaternion_of(rotation)
-    turned = np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
-    assert np.allclose(turned, rotation, atol=1e-6)
 
 
 def test_trajectory_keeps_names_times_and_values():

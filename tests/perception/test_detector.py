@@ -171,3 +171,43 @@ def test_tiny_and_empty_images_show_nothing(shape, level):
 def test_settings_that_cannot_be_are_refused(options, reason):
     with pytest.raises(ValueError, match=reason):
         MarkerDetector(DetectorSettings(**options))
+
+
+def test_marker_that_leaves_the_image_is_read_or_not_but_never_ends_the_detector():
+    sheet = np.full((300, 300), 220, np.uint8)
+    sheet[100:170, 100:170] = DICTIONARY.generateImageMarker(7, 70)
+    found = 0
+    for shift in range(2, 110, 4):
+        for image in (sheet[:, shift:], sheet[shift:], sheet[shift:, shift:]):
+            found += [each.marker_id for each in DETECTOR.detect(image)] == [7]
+    # whole with two pixels around it, it is read; cut, it is not
+    assert found >= 3 * 22
+
+
+def test_crowd_of_markers_is_read_whole_and_a_bound_is_told():
+    image = np.full((800, 1000), 220, np.uint8)
+    for index in range(80):
+        row, column = divmod(index, 10)
+        top, left = 20 + row * 96, 20 + column * 96
+        image[top : top + 70, left : left + 70] = DICTIONARY.generateImageMarker(index, 70)
+    assert sorted(each.marker_id for each in DETECTOR.detect(image)) == list(range(80))
+    assert DETECTOR.left_out == 0
+    bounded = MarkerDetector(DetectorSettings(max_candidates=10))
+    assert len(bounded.detect(image)) == 10
+    assert bounded.left_out >= 70
+
+
+def test_any_image_is_looked_at_without_an_error_of_opencv():
+    generator = np.random.default_rng(11)
+    marker = DICTIONARY.generateImageMarker(3, 63)
+    for _ in range(300):
+        height, width = generator.integers(1, 90, 2)
+        image = generator.integers(0, 256, (height, width), dtype=np.uint8)
+        if generator.random() < 0.7:
+            image[:] = generator.integers(0, 256)
+            top, left = generator.integers(-60, 80, 2)
+            sheet = np.full((300, 300), image[0, 0], np.uint8)
+            sheet[100 + top : 163 + top, 100 + left : 163 + left] = marker
+            image = sheet[100 : 100 + height, 100 : 100 + width]
+        for detection in DETECTOR.detect(image, [generator.normal(0, 1e6, (4, 2))]):
+            assert np.isfinite(detection.corners).all()

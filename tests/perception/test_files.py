@@ -13,7 +13,7 @@ from surveillance_perception.detect_command import main
 from surveillance_perception.detection.camera_model import CameraModel
 from surveillance_perception.detection.dictionaries import dictionary_named
 from surveillance_perception.marker_registry import read_registry
-from surveillance_perception.stream.image_files import ImageError, decode_image
+from surveillance_perception.stream.image_files import ImageError, decode_image, read_image
 from surveillance_perception.stream.video import open_source
 from surveillance_perception.testing.marker_scene import (
     Degradation,
@@ -75,6 +75,33 @@ def test_detect_names_each_file_that_is_no_image_and_goes_on(tmp_path, capsys, i
 def test_detect_refuses_wrong_options_in_one_line(capsys, options, reason):
     assert main(['x.png', *options]) == 2
     assert capsys.readouterr().err.startswith(reason)
+
+
+def test_detect_keeps_copies_of_images_with_one_name_apart(tmp_path, capsys, image):
+    for folder in ('a', 'b'):
+        (tmp_path / folder).mkdir()
+        cv2.imwrite(str(tmp_path / folder / 'room.png'), image)
+    files = [str(tmp_path / folder / 'room.png') for folder in ('a', 'b')]
+    assert main([*files, '--out', str(tmp_path / 'out')]) == 0
+    assert sorted(each.name for each in (tmp_path / 'out').iterdir()) == [
+        'room_markers.png',
+        'room_markers_2.png',
+    ]
+
+
+def test_detect_never_writes_over_an_image_it_was_given(tmp_path, capsys, image):
+    room, other = tmp_path / 'room.png', tmp_path / 'room_markers.png'
+    for path in (room, other):
+        cv2.imwrite(str(path), image)
+    given = other.read_bytes()
+    assert main([str(room), str(other)]) == 0
+    assert other.read_bytes() == given
+
+
+@pytest.mark.parametrize('path', ['/dev/zero', '/dev'])
+def test_what_is_no_regular_file_is_not_read(path):
+    with pytest.raises(ImageError, match='regular file'):
+        read_image(Path(path))
 
 
 @pytest.mark.parametrize('data', [b'', b'\x89PNG\r\n\x1a\n', b'\xff\xd8\xff\xe0junk', b'BM'])

@@ -144,7 +144,8 @@ def test_images_that_are_none_are_named_and_the_node_goes_on(graph: Any) -> None
         )
 
     for encoding, width, reason in (
-        ('yuv422', 320, "encoded as 'yuv422'"),
+        ('yuv444', 320, "encoded as 'yuv444'"),
+        ('forged\n[ERROR]', 320, r"encoded as 'forged\n[ERROR]'"),
         ('mono8', 100000, 'larger than'),
         ('bgr8', 320, 'rows of 320 bytes'),
         ('mono8', 0, 'is empty'),
@@ -157,6 +158,44 @@ def test_images_that_are_none_are_named_and_the_node_goes_on(graph: Any) -> None
     graph.until(lambda: named('compressed image is no image'))
     assert len(camera.show(ROOM).detections) == 2
     assert not node.stopping.is_set()
+
+
+def test_image_that_raises_costs_itself_alone(graph: Any) -> None:
+    camera, node = detector(graph)
+    before_the_epoch = image_to_ros(ROOM, Header())
+    before_the_epoch.header.stamp.sec = -5
+    camera.images.publish(before_the_epoch)
+    assert len(camera.show(ROOM).detections) == 2
+    assert node.failure is None
+
+
+def test_camera_info_that_fits_no_camera_leaves_ids_without_poses(graph: Any) -> None:
+    camera, _ = detector(graph, confirmation_frames=1)
+
+    def described(**changes: Any) -> CameraInfo:
+        message = camera_to_ros(CAMERA, Header())
+        for name, value in changes.items():
+            setattr(message, name, value)
+        camera.info.publish(message)
+        return message
+
+    def has_poses() -> bool:
+        seen = camera.show(ROOM).detections
+        assert len(seen) == 2
+        return all(math.isfinite(each.pose.position.z) for each in seen)
+
+    assert has_poses()
+    for changes in (
+        {'d': [0.1, 0.2, 0.3]},
+        {'d': [math.nan] * 5},
+        {'k': [500.0, 0.0, 160.0, 0.0, 500.0, 120.0, 0.0, 0.0, 0.0]},
+        {'distortion_model': 'mei'},
+        {'width': 100},
+    ):
+        described(**changes)
+        graph.until(lambda: not has_poses())
+        described()
+        graph.until(has_poses)
 
 
 def test_settings_change_while_it_runs(graph: Any) -> None:

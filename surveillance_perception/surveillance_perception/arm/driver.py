@@ -77,7 +77,10 @@ class ArmDriver:
     def report(
         self, names: Sequence[str], positions: Sequence[float], speeds: Sequence[float]
     ) -> None:
-        """Take a report of the joints; one that lacks a joint of the arm is not for it."""
+        """Take a report of the joints; one that lacks a joint of the arm is not for it.
+
+        One with a number that is not finite is left out.
+        """
         where = {name: index for index, name in enumerate(names)}
         if any(name not in where for name in self.arm.names) or len(positions) < len(names):
             return
@@ -86,6 +89,8 @@ class ArmDriver:
         moving = np.zeros(len(order))
         if len(speeds) >= len(names):
             moving = np.array([speeds[index] for index in order])
+        if not np.isfinite(found).all() or not np.isfinite(moving).all():
+            return
         with self._changed:
             self._measured = ArmState(found, moving, np.zeros(len(order)))
             self._reports += 1

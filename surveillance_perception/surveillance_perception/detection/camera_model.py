@@ -1,4 +1,4 @@
-"""A pinhole camera: the numbers that turn metres in front of the lens into pixels.
+"""A camera: the numbers that turn metres in front of the lens into pixels.
 
 Frame: the optical frame of REP-103 (x right, y down, z forward). Pixel centres have integer
 coordinates, as in OpenCV.
@@ -7,12 +7,27 @@ coordinates, as in OpenCV.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
+import cv2
 import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
+
+_COEFFICIENTS = {
+    'plumb_bob': (0, 4, 5),
+    'rational_polynomial': (8, 12, 14),
+    'equidistant': (4,),
+}
+
+DISTORTION_MODELS: tuple[str, ...] = tuple(_COEFFICIENTS)
+"""The models of sensor_msgs/distortion_models.hpp that are understood."""
+
+_SAME_SHAPE = 0.02
+_CORRECTIONS = 40
+_EXACT = 0.02
+_WIDEST = 1e3
 
 
 @dataclass(frozen=True)
@@ -20,35 +35,56 @@ class CameraModel:
     """Intrinsic parameters of a camera.
 
     Attributes:
-        width: ImageArray width in pixels.
-        height: ImageArray height in pixels.
+        width: Image width in pixels.
+        height: Image height in pixels.
         matrix: (3, 3) camera matrix K.
-        distortion: (n,) coefficients in OpenCV's order; empty or zeros mean a rectified image.
+        distortion: (n,) coefficients in the model's order; empty or zeros mean a rectified image.
+        distortion_model: One of `DISTORTION_MODELS`.
+
+    Raises:
+        ValueError: A number is not as a calibrated camera has it.
     """
 
     width: int
     height: int
     matrix: Array
     distortion: Array = field(default_factory=lambda: np.zeros(5))
+    distortion_model: str = 'plumb_bob'
 
     def __post_init__(self) -> None:
         if self.width <= 0 or self.height <= 0:
             raise ValueError(f'an image of {self.width}x{self.height} pixels has no area')
-        if self.matrix.shape != (3, 3) or not np.isfinite(self.matrix).all():
+        matrix = self.matrix
+        if matrix.shape != (3, 3) or not np.isfinite(matrix).all():
             raise ValueError('the camera matrix must be 3x3 finite numbers')
-        if self.matrix[0, 0] <= 0 or self.matrix[1, 1] <= 0:
+        if matrix[0, 0] <= 0 or matrix[1, 1] <= 0:
             raise ValueError(
-                f'focal lengths must be positive, got {self.matrix[0, 0]:g} and '
-                f'{self.matrix[1, 1]:g}: the camera is not calibrated'
+                f'focal lengths must be positive, got {matrix[0, 0]:g} and '
+                f'{matrix[1, 1]:g}: the camera is not calibrated'
             )
+        if matrix[2].tolist() != [0.0, 0.0, 1.0] or matrix[1, 0] or matrix[0, 1]:
+            raise ValueError(
+                'the camera matrix must have the form [fx 0 cx, 0 fy cy, 0 0 1], '
+                f'got {" ".join(f"{value:g}" for value in matrix.ravel())}'
+            )
+        allowed = _COEFFICIENTS.get(self.distortion_model)
+        if allowed is None:
+            raise ValueError(f'distortion model {self.distortion_model!r} is not known')
+        if len(self.distortion) not in allowed:
+            raise ValueError(
+                f'{len(self.distortion)} distortion coefficients, expected '
+                f'{" or ".join(str(each) for each in allowed)} for {self.distortion_model}'
+            )
+        if not np.isfinite(self.distortion).all():
+            raise ValueError('distortion coefficients must be finite')
 
     @classmethod
     def from_field_of_view(cls, width: int, height: int, horizontal: float) -> CameraModel:
         """A distortion-free camera from its horizontal field of view.
 
         Args:
-            width: ImageArray width in pixels.
-            height: ImageArray height in pixels.
+            width: Image width in pixels.
+            height: Image height in pixels.
             horizontal: Horizontal field of view in radians, between 0 and pi.
 
         Raises:
@@ -77,18 +113,47 @@ class CameraModel:
         homogeneous = points @ self.matrix.T
         return np.asarray(homogeneous[:, :2] / homogeneous[:, 2:])
 
+    def scaled_to(self, width: int, height: int) -> CameraModel | None:
+        """The same camera with images of another size; None where their shapes differ."""
+        across, down = width / self.width, height / self.height
+        if abs(across / down - 1.0) > _SAME_SHAPE:
+            return None
+        if across == down == 1.0:
+            return self
+        matrix = self.matrix.copy()
+        matrix[0, 0] *= across
+        matrix[1, 1] *= down
+        # integer coordinates are pixels' middles
+        matrix[0, 2] = (matrix[0, 2] + 0.5) * across - 0.5
+        matrix[1, 2] = (matrix[1, 2] + 0.5) * down - 0.5
+        return replace(self, width=width, height=height, matrix=matrix)
 
-def camera_of(
-    width: int, height: int, described: CameraModel | None, horizontal: float
-) -> CameraModel:
-    """The camera that took an image.
+    def rays(self, pixels: Array) -> Array | None:
+        """Where the lines of sight (n, 2) of pixels (n, 2) meet the plane z = 1.
 
-    Args:
-        width: The image's width in pixels.
-        height: Its height in pixels.
-        described: The camera as it describes itself, of use for images of its size alone.
-        horizontal: Horizontal field of view in radians of a camera that does not.
-    """
-    if described is not None and (described.width, described.height) == (width, height):
-        return described
-    return CameraModel.from_field_of_view(width, height, horizontal)
+        Returns:
+            None where the distortion cannot be taken back: coefficients that fit nothing there.
+        """
+        straight = np.linalg.inv(self.matrix)
+        fisheye = self.distortion_model == 'equidistant'
+        if not fisheye and not self.distortion.any():
+            return np.asarray(pixels @ straight[:2, :2].T + straight[:2, 2])
+        points = np.ascontiguousarray(pixels, dtype=float).reshape(-1, 1, 2)
+        undistort = cv2.fisheye.undistortPoints if fisheye else cv2.undistortPoints
+        project = cv2.fisheye.projectPoints if fisheye else cv2.projectPoints
+        zero = np.zeros(3)
+        try:
+            rays = undistort(points, self.matrix, self.distortion).reshape(-1, 2).astype(float)
+            for _ in range(_CORRECTIONS):
+                if not np.isfinite(rays).all() or np.abs(rays).max(initial=0.0) > _WIDEST:
+                    return None
+                space = np.column_stack([rays, np.ones(len(rays))]).reshape(-1, 1, 3)
+                again = project(space, zero, zero, self.matrix, self.distortion)[0]
+                miss = pixels - again.reshape(-1, 2)
+                if np.abs(miss).max(initial=0.0) < _EXACT:
+                    return np.asarray(rays)
+                # OpenCV stops after a few steps, which is too early for strong distortion
+                rays = rays + miss @ straight[:2, :2].T
+        except cv2.error:
+            pass
+        return None

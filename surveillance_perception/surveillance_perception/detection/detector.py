@@ -41,6 +41,7 @@ from surveillance_perception.detection.preprocessing import PreparedImage, prepa
 _SAME_QUAD = 1.0
 _SAME_MARKER = 0.5
 _LARGE_CELL = 8.0
+_BATCH = 64
 
 
 @dataclass(frozen=True)
@@ -55,7 +56,7 @@ class DetectorSettings:
         contrast: Grey levels by which a border must be darker than its neighbourhood.
         min_length: Longer side in pixels of the smallest marker.
         max_outlines: Dark outlines after which no further neighbourhood or bridge is tried.
-        max_candidates: How many quadrilaterals of an image are read, the likeliest first.
+        max_candidates: Bound of an image's work: quadrilaterals that are read, the likeliest first.
         blur: Standard deviation in pixels of the lens's blur.
         least_correlation: Correlation with the image that a reading needs, 0 to 1.
         least_inner_correlation: The same over the code's own cells.
@@ -71,7 +72,7 @@ class DetectorSettings:
     contrast: float = 7.0
     min_length: float = 8.0
     max_outlines: int = 400
-    max_candidates: int = 16
+    max_candidates: int = 1000
     blur: float = 0.8
     least_correlation: float = 0.85
     least_inner_correlation: float = 0.8
@@ -105,16 +106,22 @@ class Detection:
 
 @dataclass
 class MarkerDetector:
-    """Finds the markers of one dictionary in images; keeps nothing from one to the next."""
+    """Finds the markers of one dictionary in images; keeps no markers from one to the next.
+
+    Attributes:
+        settings: What to look for.
+        left_out: Candidates of the last image that `max_candidates` left unread.
+    """
 
     settings: DetectorSettings = field(default_factory=DetectorSettings)
+    left_out: int = field(default=0, init=False)
 
     def __post_init__(self) -> None:
         dictionary = dictionary_named(self.settings.dictionary)
         if self.settings.known_ids is not None:
             MarkerCodes.of(dictionary, self.settings.known_ids)
         self._reader = MarkerReader(MarkerCodes.of(dictionary), self.settings.blur)
-        self._ring = BorderCheck(self._reader.codes.side)
+        self._border = BorderCheck(self._reader.codes.side)
 
     def detect(
         self, image: npt.NDArray[np.uint8], expected: Sequence[Array] = ()
@@ -126,8 +133,16 @@ class MarkerDetector:
             expected: Corners (4, 2) where markers were in the image before.
 
         Raises:
-            ValueError: The image is empty, not of 8 bits, or of another shape.
+            ValueError: The image is empty, not of 8 bits, or of another shape, or OpenCV cannot
+                work on it.
         """
+        try:
+            return self._detect(image, expected)
+        except cv2.error as error:
+            reason = ' '.join(str(getattr(error, 'err', error)).split())
+            raise ValueError(f'OpenCV cannot work on this image: {reason}') from error
+
+    def _detect(self, image: npt.NDArray[np.uint8], expected: Sequence[Array]) -> list[Detection]:
         prepared = prepare(image)
         pyramid = ImagePyramid(prepared.grey)
         quads = self._candidates(prepared, pyramid)
@@ -135,8 +150,11 @@ class MarkerDetector:
             quads = np.concatenate([np.asarray(expected, dtype=float), quads])
         if not len(quads):
             return []
-        readings = self._reader.read(pyramid, homographies_of(quads))
-        return self._accepted(readings, prepared.grey)
+        found: list[Detection] = []
+        for start in range(0, len(quads), _BATCH):
+            readings = self._reader.read(pyramid, homographies_of(quads[start : start + _BATCH]))
+            found += self._accepted(readings, prepared.grey)
+        return _without_overlaps(found)
 
     def _candidates(self, prepared: PreparedImage, pyramid: ImagePyramid) -> Quads:
         settings = self.settings
@@ -145,10 +163,12 @@ class MarkerDetector:
         quads = quads_around(masks, min_length=settings.min_length, limit=settings.max_outlines)
         if not len(quads):
             return quads
-        correlation = self._ring.correlation(pyramid, homographies_of(quads), contrast)
+        correlation = self._border.correlation(pyramid, homographies_of(quads), contrast)
         order = np.argsort(-correlation)
-        quads = quads[order[correlation[order] > 0.0][: 4 * settings.max_candidates]]
-        return np.asarray(quads[distinct(quads, _SAME_QUAD)][: settings.max_candidates])
+        quads = quads[order[correlation[order] > 0.0]]
+        quads = quads[distinct(quads, _SAME_QUAD)]
+        self.left_out = max(0, len(quads) - settings.max_candidates)
+        return np.asarray(quads[: settings.max_candidates])
 
     def _accepted(self, readings: Readings, grey: Grey) -> list[Detection]:
         settings, codes = self.settings, self._reader.codes
@@ -180,17 +200,32 @@ class MarkerDetector:
         return detections
 
 
+def _without_overlaps(found: list[Detection]) -> list[Detection]:
+    kept: list[Detection] = []
+    for each in sorted(found, key=lambda detection: -detection.confidence):
+        if not any(_overlap(each.corners, other.corners) for other in kept):
+            kept.append(each)
+    return kept
+
+
 def _sharpened(outline: Array, grey: Grey, side: int) -> Array:
     """Corners of a large marker, which was read from halved images, found in the whole one."""
     cell = float(np.linalg.norm(np.roll(outline, -1, axis=0) - outline, axis=1).min()) / side
     if cell < _LARGE_CELL:
         return outline
-    reach = (min(int(cell / 2.5), 8),) * 2
+    reach = min(int(cell / 2.5), 8)
+    height, width = grey.shape
+    # OpenCV refuses all corners when one lies outside, and images smaller than its window
+    inside = ((outline >= 0) & (outline <= (width - 1, height - 1))).all(axis=1)
+    if not inside.any() or min(width, height) < 2 * reach + 5:
+        return outline
     limits = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 20, 0.01)
-    start = outline.astype(np.float32).reshape(-1, 1, 2)
-    refined = cv2.cornerSubPix(grey, start.copy(), reach, (-1, -1), limits)
+    start = outline[inside].astype(np.float32).reshape(-1, 1, 2)
+    refined = cv2.cornerSubPix(grey, start.copy(), (reach, reach), (-1, -1), limits)
     moved = np.linalg.norm(refined - start, axis=2)
-    return np.where(moved[:, :, None] < cell / 2.0, refined, start).reshape(4, 2).astype(float)
+    sharp = outline.copy()
+    sharp[inside] = np.where(moved[:, :, None] < cell / 2.0, refined, start).reshape(-1, 2)
+    return sharp
 
 
 def _overlap(first: Array, second: Array) -> bool:

@@ -7,12 +7,20 @@ and -1 for black, once for each id and quarter turn.
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Iterable
 from dataclasses import dataclass
+from pathlib import Path
 
 import cv2
 import numpy as np
 import numpy.typing as npt
+import yaml
+
+_FILE_SUFFIXES = ('.yaml', '.yml', '.json')
+_LARGEST_FILE = 10_000_000
+_MOST_MARKERS = 100_000
+_SMALLEST_SIDE, _LARGEST_SIDE = 3, 16
 
 Cells = npt.NDArray[np.float32]
 
@@ -22,16 +30,63 @@ DICTIONARY_NAMES: tuple[str, ...] = tuple(
 
 
 def dictionary_named(name: str) -> cv2.aruco.Dictionary:
-    """The predefined dictionary of that name, such as `DICT_5X5_100`.
+    """A predefined dictionary by its name, such as `DICT_5X5_100`, or one of the user's own.
+
+    Args:
+        name: One of `DICTIONARY_NAMES`, or the path of a YAML or JSON file as OpenCV writes and
+            reads them: `nmarkers`, `markersize`, `maxCorrectionBits`, `marker_0`, `marker_1`, ...
 
     Raises:
-        ValueError: OpenCV has no dictionary of that name.
+        ValueError: OpenCV has no dictionary of that name, and there is no usable file.
     """
-    if name not in DICTIONARY_NAMES:
-        raise ValueError(
-            f"unknown marker dictionary '{name}', expected one of {', '.join(DICTIONARY_NAMES)}"
+    if name in DICTIONARY_NAMES:
+        return cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name))
+    if Path(name).suffix.lower() in _FILE_SUFFIXES:
+        return _dictionary_in(Path(name))
+    near = difflib.get_close_matches(name, DICTIONARY_NAMES, 1, 0.0)
+    raise ValueError(
+        f"unknown marker dictionary '{name[:60]}', did you mean {near[0]}? Expected one of "
+        f'{", ".join(DICTIONARY_NAMES)}, or a file of OpenCV ({", ".join(_FILE_SUFFIXES)})'
+    )
+
+
+def _dictionary_in(path: Path) -> cv2.aruco.Dictionary:
+    what = f'marker dictionary {path}'
+    try:
+        if path.exists() and not path.is_file():
+            raise ValueError(f'{what} is no regular file')
+        if path.stat().st_size > _LARGEST_FILE:
+            raise ValueError(f'{what} has more than {_LARGEST_FILE} bytes')
+        text = path.read_text(encoding='utf-8')
+    except OSError as error:
+        raise ValueError(f'{what}: {error.strerror or error}') from error
+    except UnicodeDecodeError as error:
+        raise ValueError(f'{what} is no text') from error
+    expected = "expected OpenCV's form: nmarkers, markersize, maxCorrectionBits, marker_0, ..."
+    if text.startswith('%YAML'):
+        # OpenCV's first line is no YAML of any version
+        text = text.partition('\n')[2]
+    try:
+        values = yaml.load(text, yaml.BaseLoader)
+    except (yaml.YAMLError, RecursionError) as error:
+        raise ValueError(f'{what} is not valid YAML, {expected}') from error
+    try:
+        count, side, correction = (
+            int(values[key]) for key in ('nmarkers', 'markersize', 'maxCorrectionBits')
         )
-    return cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name))
+        codes = [str(values[f'marker_{index}']) for index in range(min(count, _MOST_MARKERS))]
+    except KeyError as error:
+        raise ValueError(f'{what} lacks {error.args[0]}, {expected}') from error
+    except (TypeError, ValueError) as error:
+        raise ValueError(f'{what} cannot be read, {expected}') from error
+    if not 1 <= count == len(codes) or not _SMALLEST_SIDE <= side <= _LARGEST_SIDE:
+        raise ValueError(f'{what} has {count} markers of {side}x{side} cells, {expected}')
+    for index, code in enumerate(codes):
+        if len(code) != side * side or set(code) - {'0', '1'}:
+            raise ValueError(f'{what}: marker_{index} must be {side * side} digits 0 or 1')
+    bits = np.array([list(code) for code in codes]).astype(np.uint8).reshape(count, side, side)
+    stored = np.concatenate([cv2.aruco.Dictionary.getByteListFromBits(each) for each in bits])
+    return cv2.aruco.Dictionary(stored, side, correction)
 
 
 @dataclass(frozen=True)

@@ -69,6 +69,7 @@ class Statistics:
     images: int = 0
     seconds: float = 0.0
     refused: int = 0
+    left_out: int = 0
     last_error: str = ''
 
     @property
@@ -159,8 +160,14 @@ class MarkerStream:
         )
         self._settings, self._detector = settings, detector
 
-    def look(self, image: ImageArray, camera: CameraModel) -> tuple[list[Sighting], list[int]]:
+    def look(
+        self, image: ImageArray, camera: CameraModel | None
+    ) -> tuple[list[Sighting], list[int]]:
         """Detect in the next image.
+
+        Args:
+            image: (height, width) grey levels or (height, width, 3) BGR.
+            camera: Where the image comes from; None when it is not known: ids without poses.
 
         Returns:
             What it shows, and the ids that it confirms for the first time.
@@ -176,9 +183,10 @@ class MarkerStream:
         sightings = []
         for detection in detections:
             size = self._settings.sizes.get(detection.marker_id, self._settings.size)
-            pose = pose_of(detection.corners, size, camera)
+            pose = None if camera is None else pose_of(detection.corners, size, camera)
             sightings.append(Sighting(detection, pose, size, detection.marker_id in confirmed))
         self.statistics.images += 1
+        self.statistics.left_out += self._detector.left_out
         self.statistics.seconds += time.perf_counter() - start
         return sightings, new
 

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from surveillance_perception.detection.detector import DetectorSettings, MarkerDetector
-from surveillance_perception.detection.dictionaries import DICTIONARY_NAMES
 from surveillance_perception.detection.marker_stream import StreamSettings, sizes_from
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import Described, declare_fields
@@ -52,7 +51,7 @@ _DETECTOR = {
     'max_outlines': Described(
         'Dark outlines after which no further neighbourhood or bridge is tried.', 1, 100_000
     ),
-    'max_candidates': Described('Outlines of an image that are read.', 1, 500),
+    'max_candidates': Described("Bound of an image's work: outlines that are read.", 1, 100_000),
 }
 _WATCH = {
     'size': Described('Side of the black square, metres.', 1e-3, 100.0, name='marker_size'),
@@ -91,8 +90,7 @@ class DetectorParameters:
         dictionary = node.parameter(
             'marker_dictionary',
             self._detector.dictionary,
-            "One of OpenCV's marker dictionaries.",
-            choices=DICTIONARY_NAMES,
+            "One of OpenCV's marker dictionaries, or a file in OpenCV's form.",
             check=lambda value: self._problem(dictionary=value),
             on_change=lambda value: self._set_detector('dictionary', value),
         )

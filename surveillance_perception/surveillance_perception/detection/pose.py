@@ -1,16 +1,20 @@
-"""Where a marker is in front of the camera."""
+"""Where a marker is in front of the camera, how sure that is, and whether it could be tilted."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from surveillance_perception.detection.camera_model import Array, CameraModel
 from surveillance_perception.detection.image_sampling import homographies_of
 
 _OUTLINE = np.array([[-1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [-1.0, -1.0, 0.0]])
+_CORNER_DEVIATION = 0.15
+_SAME_POSE = 0.02
+_STRAIGHT = np.zeros(0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,16 +27,23 @@ class MarkerPose:
         position: (3,) metres.
         rotation: (3, 3) from the marker's frame to the optical frame.
         reprojection_error: Root mean square over the corners, pixels.
+        covariance: (6, 6) of position (m) and of small rotations about the optical frame's axes
+            (rad), from the corners' deviation.
+        ambiguity: Error of this pose over that of its mirror image, 0 to 1: near 1 the marker may
+            as well be tilted the other way.
     """
 
     position: Array
     rotation: Array
     reprojection_error: float
+    covariance: Array
+    ambiguity: float = 0.0
 
     @property
     def quaternion(self) -> tuple[float, float, float, float]:
         """The rotation as x, y, z, w with w >= 0."""
-        return quaternion_of(self.rotation)
+        x, y, z, w = Rotation.from_matrix(self.rotation).as_quat(canonical=True).tolist()
+        return x, y, z, w
 
 
 def pose_of(corners: Array, size: float, camera: CameraModel) -> MarkerPose | None:
@@ -44,18 +55,35 @@ def pose_of(corners: Array, size: float, camera: CameraModel) -> MarkerPose | No
         camera: The camera that took the image.
 
     Returns:
-        The pose that fits the corners best; None when none lies in front of the camera.
+        The pose that fits the corners best; None when none lies in front of the camera, or where
+        the camera's distortion cannot be taken back.
     """
     outline = _OUTLINE * (size / 2.0)
-    seen = corners.reshape(4, 1, 2).astype(float)
-    rays = cv2.undistortPoints(seen, camera.matrix, camera.distortion).reshape(4, 2)
+    rays = camera.rays(np.asarray(corners, dtype=float))
+    if rays is None:
+        return None
+    # the corners as a camera without distortion would see them
+    seen = rays @ camera.matrix[:2, :2].T + camera.matrix[:2, 2]
     rotation, position = _from_homography(homographies_of(rays[None])[0], size)
+    if not np.isfinite(rotation).all() or not np.isfinite(position).all():
+        return None
     found = [
         pose
         for start in (rotation, _tilted_the_other_way(rotation, position))
         if (pose := _refined(outline, seen, camera, start, position)) is not None
     ]
-    return min(found, key=lambda pose: pose.reprojection_error, default=None)
+    if not found:
+        return None
+    best, other = min(found, key=_error), max(found, key=_error)
+    turned = float(np.linalg.norm(best.rotation - other.rotation))
+    if best is other or turned < _SAME_POSE:
+        return best
+    ambiguity = min(1.0, max(best.reprojection_error, 1e-9) / max(other.reprojection_error, 1e-9))
+    return replace(best, ambiguity=ambiguity)
+
+
+def _error(pose: MarkerPose) -> float:
+    return pose.reprojection_error
 
 
 def _from_homography(homography: Array, size: float) -> tuple[Array, Array]:
@@ -87,44 +115,42 @@ def _tilted_the_other_way(rotation: Array, position: Array) -> Array:
 def _refined(
     outline: Array, seen: Array, camera: CameraModel, rotation: Array, position: Array
 ) -> MarkerPose | None:
-    if not np.isfinite(rotation).all() or not np.isfinite(position).all():
+    try:
+        vector, moved = cv2.solvePnPRefineLM(
+            outline,
+            seen.reshape(4, 1, 2),
+            camera.matrix,
+            _STRAIGHT,
+            cv2.Rodrigues(rotation)[0],
+            position.reshape(3, 1).copy(),
+        )
+    except cv2.error:
         return None
-    vector, position = cv2.solvePnPRefineLM(
-        outline,
-        seen,
-        camera.matrix,
-        camera.distortion,
-        cv2.Rodrigues(rotation)[0],
-        position.reshape(3, 1).copy(),
-    )
-    turned = cv2.Rodrigues(vector)[0]
+    place, turned = moved.ravel(), cv2.Rodrigues(vector)[0]
     # the paper's front faces the camera
-    if not np.isfinite(position).all() or position[2] <= 0 or turned[:, 2] @ position.ravel() > 0:
+    if not np.isfinite(place).all() or place[2] <= 0 or turned[:, 2] @ place > 0:
         return None
-    projected, _ = cv2.projectPoints(outline, vector, position, camera.matrix, camera.distortion)
-    error = float(np.sqrt(np.square(projected - seen).sum(axis=2).mean()))
-    return MarkerPose(position.ravel(), turned, error)
+    arms = outline @ turned.T
+    points = arms + place
+    if (points[:, 2] <= 0).any():
+        return None
+    error = float(np.sqrt(np.square(camera.project(points) - seen).sum(axis=1).mean()))
+    return MarkerPose(place, turned, error, _covariance(arms, points, camera, error))
 
 
-def quaternion_of(rotation: Array) -> tuple[float, float, float, float]:
-    """Unit quaternion x, y, z, w with w >= 0 of a rotation matrix (3, 3).
+def _covariance(arms: Array, points: Array, camera: CameraModel, error: float) -> Array:
+    """Covariance (6, 6) of position and rotation: the inverse of the Gauss-Newton normal matrix.
 
-    From the largest of the four squared components, which keeps clear of small divisors
-    (Shepperd, "Quaternion from rotation matrix", J. Guidance and Control 1(3), 1978).
+    Eight coordinates determine six numbers, so the residual of one marker tells little of its
+    corners' deviation: it counts where it is larger than what the detector's corners have.
     """
-    trace = float(np.trace(rotation))
-    squares = np.array([*(2.0 * np.diag(rotation) - trace), trace])
-    largest = int(np.argmax(squares))
-    matrix = np.empty((4, 4))
-    matrix[:3, :3] = rotation + rotation.T
-    matrix[np.arange(3), np.arange(3)] = 1.0 + 2.0 * np.diag(rotation) - trace
-    matrix[3, :3] = matrix[:3, 3] = [
-        rotation[2, 1] - rotation[1, 2],
-        rotation[0, 2] - rotation[2, 0],
-        rotation[1, 0] - rotation[0, 1],
-    ]
-    matrix[3, 3] = 1.0 + trace
-    row = matrix[largest]
-    row = row / np.linalg.norm(row)
-    x, y, z, w = (row if row[3] >= 0 else -row).tolist()
-    return x, y, z, w
+    focal = np.diag(camera.matrix)[:2]
+    x, y, z = points.T
+    by_point = np.zeros((4, 2, 3))
+    by_point[:, 0, 0], by_point[:, 1, 1] = focal[0] / z, focal[1] / z
+    by_point[:, 0, 2], by_point[:, 1, 2] = -focal[0] * x / z**2, -focal[1] * y / z**2
+    # a small rotation w moves a point by w x arm
+    by_turn = -np.cross(arms[:, None, :], np.eye(3)[None]).transpose(0, 2, 1)
+    jacobian = np.concatenate([by_point, by_point @ by_turn], axis=2).reshape(8, 6)
+    deviation = max(_CORNER_DEVIATION, error * np.sqrt(4.0 / 2.0))
+    return np.asarray(np.linalg.pinv(jacobian.T @ jacobian, hermitian=True) * deviation**2)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+import warnings
 from pathlib import Path
 
 import cv2
@@ -13,38 +15,84 @@ ImageArray = npt.NDArray[np.uint8]
 IMAGE_SUFFIXES = ('.png', '.jpg', '.jpeg', '.bmp', '.pgm', '.ppm', '.tif', '.tiff', '.webp')
 
 
+MAX_PIXELS = 100_000_000
+"""The largest image that is decoded where nobody says otherwise."""
+
+MAX_BYTES = 500_000_000
+"""The largest image file that is read."""
+
+_FORMATS = ('PNG', 'JPEG', 'BMP', 'WEBP', 'TIFF', 'PPM')
+
+
 class ImageError(ValueError):
     """An image cannot be read; the message is one line."""
 
 
-def decode_image(data: bytes, what: str) -> ImageArray:
+def decode_image(data: bytes, what: str, max_pixels: int = MAX_PIXELS) -> ImageArray:
     """A BGR image (height, width, 3) from an encoded one, such as a JPEG.
 
+    The size in the header is looked at first: a small file may say that it is huge.
+
+    Args:
+        data: The encoded image.
+        what: Names it in an error.
+        max_pixels: The largest image that is taken.
+
     Raises:
-        ImageError: `data` is empty or no image.
+        ImageError: `data` is empty, no image, or a larger one.
     """
     if not data:
         raise ImageError(f'{what} is empty, expected an encoded image')
+    _check_size(_size_in_header(data, what, max_pixels), what, max_pixels)
     try:
         image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
     except cv2.error as error:
         raise ImageError(f'{what} cannot be decoded: {_reason(error)}') from error
     if image is None:
         raise ImageError(f'{what} is no image that OpenCV can decode')
+    _check_size((image.shape[1], image.shape[0]), what, max_pixels)
     return np.asarray(image, dtype=np.uint8)
 
 
-def read_image(path: Path) -> ImageArray:
+def read_image(path: Path, max_pixels: int = MAX_PIXELS) -> ImageArray:
     """A BGR image (height, width, 3) from a file.
 
     Raises:
-        ImageError: The file cannot be read or is no image.
+        ImageError: The file cannot be read, is no image, or a larger one than `max_pixels`.
     """
     try:
+        if path.exists() and not path.is_file():
+            raise ImageError(f'{path} is no regular file')
+        size = path.stat().st_size
+        if size > MAX_BYTES:
+            raise ImageError(f'{path} has {size} bytes, at most {MAX_BYTES} are read')
         data = path.read_bytes()
     except OSError as error:
         raise ImageError(f'{path}: {error.strerror or error}') from error
-    return decode_image(data, str(path))
+    return decode_image(data, str(path), max_pixels)
+
+
+def _size_in_header(data: bytes, what: str, max_pixels: int) -> tuple[int, int]:
+    """Width and height by the header alone, which Pillow reads without decoding."""
+    # late: nodes that read raw images need no Pillow
+    import PIL.Image
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter('ignore')
+            with PIL.Image.open(io.BytesIO(data), formats=_FORMATS) as image:
+                return image.size
+    except PIL.Image.DecompressionBombError:
+        raise ImageError(f'{what} has far more than {max_pixels} pixels') from None
+    except Exception as error:
+        # whatever Pillow raises on junk: OSError, SyntaxError, struct.error, EOFError, ...
+        raise ImageError(f'{what} is no image that OpenCV can decode') from error
+
+
+def _check_size(size: tuple[int, int], what: str, max_pixels: int) -> None:
+    width, height = size
+    if width * height > max_pixels:
+        raise ImageError(f'{what} of {width}x{height} pixels is larger than {max_pixels} pixels')
 
 
 def _reason(error: cv2.error) -> str:

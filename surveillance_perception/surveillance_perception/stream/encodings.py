@@ -1,0 +1,161 @@
+"""Pixels of the encodings that cameras send, as the 8-bit grey or BGR images that detectors read.
+
+Where an encoding carries brightness apart (YUV) or has to be interpolated anyway (Bayer), the
+image becomes grey: nothing here needs its colour. Sixteen bits are scaled so that the brightest
+value fits into eight, because cameras fill between ten and sixteen of them.
+
+The names are those of `sensor_msgs/image_encodings.hpp`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from surveillance_perception.stream.image_files import ImageArray, ImageError
+
+_LONGEST_NAME = 40
+_Pixels = npt.NDArray[np.uint8] | npt.NDArray[np.uint16]
+
+
+@dataclass(frozen=True)
+class _Encoding:
+    """How pixels lie in memory.
+
+    Attributes:
+        channels: Values of a pixel; for YUV 4:2:2 two.
+        wide: Whether a value has 16 bits.
+        conversion: OpenCV's conversion to grey or BGR; None takes the values as they are.
+        multiple: Width and height must be multiples of these.
+        planes: Rows of data for each row of pixels, times two (3: 4:2:0 with its colour behind).
+    """
+
+    channels: int
+    wide: bool = False
+    conversion: int | None = None
+    multiple: tuple[int, int] = (1, 1)
+    planes: int = 2
+
+
+def _table() -> dict[str, _Encoding]:
+    rgb, rgba, bgra = cv2.COLOR_RGB2BGR, cv2.COLOR_RGBA2BGR, cv2.COLOR_BGRA2BGR
+    table: dict[str, _Encoding] = {}
+    for bits, wide in (('8', False), ('16', True)):
+        kind = f'{bits}UC'
+        table |= {
+            f'mono{bits}': _Encoding(1, wide),
+            f'{kind}1': _Encoding(1, wide),
+            f'rgb{bits}': _Encoding(3, wide, rgb),
+            f'bgr{bits}': _Encoding(3, wide),
+            f'{kind}3': _Encoding(3, wide),
+            f'rgba{bits}': _Encoding(4, wide, rgba),
+            f'bgra{bits}': _Encoding(4, wide, bgra),
+            f'{kind}4': _Encoding(4, wide, bgra),
+        }
+        for pattern in ('RGGB', 'BGGR', 'GBRG', 'GRBG'):
+            conversion = getattr(cv2, f'COLOR_Bayer{pattern}2GRAY')
+            table[f'bayer_{pattern.lower()}{bits}'] = _Encoding(1, wide, conversion, (2, 2))
+    for name in ('yuv422', 'uyvy'):
+        table[name] = _Encoding(2, False, cv2.COLOR_YUV2GRAY_UYVY, (2, 1))
+    for name in ('yuv422_yuy2', 'yuyv'):
+        table[name] = _Encoding(2, False, cv2.COLOR_YUV2GRAY_YUYV, (2, 1))
+    for name in ('nv12', 'nv21'):
+        # the rows of brightness come first, those of colour are not looked at
+        table[name] = _Encoding(1, multiple=(2, 2), planes=3)
+    return table
+
+
+_ENCODINGS = _table()
+
+ENCODING_NAMES: tuple[str, ...] = tuple(_ENCODINGS)
+"""What `image_of_pixels` reads."""
+
+
+def image_of_pixels(
+    encoding: str,
+    width: int,
+    height: int,
+    step: int,
+    data: bytes,
+    *,
+    big_endian: bool = False,
+    max_pixels: int,
+) -> ImageArray:
+    """A grey (height, width) or BGR (height, width, 3) image from raw pixels.
+
+    Args:
+        encoding: One of `ENCODING_NAMES`.
+        width: Pixels.
+        height: Pixels.
+        step: Bytes of a row of data.
+        data: The rows, or any buffer of bytes.
+        big_endian: Order of the bytes of 16-bit values.
+        max_pixels: The largest image that is taken.
+
+    Raises:
+        ImageError: The encoding is not known, or size, step and data do not fit.
+    """
+    how = _ENCODINGS.get(encoding)
+    if how is None:
+        raise ImageError(
+            f'image encoded as {printable(encoding)}, expected one of {", ".join(_ENCODINGS)}'
+        )
+    size = f'{width}x{height}'
+    if width <= 0 or height <= 0:
+        raise ImageError(f'image of {size} pixels is empty')
+    if width * height > max_pixels:
+        raise ImageError(f'image of {size} pixels is larger than {max_pixels} pixels')
+    if width % how.multiple[0] or height % how.multiple[1]:
+        raise ImageError(
+            f'image of {size} pixels, expected multiples of '
+            f'{how.multiple[0]}x{how.multiple[1]} for {encoding}'
+        )
+    row = width * how.channels * (2 if how.wide else 1)
+    if step < row:
+        raise ImageError(
+            f'image has rows of {step} bytes, expected at least {row} '
+            f'for {width} pixels of {encoding}'
+        )
+    rows = height * how.planes // 2
+    # the last row may come without its padding
+    expected = step * (rows - 1) + row
+    if len(data) < expected:
+        raise ImageError(f'image of {size} pixels has {len(data)} bytes, expected {expected}')
+    values = np.frombuffer(data, np.uint8, min(len(data), step * rows))
+    if len(values) < step * rows:
+        values = np.pad(values, (0, step * rows - len(values)))
+    used = values.reshape(rows, step)[:height, :row]
+    pixels = _eight_bits(used, big_endian) if how.wide else used
+    if how.channels > 1:
+        pixels = pixels.reshape(height, width, how.channels)
+    return _converted(np.ascontiguousarray(pixels), how.conversion, encoding)
+
+
+def printable(text: str) -> str:
+    """A text from outside in quotes, without control characters, shortened: fit for a log line."""
+    shown = text if len(text) <= _LONGEST_NAME else text[:_LONGEST_NAME] + '...'
+    return repr(shown)
+
+
+def _eight_bits(rows: npt.NDArray[np.uint8], big_endian: bool) -> ImageArray:
+    order: Callable[[str], np.dtype[np.uint16]] = np.dtype
+    values = np.ascontiguousarray(rows).view(order('>u2' if big_endian else '<u2'))
+    brightest = int(values.max())
+    if brightest <= 255:
+        return values.astype(np.uint8)
+    native = values.astype(np.uint16, copy=False)
+    return np.asarray(cv2.convertScaleAbs(native, alpha=255.0 / brightest), dtype=np.uint8)
+
+
+def _converted(pixels: ImageArray, conversion: int | None, encoding: str) -> ImageArray:
+    if conversion is None:
+        return pixels
+    try:
+        return np.asarray(cv2.cvtColor(pixels, conversion), dtype=np.uint8)
+    except cv2.error as error:
+        shape = f'{pixels.shape[1]}x{pixels.shape[0]}'
+        raise ImageError(f'image of {shape} pixels of {encoding} cannot be converted') from error

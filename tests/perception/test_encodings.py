@@ -1,0 +1,122 @@
+"""Raw pixels of real cameras' encodings, held against OpenCV's own conversions."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from surveillance_perception.stream import ImageError
+from surveillance_perception.stream.encodings import ENCODING_NAMES, image_of_pixels, printable
+
+GREY = np.arange(10, 250, 10, dtype=np.uint8).reshape(4, 6)
+COLOUR = np.stack([GREY, GREY[::-1], GREY[:, ::-1]], axis=2)
+LIMIT = 10**6
+
+
+def read(encoding, values, height=4, width=6, **options):
+    rows = np.ascontiguousarray(values)
+    step = options.pop('step', rows.nbytes // rows.shape[0])
+    return image_of_pixels(
+        encoding, width, height, step, rows.tobytes(), max_pixels=LIMIT, **options
+    )
+
+
+@pytest.mark.parametrize(
+    ('encoding', 'values', 'expected'),
+    [
+        ('mono8', GREY, GREY),
+        ('8UC1', GREY, GREY),
+        ('8UC3', COLOUR, COLOUR),
+        ('rgb8', COLOUR[..., ::-1], COLOUR),
+        ('rgb16', COLOUR[..., ::-1].astype(np.uint16), COLOUR),
+    ],
+)
+def test_values_arrive_unchanged(encoding, values, expected):
+    assert (read(encoding, values) == expected).all()
+
+
+@pytest.mark.parametrize('encoding', ['mono16', '16UC1'])
+@pytest.mark.parametrize('bits', [10, 12, 16])
+@pytest.mark.parametrize('big_endian', [False, True])
+def test_sixteen_bits_fill_the_eight(encoding, bits, big_endian):
+    values = GREY.astype(np.uint16) << (bits - 8)
+    stored = values.astype('>u2' if big_endian else '<u2')
+    found = read(encoding, stored, big_endian=big_endian).astype(float)
+    assert found.max() == 255
+    assert np.allclose(found / 255, GREY / GREY.max(), atol=0.005)
+
+
+@pytest.mark.parametrize(
+    ('encoding', 'brightness'),
+    [('yuv422', 1), ('uyvy', 1), ('yuv422_yuy2', 0), ('yuyv', 0)],
+)
+def test_interleaved_yuv_gives_its_brightness(encoding, brightness):
+    values = np.full((4, 6, 2), 128, np.uint8)
+    values[..., brightness] = GREY
+    assert (read(encoding, values.reshape(4, 12)) == GREY).all()
+
+
+@pytest.mark.parametrize('encoding', ['nv12', 'nv21'])
+def test_planar_yuv_gives_its_brightness(encoding):
+    values = np.concatenate([GREY, np.full((2, 6), 77, np.uint8)])
+    assert (read(encoding, values, step=6) == GREY).all()
+    with pytest.raises(ImageError, match='has 24 bytes, expected 36'):
+        read(encoding, GREY)
+
+
+@pytest.mark.parametrize(
+    ('pattern', 'red', 'blue'),
+    [
+        ('rggb', (0, 0), (1, 1)),
+        ('bggr', (1, 1), (0, 0)),
+        ('gbrg', (1, 0), (0, 1)),
+        ('grbg', (0, 1), (1, 0)),
+    ],
+)
+def test_bayer_weighs_the_colours_as_grey_does(pattern, red, blue):
+    # a red scene: only the red cells are lit
+    mosaic = np.zeros((16, 16), np.uint8)
+    mosaic[red[0] :: 2, red[1] :: 2] = 200
+    seen = read(f'bayer_{pattern}8', mosaic, 16, 16)[4:-4, 4:-4]
+    expected = cv2.cvtColor(np.full((1, 1, 3), (0, 0, 200), np.uint8), cv2.COLOR_BGR2GRAY)[0, 0]
+    assert abs(float(seen.mean()) - float(expected)) < 3
+    mosaic = np.zeros((16, 16), np.uint8)
+    mosaic[blue[0] :: 2, blue[1] :: 2] = 200
+    assert read(f'bayer_{pattern}8', mosaic, 16, 16)[4:-4, 4:-4].mean() < 30
+
+
+def test_last_row_may_lack_its_padding():
+    data = np.pad(GREY, ((0, 0), (0, 2))).tobytes()[:-2]
+    assert (image_of_pixels('mono8', 6, 4, 8, data, max_pixels=LIMIT) == GREY).all()
+
+
+def test_unknown_encoding_is_quoted_in_one_line():
+    with pytest.raises(ImageError) as error:
+        read('mono8\n[ERROR] [armor]: forged\x1b[2J' + 'x' * 1000, GREY)
+    assert str(error.value).isprintable()
+    assert len(str(error.value)) < 600
+    assert 'expected one of mono8' in str(error.value)
+    assert printable('plain') == "'plain'"
+
+
+@settings(max_examples=300, derandomize=True, deadline=None)
+@given(
+    st.one_of(st.sampled_from(ENCODING_NAMES), st.text(max_size=12)),
+    st.integers(0, 40),
+    st.integers(0, 40),
+    st.integers(0, 2**32 - 1) | st.integers(0, 200),
+    st.binary(max_size=4000),
+    st.booleans(),
+)
+def test_any_pixels_are_an_image_or_refused(encoding, width, height, step, data, big_endian):
+    try:
+        image = image_of_pixels(
+            encoding, width, height, step, data, big_endian=big_endian, max_pixels=1000
+        )
+    except ImageError:
+        return
+    assert image.shape[:2] == (height, width)
+    assert image.dtype == np.uint8
