@@ -105,6 +105,12 @@ NODES = (
         'shows a running mission in the terminal',
     ),
     Node(
+        'mission_recorder',
+        'surveillance_operator',
+        'MissionRecorder',
+        'writes a recording that Foxglove and ros2 bag open',
+    ),
+    Node(
         'simulator',
         'surveillance_simulation',
         'Simulator',

@@ -1,0 +1,239 @@
+"""A snapshot as the page shows it: named parts of plain values, and patches of what changed.
+
+The page over the network and the time line in a recording carry the same parts. A part is computed
+only when a field that it comes from has changed.
+"""
+
+from __future__ import annotations
+
+import base64
+import io
+from collections.abc import Callable, Mapping
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from surveillance_operator.snapshot import Grid, Snapshot
+
+Parts = dict[str, Any]
+
+OCCUPIED = 65
+"""From this on a cell is a wall, percent."""
+MOST_TRAIL = 600
+"""Points of the trail in a whole frame."""
+
+
+def _points(points: NDArray[np.float64] | None) -> list[list[float]]:
+    return [] if points is None else np.round(points, 2).tolist()
+
+
+def _grid(grid: Grid | None) -> Any:
+    if grid is None:
+        return None
+    # Transparent where nothing is known, so that the page's own colours show through.
+    colours = np.zeros((*grid.cells.shape, 2), np.uint8)
+    colours[grid.cells >= OCCUPIED] = 0, 255
+    colours[(grid.cells >= 0) & (grid.cells < OCCUPIED)] = 128, 28
+    file = io.BytesIO()
+    Image.fromarray(colours[::-1], 'LA').save(file, 'PNG', optimize=True)
+    rows, columns = grid.cells.shape
+    left, bottom = grid.origin
+    return {
+        'image': 'data:image/png;base64,' + base64.b64encode(file.getvalue()).decode(),
+        'box': [left, bottom, left + columns * grid.resolution, bottom + rows * grid.resolution],
+        'known': list(grid.known),
+    }
+
+
+def _decision(snapshot: Snapshot) -> Any:
+    decision = snapshot.decision
+    if decision is None:
+        return None
+    return {
+        'number': snapshot.number,
+        'time': decision.time,
+        'from': decision.from_place,
+        'place': decision.place,
+        'target': decision.target,
+        'rule': decision.rule,
+        'policy': decision.policy,
+        'reason': decision.reason,
+        'scores': [[name, round(value, 3)] for name, value in decision.scores.items()],
+    }
+
+
+def _status(snapshot: Snapshot) -> Any:
+    status = snapshot.status
+    if status is None:
+        return None
+    return {
+        'machine': status.machine,
+        'state': status.state,
+        'since': status.since,
+        'place': status.place,
+        'heading_to': status.heading_to,
+        'help': status.waiting_for_help,
+        'text': status.text,
+        'avoided': list(status.avoided),
+    }
+
+
+def _places(snapshot: Snapshot) -> Any:
+    names = sorted({*snapshot.positions, *snapshot.visited_at})
+    return {
+        name: {
+            'at': snapshot.positions.get(name),
+            'visited': snapshot.visited_at.get(name),
+            'urgent': name in snapshot.urgent,
+        }
+        for name in names
+    }
+
+
+def _machine(snapshot: Snapshot) -> Any:
+    return [
+        {
+            'path': each.path,
+            'kind': each.kind,
+            'states': list(each.states),
+            'initial': list(each.initial),
+            'outcomes': list(each.outcomes),
+            'edges': [list(edge) for edge in each.edges],
+        }
+        for each in snapshot.containers
+    ]
+
+
+def _transitions(snapshot: Snapshot) -> Any:
+    return [
+        [
+            each.sequence,
+            each.time,
+            each.path,
+            each.from_state,
+            each.outcome,
+            each.to_state,
+            round(each.duration, 2),
+        ]
+        for each in snapshot.transitions[-20:]
+    ]
+
+
+def _health(snapshot: Snapshot) -> Any:
+    nodes = {
+        name: {'up': name in snapshot.nodes, 'restarts': snapshot.restarts.get(name, 0)}
+        for name in sorted({*snapshot.nodes, *snapshot.ended})
+    }
+    reports = {
+        name: {
+            'level': each.level,
+            'message': each.message,
+            'hardware': each.hardware,
+            'values': [list(value) for value in each.values],
+            'time': each.time,
+        }
+        for name, each in sorted(snapshot.health.items())
+    }
+    return {'nodes': nodes, 'reports': reports, 'silent': dict(snapshot.silent)}
+
+
+def _history(snapshot: Snapshot) -> Any:
+    history = snapshot.history
+    return {
+        'visits': [[round(at, 1), place] for at, place in history.visits],
+        'battery': [[round(at, 1), level] for at, level in history.battery],
+        'marks': [[round(at, 1), kind, text] for at, kind, text in history.marks],
+    }
+
+
+PARTS: Mapping[str, tuple[tuple[str, ...], Callable[[Snapshot], Any]]] = {
+    'mission': (
+        ('where', 'mode', 'threshold', 'policy', 'nodes'),
+        lambda s: {
+            'where': s.where,
+            'mode': s.mode,
+            'threshold': s.threshold,
+            'policy': s.policy,
+            'running': bool(s.nodes),
+        },
+    ),
+    'status': (('status',), _status),
+    'decision': (('decision', 'number'), _decision),
+    'battery': (
+        ('battery', 'battery_low'),
+        lambda s: None if s.battery is None else {'level': s.battery, 'low': s.battery_low},
+    ),
+    'grid': (('grid',), lambda s: _grid(s.grid)),
+    'places': (('positions', 'visited_at', 'urgent'), _places),
+    'links': (('links',), lambda s: sorted(map(list, s.links))),
+    'doors': (
+        ('doors', 'door_lines'),
+        lambda s: {
+            name: {'open': (s.doors or {}).get(name), 'line': s.door_lines.get(name)}
+            for name in sorted({*(s.doors or {}), *s.door_lines})
+        },
+    ),
+    'pose': (('pose',), lambda s: None if s.pose is None else [round(v, 3) for v in s.pose]),
+    'plan': (('plan',), lambda s: _points(s.plan)),
+    'scan': (('scan',), lambda s: _points(s.scan)),
+    'obstacles': (('obstacles',), lambda s: _points(s.obstacles)),
+    'machine': (('containers',), _machine),
+    'active': (('active', 'paused'), lambda s: {'paths': list(s.active), 'paused': s.paused}),
+    'transitions': (('transitions',), _transitions),
+    'markers': (
+        ('detections', 'scan_progress'),
+        lambda s: {
+            'seen': [
+                [each.id, each.known, each.confirmed, round(each.confidence, 2)]
+                for each in s.detections
+            ],
+            'progress': s.scan_progress,
+        },
+    ),
+    'requests': (('requests',), lambda s: dict(s.requests)),
+    'health': (('nodes', 'ended', 'restarts', 'health', 'silent'), _health),
+    'events': (('events',), lambda s: [list(each) for each in s.events]),
+    'history': (('history',), _history),
+}
+"""Each part with the snapshot's fields that it comes from."""
+
+assert {name for sources, _ in PARTS.values() for name in sources} <= {
+    field.name for field in fields(Snapshot)
+}
+
+
+class Framer:
+    """Turns a series of snapshots into patches.
+
+    Args:
+        without: Parts to leave out.
+    """
+
+    def __init__(self, without: frozenset[str] = frozenset()) -> None:
+        self._parts = {name: part for name, part in PARTS.items() if name not in without}
+        self._last: Snapshot | None = None
+        self.parts: Parts = {}
+
+    def patch(self, snapshot: Snapshot) -> Parts:
+        """Return the parts that differ from the last snapshot's."""
+        last, changed = self._last, {}
+        self._last = snapshot
+        for name, (sources, compute) in self._parts.items():
+            if last is not None and all(
+                getattr(last, source) is getattr(snapshot, source) for source in sources
+            ):
+                continue
+            value = compute(snapshot)
+            if name not in self.parts or self.parts[name] != value:
+                self.parts[name] = changed[name] = value
+        return changed
+
+    def whole(self) -> Parts:
+        """Return all parts, and the trail, which patches leave to whoever follows the pose."""
+        trail = self._last.trail if self._last is not None else None
+        if trail is not None and len(trail) > MOST_TRAIL:
+            trail = trail[:: -(-len(trail) // MOST_TRAIL)]
+        return {**self.parts, 'trail': _points(trail)}

@@ -1,0 +1,134 @@
+"""The node `mission_recorder`: writes all topics of a mission to a recording, and its time line.
+
+It takes serialised messages as they came and never looks into them. Topics are found as they
+appear. Images are left out unless asked for: they are 300 times as much as all the rest.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+
+from surveillance_operator.mission_feed import MissionFeed
+from surveillance_operator.polled_subscription import PolledSubscription
+from surveillance_operator.recording import timeline
+from surveillance_operator.recording.bag import NAME, BagWriter, RecordingError, TopicType, prune
+from surveillance_operator.recording.schemas import UnknownTypeError, definition, message_class
+from surveillance_operator.recording.timeline import TimelineWriter
+from surveillance_runtime.node import PatrolNode, StartError
+from surveillance_runtime.process import run_node
+
+DRAIN_PERIOD, SEAL_PERIOD, FEED_PERIOD = 0.2, 0.9, 0.4
+"""Seconds between two looks at all queues, two chunks, and two lines of the time line."""
+PRUNE_PERIOD = 60.0
+QUEUE = 2000
+"""Messages of one topic that may come within `DRAIN_PERIOD`; a latched topic brings its own."""
+IMAGES = ('sensor_msgs/msg/Image', 'sensor_msgs/msg/CompressedImage')
+
+
+class MissionRecorder(PatrolNode):
+    """Records until it is stopped."""
+
+    def __init__(self, **node_options: Any) -> None:
+        super().__init__('mission_recorder', **node_options)
+        folder: str = self.parameter(
+            'folder', 'recording', 'Folder of the recording.', read_only=True
+        )
+        images = self.parameter('images', False, 'Record images, too.', read_only=True)
+        self._keep = self.parameter(
+            'keep',
+            20.0,
+            'Most of all recordings beside this one to keep, gigabytes; the oldest are deleted.',
+            minimum=0.0,
+        )
+        megabytes = self.parameter('segment_size', 128.0, 'Megabytes of a file.', minimum=0.1)
+        seconds = self.parameter('segment_age', 3600.0, 'Seconds of a file.', minimum=1.0)
+        self._left_out = frozenset(() if images else IMAGES)
+        path = Path(folder)
+        try:
+            self._bag = BagWriter(path, segment_bytes=int(megabytes * 1e6), segment_seconds=seconds)
+            self._timeline = TimelineWriter(path.with_name(timeline.NAME))
+        except (RecordingError, OSError) as error:
+            raise StartError(str(error)) from error
+        self._subscriptions_by_topic: dict[str, PolledSubscription] = {}
+        self._unknown: set[str] = set()
+        self._feed = MissionFeed(self, FEED_PERIOD)
+        self.spawn(self._record, 'recording')
+
+    def _record(self) -> None:
+        next_seal = next_line = next_prune = 0.0
+        try:
+            while not self.stopping.wait(DRAIN_PERIOD):
+                now = time.monotonic()
+                self._drain()
+                if now >= next_line:
+                    next_line = now + FEED_PERIOD
+                    self._timeline.add(self._feed.see(), time.time())
+                if now >= next_seal:
+                    next_seal = now + SEAL_PERIOD
+                    self._bag.seal()
+                    self._find_topics()
+                if now >= next_prune and self._bag.folder.name == NAME:
+                    next_prune = now + PRUNE_PERIOD
+                    prune(self._bag.folder.resolve().parents[1], self._keep * 1e9)
+        except (RecordingError, OSError) as error:
+            self.fail(f'recording ended: {error}')
+        finally:
+            self._drain()
+            self._timeline.add(self._feed.see(), time.time())
+            self._bag.close()
+            self._timeline.close()
+
+    def _drain(self) -> None:
+        for topic, subscription in self._subscriptions_by_topic.items():
+            while (taken := subscription.take()) is not None:
+                data, stamps = taken
+                self._bag.write(
+                    topic, data, stamps['received_timestamp'], stamps['source_timestamp']
+                )
+
+    def _find_topics(self) -> None:
+        for topic, types in self.get_topic_names_and_types():
+            if topic in self._subscriptions_by_topic or topic in self._unknown:
+                continue
+            offers = [
+                each
+                for each in self.get_publishers_info_by_topic(topic)
+                if each.node_name != self.get_name()
+            ]
+            if offers:
+                self._follow(topic, types[0], offers)
+
+    def _follow(self, topic: str, kind: str, offers: Sequence[Any]) -> None:
+        if kind in self._left_out:
+            self._unknown.add(topic)
+            return
+        profiles = [each.qos_profile for each in offers]
+        reliable = all(each.reliability == ReliabilityPolicy.RELIABLE for each in profiles)
+        latched = all(each.durability == DurabilityPolicy.TRANSIENT_LOCAL for each in profiles)
+        depth = max((each.depth for each in profiles), default=10) or 10
+        qos = QoSProfile(
+            depth=QUEUE,
+            reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
+            durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
+        )
+        try:
+            type_hash = str(getattr(offers[0], 'topic_type_hash', ''))
+            self._bag.add_topic(
+                TopicType(topic, kind, definition(kind), reliable, latched, depth, type_hash)
+            )
+            subscription = PolledSubscription(self, message_class(kind), topic, qos, raw=True)
+        except UnknownTypeError as error:
+            self._unknown.add(topic)
+            self.get_logger().warn(f'topic {topic} is not recorded: {error}')
+            return
+        self._subscriptions_by_topic[topic] = subscription
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the node until it is stopped."""
+    return run_node(MissionRecorder, args)

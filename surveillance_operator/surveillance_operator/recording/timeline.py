@@ -1,0 +1,147 @@
+"""The time line of a recording: what the page showed, to be replayed without ROS.
+
+A file of lines, each one JSON object: `t` (seconds since 1970), `now` (the mission's time) and `p`,
+the parts that changed. Every minute a line holds all parts (`k` is 1), so that a reader that jumps
+reads little. A torn last line is ignored.
+"""
+
+from __future__ import annotations
+
+import bisect
+import json
+import os
+import re
+from pathlib import Path
+from typing import Any
+
+from surveillance_operator.frames import Framer, Parts
+from surveillance_operator.snapshot import Snapshot
+
+NAME = 'timeline.jsonl'
+WHOLE_PERIOD = 60.0
+"""Seconds between two lines that hold everything."""
+_HEAD = re.compile(rb'\{"t":([\d.]+),"k":([01]),"e":"(\w*)"')
+MARKS = ('decision', 'failure', 'recharge')
+"""What a replay can jump to."""
+
+
+class TimelineError(ValueError):
+    """A time line cannot be read; the message is one line that names the file."""
+
+
+class TimelineWriter:
+    """Appends to a time line.
+
+    Args:
+        path: The file.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._file = open(path, 'ab', buffering=0)  # noqa: SIM115 - kept open
+        # The lidar's points come ten times a second: they are in the recording itself.
+        self._framer = Framer(without=frozenset({'scan'}))
+        self._whole = 0.0
+        self._before: Snapshot | None = None
+
+    def add(self, snapshot: Snapshot, at: float) -> None:
+        """Write what changed, if anything did.
+
+        Args:
+            snapshot: What is known.
+            at: Seconds since 1970.
+        """
+        changed = self._framer.patch(snapshot)
+        whole = at - self._whole >= WHOLE_PERIOD
+        if not changed and not whole:
+            return
+        if whole:
+            self._whole, changed = at, self._framer.whole()
+        line = json.dumps({'now': round(snapshot.now, 2), 'p': changed}, separators=(',', ':'))
+        head = f'{{"t":{at:.3f},"k":{int(whole)},"e":"{self._event(snapshot)}",'
+        os.write(self._file.fileno(), (head + line[1:] + '\n').encode())
+        self._before = snapshot
+
+    def close(self) -> None:
+        """Close the file; nothing is lost without it."""
+        self._file.close()
+
+    def _event(self, snapshot: Snapshot) -> str:
+        """Return the most important thing that happened since the last line."""
+        before = self._before
+        marks = snapshot.history.marks
+        if before is not None and marks and marks != before.history.marks:
+            kind = marks[-1][1]
+            return kind if kind in MARKS else 'failure' if kind == 'help' else ''
+        if before is None or snapshot.number != before.number:
+            return 'decision' if snapshot.decision is not None else ''
+        return ''
+
+
+class Timeline:
+    """Reads a time line.
+
+    Args:
+        path: The file.
+
+    Attributes:
+        times: Of the lines, seconds since 1970, ascending.
+        marks: Times by what happened, one of `MARKS`.
+
+    Raises:
+        TimelineError: There is no such file, or nothing in it.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.times: list[float] = []
+        self.marks: dict[str, list[float]] = {name: [] for name in MARKS}
+        self._offsets: list[int] = []
+        self._wholes: list[int] = []
+        try:
+            self._file = open(path, 'rb')  # noqa: SIM115 - kept open
+        except OSError as error:
+            raise TimelineError(f'{path}: {error.strerror}') from None
+        offset = 0
+        for line in self._file:
+            match = _HEAD.match(line)
+            if match and line.endswith(b'\n'):
+                at = float(match.group(1))
+                if match.group(2) == b'1':
+                    self._wholes.append(len(self.times))
+                if (mark := match.group(3).decode()) in self.marks:
+                    self.marks[mark].append(at)
+                # A clock that was set back must not hide lines.
+                self.times.append(max(at, self.times[-1] if self.times else at))
+                self._offsets.append(offset)
+            offset += len(line)
+        if not self._wholes:
+            raise TimelineError(f'{path}: holds nothing to replay')
+
+    def at(self, time: float) -> tuple[int, float, Parts]:
+        """Return the number of the line that holds at a time, the mission's time, and all parts."""
+        number = max(self._wholes[0], bisect.bisect_right(self.times, time) - 1)
+        first = self._wholes[bisect.bisect_right(self._wholes, number) - 1]
+        parts: Parts = {}
+        now = 0.0
+        trail: list[Any] = []
+        for each in range(first, number + 1):
+            now, changed = self.line(each)
+            trail = changed.pop('trail', trail)
+            if changed.get('pose') and each > first:
+                trail.append(changed['pose'][:2])
+            parts.update(changed)
+        return number, now, {**parts, 'trail': trail}
+
+    def line(self, number: int) -> tuple[float, Parts]:
+        """Return the mission's time of a line, and the parts that it changes."""
+        self._file.seek(self._offsets[number])
+        content = json.loads(self._file.readline())
+        return float(content['now']), content['p']
+
+    def next_mark(self, kind: str, time: float) -> float | None:
+        """Return when the next event of a kind happened after a time."""
+        later = bisect.bisect_right(self.marks[kind], time + 1e-3)
+        return self.marks[kind][later] if later < len(self.marks[kind]) else None
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()

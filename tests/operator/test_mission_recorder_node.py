@@ -1,0 +1,68 @@
+"""The recording node among real publishers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from nav_msgs.msg import OccupancyGrid
+from rclpy.serialization import deserialize_message, serialize_message
+from rosbags.highlevel import AnyReader
+from sensor_msgs.msg import Image, LaserScan
+from std_msgs.msg import String
+
+from surveillance_interfaces.action import FollowPath
+from surveillance_interfaces.msg import Decision
+from surveillance_operator.mission_recorder_node import MissionRecorder
+from surveillance_operator.recording.bag import messages
+from surveillance_operator.recording.timeline import Timeline
+from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
+
+
+def test_every_message_comes_back_as_it_was_published(graph: Any, tmp_path: Path) -> None:
+    feedback = FollowPath.Impl.FeedbackMessage()
+    feedback.feedback.position.x = 2.5
+    grid = OccupancyGrid(data=[0, 100, -1, 0])
+    grid.info.width = grid.info.height = 2
+    grid.info.resolution = 0.5
+    published = {
+        '/decision': (Decision(sequence=3, place='R3', candidates=['R3'], scores=[0.5]), STATE_QOS),
+        '/map': (grid, STATE_QOS),
+        '/scan': (LaserScan(ranges=np.linspace(0, 1, 50, dtype=np.float32)), SENSOR_QOS),
+        '/follow_path/_action/feedback': (feedback, 10),
+        '/words': (String(data='ü → ∞'), 10),
+    }
+    publishers = {
+        topic: graph.node.create_publisher(type(message), topic, qos)
+        for topic, (message, qos) in published.items()
+    }
+    images = graph.node.create_publisher(Image, '/image', 1)
+    folder = tmp_path / '20260101-000000' / 'recording'
+    recorder = graph.add(MissionRecorder, parameters={'folder': str(folder)})
+    graph.until(lambda: all(p.get_subscription_count() for p in publishers.values()))
+    for topic, (message, _) in published.items():
+        publishers[topic].publish(message)
+    timeline = folder.parent / 'timeline.jsonl'
+    graph.until(lambda: b'R3' in timeline.read_bytes())
+    assert images.get_subscription_count() == 0
+    graph.remove(recorder)
+
+    found = {
+        channel.topic: message.data
+        for _, channel, message in messages(folder)
+        if channel.topic in published
+    }
+    assert found.keys() == published.keys()
+    for topic, data in found.items():
+        message = published[topic][0]
+        assert deserialize_message(data, type(message)) == message
+        assert data == serialize_message(message)
+    with AnyReader([folder]) as reader:
+        for connection, _, data in reader.messages():
+            read: Any = reader.deserialize(data, connection.msgtype)
+            if connection.topic == '/decision':
+                assert (read.sequence, read.place) == (3, 'R3')
+            if connection.topic == '/follow_path/_action/feedback':
+                assert read.feedback.position.x == 2.5
+    assert Timeline(timeline).at(1e12)[2]['decision']['place'] == 'R3'

@@ -1,0 +1,81 @@
+"""The time line of a recording: written, torn, read back, jumped in."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from surveillance_behaviour.policy.situation import Decision
+from surveillance_operator.frames import Framer
+from surveillance_operator.recording.timeline import Timeline, TimelineError, TimelineWriter
+from surveillance_operator.snapshot import Snapshot
+
+DECISION = Decision(0.0, 'A', 'B', 'B', 'URGENT', 'tour', 'why', {'B': 1.0})
+
+
+def record(path: Path, seconds: int = 200) -> None:
+    writer = TimelineWriter(path)
+    for second in range(seconds):
+        pose = (second / 10, 0.0, 0.0)
+        writer.add(
+            Snapshot(
+                now=float(second),
+                battery=100.0 - second // 10,
+                pose=pose,
+                trail=np.array([(x / 10, 0.0) for x in range(second + 1)]),
+                decision=DECISION,
+                number=1 + second // 50,
+            ),
+            1000.0 + second,
+        )
+    writer.close()
+
+
+def test_any_time_shows_what_was_known_then(tmp_path: Path) -> None:
+    record(tmp_path / 'timeline.jsonl')
+    line = Timeline(tmp_path / 'timeline.jsonl')
+    for time in (1000.0, 1059.9, 1060.0, 1150.5, 1199.0, 9999.0, 0.0):
+        _, now, parts = line.at(time)
+        second = int(min(max(time, 1000.0), 1199.0) - 1000)
+        assert now == second
+        assert parts['pose'] == [second / 10, 0.0, 0.0]
+        assert parts['battery']['level'] == 100 - second // 10
+        assert parts['trail'][-1] == [second / 10, 0.0]
+        assert len(parts['trail']) == second + 1
+
+
+def test_the_next_decision_is_found(tmp_path: Path) -> None:
+    record(tmp_path / 'timeline.jsonl')
+    line = Timeline(tmp_path / 'timeline.jsonl')
+    assert line.next_mark('decision', 1000.0) == 1050.0
+    assert line.next_mark('decision', 1050.0) == 1100.0
+    assert line.next_mark('decision', 1150.0) is None
+    assert line.next_mark('failure', 0.0) is None
+
+
+def test_a_torn_last_line_is_left_out(tmp_path: Path) -> None:
+    path = tmp_path / 'timeline.jsonl'
+    record(path, 5)
+    path.write_bytes(path.read_bytes()[:-4])
+    assert Timeline(path).times[-1] == 1003.0
+
+
+@pytest.mark.parametrize('content', [None, '', 'no time line\n'])
+def test_what_is_no_time_line_is_said_in_one_line(content: str | None, tmp_path: Path) -> None:
+    path = tmp_path / 'timeline.jsonl'
+    if content is not None:
+        path.write_text(content)
+    with pytest.raises(TimelineError, match=r'timeline\.jsonl: '):
+        Timeline(path)
+
+
+def test_a_patch_holds_what_changed_alone() -> None:
+    framer = Framer()
+    first = framer.patch(Snapshot(battery=50.0, decision=DECISION, number=1))
+    assert first['battery'] == {'level': 50.0, 'low': False}
+    assert framer.patch(replace(Snapshot(), battery=50.0, decision=DECISION, number=1)) == {}
+    after = framer.patch(replace(Snapshot(), battery=49.0, decision=DECISION, number=1))
+    assert after == {'battery': {'level': 49.0, 'low': False}}
