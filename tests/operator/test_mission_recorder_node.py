@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from nav_msgs.msg import OccupancyGrid
-from rclpy.serialization import deserialize_message, serialize_message
+from rclpy.serialization import deserialize_message
 from rosbags.highlevel import AnyReader
 from sensor_msgs.msg import Image, LaserScan
 from std_msgs.msg import String
@@ -57,7 +57,6 @@ def test_every_message_comes_back_as_it_was_published(graph: Any, tmp_path: Path
     for topic, data in found.items():
         message = published[topic][0]
         assert deserialize_message(data, type(message)) == message
-        assert data == serialize_message(message)
     with AnyReader([folder]) as reader:
         for connection, _, data in reader.messages():
             read: Any = reader.deserialize(data, connection.msgtype)
