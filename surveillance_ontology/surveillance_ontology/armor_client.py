@@ -10,6 +10,7 @@ for themselves, so there they must be awaited.
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from typing import Any
 
@@ -35,7 +36,7 @@ from surveillance_ontology.conversions import (
     request_to_ros,
     response_from_ros,
 )
-from surveillance_runtime.calls import CallError, ServiceCaller
+from surveillance_runtime.calls import CallError, CallTimeoutError, ServiceCaller
 from surveillance_runtime.waiting import Interrupt
 
 __all__ = [
@@ -49,6 +50,8 @@ __all__ = [
 ]
 
 RETRY_SECONDS = 0.1
+SPUN_WITHIN = 0.2
+"""Seconds within which an executor that spins runs a task."""
 CHANGES_TOPIC = 'fact_changes'
 CHANGES_QOS = QoSProfile(
     depth=100,  # The publisher keeps one; a subscriber that is busy may catch up with a burst.
@@ -76,6 +79,7 @@ class RosTransport:
         timeout: float,
         interrupt: Interrupt | None = None,
     ) -> None:
+        self._node = node
         self._single = ServiceCaller(node, ArmorDirective, service_name)
         self._serial = ServiceCaller(node, ArmorDirectiveList, serial_service_name)
         self._interrupt = interrupt
@@ -83,19 +87,35 @@ class RosTransport:
 
     def call(self, request: DirectiveRequest) -> DirectiveResponse:
         """Carry out one directive and block until the answer."""
-        try:
-            answer = self._single.call(_one(request), self.timeout, self._interrupt)
-        except CallError as error:
-            raise ArmorServiceCallError(str(error)) from error
+        answer = self._blocking(self._single, _one(request))
         return response_from_ros(answer.armor_response)
 
     def call_list(self, requests: Batch) -> ListResponse:
         """Carry out a batch and block until the answer."""
+        answer = self._blocking(self._serial, _many(requests))
+        return _list_from_ros(answer)
+
+    def _blocking(self, caller: ServiceCaller, request: Any) -> Any:
         try:
-            answer = self._serial.call(_many(requests), self.timeout, self._interrupt)
+            return caller.call(request, self.timeout, self._interrupt)
+        except CallTimeoutError as error:
+            if self._is_spun():
+                raise ArmorServiceCallError(str(error)) from error
+            raise ArmorServiceCallError(
+                f'{error}: no thread spins node {self._node.get_name()!r} meanwhile; spin it in '
+                'another thread, await ....call_async(...) where this is one of its callbacks, or '
+                'use armor_api.armor_client.ArmorClient, which spins a node of its own. '
+                'The server may have carried the directive out.'
+            ) from error
         except CallError as error:
             raise ArmorServiceCallError(str(error)) from error
-        return _list_from_ros(answer)
+
+    def _is_spun(self) -> bool:
+        if self._node.executor is None:
+            return False
+        spun = threading.Event()
+        self._node.executor.create_task(spun.set)
+        return spun.wait(SPUN_WITHIN)
 
     async def call_async(self, request: DirectiveRequest) -> DirectiveResponse:
         """Carry out one directive."""

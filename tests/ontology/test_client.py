@@ -170,6 +170,8 @@ def test_replacing_the_only_value(client: ArmorClient) -> None:
     with pytest.raises(ArmorServiceInternalError) as several:
         change.replace_one_dataprop_b2_ind('size', 'X', 'LONG', '4')
     assert several.value.exit_code == 206
+    assert several.value.code == 206
+    assert several.value.msg == str(several.value)
     change.replace_one_objectprop_b2_ind('near', 'X', 'A')
     change.replace_one_objectprop_b2_ind('near', 'X', 'B')
     assert ask.objectprop_b2_ind('near', 'X') == ['B']

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from surveillance_ontology.armor.directives.table import TABLE
@@ -398,3 +400,44 @@ def test_an_inconsistency_ends_with_its_cause(
     ask('REMOVE DATAPROP IND', 'visitedAt', 'R3', 'LONG', '6')
     answer = ask('REASON')
     assert (answer.success, answer.is_consistent) == (True, True)
+
+
+def test_a_class_of_which_nothing_else_is_known_is_below_owl_thing_at_once(ask: Ask) -> None:
+    before = names(ask('QUERY CLASS CLASS', 'owl:Thing'))
+    ask('ADD CLASS', 'KITCHEN')
+    below = names(ask('QUERY CLASS CLASS', 'owl:Thing'))
+    assert sorted({*below} - {*before}) == ['KITCHEN']
+    ask('REMOVE CLASS', 'KITCHEN')
+    assert names(ask('QUERY CLASS CLASS', 'owl:Thing')) == before
+
+
+def test_an_ill_formed_value_can_be_retracted_but_not_added(
+    service: ArmorService, tmp_path: Path
+) -> None:
+    """Files of others hold such values; a client removes what an answer shows."""
+    (tmp_path / 'x.ttl').write_text(
+        f'@prefix : <{IRI}#> . @prefix xsd: <http://www.w3.org/2001/XMLSchema#> .\n'
+        ':p a <http://www.w3.org/2002/07/owl#DatatypeProperty> .\n:R1 :p "abc"^^xsd:integer .\n'
+    )
+    ask = asker(service)
+    assert ask('LOAD FILE', 'x.ttl', IRI, 'false', '', 'false').success
+    shown = ask('QUERY DATAPROP IND', 'p', 'R1').queried_objects
+    assert shown == ['"abc"^^xsd:integer']
+    assert ask('ADD DATAPROP IND', 'p', 'R1', 'INT', shown[0]).exit_code == 205
+    assert ask('REMOVE DATAPROP IND', 'p', 'R1', 'INT', shown[0]).success
+    assert ask('QUERY DATAPROP IND', 'p', 'R1').queried_objects == []
+
+
+def test_names_and_languages_survive_saving_and_loading(ask: Ask) -> None:
+    ask('ADD DATAPROP IND', 'label', 'R1', 'STRING', '"Raum"@DE-at')
+    ask('ADD DATAPROP IND', 'label', 'R%25', 'STRING', '"quoted"')
+    before = [ask('QUERY DATAPROP IND', 'label', name).queried_objects for name in ('R1', 'R%25')]
+    assert before == [['"Raum"@de-at'], ['"\\"quoted\\""^^xsd:string']]
+    assert ask('SAVE', 'map.owl').success
+    assert ask('LOAD FILE', 'map.owl', IRI, 'false', '', 'false', reference='again').success
+    assert before == [
+        ask('QUERY DATAPROP IND', 'label', name, reference='again').queried_objects
+        for name in ('R1', 'R%25')
+    ]
+    assert ask('REMOVE DATAPROP IND', 'label', 'R1', 'STRING', '"Raum"@DE-AT').success
+    assert ask('QUERY DATAPROP IND', 'label', 'R1').queried_objects == []

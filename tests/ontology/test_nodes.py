@@ -26,7 +26,7 @@ from surveillance_ontology.armor_server_node import ArmorServer
 from surveillance_ontology.conversions import point_to_ros
 from surveillance_ontology.ontology_map_builder_node import OntologyMapBuilder
 from surveillance_runtime.calls import ServiceCaller
-from surveillance_runtime.node import StartError
+from surveillance_runtime.node import PatrolNode, StartError
 from surveillance_runtime.qos import STATE_QOS
 
 from .seven_rooms import IRI, ONTOLOGY, SEVEN_ROOMS, build_seven_rooms
@@ -124,6 +124,33 @@ def test_a_missing_server_is_reported_in_time(graph: Any) -> None:
     armor = ArmorClient(graph.node, 'test', 'map', timeout=0.1)
     with pytest.raises(ArmorServiceCallError, match='armor_interface_srv'):
         armor.query.ind_b2_class('ROOM')
+
+
+def test_a_client_that_nobody_spins_says_so(graph: Any) -> None:
+    graph.add(ArmorServer)
+    lonely = PatrolNode('lonely', context=graph.context, use_global_arguments=False)
+    armor = ArmorClient(lonely, 'test', 'map', timeout=0.3)
+    with pytest.raises(ArmorServiceCallError, match="no thread spins node 'lonely'") as error:
+        armor.utils.get_all_refs()
+    assert 'armor_api' in error.value.msg
+    lonely.destroy_node()
+
+
+def test_a_blocking_call_in_a_callback_says_so(graph: Any) -> None:
+    graph.add(ArmorServer)
+    armor = ArmorClient(graph.node, 'test', 'map', timeout=0.3)
+    armor.utils.get_all_refs()
+    said: list[str] = []
+
+    def callback() -> None:
+        try:
+            armor.utils.get_all_refs()
+        except ArmorServiceCallError as error:
+            said.append(error.msg)
+
+    graph.node.executor.create_task(callback)
+    graph.until(lambda: said)
+    assert 'call_async' in said[0]
 
 
 def test_a_long_query_keeps_nobody_waiting(graph: Any) -> None:

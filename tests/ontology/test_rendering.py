@@ -37,7 +37,7 @@ def test_entities_are_read(text: str, iri: str) -> None:
 
 
 @pytest.mark.parametrize(
-    'text', ['', 'a b', 'a\x00', 'a\n', '<>', 'a"b', '#x', 'a' * 3000, '<a b>']
+    'text', ['', 'a b', 'a\x00', 'a\n', '<>', 'a"b', '#x', '50%', '%4', '%zz', 'a' * 3000, '<a b>']
 )
 def test_names_that_no_iri_can_hold_are_refused(text: str) -> None:
     with pytest.raises(ValueError, match=r'\S'):
@@ -53,6 +53,10 @@ def test_names_that_no_iri_can_hold_are_refused(text: str) -> None:
         ('LONG', '+007', '"7"^^xsd:long'),
         ('INT', '3', '"3"^^xsd:integer'),
         ('INTEGER', '"3"^^xsd:long', '"3"^^xsd:long'),
+        ('INT', '"3"', '"3"^^xsd:integer'),
+        ('STRING', '"hello"', '"\\"hello\\""^^xsd:string'),
+        ('STRING', '"x"@EN-us', '"x"@en-us'),
+        ('BOOLEAN', '"true"^^xsd:boolean', '"true"^^xsd:boolean'),
         ('STRING', 'ab "q"', '"ab \\"q\\""^^xsd:string'),
         ('STRING', '"ab \\"q\\""^^xsd:string', '"ab \\"q\\""^^xsd:string'),
         ('STRING', '"x"@en', '"x"@en'),
@@ -89,6 +93,12 @@ def test_doubles_are_narrowed_when_asked_for() -> None:
         ('LONG', '1.5', 'not a whole number'),
         ('LONG', '', 'not a whole number'),
         ('FLOAT', '1,5', 'not a number'),
+        ('INT', '"abc"^^xsd:integer', 'is not a value of INT'),
+        ('INT', '"5"^^xsd:string', 'is not a value of INT'),
+        ('INT', '"x"@en', 'is not a value of INT'),
+        ('FLOAT', '"true"^^xsd:boolean', 'is not a value of FLOAT'),
+        ('BOOLEAN', '"5"^^xsd:integer', 'is not a value of BOOLEAN'),
+        ('INT', '"abc"', 'not a whole number'),
         ('DOUBLE', '0x10', 'not a number'),
         ('STRING', 'a\x01', 'which XML cannot hold'),
         ('STRING', '\ud800', 'which XML cannot hold'),

@@ -43,20 +43,37 @@ Steps = Generator[DirectiveRequest | Batch, Any, R]
 """What an operation is: it yields a directive (and is sent its response) or a batch of them."""
 
 
-class ArmorServiceCallError(Exception):
+class ArmorError(Exception):
+    """A directive that was not carried out.
+
+    Attributes:
+        msg: What went wrong, in one line.
+    """
+
+    def __init__(self, message: str) -> None:
+        super().__init__(message)
+        self.msg = message
+
+
+class ArmorServiceCallError(ArmorError):
     """The server could not be reached, or did not answer in time."""
 
 
-class ArmorServiceInternalError(Exception):
+class ArmorServiceInternalError(ArmorError):
     """The server refused a directive.
 
     Attributes:
-        exit_code: ARMOR's exit code.
+        code: ARMOR's exit code.
     """
 
     def __init__(self, message: str, exit_code: int | str) -> None:
         super().__init__(message)
-        self.exit_code = ExitCode(int(exit_code))
+        self.code = ExitCode(int(exit_code))
+
+    @property
+    def exit_code(self) -> ExitCode:
+        """The same as `code`, by the name of the response's field."""
+        return self.code
 
 
 class Transport(Protocol):

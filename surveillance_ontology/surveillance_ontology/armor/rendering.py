@@ -15,10 +15,12 @@ from functools import lru_cache
 from surveillance_ontology.armor.protocol import DirectiveError, ExitCode
 from surveillance_ontology.owl.expressions import Literal
 from surveillance_ontology.owl.vocabulary import OWL, RDF, RDFS, XSD
+from surveillance_ontology.reasoner.datatypes import IllFormedLiteral, parse_value
 
 MAX_NAME = 2048
 PREFIXES = {'owl': OWL, 'xsd': XSD, 'rdf': RDF, 'rdfs': RDFS}
 _FORBIDDEN_IN_IRI = re.compile(r'[\x00-\x20<>"{}|\\^`\x7f-\x9f\ud800-\udfff]')
+_BARE_PERCENT = re.compile(r'%(?![0-9A-Fa-f]{2})')
 _FORBIDDEN_IN_TEXT = re.compile(r'[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]')
 _ABSOLUTE_IRI = re.compile(r'[A-Za-z][A-Za-z0-9+.-]*:[^\s]+\Z')
 _RENDERED = re.compile(
@@ -28,6 +30,14 @@ _RENDERED = re.compile(
 )
 _INTEGER = re.compile(r'[+-]?[0-9]+\Z')
 _MAX_DIGITS = 4000
+_NUMBERS = frozenset(
+    XSD + name
+    for name in (
+        *('integer', 'long', 'int', 'short', 'byte', 'decimal', 'float', 'double'),
+        *('nonNegativeInteger', 'positiveInteger', 'nonPositiveInteger', 'negativeInteger'),
+        *('unsignedLong', 'unsignedInt', 'unsignedShort', 'unsignedByte'),
+    )
+)
 _INTEGER_RANGES = {'integer': 31, 'long': 63}
 
 TYPES = {
@@ -89,6 +99,8 @@ def parse_entity(text: str, base: str) -> str:
     full = False
     if name[0] == '<' and name[-1] == '>':
         name, full = name[1:-1], True
+    if _BARE_PERCENT.search(name):
+        raise ValueError(f"{shown(text)} has a bare '%', in an IRI written %25")
     if found := _FORBIDDEN_IN_IRI.search(name):
         raise ValueError(
             f'{shown(text)} has the character {found.group()!r}, not allowed in an IRI'
@@ -105,13 +117,16 @@ def parse_entity(text: str, base: str) -> str:
     return f'{base}#{name}'
 
 
-def parse_literal(type_word: str, text: str, *, narrow_doubles: bool = False) -> Literal:
+def parse_literal(
+    type_word: str, text: str, *, narrow_doubles: bool = False, stored: bool = False
+) -> Literal:
     """Read a value argument: its bare lexical form, or the form that answers have.
 
     Args:
         type_word: A key of `TYPES`, in capitals.
         text: ``10`` or ``"10"^^xsd:long`` or ``"10"^^<http://www.w3.org/2001/XMLSchema#long>``.
         narrow_doubles: Store DOUBLE as xsd:float, as ARMOR 2.2 does.
+        stored: The value is one that an answer showed, to be retracted: whatever was shown is read.
 
     Raises:
         ValueError: The text is not a value of the type.
@@ -125,8 +140,13 @@ def parse_literal(type_word: str, text: str, *, narrow_doubles: bool = False) ->
         wanted = 'float'
     if text[:1] == '"' and (match := _RENDERED.match(text)):
         rendered = _rendered_literal(match)
-        if rendered is not None and (wanted != 'string' or _is_text(rendered)):
+        typed = bool(match['iri'] or match['name'] or match['language'])
+        if rendered is not None and not typed and wanted != 'string':
+            text = rendered.lexical
+        elif rendered is not None and typed and (stored or _is_of(wanted, rendered)):
             return rendered
+        elif wanted != 'string':
+            raise ValueError(f'{shown(text)} is not a value of {type_word}')
     return Literal(_lexical(wanted, text, type_word), XSD + wanted)
 
 
@@ -146,7 +166,8 @@ def parse_rendered(text: str) -> Literal:
 def _rendered_literal(match: re.Match[str]) -> Literal | None:
     text = re.sub(r'\\(.)', r'\1', match['text'], flags=re.DOTALL)
     if match['language']:
-        return Literal(text, RDF + 'langString', match['language'])
+        # Language tags mean the same in any case (RDF 1.1); files are read in lower case.
+        return Literal(text, RDF + 'langString', match['language'].lower())
     if match['iri']:
         return Literal(text, match['iri'])
     if not match['name']:
@@ -157,8 +178,15 @@ def _rendered_literal(match: re.Match[str]) -> Literal | None:
     return Literal(text, match['name']) if '://' in match['name'] else None
 
 
-def _is_text(literal: Literal) -> bool:
-    return literal.datatype == XSD + 'string' or bool(literal.language)
+def _is_of(wanted: str, literal: Literal) -> bool:
+    """Tell whether a literal with its own datatype is a value of the kind that is wanted."""
+    if wanted == 'string':
+        return literal.datatype == XSD + 'string' or bool(literal.language)
+    try:
+        parse_value(literal)
+    except IllFormedLiteral:
+        return False
+    return literal.datatype in ((XSD + 'boolean',) if wanted == 'boolean' else _NUMBERS)
 
 
 def _lexical(wanted: str, text: str, type_word: str) -> str:

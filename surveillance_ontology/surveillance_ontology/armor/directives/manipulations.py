@@ -9,6 +9,7 @@ from __future__ import annotations
 from surveillance_ontology.armor.directives.table import (
     CLS,
     DAT,
+    GONE,
     IND,
     NEW,
     OBJ,
@@ -225,7 +226,7 @@ def _remove_class_class(_: Reference, cls: str, above: str) -> list[Change]:
 
 @manipulation(
     'REMOVE DATAPROP IND',
-    *(DAT, IND, TYPE, VALUE),
+    *(DAT, IND, TYPE, GONE),
     summary='Retracts a value of a data property. Value and type must be those asserted, else '
     'nothing happens.',
     verb='removed from',

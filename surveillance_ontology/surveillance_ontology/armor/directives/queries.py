@@ -31,6 +31,7 @@ from surveillance_ontology.owl.axioms import (
     DataPropertyAssertion,
     ObjectPropertyAssertion,
     SameIndividual,
+    SubClassOf,
 )
 from surveillance_ontology.owl.expressions import (
     ClassExpression,
@@ -128,7 +129,12 @@ def _classes(ref: Reference, ind: str, bottom: bool) -> DirectiveResponse:
     summary='All classes below a class, direct and indirect, owl:Nothing among them.',
 )
 def _subclasses(ref: Reference, cls: str) -> DirectiveResponse:
-    below = _entities(ref.kb.subclasses(cls) | {NOTHING})
+    classes = ref.kb.subclasses(cls) | {NOTHING}
+    if cls == THING:
+        # A class of which nothing else is known is none of the reasoner's.
+        told = (axiom for axiom in ref.kb.axioms_about(THING) if isinstance(axiom, SubClassOf))
+        classes |= {axiom.sub for axiom in told if isinstance(axiom.sub, str)} - {THING}
+    below = _entities(classes)
     response = DirectiveResponse(queried_objects=below)
     if not ref.kb.is_known('class', cls):
         response.error_description = f'{ref.name} has no class {render_entity(cls)}'

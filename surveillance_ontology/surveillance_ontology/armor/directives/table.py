@@ -59,6 +59,8 @@ class Read(Enum):
     TYPE = 'type'
     """A word of `rendering.TYPES`; the values behind it are read by it, itself it is not passed."""
     VALUE = 'value'
+    STORED = 'stored value'
+    """As a value; one that an answer showed is taken whatever it is, to be retracted."""
     NUMBER = 'number'
     FLAG = 'flag'
     TEXT = 'text'
@@ -175,8 +177,11 @@ class Directive:
                     values.append(parse_entity(text, base))
                 elif read == Read.TYPE.value:
                     type_word = self._type(text, args)
-                elif read == Read.VALUE.value:
-                    values.append(parse_literal(type_word, text, narrow_doubles=narrow_doubles))
+                elif read in _LITERALS:
+                    stored = read == Read.STORED.value
+                    values.append(
+                        parse_literal(type_word, text, narrow_doubles=narrow_doubles, stored=stored)
+                    )
                 else:
                     values.append(_OTHERS[read](text))
             if self.rest:
@@ -218,6 +223,7 @@ def _flag(text: str) -> bool:
 
 
 _ENTITY = 'entity'
+_LITERALS = (Read.VALUE.value, Read.STORED.value)
 _OTHERS: dict[str, Callable[[str], Any]] = {
     Read.NUMBER.value: _number,
     Read.FLAG.value: _flag,
@@ -306,7 +312,8 @@ DAT = Argument('property', Read.DATA_PROPERTY)
 TYPE = Argument('type', Read.TYPE)
 VALUE = Argument('value', Read.VALUE)
 NEW = Argument('new value', Read.VALUE)
-OLD = Argument('old value', Read.VALUE)
+OLD = Argument('old value', Read.STORED)
+GONE = Argument('value', Read.STORED)
 
 
 def text(name: str, default: str | None = None) -> Argument:
