@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
+from action_msgs.msg import GoalStatus, GoalStatusArray
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseWithCovarianceStamped, Twist
 from rclpy.clock import Clock as RclpyClock
@@ -20,15 +23,21 @@ from surveillance_runtime.place import PlaceError
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
 from surveillance_simulation import conversions, simulator_parameters
-from surveillance_simulation.camera.mujoco_rendering import MujocoMissing
+from surveillance_simulation.camera.mujoco_rendering import MujocoMissingError
+from surveillance_simulation.clock_rate import DRIVING, PLANNING, ClockRate
 from surveillance_simulation.feeds.camera_feed import CameraFeed
 from surveillance_simulation.feeds.fault_services import FaultServices
 from surveillance_simulation.feeds.sensor_feed import SensorFeed
-from surveillance_simulation.pace import Pace
 from surveillance_simulation.robot.arm_motion import TrajectoryError
 from surveillance_simulation.robot.robot import Robot
 from surveillance_simulation.world.textures import TextureError
 from surveillance_simulation.world.world import World
+
+_UNDER_WAY = (
+    GoalStatus.STATUS_ACCEPTED,
+    GoalStatus.STATUS_EXECUTING,
+    GoalStatus.STATUS_CANCELING,
+)
 
 
 class Simulator(PatrolNode):
@@ -41,7 +50,7 @@ class Simulator(PatrolNode):
     def __init__(self, **node_options: Any) -> None:
         super().__init__('simulator', **node_options)
         seed = self.parameter('random_seed', 0, 'Seed of all noise: the same seed, the same run.')
-        pace = simulator_parameters.pace(self)
+        rate = simulator_parameters.clock_rate(self)
         try:
             world = World.from_parameters(simulator_parameters.place(self))
         except PlaceError as error:
@@ -53,23 +62,34 @@ class Simulator(PatrolNode):
             rng=np.random.default_rng(seed),
         )
         self._changing = threading.RLock()
-        self._drives_clock = pace.speed != 1.0 or bool(self.get_parameter('use_sim_time').value)
-        self._pace = Pace(pace, time.monotonic())
+        self._drives_clock = rate.speed != 1.0 or bool(self.get_parameter('use_sim_time').value)
+        self._rate = ClockRate(rate, time.monotonic())
         self._sensors = SensorFeed(self, self.robot, drives_clock=self._drives_clock)
         try:
             self._camera = CameraFeed(self, self.robot, seed, self._changing, self._stamp)
-        except (TextureError, MujocoMissing) as error:
+        except (TextureError, MujocoMissingError) as error:
             raise StartError(f'simulator: {error}') from None
         FaultServices(self, self.robot, self._changing, self._sensors.tell_doors)
         self.create_subscription(Twist, 'cmd_vel', self._on_command, 1)
         self.create_subscription(
             PoseWithCovarianceStamped, 'amcl_pose', self._on_estimate, STATE_QOS
         )
+        self.create_subscription(Time, 'mission_waits_until', self._on_mission_waits, STATE_QOS)
+        for action in (*PLANNING, *DRIVING):
+            self.create_subscription(
+                GoalStatusArray,
+                f'{action}/_action/status',
+                partial(self._on_goals, action),
+                STATE_QOS,
+            )
         self.create_subscription(JointTrajectory, 'arm/joint_trajectory', self._on_trajectory, 1)
         steady = RclpyClock(clock_type=ClockType.STEADY_TIME)
         self._sensors.publish(self._stamp())
-        self._timer = self.create_timer(pace.period, self._tick, clock=steady)
-        self.create_timer(pace.patience, self._go_on, clock=steady)
+        self._timer = self.create_timer(rate.period, self._tick, clock=steady)
+        self.create_timer(rate.patience, self._go_on, clock=steady)
+        if self._drives_clock:
+            self._told_of_clock = False
+            self.create_timer(1.0, self._look_for_another_clock, clock=steady)
 
     def _stamp(self) -> Time:
         if self._drives_clock:
@@ -78,8 +98,8 @@ class Simulator(PatrolNode):
 
     def _tick(self) -> None:
         with self._changing:
-            passed = self._pace.due(self.robot.time, time.monotonic(), moving=self.robot.is_moving)
-            if self._pace.is_waiting:
+            passed = self._rate.due(self.robot.time, time.monotonic(), moving=self.robot.is_moving)
+            if self._rate.is_waiting:
                 # The answer wakes it: ticks in vain would take the time that the answer needs.
                 self._timer.cancel()
             if not passed:
@@ -89,22 +109,41 @@ class Simulator(PatrolNode):
         self._camera.tick()
 
     def _go_on(self) -> None:
-        if self._pace.is_waiting:
+        if self._rate.is_waiting:
             self._timer.reset()
             self._tick()
+
+    def _look_for_another_clock(self) -> None:
+        others = self.count_publishers('/clock') - 1
+        if others > 0 and not self._told_of_clock:
+            self.get_logger().error(
+                f'{others} other publisher(s) of /clock in this ROS domain: time jumps for every '
+                'node. Expected one; give the other robot its own --domain.'
+            )
+        self._told_of_clock = others > 0
 
     def _on_command(self, message: Twist) -> None:
         speed, turn_speed = message.linear.x, message.angular.z
         with self._changing:
             self.robot.base.command(speed, turn_speed)
-            self._pace.command(self.robot.base.is_moving, self.robot.time)
+            self._rate.command(self.robot.base.is_moving, self.robot.time)
         self._go_on()
 
     def _on_estimate(self, message: PoseWithCovarianceStamped) -> None:
         if self._drives_clock:
             measured = seconds_of(message.header.stamp)
-            self._pace.estimate(measured)
+            self._rate.estimate(measured)
             self._go_on()
+
+    def _on_mission_waits(self, message: Time) -> None:
+        until = message.sec + 1e-9 * message.nanosec
+        self._rate.mission_waits(until or math.inf)
+        self._go_on()
+
+    def _on_goals(self, action: str, message: GoalStatusArray) -> None:
+        executed = any(goal.status in _UNDER_WAY for goal in message.status_list)
+        self._rate.goals(action, executed=executed)
+        self._go_on()
 
     def _on_trajectory(self, message: JointTrajectory) -> None:
         names, points = conversions.trajectory_from_ros(message)

@@ -10,11 +10,11 @@ from typing import Any
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import Described, declare_fields
 from surveillance_simulation.camera.model import Camera, Conditions
-from surveillance_simulation.pace import PaceModel
+from surveillance_simulation.clock_rate import ClockRateModel
 from surveillance_simulation.robot.base import BaseModel
 from surveillance_simulation.robot.lidar import LidarModel
 
-_PACE = {
+_CLOCK_RATE = {
     'speed': Described(
         'Simulated seconds per real second; 0: as fast as the nodes keep up.', 0.0, 1000.0
     ),
@@ -84,9 +84,9 @@ def place(node: PatrolNode) -> dict[str, Any]:
     return described
 
 
-def pace(node: PatrolNode) -> PaceModel:
+def clock_rate(node: PatrolNode) -> ClockRateModel:
     """Declare how simulated time goes."""
-    return declare_fields(node, PaceModel(), _PACE)
+    return declare_fields(node, ClockRateModel(), _CLOCK_RATE)
 
 
 def map_resolution(node: PatrolNode) -> float:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from builtin_interfaces.msg import Duration
+from builtin_interfaces.msg import Duration, Time
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, Twist
 from nav_msgs.msg import OccupancyGrid, Odometry
 from rosgraph_msgs.msg import Clock
@@ -180,8 +180,9 @@ def test_markers_break_and_move(graph: Any) -> None:
         (PlaceObstacle, 'place_obstacle', {'name': 'b'}, "obstacle 'b': radius 0 m"),
         (RemoveObstacle, 'remove_obstacle', {'name': 'b'}, "there is no obstacle 'b'"),
         (DrainBattery, 'drain_battery', {'percent': 101.0}, 'percent 101: expected 0 to 100'),
-        (PushRobot, 'push_robot', {'dx': math.nan}, 'expected finite numbers'),
-        (SlipOdometry, 'slip_odometry', {'dyaw': math.inf}, 'expected finite numbers'),
+        (PushRobot, 'push_robot', {'dx': math.nan}, 'expected -1000 to 1000, got nan'),
+        (PushRobot, 'push_robot', {'dx': 1.7e308}, 'expected -1000 to 1000, got 1.7e+308'),
+        (SlipOdometry, 'slip_odometry', {'dyaw': math.inf}, 'expected -1000 to 1000, got '),
         (SetMarker, 'set_marker', {'name': 'm1', 'state': 'lost'}, "marker state 'lost'"),
         (
             SetMarker,
@@ -248,3 +249,27 @@ def test_at_real_time_it_leaves_the_clock_alone(graph: Any) -> None:
     graph.until(lambda: len(odometry) > 2)
     assert not clocks
     assert odometry[-1].header.stamp.sec > 1_000_000_000
+
+
+def test_a_second_clock_in_the_domain_is_named_once(graph: Any, capfd: Any) -> None:
+    graph.node.create_publisher(Clock, '/clock', 1)
+    simulator(graph)
+    told: list[str] = []
+
+    def looked() -> bool:
+        told.append(capfd.readouterr().err)
+        return 'publisher(s) of /clock' in ''.join(told)
+
+    graph.until(looked)
+
+
+def test_time_stands_while_the_mission_is_at_work(graph: Any) -> None:
+    node = simulator(graph, speed=0.0)
+    waits = graph.node.create_publisher(Time, 'mission_waits_until', STATE_QOS)
+    clocks = graph.listen(Clock, '/clock')
+    graph.until(lambda: clocks)
+    until = int(node.robot.time) + 30
+    waits.publish(Time(sec=until))
+    graph.until(lambda: node.robot.time == pytest.approx(until))
+    waits.publish(Time(sec=until + 2))
+    graph.until(lambda: node.robot.time == pytest.approx(until + 2))

@@ -32,7 +32,7 @@ except ImportError:
 _PANEL_THICKNESS = 0.004
 
 
-class MujocoMissing(Exception):
+class MujocoMissingError(Exception):
     """MuJoCo is not installed; the message says how to get it."""
 
 
@@ -43,11 +43,11 @@ class MujocoRenderer:
         """Prepare pictures.
 
         Raises:
-            MujocoMissing: MuJoCo is not installed.
+            MujocoMissingError: MuJoCo is not installed.
             TextureError: A marker's dictionary or id does not exist.
         """
         if mujoco is None:
-            raise MujocoMissing(
+            raise MujocoMissingError(
                 "renderer 'mujoco': expected the package mujoco (pip install mujoco)"
             )
         self._world = world

@@ -47,7 +47,7 @@ class CameraFeed:
 
         Raises:
             TextureError: A marker's dictionary or id does not exist.
-            MujocoMissing: MuJoCo is to render and is not installed.
+            MujocoMissingError: MuJoCo is to render and is not installed.
         """
         self.conditions = simulator_parameters.conditions(node, self._take_conditions)
         self._robot = robot

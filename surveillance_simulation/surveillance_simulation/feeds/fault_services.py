@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import Any
 
@@ -23,6 +22,9 @@ from surveillance_runtime.place import PlaceError
 from surveillance_simulation import conversions
 from surveillance_simulation.robot.robot import Robot
 from surveillance_simulation.world.textures import TextureError, marker_panel
+
+LONGEST_SHIFT = 1000.0
+"""The longest push or slip, metres or rad; longer than any place."""
 
 
 class FaultServices:
@@ -87,12 +89,12 @@ class FaultServices:
         return f'obstacle {request.name} is gone'
 
     def _push_robot(self, request: PushRobot.Request) -> str:
-        _check_finite(request.dx, request.dy, request.dyaw)
+        _check_shift(request.dx, request.dy, request.dyaw)
         way = self._robot.base.push(request.dx, request.dy, request.dyaw)
         return f'pushed by {way:.2f} m and {request.dyaw:.2f} rad'
 
     def _slip_odometry(self, request: SlipOdometry.Request) -> str:
-        _check_finite(request.dx, request.dy, request.dyaw)
+        _check_shift(request.dx, request.dy, request.dyaw)
         self._robot.base.slip(request.dx, request.dy, request.dyaw)
         return f'odometry slipped by ({request.dx:.2f}, {request.dy:.2f}) m, {request.dyaw:.2f} rad'
 
@@ -116,6 +118,8 @@ class FaultServices:
         )
 
 
-def _check_finite(*numbers: float) -> None:
-    if not all(map(math.isfinite, numbers)):
-        raise PlaceError((), f'expected finite numbers, got {", ".join(map(str, numbers))}')
+def _check_shift(*numbers: float) -> None:
+    """Refuse what is no shift of a robot in a place: metres and rad up to `LONGEST_SHIFT`."""
+    for number in numbers:
+        if not abs(number) <= LONGEST_SHIFT:  # also false for NaN
+            raise PlaceError((), f'expected -{LONGEST_SHIFT:g} to {LONGEST_SHIFT:g}, got {number}')

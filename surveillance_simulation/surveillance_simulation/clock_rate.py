@@ -1,20 +1,32 @@
-"""How fast simulated time goes beside real time.
+"""The rate of simulated time: the real-time factor, and lockstep with the robot's programs.
 
-`speed` is simulated seconds per real second; 0 means as fast as the robot's programs keep up. Two
-things hold time back then: a ceiling, so that a program's thinking does not cost the robot minutes;
-and lockstep: time waits while a program that has not answered the last measurement yet is still at
-work on it. While the base is under command the answer is the next command; from a robot that
-estimates where it is, it is the next estimate. A program that stays silent for `patience` real
-seconds is given up until it answers again, and time goes on.
+`speed` is simulated seconds per real second; 0 means as fast as the robot's programs keep up. Then
+a ceiling bounds the rate, and time stands still while a program is at work on its answer:
+
+- a controller on the next command, while the base is under command;
+- a localisation on the next estimate of the pose;
+- a planner on a path, while one of its goals is executed;
+- the mission on its next step: it says until which simulated time it waits, and time does not
+  pass that moment until it says so again. While a drive is executed, it waits for the drive.
+
+So a mission takes as many simulated seconds at full speed as in real time. A program that stays
+silent for `patience` real seconds is given up until it answers again, and time goes on.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
+PLANNING = ('compute_path', 'motion/planner')
+"""Actions that take no simulated time: it stands still while one of their goals is executed."""
+DRIVING = ('follow_path', 'motion/controller')
+"""Actions during which the mission waits for the robot."""
+MIN_STEP = 0.001
+"""The shortest step of time, seconds."""
+
 
 @dataclass(frozen=True)
-class PaceModel:
+class ClockRateModel:
     """How time goes.
 
     Attributes:
@@ -75,21 +87,48 @@ class Answers:
         return False
 
 
-class Pace:
+class ClockRate:
     """Decides how much simulated time passes at each tick.
 
     Attributes:
-        is_waiting: Whether time stands still until a command or an estimate comes.
+        is_waiting: Whether time stands still until a program answers.
     """
 
-    def __init__(self, model: PaceModel, steady: float) -> None:
+    def __init__(self, model: ClockRateModel, steady: float) -> None:
         """Start at the given reading of the steady clock, seconds."""
         self._model = model
         self._last = steady
         self._owed = 0.0
         self._commands = Answers(model.window, model.patience)
         self._estimates = Answers(model.estimate_window, model.patience)
+        self._mission_waits_until: float | None = None
+        self._mission_late_since: float | None = None
+        self._executed: dict[str, bool] = {}
         self.is_waiting = False
+
+    def mission_waits(self, until: float) -> None:
+        """Note that the mission waits until this simulated time, seconds; inf: for an event."""
+        self._mission_waits_until, self._mission_late_since = until, None
+
+    def goals(self, action: str, *, executed: bool) -> None:
+        """Note whether an action's goal is executed, for `PLANNING` and `DRIVING` actions."""
+        self._executed[action] = executed
+
+    def _mission_is_late(self, simulated: float, steady: float) -> bool:
+        """Return whether time must wait for the mission, or for a planner that it waits for."""
+        if self._mission_waits_until is None:
+            return False
+        planning = any(self._executed.get(action) for action in PLANNING)
+        driving = any(self._executed.get(action) for action in DRIVING)
+        if not planning and (driving or simulated < self._mission_waits_until - 1e-9):
+            self._mission_late_since = None
+            return False
+        if self._mission_late_since is None:
+            self._mission_late_since = steady
+        if steady - self._mission_late_since < self._model.patience:
+            return True
+        self._mission_waits_until = None
+        return False
 
     def command(self, moving: bool, simulated: float) -> None:
         """Note a command: whether it moves the base, and the simulated time when it came."""
@@ -116,14 +155,17 @@ class Pace:
         late = [
             answers.are_late(simulated, steady) for answers in (self._commands, self._estimates)
         ]
+        late.append(self._mission_is_late(simulated, steady))
         self.is_waiting = model.speed == 0.0 and any(late)
         if self.is_waiting:
             # Ready to go on at once when the answer comes.
             self._owed = min(self._owed + elapsed * model.ceiling, step)
             return 0.0
         if model.speed == 0.0:
-            if not moving:
+            if not moving and not any(self._executed.values()):
                 step = model.idle_step
+            if self._mission_waits_until is not None and not any(self._executed.values()):
+                step = min(step, max(self._mission_waits_until - simulated, MIN_STEP))
             self._owed = min(self._owed + elapsed * model.ceiling, step)
         else:
             # What a busy machine falls behind is caught up with, but not without bound.

@@ -1,0 +1,121 @@
+"""How simulated time passes beside real time."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from surveillance_simulation.clock_rate import ClockRate, ClockRateModel
+
+
+def run(model: ClockRateModel, real: float, tick: float, *, moving: bool = True) -> float:
+    """Return the simulated seconds that pass while the steady clock runs for `real` seconds."""
+    rate, simulated = ClockRate(model, 0.0), 0.0
+    for number in range(1, round(real / tick) + 1):
+        simulated += rate.due(simulated, number * tick, moving=moving)
+    return simulated
+
+
+@pytest.mark.parametrize('speed', [0.5, 1.0, 10.0])
+def test_time_goes_at_the_wanted_speed(speed: float) -> None:
+    assert run(ClockRateModel(speed=speed), 10.0, 0.004) == pytest.approx(10.0 * speed, abs=0.11)
+
+
+def test_a_late_machine_catches_up_without_bound_on_none() -> None:
+    rate = ClockRate(ClockRateModel(speed=1.0, step=0.1), 0.0)
+    assert rate.due(0.0, 60.0, moving=True) == pytest.approx(0.1)
+    caught_up = sum(rate.due(0.0, 60.0, moving=True) for _ in range(100))
+    assert caught_up == pytest.approx(0.4)
+
+
+def test_as_fast_as_possible_ends_at_the_ceiling() -> None:
+    model = ClockRateModel(speed=0.0, ceiling=50.0)
+    assert run(model, 2.0, 0.0005) == pytest.approx(100.0, abs=0.2)
+    assert run(model, 2.0, 0.0005, moving=False) == pytest.approx(100.0, abs=0.3)
+
+
+def test_time_waits_for_the_next_command_of_a_controller_at_work() -> None:
+    rate = ClockRate(ClockRateModel(speed=0.0, step=0.1, window=0.15, patience=0.2), 0.0)
+    rate.command(True, 0.0)
+    passed = [rate.due(0.1 * count, 0.01 * count, moving=True) for count in range(1, 6)]
+    assert passed == pytest.approx([0.1, 0.0, 0.0, 0.0, 0.0])
+    assert rate.is_waiting
+    rate.command(True, 0.2)
+    # At once: what was owed while it waited is not lost.
+    assert rate.due(0.2, 0.05, moving=True) == pytest.approx(0.1)
+    assert not rate.is_waiting
+
+
+def test_time_waits_for_a_robot_that_works_out_where_it_is() -> None:
+    rate = ClockRate(ClockRateModel(speed=0.0, estimate_window=0.45), 0.0)
+    assert rate.due(0.5, 0.01, moving=False) > 0.0  # Nobody has told a pose yet.
+    rate.estimate(0.5)
+    assert rate.due(0.5, 0.02, moving=False) > 0.0
+    assert rate.due(1.0, 0.03, moving=False) == 0.0
+    assert rate.is_waiting
+    rate.estimate(1.0)
+    assert rate.due(1.0, 0.04, moving=False) > 0.0
+
+
+def test_a_silent_program_is_given_up_until_it_answers_again() -> None:
+    rate = ClockRate(ClockRateModel(speed=0.0, patience=0.2), 0.0)
+    rate.command(True, 0.0)
+    assert rate.due(1.0, 5.0, moving=True) == 0.0  # A machine that stood still is no silence.
+    assert rate.due(1.0, 5.1, moving=True) == 0.0
+    assert rate.due(1.0, 5.25, moving=True) > 0.0
+    assert rate.due(1.1, 5.26, moving=True) > 0.0
+    rate.command(True, 1.2)
+    assert rate.due(1.4, 5.27, moving=True) == 0.0
+
+
+def test_nothing_waits_when_the_base_was_told_to_stand() -> None:
+    rate = ClockRate(ClockRateModel(speed=0.0), 0.0)
+    rate.command(True, 0.0)
+    rate.command(False, 0.1)
+    assert rate.due(1.0, 0.01, moving=False) > 0.0
+
+
+def test_nothing_is_waited_for_at_a_set_speed() -> None:
+    rate = ClockRate(ClockRateModel(speed=1.0), 0.0)
+    rate.command(True, 0.0)
+    rate.estimate(0.0)
+    assert rate.due(5.0, 5.0, moving=True) > 0.0
+    assert not rate.is_waiting
+
+
+def test_time_stands_at_the_end_of_the_mission_s_wait_until_it_waits_again() -> None:
+    rate = ClockRate(ClockRateModel(speed=0.0, idle_step=0.5), 0.0)
+    rate.mission_waits(10.2)
+    assert rate.due(10.0, 0.01, moving=False) == pytest.approx(0.2)
+    assert rate.due(10.2, 0.02, moving=False) == 0.0
+    assert rate.is_waiting
+    rate.mission_waits(12.2)
+    assert rate.due(10.2, 0.03, moving=False) > 0.0
+
+
+def test_a_drive_takes_time_and_a_plan_takes_none() -> None:
+    rate = ClockRate(ClockRateModel(speed=0.0), 0.0)
+    rate.mission_waits(1.0)
+    rate.goals('compute_path', executed=True)
+    assert rate.due(1.0, 0.01, moving=False) == 0.0
+    rate.goals('compute_path', executed=False)
+    rate.goals('follow_path', executed=True)
+    assert rate.due(1.0, 0.02, moving=False) == pytest.approx(0.1)
+    rate.goals('follow_path', executed=False)
+    assert rate.due(1.1, 0.03, moving=False) == 0.0
+
+
+def test_a_mission_that_died_does_not_stop_time_for_good() -> None:
+    rate = ClockRate(ClockRateModel(speed=0.0, patience=0.2), 0.0)
+    rate.mission_waits(1.0)
+    assert rate.due(1.0, 5.0, moving=False) == 0.0
+    assert rate.due(1.0, 5.3, moving=False) > 0.0
+    rate.mission_waits(1.5)
+    assert rate.due(1.5, 5.4, moving=False) == 0.0
+
+
+def test_a_mission_that_waits_for_an_event_holds_nothing_back() -> None:
+    rate = ClockRate(ClockRateModel(speed=0.0), 0.0)
+    rate.mission_waits(math.inf)
+    assert rate.due(100.0, 0.01, moving=False) > 0.0
