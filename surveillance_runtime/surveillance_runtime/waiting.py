@@ -18,7 +18,7 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.task import Future
 
-from surveillance_runtime.interrupt import Interrupt as Interrupt
+from surveillance_fsm import Interrupt as Interrupt
 
 if TYPE_CHECKING:
     from surveillance_runtime.node import PatrolNode

@@ -7,8 +7,8 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 import surveillance_fsm as fsm
-from surveillance_fsm.active import ActiveContainer
-from surveillance_fsm.container import describe
+from surveillance_fsm.container import Container
+from surveillance_fsm.exceptions import describe
 from surveillance_runtime.action_server import GoalAbortedError, GoalRun, GoalServer
 from surveillance_runtime.node import PatrolNode
 
@@ -45,7 +45,7 @@ class ActionServerWrapper:
         node: PatrolNode,
         server_name: str,
         action_spec: Any,
-        wrapped_container: ActiveContainer,
+        wrapped_container: Container,
         succeeded_outcomes: Iterable[str] = (),
         aborted_outcomes: Iterable[str] = (),
         preempted_outcomes: Iterable[str] = (),

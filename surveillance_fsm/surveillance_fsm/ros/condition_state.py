@@ -8,7 +8,7 @@ from typing import Any
 from rclpy.node import Node
 
 import surveillance_fsm as fsm
-from surveillance_fsm.container import describe
+from surveillance_fsm.exceptions import describe
 from surveillance_fsm.ros.exchange import seconds
 from surveillance_runtime.waiting import ClockWait
 

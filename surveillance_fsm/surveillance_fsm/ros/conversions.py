@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from surveillance_fsm.active import ActiveContainer
+from surveillance_fsm.container import Container
 from surveillance_fsm.export import to_mermaid
-from surveillance_fsm.record import Transition
+from surveillance_fsm.history import Transition
 from surveillance_fsm.structure import structure_of
 from surveillance_interfaces.msg import (
     FsmContainer,
@@ -56,7 +56,7 @@ def transition_from(message: FsmTransition) -> Transition:
     )
 
 
-def status_message(root: ActiveContainer, sequence: int, stamp: Any) -> FsmStatus:
+def status_message(root: Container, sequence: int, stamp: Any) -> FsmStatus:
     """What a machine's root is doing, after the transition with number `sequence`."""
     return FsmStatus(
         stamp=stamp,
@@ -69,7 +69,7 @@ def status_message(root: ActiveContainer, sequence: int, stamp: Any) -> FsmStatu
     )
 
 
-def structure_message(root: ActiveContainer, stamp: Any) -> FsmStructure:
+def structure_message(root: Container, stamp: Any) -> FsmStructure:
     """A machine's root and all its containers."""
     return FsmStructure(
         stamp=stamp,

@@ -11,9 +11,9 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_srvs.srv import Trigger
 
 import surveillance_fsm as fsm
-from surveillance_fsm.active import ActiveContainer
+from surveillance_fsm.container import Container
 from surveillance_fsm.export import to_ascii
-from surveillance_fsm.record import Transition, TransitionFeed
+from surveillance_fsm.history import Transition, TransitionFeed
 from surveillance_fsm.ros.conversions import (
     status_message,
     structure_message,
@@ -53,7 +53,7 @@ class IntrospectionServer:
             the root has.
     """
 
-    def __init__(self, node: Node, server_name: str, state: ActiveContainer, path: str) -> None:
+    def __init__(self, node: Node, server_name: str, state: Container, path: str) -> None:
         self._node = node
         self._root = state
         if path.strip('/'):

@@ -11,7 +11,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
 import surveillance_fsm as fsm
-from surveillance_fsm.container import describe
+from surveillance_fsm.exceptions import describe
 from surveillance_fsm.ros.exchange import seconds
 
 

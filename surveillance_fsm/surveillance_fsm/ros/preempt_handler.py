@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from rclpy.node import Node
 
-from surveillance_fsm.active import ActiveContainer
+from surveillance_fsm.container import Container
 
 
-def set_preempt_handler(node: Node, container: ActiveContainer, timeout: float = 5.0) -> None:
+def set_preempt_handler(node: Node, container: Container, timeout: float = 5.0) -> None:
     """Preempt a container when the node stops or its ROS context shuts down.
 
     Args:

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 
 from rclpy.node import Node
 
-from surveillance_runtime.interrupt import Interrupt
+from surveillance_fsm import Interrupt
 
 
 class ExecutorPulse:

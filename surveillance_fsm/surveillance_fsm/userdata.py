@@ -12,10 +12,15 @@ import copy
 import re
 from collections.abc import Callable, Iterable, Mapping
 from functools import lru_cache
-from typing import Any
+from typing import Any, ClassVar
 
 from surveillance_fsm.exceptions import InvalidUserCodeError, MissingKeyError
 from surveillance_fsm.log import logerr
+
+
+def raw(userdata: UserData) -> dict[str, Any]:
+    """Return the dictionary behind userdata, for the engine's own copying."""
+    return userdata._data
 
 
 class UserData:
@@ -94,18 +99,18 @@ class Remapper:
         output_keys: The state's names of the keys it writes.
         remapping: From the state's names to those in `ud`.
         constants: Values of input keys that come from no userdata.
-        where: The state's path, for error messages.
+        where: What shows the state's path, for error messages.
     """
 
-    __slots__ = ('_constants', '_data', '_input', '_map', '_output', '_ud', '_where')
+    __slots__ = ('_constants', '_data', '_ud', '_where')
 
     _constants: Mapping[str, Any]
     _data: Any
-    _input: tuple[str, ...]
-    _map: Mapping[str, str]
-    _output: tuple[str, ...]
     _ud: Any
-    _where: str
+    _where: object
+    # Of the class that is made for a combination of keys: from the state's names to those outside.
+    _input: ClassVar[Mapping[str, str]] = {}
+    _output: ClassVar[Mapping[str, str]] = {}
 
     def __new__(
         cls,
@@ -114,20 +119,19 @@ class Remapper:
         output_keys: Iterable[str] = (),
         remapping: Mapping[str, str] | Iterable[Any] = (),
         constants: Mapping[str, Any] | None = None,
-        where: str = '',
+        where: object = '',
     ) -> Remapper:
-        inputs, outputs = tuple(input_keys), tuple(output_keys)
-        # Copied: SMACH's own states pass an empty list for "no remapping".
-        renamed = dict(remapping)
-        fixed = dict(constants or {})
+        fixed = constants or _NO_CONSTANTS
         view_class = _view_class(
-            frozenset(inputs), frozenset(outputs), frozenset(renamed.items()), frozenset(fixed)
+            frozenset(input_keys),
+            frozenset(output_keys),
+            # SMACH's own states pass an empty list for "no remapping".
+            frozenset(dict(remapping).items()),
+            frozenset(fixed),
         )
         view = object.__new__(view_class)
         view._constants = fixed
         view._data = ud._data if isinstance(ud, UserData) else ud
-        view._input, view._output = inputs, outputs
-        view._map = renamed
         view._ud = ud
         view._where = where
         return view
@@ -140,10 +144,44 @@ class Remapper:
         """The state's names of its input keys that have a value."""
         return [key for key in self._input if key in self]
 
+    def fsm_copy_to(self, target: dict[str, Any], keys: Iterable[str]) -> list[str]:
+        """Copy the values of input keys into `target`; the keys that have none.
+
+        Raises:
+            InvalidUserCodeError: A key is not among the input keys.
+        """
+        data, outer, missing = self._data, self._input, []
+        for key in keys:
+            try:
+                target[key] = data[outer[key]]
+            except KeyError:
+                if key in self:
+                    target[key] = self[key]
+                else:
+                    missing.append(key)
+        return missing
+
+    def fsm_take_from(self, source: Mapping[str, Any], keys: Iterable[str]) -> list[str]:
+        """Write the values that `source` has for output keys; the keys that it has none for.
+
+        Raises:
+            InvalidUserCodeError: A key is not among the output keys.
+        """
+        data, outer, constants, missing = self._data, self._output, self._constants, []
+        for key in keys:
+            if key not in source:
+                missing.append(key)
+            elif key in outer and key not in constants:
+                data[outer[key]] = source[key]
+            else:
+                raise self._undeclared('write', key)
+        return missing
+
     def __contains__(self, key: object) -> bool:
-        if key not in self._input:
-            return False
-        return key in self._constants or self._map.get(str(key), key) in self._data
+        if key in self._constants:
+            return key in self._input
+        outer = self._input.get(key)  # type: ignore[call-overload]
+        return outer is not None and outer in self._data
 
     def __getitem__(self, key: str) -> Any:
         if key not in self._input:
@@ -151,14 +189,14 @@ class Remapper:
         if key in self._constants:
             return self._constants[key]
         try:
-            return self._data[self._map.get(key, key)]
+            return self._data[self._input[key]]
         except KeyError:
             raise self._missing(key) from None
 
     def __setitem__(self, key: str, item: Any) -> None:
         if key not in self._output or key in self._constants:
             raise self._undeclared('write', key)
-        self._data[self._map.get(key, key)] = item
+        self._data[self._output[key]] = item
 
     def __getattr__(self, name: str) -> Any:
         # Only names without a property come here: undeclared ones.
@@ -166,9 +204,25 @@ class Remapper:
             raise AttributeError(name)
         raise self._undeclared('read', name)
 
+    def fsm_revoke(self) -> None:
+        """Cut the view off its userdata, for a state that was left behind."""
+        self._data = self._ud = _Revoked(self._where)
+
+    def fsm_explain(self, error: BaseException) -> InvalidUserCodeError | None:
+        """Tell which undeclared key an ``AttributeError`` out of a state was about.
+
+        A view has no ``__setattr__`` of its own, which would cost every write a function call; the
+        interpreter itself refuses unknown names, and this puts its refusal in the engine's words.
+        """
+        if not isinstance(error, AttributeError):
+            return None
+        match = _UNKNOWN_ATTRIBUTE.search(str(error))
+        return self._undeclared('write', match.group(1)) if match else None
+
     def _undeclared(self, deed: str, key: str) -> InvalidUserCodeError:
         kind, declared = ('input', self._input) if deed == 'read' else ('output', self._output)
-        state = f"State '{self._where}'" if self._where else 'A state'
+        where = str(self._where)
+        state = f"State '{where}'" if where else 'A state'
         if key in self._constants:
             return InvalidUserCodeError(f"{state} cannot write userdata key '{key}': a constant")
         return InvalidUserCodeError(
@@ -177,24 +231,24 @@ class Remapper:
         )
 
     def _missing(self, key: str) -> MissingKeyError:
-        outer = self._map.get(key, key)
+        outer = self._input.get(key, key)
         renamed = f" (remapped to '{outer}')" if outer != key else ''
         available = sorted(self._data.keys()) if hasattr(self._data, 'keys') else []
-        state = f"State '{self._where}'" if self._where else 'A state'
+        where = str(self._where)
+        state = f"State '{where}'" if where else 'A state'
         return MissingKeyError(
             f"{state} reads userdata key '{key}'{renamed}, which nothing has written; the keys "
             f'set are {available}'
         )
 
-    def _revoke(self) -> None:
-        """Cut the view off its userdata, for a state that was left behind."""
-        self._data = self._ud = _Revoked(self._where)
+
+_NO_CONSTANTS: Mapping[str, Any] = {}
 
 
 class _Revoked:
-    """What a left-behind state finds in place of userdata."""
+    """What a state that was left behind finds in place of userdata."""
 
-    def __init__(self, where: str) -> None:
+    def __init__(self, where: object) -> None:
         self._where = where
 
     def _refuse(self, *_: Any) -> Any:
@@ -213,7 +267,11 @@ def _view_class(
     constants: frozenset[str],
 ) -> type[Remapper]:
     outer = dict(remapping)
-    namespace: dict[str, Any] = {'__slots__': ()}
+    namespace: dict[str, Any] = {
+        '__slots__': (),
+        '_input': {key: outer.get(key, key) for key in sorted(inputs)},
+        '_output': {key: outer.get(key, key) for key in sorted(outputs)},
+    }
     for key in inputs | outputs:
         # Names of methods stay methods, as in SMACH: such keys are reached as items.
         if key.startswith('_') or hasattr(Remapper, key):
@@ -265,15 +323,3 @@ def _refused_write(key: str) -> Callable[[Remapper, Any], None]:
 
 _VIEW_NAME = 'StateUserData'
 _UNKNOWN_ATTRIBUTE = re.compile(rf"'{_VIEW_NAME}' object has no attribute '(\w+)'")
-
-
-def undeclared_write(view: object, error: BaseException) -> InvalidUserCodeError | None:
-    """Tell which undeclared key an ``AttributeError`` out of a state was about.
-
-    A view has no ``__setattr__`` of its own, which would cost every write a function call; the
-    interpreter itself refuses unknown names, and this puts its refusal in the engine's words.
-    """
-    if not isinstance(view, Remapper) or not isinstance(error, AttributeError):
-        return None
-    match = _UNKNOWN_ATTRIBUTE.search(str(error))
-    return view._undeclared('write', match.group(1)) if match else None
