@@ -97,7 +97,11 @@ class Interrupt:
 
 
 class Clock(Protocol):
-    """Where a machine's seconds come from."""
+    """Where a machine's seconds come from.
+
+    One whose time may jump back has a method ``elapsed()``, too, which goes on as ``now()`` does,
+    but never back; its sleeps last as long as that says.
+    """
 
     def now(self) -> float:
         """The time in seconds; only differences have a meaning."""
@@ -123,3 +127,9 @@ class WallClock:
 
 
 WALL_CLOCK = WallClock()
+
+
+def elapsed_of(clock: Clock) -> Callable[[], float]:
+    """What tells how much time passes on a clock, whether it may jump back or not."""
+    elapsed: Callable[[], float] = getattr(clock, 'elapsed', clock.now)
+    return elapsed

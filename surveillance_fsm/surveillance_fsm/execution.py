@@ -21,7 +21,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from surveillance_fsm import log
-from surveillance_fsm.clock import WALL_CLOCK, Clock, Interrupt
+from surveillance_fsm.clock import WALL_CLOCK, Clock, Interrupt, elapsed_of
 from surveillance_fsm.exceptions import (
     InvalidStateError,
     InvalidTransitionError,
@@ -421,7 +421,7 @@ class Run:
         clock: The machine's clock.
         preempt_timeout: See `DEFAULT_PREEMPT_TIMEOUT`; None waits for ever.
         trace: Where transitions are reported, if anywhere.
-        now: The time of reports.
+        now: The time of reports and limits.
         chatty: Transitions are worth a line in the log.
         paused: No further state is entered.
         steps: States that may be entered although paused.
@@ -440,7 +440,7 @@ class Run:
         self.clock = clock
         self.preempt_timeout = preempt_timeout
         self.trace = trace
-        self.now: Callable[[], float] = time.monotonic if clock is WALL_CLOCK else clock.now
+        self.now: Callable[[], float] = time.monotonic if clock is WALL_CLOCK else elapsed_of(clock)
         self.chatty = log.chatty()
         self.paused = False
         self.steps = 0

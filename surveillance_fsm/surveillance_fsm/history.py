@@ -23,7 +23,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import IO, Any, NamedTuple
 
-from surveillance_fsm.clock import WALL_CLOCK, Clock, Interrupt
+from surveillance_fsm.clock import WALL_CLOCK, Clock, Interrupt, elapsed_of
 from surveillance_fsm.container import Container
 from surveillance_fsm.exceptions import SmachError, describe, shown
 from surveillance_fsm.execution import History, RawTransition
@@ -455,7 +455,7 @@ def _capture(state: State, path: str, leave_out: frozenset[str]) -> dict[str, An
     progress = dict(getattr(state, 'fsm_progress', None) or {})
     waiting = getattr(state, 'fsm_waiting', None)
     if waiting is not None:
-        progress[waiting[0]] = state.fsm_clock.now() - waiting[1]
+        progress[waiting[0]] = elapsed_of(state.fsm_clock)() - waiting[1]
     if progress:
         entry['progress'] = _kept(progress, path, 'progress', frozenset())
     if not isinstance(state, Container):

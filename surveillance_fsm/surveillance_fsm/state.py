@@ -10,7 +10,7 @@ import threading
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, ClassVar
 
-from surveillance_fsm.clock import WALL_CLOCK, Clock, Interrupt
+from surveillance_fsm.clock import WALL_CLOCK, Clock, Interrupt, elapsed_of
 from surveillance_fsm.exceptions import InvalidStateError, shown
 
 # Guards the preempt flags of all states: it is held for a few instructions, on preempts and waits
@@ -275,19 +275,20 @@ class State:
             True when the full time passed, False when a preempt ended the wait.
         """
         clock = self.fsm_clock
+        elapsed = elapsed_of(clock)
         before = self.progress.get(progress, 0.0) if progress is not None else 0.0
-        start = clock.now() - before
+        start = elapsed() - before
         if progress is not None:
             self.fsm_waiting = (progress, start)
         while True:
             interrupt = self._armed_interrupt()
-            finished = clock.sleep(max(0.0, start + seconds - clock.now()), interrupt)
+            finished = clock.sleep(max(0.0, start + seconds - elapsed()), interrupt)
             # A preempt that was serviced meanwhile may wake a wait it was not meant for.
             if finished or self._preempt_requested:
                 break
         if progress is not None:
             self.fsm_waiting = None
-            self.progress[progress] = seconds if finished else clock.now() - start
+            self.progress[progress] = seconds if finished else elapsed() - start
         return finished
 
     @property

@@ -173,7 +173,7 @@ def settle(
 
 def _begin_watch(thread: ExecutionThread, node: Node, limits: Limits) -> Watch:
     """Put limits to work on the state that the innermost frame is about to execute."""
-    now = thread.run.clock.now()
+    now = thread.run.now()
     with thread.run.condition:
         thread.check()
         watch = Watch(
@@ -231,7 +231,7 @@ def supervise(run: Run, threads: Sequence[ExecutionThread], wakeup: Interrupt) -
         if alarm is not None:
             alarm.daemon = True
             alarm.start()
-        run.clock.sleep(max(0.0, clocked - run.clock.now()), wakeup)
+        run.clock.sleep(max(0.0, clocked - run.now()), wakeup)
         if alarm is not None:
             alarm.cancel()
     for thread in threads:
@@ -256,7 +256,7 @@ def _bounds_itself(thread: ExecutionThread) -> bool:
 
 def _enforce(thread: ExecutionThread) -> None:
     """Do what is due: ask states to stop, or go on without them."""
-    now = thread.run.clock.now()
+    now = thread.run.now()
     with thread.run.condition:
         if thread.done:
             return
