@@ -121,13 +121,14 @@ def _service_rows(label: str, store: Any, rounds: int) -> list[Row]:
     from surveillance_ontology.armor.access import DATA
     from surveillance_ontology.armor.client import ArmorClient, InProcessTransport
     from surveillance_ontology.armor.service import ArmorService
-    from surveillance_ontology.map_building import MapBuilding
+    from surveillance_ontology.patrol_ontology import PatrolOntology
     from surveillance_runtime.place import read_place
 
     service = ArmorService(store=store)
     client = ArmorClient('benchmark', 'map', InProcessTransport(service))
-    building = MapBuilding(client, str(DATA / 'surveillance.owl'), IRI)
-    building.build(read_place(PLACE), 2_000_000_000, 'E')
+    ontology = PatrolOntology(client)
+    ontology.build(read_place(PLACE), str(DATA / 'surveillance.owl'), IRI, 2_000_000_000)
+    ontology.record_place('E', 2_000_000_000)
     corridors = f'SELECT ?x WHERE {{ ?x a <{IRI}#CORRIDOR> }}'
     calls = {'one visit (7 directives)': Visit(client), **single_calls(client)}
     taken = medians(calls, rounds)
@@ -141,7 +142,7 @@ def servers() -> Any:
     """The processes that answer."""
     module = 'surveillance_ontology.'
     arguments = [
-        ['-m', module + 'armor_server_node', '--ros-args', '-p', 'store:=none'],
+        ['-m', module + 'armor_server_node'],
         ['-m', module + 'ontology_map_builder_node', '--ros-args', '--params-file', str(PLACE)],
         ['-c', TRIGGER],
     ]

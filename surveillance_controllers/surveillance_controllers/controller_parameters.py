@@ -215,6 +215,10 @@ _MOTION = {
         'MANUAL, RANDOM and Nav2: the robot is in the nearest place within this distance, m.',
         *(0.0, 1000.0),
     ),
+    'robot_room': Described(
+        'MANUAL, RANDOM and Nav2: the room in which the robot starts; empty: as the map says that '
+        'is built from a message.'
+    ),
     'random_seed': _RANDOM_SEED,
     'peer_timeout': _PEER_TIMEOUT,
     'console': _CONSOLE,
@@ -232,6 +236,7 @@ class MotionSettings:
     dock_reach: float = 0.5
     feedback_period: float = 0.2
     place_reach: float = 2.0
+    robot_room: str = ''
     random_seed: int = -1
     peer_timeout: float = 10.0
     console: bool = True

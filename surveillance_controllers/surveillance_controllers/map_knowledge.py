@@ -1,30 +1,30 @@
-"""What a controller asks of the map and the ontology, and what it writes there.
+"""The map's places and doors as map builder and ontology have them, followed without asking twice.
 
-Every method blocks for at most the peers' deadline, so it belongs on a worker thread.
+Every method may block for the peers' deadline, so it belongs on a worker thread.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 
 from surveillance_controllers import conversions
 from surveillance_controllers.geometry.polyline import Points
+from surveillance_interfaces.msg import RobotPlace
 from surveillance_interfaces.srv import ReferenceName, RoomPosition
-from surveillance_ontology.armor.protocol import DirectiveRequest
 from surveillance_ontology.armor_client import (
     ArmorClient,
     ArmorServiceCallError,
     ArmorServiceInternalError,
     FactSubscription,
-    name_in,
-    value_in,
 )
+from surveillance_ontology.patrol_ontology import DOORS, PatrolOntology
 from surveillance_runtime.calls import CallError, ServiceCaller
 from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.waiting import Interrupt
-
-ROBOT = 'Robot1'
 
 
 class KnowledgeError(Exception):
@@ -32,7 +32,7 @@ class KnowledgeError(Exception):
 
 
 class MapKnowledge:
-    """The map's places and the robot's whereabouts, as map builder and ontology know them.
+    """The places and doors of the map; the ontology's changes are followed, not asked for.
 
     Args:
         node: The node that asks.
@@ -44,7 +44,20 @@ class MapKnowledge:
         self._timeout = timeout
         self._positions = ServiceCaller(node, RoomPosition, 'ontology_map/room_position')
         self._names = ServiceCaller(node, ReferenceName, 'ontology_map/reference_name')
+        self._connecting = threading.Lock()
+        self._changed = threading.Condition()
         self._armor: ArmorClient | None = None
+        self._ontology: PatrolOntology | None = None
+        self._doors: FactSubscription | None = None
+        self._known: dict[str, Points] = {}
+        self._robot_place = ''
+        node.create_subscription(RobotPlace, 'robot_place', self._on_robot_place, STATE_QOS)
+
+    def assume(self, positions: Mapping[str, Points]) -> None:
+        """Takes points of places, so that the map builder need not be asked for them."""
+        self._known.update(positions)
+
+    # --- what the map builder knows ---
 
     def find_position(self, place: str, interrupt: Interrupt) -> Points | None:
         """The point of a place that the robot can reach; None when the map has no such place.
@@ -56,7 +69,7 @@ class MapKnowledge:
             KnowledgeError: The map does not answer.
         """
         request = RoomPosition.Request(room_name=place)
-        with _answered():
+        with answered():
             answer = self._positions.call(request, self._timeout, interrupt)
         if not answer.valid:
             return None
@@ -74,29 +87,54 @@ class MapKnowledge:
             raise KnowledgeError(f'the map has no place {place!r}')
         return point
 
-    def places(self, interrupt: Interrupt) -> dict[str, Points]:
-        """Every place with its point.
+    # --- what the ontology knows ---
 
-        Raises:
-            KnowledgeError: Map or ontology do not answer.
-        """
-        with _answered():
-            names = self._client(interrupt).query.ind_b2_class('LOCATION')
-        return {name: self.position(name, interrupt) for name in sorted(names)}
-
-    def connect(self, interrupt: Interrupt) -> None:
-        """Waits until the map is built, so that the ontology can be asked.
+    def connect(self, interrupt: Interrupt) -> PatrolOntology:
+        """The ontology, once the map is built.
 
         Raises:
             KnowledgeError: It is not built within the deadline.
         """
-        with _answered():
-            self._client(interrupt)
+        with self._connecting, answered():
+            if self._ontology is None:
+                answer = self._names.call(ReferenceName.Request(), self._timeout, interrupt)
+                self._armor = ArmorClient(
+                    self._node,
+                    self._node.get_name(),
+                    answer.name,
+                    timeout=self._timeout,
+                    interrupt=self._node.stopping,
+                )
+                self._doors = FactSubscription(
+                    self._node, self._armor, DOORS, lambda _fact, _came: self._notify()
+                )
+                self._ontology = PatrolOntology(self._armor)
+            return self._ontology
 
     @property
     def connected(self) -> bool:
         """Whether the map has been built, so that the ontology can be asked without a long wait."""
-        return self._armor is not None
+        return self._ontology is not None
+
+    def watch(
+        self, pattern: str, interrupt: Interrupt, on_change: Callable[[], None]
+    ) -> FactSubscription:
+        """Keeps the facts that match a pattern as long as the node lives.
+
+        Args:
+            pattern: Which facts.
+            interrupt: Ends the wait for the map.
+            on_change: Called in the executor's thread with each fact that comes or goes, and when
+                the ontology was loaded or dropped.
+
+        Raises:
+            KnowledgeError: The map is not built yet.
+        """
+        self.connect(interrupt)
+        assert self._armor is not None
+        return FactSubscription(
+            self._node, self._armor, pattern, lambda _fact, _came: on_change(), on_change
+        )
 
     def doors(self, interrupt: Interrupt) -> dict[str, set[str]]:
         """The places that each door leads into, as the ontology has them now.
@@ -104,116 +142,66 @@ class MapKnowledge:
         Raises:
             KnowledgeError: The ontology does not answer.
         """
-        with _answered():
-            armor = self._client(interrupt)
-            places = armor.query.ind_b2_class('LOCATION')
-            questions = [armor.request('QUERY OBJECTPROP IND', 'hasDoor', p) for p in places]
-            answers = armor.batch(questions).responses
+        self.connect(interrupt)
+        subscription = self._doors
+        assert subscription is not None
+        deadline = time.monotonic() + self._timeout
+        unsubscribe = interrupt.subscribe(self._notify)
+        try:
+            with self._changed:
+                while not (facts := subscription.facts):
+                    if interrupt.is_set() or not self._changed.wait(deadline - time.monotonic()):
+                        raise KnowledgeError(f'the ontology named no door in {self._timeout:g} s')
+        finally:
+            unsubscribe()
         rooms_of: dict[str, set[str]] = {}
-        for place, answer in zip(places, answers, strict=True):
-            for door in answer.queried_objects:
-                rooms_of.setdefault(name_in(door), set()).add(place)
+        for fact in facts:
+            place, door = fact.arguments
+            rooms_of.setdefault(door, set()).add(place)
         return rooms_of
 
-    def watch(
-        self, pattern: str, interrupt: Interrupt, on_change: Callable[[], None] = lambda: None
-    ) -> FactSubscription:
-        """Keeps the facts that match a pattern, such as `hasDoor(?, ?)`, as long as the node lives.
-
-        Args:
-            pattern: Which facts.
-            interrupt: Ends the wait for the map.
-            on_change: Called in the executor's thread with each fact that comes or goes.
+    def places(self, interrupt: Interrupt) -> dict[str, Points]:
+        """Every place with its point.
 
         Raises:
-            KnowledgeError: The map is not built yet.
+            KnowledgeError: Map or ontology do not answer.
         """
-        with _answered():
-            armor = self._client(interrupt)
-        return FactSubscription(self._node, armor, pattern, lambda _fact, _came: on_change())
+        names = {place for places in self.doors(interrupt).values() for place in places}
+        for name in names ^ self._known.keys():
+            # The facts may come one by one, so what is missing among them is asked for.
+            position = self.find_position(name, interrupt)
+            if position is None:
+                self._known.pop(name, None)
+            else:
+                self._known[name] = position
+        return dict(self._known)
 
     def robot_place(self, interrupt: Interrupt) -> str:
-        """The place in which the ontology has the robot.
+        """The place that the robot is in, from whoever knows it, or else from the ontology.
 
         Raises:
-            KnowledgeError: It has the robot in no place, or in several, or does not answer.
+            KnowledgeError: Nobody knows, or the ontology does not answer.
         """
-        with _answered():
-            found = self._client(interrupt).query.objectprop_b2_ind('isIn', ROBOT)
+        if self._robot_place:
+            return self._robot_place
+        with answered():
+            found = self.connect(interrupt).robot_places()
         if len(found) != 1:
-            what = f'several places: {", ".join(sorted(found))}' if found else 'no place'
-            raise KnowledgeError(f'the ontology has {ROBOT} in {what}')
-        return str(found[0])
+            what = f'several places: {", ".join(found)}' if found else 'no place'
+            raise KnowledgeError(f'the ontology has the robot in {what}')
+        return found[0]
 
-    def record_place(self, place: str, before: Iterable[str], interrupt: Interrupt) -> None:
-        """Writes that the robot is in a place (isIn), in one exchange with the ontology.
+    def _on_robot_place(self, message: RobotPlace) -> None:
+        self._robot_place = message.place
 
-        Args:
-            place: The place.
-            before: Where the ontology has it so far.
-            interrupt: Ends the wait for the ontology.
-
-        Raises:
-            KnowledgeError: The ontology does not answer.
-        """
-        with _answered():
-            armor = self._client(interrupt)
-            _carry_out(armor, _moved(armor, before, place))
-
-    def record_visit(self, place: str, now: float, interrupt: Interrupt) -> None:
-        """Writes that the robot is in a place now: isIn, now, and the place's visitedAt.
-
-        Args:
-            place: The place.
-            now: ROS time, seconds; the ontology keeps whole ones.
-            interrupt: Ends the wait for the ontology.
-
-        Raises:
-            KnowledgeError: The ontology does not answer.
-        """
-        seconds = str(int(now))
-        with _answered():
-            armor = self._client(interrupt)
-            changes = _moved(armor, armor.query.objectprop_b2_ind('isIn', ROBOT), place)
-            for name, owner in (('now', ROBOT), ('visitedAt', place)):
-                for old in armor.query.dataprop_b2_ind(name, owner):
-                    old_value = str(value_in(old))
-                    changes.append(
-                        armor.request('REMOVE DATAPROP IND', name, owner, 'LONG', old_value)
-                    )
-                changes.append(armor.request('ADD DATAPROP IND', name, owner, 'LONG', seconds))
-            _carry_out(armor, changes)
-
-    def _client(self, interrupt: Interrupt) -> ArmorClient:
-        if self._armor is None:
-            answer = self._names.call(ReferenceName.Request(), self._timeout, interrupt)
-            self._armor = ArmorClient(
-                self._node,
-                self._node.get_name(),
-                answer.name,
-                timeout=self._timeout,
-                interrupt=self._node.stopping,
-            )
-        return self._armor
-
-
-def _moved(armor: ArmorClient, before: Iterable[str], place: str) -> list[DirectiveRequest]:
-    leave = [
-        armor.request('REMOVE OBJECTPROP IND', 'isIn', ROBOT, old) for old in before if old != place
-    ]
-    return [*leave, armor.request('ADD OBJECTPROP IND', 'isIn', ROBOT, place)]
-
-
-def _carry_out(armor: ArmorClient, changes: list[DirectiveRequest]) -> None:
-    """Makes the changes as one, with no other client's in between, and lets the reasoner see
-    them."""
-    for response in armor.batch([*changes, armor.request('REASON')]).responses:
-        if not response.success:
-            raise KnowledgeError(f'the ontology refuses: {response.error_description}')
+    def _notify(self) -> None:
+        with self._changed:
+            self._changed.notify_all()
 
 
 @contextmanager
-def _answered() -> Iterator[None]:
+def answered() -> Iterator[None]:
+    """Turns what a peer did not answer into a `KnowledgeError`."""
     try:
         yield
     except (CallError, ArmorServiceCallError, ArmorServiceInternalError) as error:

@@ -1,8 +1,9 @@
 """The node `motion_controller`: moves the robot.
 
-Actions: `follow_path` along a path, and `motion/controller` through via points into a place, whose
-visit it then notes in the ontology. How the robot moves is the execution mode's matter: as the
-operator says (MANUAL), by chance (RANDOM), or as the base drives (SIMULATED).
+Actions: `follow_path` along a path, and `motion/controller` through via points into a place. How
+the robot moves is the execution mode's matter: as the operator says (MANUAL), by chance (RANDOM),
+or as the base drives (SIMULATED). It publishes the place that the robot is in as `robot_place` and
+writes it into the ontology.
 """
 
 from __future__ import annotations
@@ -21,7 +22,8 @@ from surveillance_controllers.manual.console_commands import MOTION, ParsedComma
 from surveillance_controllers.manual.operator_console import OperatorConsole
 from surveillance_controllers.manual.operator_desk import OperatorDesk
 from surveillance_controllers.map_knowledge import KnowledgeError, MapKnowledge
-from surveillance_controllers.motion.arrival import MotionFailed, nearest_place
+from surveillance_controllers.motion.arrival import MotionFailed, place_reached
+from surveillance_controllers.motion.place_recording import PlaceRecorder
 from surveillance_controllers.motion.stimulus_motion import glide
 from surveillance_interfaces.action import Control, FollowPath
 from surveillance_runtime.action_server import GoalAbortedError, GoalRun, GoalServer
@@ -47,6 +49,11 @@ class MotionController(PatrolNode):
         self._knowledge = MapKnowledge(self, self._settings.peer_timeout)
         self._desk: OperatorDesk[tuple[float, float]] = OperatorDesk(self._announce)
         self._console = OperatorConsole(self, MOTION, self._carry_out, lambda: self._desk.status)
+        localises = self._mode == 'SIMULATED' and self._settings.navigator == 'own'
+        start = None if localises else self._settings.robot_room
+        reach = self._settings.place_reach
+        self._recorder = PlaceRecorder(self, self._knowledge, reach, start)
+        self._tells_ends = not localises
         self._robot: Motion | None = None
         if self._mode == 'SIMULATED':
             self._robot = self._make_robot()
@@ -60,7 +67,7 @@ class MotionController(PatrolNode):
         # Only here, for the libraries behind it take their time to import.
         from surveillance_controllers.motion.robot_motion import make_motion
 
-        return make_motion(self, self._settings, self._knowledge)
+        return make_motion(self, self._settings, self._knowledge, self._recorder)
 
     def _announce(self, text: str) -> None:
         self._console.announce(text)
@@ -82,6 +89,8 @@ class MotionController(PatrolNode):
         except MotionFailed as failure:
             position = conversions.point_from(path[0] if failure.end is None else failure.end)
             raise GoalAbortedError(str(failure), FollowPath.Result(position=position)) from failure
+        if self._tells_ends:
+            self._recorder.tell_point(end)
         return FollowPath.Result(position=conversions.point_from(end))
 
     def _control(self, goal: Any, run: GoalRun) -> Control.Result:
@@ -100,7 +109,7 @@ class MotionController(PatrolNode):
         try:
             end = self._move(path, run, report, 'move through via points')
             if not run.interrupt.is_set():
-                self._note_visit(path[-1], end, run)
+                self._arrive(path[-1], end, run)
         except (MotionFailed, KnowledgeError) as failure:
             if isinstance(failure, MotionFailed):
                 end = failure.end
@@ -108,12 +117,14 @@ class MotionController(PatrolNode):
             raise GoalAbortedError(str(failure), Control.Result(reached_point=point)) from failure
         return Control.Result(reached_point=conversions.point_from(end))
 
-    def _note_visit(self, goal: Points, end: Points, run: GoalRun) -> None:
+    def _arrive(self, goal: Points, end: Points, run: GoalRun) -> None:
+        """Makes sure that the robot is in a place, tells it, and looks around there."""
         if self._robot is None:
-            place = nearest_place(self._knowledge, end, self._settings.place_reach, run)
+            places = self._knowledge.places(run.interrupt)
+            place = place_reached(places, end, self._settings.place_reach)
         else:
             place = self._robot.place_reached(goal, end, run)
-        self._knowledge.record_visit(place, run.now(), run.interrupt)
+        self._recorder.tell(place)
         if self._robot is not None:
             self._robot.look_around(run)
 

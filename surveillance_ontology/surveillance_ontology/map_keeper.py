@@ -1,7 +1,6 @@
 """Keeps a place in the ontology: builds it, builds it again when the server lost it, changes it.
 
-Everything here blocks while the server answers and belongs on a worker thread; `robot_room` alone
-may be set from elsewhere.
+Everything here blocks while the server answers and belongs on a worker thread.
 """
 
 from __future__ import annotations
@@ -10,7 +9,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from surveillance_ontology.armor.client import ArmorServiceCallError, ArmorServiceInternalError
-from surveillance_ontology.map_building import MapBuilding, RoomNote, extended
+from surveillance_ontology.map_building import RoomNote, extended
+from surveillance_ontology.patrol_ontology import NEVER, PatrolOntology
 from surveillance_runtime.place import Place, PlaceError
 
 
@@ -20,8 +20,8 @@ class Reports:
 
     Attributes:
         info: The map was built.
-        warn: The server is not there yet; it is tried again.
-        refused: A map that was sent is not used.
+        warn: The server is not there yet; it is tried again. Or the ontology contradicted itself.
+        refused: A map that was sent is not used; a contradiction that building anew does not end.
         failed: The map cannot be built at all, for example because the ontology is missing.
     """
 
@@ -31,11 +31,28 @@ class Reports:
     failed: Callable[[str], None]
 
 
+@dataclass(frozen=True)
+class Source:
+    """The ontology that a map is entered into.
+
+    Attributes:
+        path: Its file.
+        uri: Its IRI.
+        urgent_at_start: Places that nobody has visited count as never visited; else as visited
+            when the map was built first.
+    """
+
+    path: str
+    uri: str
+    urgent_at_start: bool = True
+
+
 class MapKeeper:
     """The map of one reference.
 
     Args:
-        building: Writes a place into the ontology.
+        ontology: The ontology.
+        source: What it starts from.
         place: What is known at the start; None waits for `extend`.
         now: Time in whole seconds.
         stopping: Tells whether to give up.
@@ -44,26 +61,28 @@ class MapKeeper:
 
     Attributes:
         place: The place as it is now.
-        robot_room: Where the robot was last; used when the ontology does not know.
         is_built: The ontology holds the place, as far as is known.
     """
 
     def __init__(
         self,
-        building: MapBuilding,
+        ontology: PatrolOntology,
+        source: Source,
         place: Place | None,
         now: Callable[[], int],
         stopping: Callable[[], bool],
         reports: Reports,
         on_built: Callable[[], None],
     ) -> None:
-        self._building = building
+        self._ontology = ontology
+        self._source = source
         self._now = now
         self._stopping = stopping
         self._reports = reports
         self._on_built = on_built
+        self._began: int | None = None
+        self._gave_up_mending = False
         self.place = place
-        self.robot_room = place.start if place else ''
         self.is_built = False
 
     def ensure_built(self) -> None:
@@ -71,10 +90,11 @@ class MapKeeper:
         told = False
         while self.place is not None and not self._stopping():
             try:
-                if self.is_built and self._building.is_loaded():
+                if self.is_built and self._ontology.is_loaded():
                     return
                 self.is_built = False
-                self.place = self._building.build(self.place, self._now(), self.robot_room)
+                self.place = self._build(self.place)
+                self._end_contradiction()
             except ArmorServiceCallError as error:
                 if not told and not self._stopping():
                     self._reports.warn(f'waiting for the armor server: {error}')
@@ -89,6 +109,49 @@ class MapKeeper:
                 self._on_built()
                 return
 
+    def _build(self, place: Place) -> Place:
+        if self._began is None:
+            self._began = self._now()
+        source = self._source
+        return self._ontology.build(
+            place, source.path, source.uri, self._first_visit(), self._now()
+        )
+
+    def _first_visit(self) -> int:
+        return NEVER if self._source.urgent_at_start or self._began is None else self._began
+
+    def end_contradiction(self) -> None:
+        """Build an ontology that contradicts itself anew from what is known.
+
+        What others asserted in it beside the map is lost; the robot's place and its visits are told
+        again by those who know them. It is done once: a contradiction that is still there
+        afterwards stands in the file, or somebody asserts it again and again.
+        """
+        try:
+            self._end_contradiction()
+        except ArmorServiceCallError:
+            self.ensure_built()
+        except ArmorServiceInternalError:
+            # The ontology has gone; its loading or dropping is announced.
+            pass
+
+    def _end_contradiction(self) -> None:
+        why = self._ontology.contradiction()
+        if not why:
+            self._gave_up_mending = False
+            return
+        if self.place is None or self._gave_up_mending:
+            return
+        self._gave_up_mending = True
+        self._reports.warn(f'the ontology contradicts itself and is built anew: {why}')
+        self._ontology.forget()
+        self.place = self._build(self.place)
+        why = self._ontology.contradiction()
+        if why:
+            self._reports.refused(f'the ontology still contradicts itself: {why}')
+        else:
+            self._gave_up_mending = False
+
     def extend(self, notes: Sequence[RoomNote], robot_room: str) -> None:
         """Take in rooms that were described by a message."""
         try:
@@ -96,12 +159,10 @@ class MapKeeper:
         except PlaceError as error:
             self._reports.refused(f'the map that was sent is not used: {error}')
             return
-        if robot_room or not self.robot_room:
-            self.robot_room = place.start
         before, self.place = self.place, place
         if before is not None and self.is_built:
             try:
-                self._building.change(before, place, self._now())
+                self._ontology.change(before, place, self._first_visit())
             except (ArmorServiceCallError, ArmorServiceInternalError) as error:
                 self._reports.warn(f'the map is built anew: {error}')
             else:
@@ -119,7 +180,7 @@ class MapKeeper:
             return 'there is no map yet'
         try:
             after = change(self.place)
-            self._building.change(self.place, after, self._now())
+            self._ontology.change(self.place, after, self._first_visit())
         except PlaceError as error:
             return str(error)
         except (ArmorServiceCallError, ArmorServiceInternalError) as error:
@@ -134,6 +195,6 @@ class MapKeeper:
             PlaceError: The room cannot be removed; the robot's room never.
         """
         left = place.without_room(name)
-        if self._building.robot_room() == name:
+        if name in self._ontology.robot_places():
             raise PlaceError(('map', name), 'the robot is in it, it cannot be removed')
         return left

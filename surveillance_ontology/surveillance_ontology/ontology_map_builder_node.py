@@ -1,7 +1,8 @@
 """The map builder: loads the ontology into the armor server and enters the place.
 
 It goes on watching: when the server comes late, comes back without its ontologies, or drops this
-one, the map is built again, with the rooms and doors as they are by then.
+one, the map is built again, with the rooms and doors as they are by then. An ontology that
+contradicts itself is built anew, too. Where the robot is, and what it visited, is told by others.
 """
 
 from __future__ import annotations
@@ -11,14 +12,16 @@ from collections.abc import Callable
 from typing import Any
 
 from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.clock import Clock, ClockType
+from rclpy.event_handler import SubscriptionEventCallbacks
 
-from surveillance_interfaces.msg import OntologyMap
+from surveillance_interfaces.msg import FactChanges, OntologyMap
 from surveillance_interfaces.srv import AddRoom, ReferenceName, RemoveRoom, RoomPosition, SetDoor
-from surveillance_ontology.armor_client import ArmorClient, FactSubscription
+from surveillance_ontology.armor_client import CHANGES_QOS, CHANGES_TOPIC, ArmorClient
 from surveillance_ontology.conversions import point_to_ros, position_from_ros, room_note_from_ros
-from surveillance_ontology.map_building import ROBOT, MapBuilding
-from surveillance_ontology.map_keeper import MapKeeper, Reports
+from surveillance_ontology.map_keeper import MapKeeper, Reports, Source
 from surveillance_ontology.ontology_parameters import builder_settings
+from surveillance_ontology.patrol_ontology import PatrolOntology
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.place import Place
 from surveillance_runtime.place.parameters import described_place
@@ -28,6 +31,9 @@ from surveillance_runtime.waiting import AwaitedEvent, AwaitedWork
 
 SECONDS_PER_ROOM = 0.005
 """By which the longest wait grows with the map."""
+PATIENCE = 1.0
+"""Steady seconds after which an ontology that contradicts itself is built anew: who knows where the
+robot is, or changes two facts one after the other, may end the contradiction before."""
 
 
 class OntologyMapBuilder(PatrolNode):
@@ -46,7 +52,8 @@ class OntologyMapBuilder(PatrolNode):
         self._built = AwaitedEvent(self)
         log = self.get_logger()
         self._keeper = MapKeeper(
-            MapBuilding(armor, settings.ontology_path, settings.ontology_uri),
+            PatrolOntology(armor),
+            Source(settings.ontology_path, settings.ontology_uri, settings.urgent_at_start),
             place,
             lambda: int(self.get_clock().now().nanoseconds // 1_000_000_000),
             self.stopping.is_set,
@@ -54,8 +61,17 @@ class OntologyMapBuilder(PatrolNode):
             self._built.happen,
         )
         self._work = AwaitedWork(self, 1)
-        pattern = f'isIn({ROBOT}, ?)'
-        self._is_in = FactSubscription(self, armor, pattern, self._on_moved, self._look)
+        # Steady time: a simulated clock may stand still.
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._doubt = self.create_timer(PATIENCE, self._on_doubt, clock=steady)
+        self._doubt.cancel()
+        self.create_subscription(
+            FactChanges,
+            CHANGES_TOPIC,
+            self._on_changes,
+            CHANGES_QOS,
+            event_callbacks=SubscriptionEventCallbacks(matched=lambda _status: self._look()),
+        )
         self._serve()
         self._look()
 
@@ -123,9 +139,17 @@ class OntologyMapBuilder(PatrolNode):
         notes = [room_note_from_ros(place) for place in msg.places]
         self._work.put(lambda: self._keeper.extend(notes, msg.robot_room))
 
-    def _on_moved(self, fact: Any, came: bool) -> None:
-        if came:
-            self._keeper.robot_room = fact.arguments[1]
+    def _on_changes(self, msg: FactChanges) -> None:
+        if msg.reference_name != self._reference:
+            return
+        if msg.sequence == 0:
+            self._look()
+        elif not msg.is_consistent and self._doubt.is_canceled():
+            self._doubt.reset()
+
+    def _on_doubt(self) -> None:
+        self._doubt.cancel()
+        self._work.put(self._keeper.end_contradiction)
 
 
 def main(args: list[str] | None = None) -> int:

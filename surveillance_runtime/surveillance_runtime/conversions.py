@@ -13,6 +13,11 @@ def seconds_of(stamp: Time | Duration) -> float:
     return float(stamp.sec + stamp.nanosec / 1e9)
 
 
+def nanoseconds_of(stamp: Time) -> int:
+    """Return a stamp as whole nanoseconds since the clock's start."""
+    return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
+
+
 def cloud_from_points(points: NDArray[np.float64]) -> PointCloud2:
     """Points of shape (n, 2), metres, as a cloud in the map's frame; the caller stamps it."""
     message = PointCloud2()

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from surveillance_behaviour.mission.battery_gauge import BatteryGauge
@@ -175,8 +175,17 @@ class World:
         self._call('set_urgency_threshold', interrupt)
         self.threshold = seconds
 
-    def beliefs(self, classes: Sequence[str], now: float, interrupt: Interrupt) -> Beliefs:
+    def beliefs(
+        self,
+        classes: Sequence[str],
+        now: float,
+        interrupt: Interrupt,
+        visits: Mapping[str, float] | None = None,
+    ) -> Beliefs:
         self._call('beliefs', interrupt)
+        for place, seconds in (visits or {}).items():
+            if place in self.visited_at:
+                self.visited_at[place] = max(self.visited_at[place], seconds)
         urgent = self.urgent()
         members = {
             place: frozenset(
@@ -194,18 +203,9 @@ class World:
             connections={place: self.neighbours(place) for place in self.rooms},
         )
 
-    def robot_place(self, interrupt: Interrupt) -> str:
-        self._call('robot_place', interrupt)
+    def await_place(self, place: str, seconds: float, interrupt: Interrupt) -> str:
+        self._call('await_place', interrupt)
         return self.is_in
-
-    def note_visit(self, place: str, now: float, interrupt: Interrupt) -> None:
-        self._call('note_visit', interrupt)
-        self.visited_at[place] = now
-
-    def note_arrival(self, before: str, place: str, now: float, interrupt: Interrupt) -> None:
-        self._call('note_arrival', interrupt)
-        self.is_in = place
-        self.visited_at[place] = now
 
     def position(self, place: str, interrupt: Interrupt) -> Point:
         self._call('position', interrupt)
@@ -239,6 +239,7 @@ class World:
             self.at = point
         self.gauge.set_charging(self.docked())
         self.place = min(self.rooms, key=lambda room: math.dist(self.positions[room], self.at))
+        self.is_in = self.place
         self.arrivals.append((self.clock.time, self.place))
         return self.at
 
@@ -262,10 +263,7 @@ class World:
 
     def control(self, via_points: Sequence[Point], interrupt: Interrupt) -> Point:
         self._call('control', interrupt)
-        end = self._drive(via_points, interrupt)
-        self.is_in = self.place
-        self.visited_at[self.place] = self.clock.time
-        return end
+        return self._drive(via_points, interrupt)
 
     def recharge(self, interrupt: Interrupt) -> None:
         self._call('recharge', interrupt)

@@ -28,9 +28,7 @@ from .scripted_world import World
 
 CALLS = [
     'beliefs',
-    'note_visit',
-    'note_arrival',
-    'robot_place',
+    'await_place',
     'position',
     'plan',
     'follow',

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import threading
 from pathlib import Path
 
 import pytest
 
-from surveillance_behaviour.peers.armor_knowledge import ArmorKnowledge
-from surveillance_behaviour.peers.ports import InterruptedWaitError, LostRobotError, PeerError
+from surveillance_behaviour.peers.armor_knowledge import ArmorKnowledge, Whereabouts
+from surveillance_behaviour.peers.ports import AwayError, InterruptedWaitError, PeerError
 from surveillance_fsm import Interrupt
 from surveillance_ontology.armor.access import DATA
 from surveillance_ontology.armor.client import (
@@ -16,7 +17,7 @@ from surveillance_ontology.armor.client import (
     InProcessTransport,
 )
 from surveillance_ontology.armor.service import ArmorService
-from surveillance_ontology.map_building import MapBuilding
+from surveillance_ontology.patrol_ontology import PatrolOntology
 from surveillance_runtime.place import read_place
 
 PLACE = read_place(Path(__file__).parents[2] / 'config' / 'seven_rooms.yaml')
@@ -27,111 +28,84 @@ NOBODY = Interrupt()
 @pytest.fixture
 def transport() -> InProcessTransport:
     transport = InProcessTransport(ArmorService())
-    armor = ArmorClient('builder', 'map', transport)
-    building = MapBuilding(armor, str(DATA / 'surveillance.owl'), 'http://bnc/exp-rob-lab/2022-23')
-    building.build(PLACE, 100, PLACE.start)
+    ontology = PatrolOntology(ArmorClient('builder', 'map', transport))
+    ontology.build(PLACE, str(DATA / 'surveillance.owl'), 'http://bnc/exp-rob-lab/2022-23')
+    ontology.record_place('E', 1)
     return transport
 
 
 @pytest.fixture
-def armor(transport: InProcessTransport) -> ArmorClient:
-    return ArmorClient('test', 'map', transport)
+def ontology(transport: InProcessTransport) -> PatrolOntology:
+    return PatrolOntology(ArmorClient('test', 'map', transport))
 
 
 @pytest.fixture
-def knowledge(transport: InProcessTransport) -> ArmorKnowledge:
-    return ArmorKnowledge('test', transport, Interrupt(), lambda _interrupt: 'map')
+def whereabouts() -> Whereabouts:
+    return Whereabouts()
+
+
+@pytest.fixture
+def knowledge(transport: InProcessTransport, whereabouts: Whereabouts) -> ArmorKnowledge:
+    return ArmorKnowledge('test', transport, Interrupt(), lambda _interrupt: 'map', whereabouts)
 
 
 def test_beliefs_are_what_the_ontology_infers(knowledge: ArmorKnowledge) -> None:
     knowledge.set_urgency_threshold(30.0, NOBODY)
-    beliefs = knowledge.beliefs(RULES, 110.7, NOBODY)
+    beliefs = knowledge.beliefs(RULES, 110.7, NOBODY, {'E': 100.0})
     assert beliefs.place == 'E'
     assert beliefs.reachable == ('C1', 'C2')
     assert beliefs.connections['C1'] == ('C2', 'E', 'R1', 'R2')
-    assert beliefs.classes['C1'] == {'CORRIDOR', 'ROOM'}
-    assert beliefs.classes['R1'] == {'ROOM'}
-    assert set(beliefs.visited_at.values()) == {100.0}
+    assert beliefs.classes['C1'] == {'URGENT', 'CORRIDOR', 'ROOM'}
+    assert beliefs.classes['E'] == {'CORRIDOR', 'ROOM'}
+    assert beliefs.visited_at == {'E': 100.0}
 
 
-@pytest.mark.parametrize(('now', 'urgent'), [(130.0, False), (131.0, True)])
-def test_places_become_urgent_beyond_the_threshold(
-    knowledge: ArmorKnowledge, now: float, urgent: bool
+def test_beliefs_wait_for_the_place_that_was_heard_of(
+    transport: InProcessTransport, ontology: PatrolOntology, whereabouts: Whereabouts
 ) -> None:
-    knowledge.set_urgency_threshold(30.0, NOBODY)
-    assert ('URGENT' in knowledge.beliefs(RULES, now, NOBODY).classes['R1']) is urgent
-
-
-def test_visits_and_arrivals_replace_what_was_known(
-    knowledge: ArmorKnowledge, armor: ArmorClient
-) -> None:
-    knowledge.note_visit('E', 120.0, NOBODY)
-    knowledge.note_arrival('E', 'C1', 127.9, NOBODY)
-    beliefs = knowledge.beliefs(RULES, 128.0, NOBODY)
-    assert (beliefs.place, beliefs.visited_at['E'], beliefs.visited_at['C1']) == (
-        'C1',
-        120.0,
-        127.0,
+    knowledge = ArmorKnowledge(
+        'test', transport, Interrupt(), lambda _interrupt: 'map', whereabouts, 10.0
     )
-    assert armor.query.dataprop_b2_ind('now', 'Robot1') == ['"128"^^xsd:long']
-    assert knowledge.robot_place(NOBODY) == 'C1'
-
-
-def test_a_robot_in_two_places_at_once_is_named_and_found_again(
-    knowledge: ArmorKnowledge, armor: ArmorClient
-) -> None:
-    armor.manipulation.add_objectprop_to_ind('isIn', 'Robot1', 'C1')
-    with pytest.raises(LostRobotError, match='Robot1 isIn C1 and E'):
-        knowledge.beliefs(RULES, 110.0, NOBODY)
-    knowledge.note_arrival('', 'C1', 110.0, NOBODY)
-    assert knowledge.beliefs(RULES, 111.0, NOBODY).place == 'C1'
-
-
-def test_a_map_that_is_built_leaves_the_robot_where_somebody_has_told_it_is() -> None:
-    transport = InProcessTransport(ArmorService())
-    armor = ArmorClient('builder', 'map', transport)
-    ontology, iri = str(DATA / 'surveillance.owl'), 'http://bnc/exp-rob-lab/2022-23'
-    armor.utils.load_ref_from_file(ontology, iri, False, 'PELLET', True)
-    armor.manipulation.add_objectprop_to_ind('isIn', 'Robot1', 'C1')
-    MapBuilding(armor, ontology, iri).build(PLACE, 100, PLACE.start)
-    knowledge = ArmorKnowledge('test', transport, Interrupt(), lambda _interrupt: 'map')
+    whereabouts.note('C1', 500)
+    late = threading.Timer(0.1, lambda: ontology.record_place('C1', 500))
+    late.start()
     assert knowledge.beliefs(RULES, 110.0, NOBODY).place == 'C1'
+    late.join()
 
 
-def test_a_lost_robot_is_named_and_found_again(
-    knowledge: ArmorKnowledge, armor: ArmorClient
+def test_beliefs_that_know_nothing_of_the_place_are_refused_in_time(
+    knowledge: ArmorKnowledge, whereabouts: Whereabouts
 ) -> None:
-    armor.manipulation.remove_objectprop_from_ind('isIn', 'Robot1', 'E')
-    with pytest.raises(LostRobotError, match='Robot1 isIn no place'):
-        knowledge.robot_place(NOBODY)
-    armor.manipulation.add_objectprop_to_ind('isIn', 'Robot1', 'E')
-    armor.manipulation.add_objectprop_to_ind('isIn', 'Robot1', 'C2')
-    with pytest.raises((LostRobotError, PeerError)):
-        knowledge.beliefs(RULES, 130.0, NOBODY)
-    knowledge.note_arrival('', 'C2', 131.0, NOBODY)
-    assert knowledge.beliefs(RULES, 132.0, NOBODY).place == 'C2'
-
-
-def test_a_visit_time_that_is_none_is_named(knowledge: ArmorKnowledge, armor: ArmorClient) -> None:
-    armor.manipulation.add_dataprop_to_ind('visitedAt', 'R1', 'STRING', 'yesterday')
-    with pytest.raises(PeerError, match=r'inconsistent|visitedAt of R1'):
+    whereabouts.note('C1', 500)
+    with pytest.raises(PeerError, match='armor: nobody told it where the robot is'):
+        knowledge.beliefs(RULES, 110.0, NOBODY)
+    whereabouts.note('', 600)
+    with pytest.raises(PeerError, match='armor: nobody told it where the robot is'):
         knowledge.beliefs(RULES, 110.0, NOBODY)
 
 
-def test_a_new_place_is_believed_at_once(knowledge: ArmorKnowledge, armor: ArmorClient) -> None:
-    before = knowledge.beliefs(RULES, 110.0, NOBODY)
-    armor.manipulation.add_objectprop_to_ind('hasDoor', 'R9', 'D1')
-    armor.manipulation.add_dataprop_to_ind('visitedAt', 'R9', 'LONG', '105')
-    after = knowledge.beliefs(RULES, 111.0, NOBODY)
-    assert set(after.connections) == {*before.connections, 'R9'}
+def test_a_place_is_waited_for_as_long_as_somebody_tells_it(
+    knowledge: ArmorKnowledge, whereabouts: Whereabouts
+) -> None:
+    assert knowledge.await_place('C1', 60.0, NOBODY) == '', 'nobody ever told: no wait'
+    whereabouts.note('E', 1)
+    assert knowledge.await_place('C1', 0.05, NOBODY) == 'E'
+    late = threading.Timer(0.05, lambda: whereabouts.note('C1', 2))
+    late.start()
+    assert knowledge.await_place('C1', 60.0, NOBODY) == 'C1'
+    late.join()
+    raised = Interrupt()
+    threading.Timer(0.05, raised.set).start()
+    with pytest.raises(InterruptedWaitError):
+        knowledge.await_place('E', 60.0, raised)
 
 
 def test_an_unknown_ontology_is_asked_for_anew(transport: InProcessTransport) -> None:
     names = ['other', 'map']
     knowledge = ArmorKnowledge('test', transport, Interrupt(), lambda _interrupt: names.pop(0))
     with pytest.raises(PeerError, match="unknown reference 'other'"):
-        knowledge.robot_place(NOBODY)
-    assert knowledge.robot_place(NOBODY) == 'E'
+        knowledge.set_urgency_threshold(5.0, NOBODY)
+    knowledge.set_urgency_threshold(5.0, NOBODY)
 
 
 def test_an_interrupted_call_is_no_fault_of_the_server(transport: InProcessTransport) -> None:
@@ -144,6 +118,6 @@ def test_an_interrupted_call_is_no_fault_of_the_server(transport: InProcessTrans
     transport.call_list = cut_off  # type: ignore[method-assign, assignment]
     knowledge = ArmorKnowledge('test', transport, Interrupt(), lambda _interrupt: 'map')
     with pytest.raises(InterruptedWaitError):
-        knowledge.robot_place(raised)
-    with pytest.raises(PeerError, match='armor: interrupted'):
-        knowledge.robot_place(Interrupt())
+        knowledge.beliefs(RULES, 1.0, raised)
+    with pytest.raises(AwayError, match='armor: interrupted'):
+        knowledge.beliefs(RULES, 1.0, Interrupt())

@@ -133,11 +133,14 @@ RECHARGE = ('recharge', {'place': 'E', 'seconds': 9.0})
     [
         ([], None),
         ([START], CutOff(0.0, 'E')),
-        ([START, VISIT, EXPLORING], CutOff(2.0, 'C1', 3.5)),
+        ([START, VISIT, EXPLORING], CutOff(2.0, 'C1', 3.5, visits={'C1': 1.0})),
         ([START, DECISION], CutOff(1.0, 'E', math.inf, left=True)),
-        ([START, DECISION, VISIT], CutOff(2.0, 'C1')),
+        ([START, DECISION, VISIT], CutOff(2.0, 'C1', visits={'C1': 2.0})),
         ([START, TO_CHARGE], CutOff(1.0, 'E', math.inf, left=True, charging='it is low')),
-        ([START, TO_CHARGE, VISIT], CutOff(2.0, 'C1', charging='it is low')),
+        (
+            [START, TO_CHARGE, VISIT],
+            CutOff(2.0, 'C1', charging='it is low', visits={'C1': 2.0}),
+        ),
         ([START, TO_CHARGE, RECHARGE], CutOff(2.0, 'E', math.inf)),
         ([START, DECISION, START], CutOff(2.0, 'E', math.inf, left=True)),
         ([START, DECISION, ('end', {})], None),

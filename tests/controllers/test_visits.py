@@ -1,4 +1,4 @@
-"""The second seed's actions with ARMOR and the map builder, without a robot: plan, move, note."""
+"""The actions of `patrol` with ARMOR and the map builder, without a robot: plan, move, tell."""
 
 from __future__ import annotations
 
@@ -12,10 +12,12 @@ from std_msgs.msg import String
 from surveillance_controllers.motion_controller_node import MotionController
 from surveillance_controllers.planner_controller_node import PlannerController
 from surveillance_interfaces.action import Control, Plan
-from surveillance_interfaces.srv import ConsoleCommand
+from surveillance_interfaces.msg import RobotPlace
+from surveillance_interfaces.srv import ConsoleCommand, ReferenceName
 from surveillance_ontology.armor_client import ArmorClient
 from surveillance_ontology.armor_server_node import ArmorServer
 from surveillance_ontology.ontology_map_builder_node import OntologyMapBuilder
+from surveillance_ontology.patrol_ontology import PatrolOntology
 from surveillance_runtime.calls import GoalCaller, ServiceCaller
 from surveillance_runtime.qos import STATE_QOS
 
@@ -24,7 +26,12 @@ from surveillance_runtime.qos import STATE_QOS
 def armor(graph: Any, seven_rooms: dict[str, Any]) -> ArmorClient:
     graph.add(ArmorServer)
     graph.add(OntologyMapBuilder, seven_rooms)
-    return ArmorClient(graph.node, 'test', 'surveillance')
+    ServiceCaller(graph.node, ReferenceName, 'ontology_map/reference_name').call(
+        ReferenceName.Request(), 10.0
+    )
+    armor = ArmorClient(graph.node, 'test', 'surveillance')
+    PatrolOntology(armor).record_place('E', 1)
+    return armor
 
 
 def plan(graph: Any, target: str) -> Any:
@@ -79,9 +86,10 @@ def control(graph: Any, in_background: Any, point: Point, command: str) -> Any:
     return end(), seen
 
 
-def test_a_visit_is_written_into_the_ontology(
+def test_the_place_that_was_reached_is_published_and_written_into_the_ontology(
     graph: Any, armor: ArmorClient, in_background: Any
 ) -> None:
+    places = graph.listen(RobotPlace, 'robot_place', STATE_QOS)
     graph.add(
         MotionController,
         {'execution_mode': 'MANUAL', 'console': False, 'feedback_period': 0.02},
@@ -92,11 +100,8 @@ def test_a_visit_is_written_into_the_ontology(
     assert (reached.x, reached.y) == pytest.approx((10, 8), abs=0.02)
     graph.until(lambda: len(seen) >= 2)
     assert [f.reached_point.x for f in seen] == sorted(f.reached_point.x for f in seen)
-    assert armor.query.objectprop_b2_ind('isIn', 'Robot1') == ['C1']
-    (visited,) = armor.query.dataprop_b2_ind('visitedAt', 'C1')
-    (now,) = armor.query.dataprop_b2_ind('now', 'Robot1')
-    assert visited == now
-    assert visited.endswith('^^xsd:long')
+    graph.until(lambda: places and places[-1].place == 'C1')
+    graph.until(lambda: armor.query.objectprop_b2_ind('isIn', 'Robot1') == ['C1'])
 
 
 def test_a_move_that_ends_in_no_place_is_aborted_and_not_noted(

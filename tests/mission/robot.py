@@ -99,6 +99,7 @@ class Robot:
                 'execution_mode': 'RANDOM',
                 'random_seed': 2,
                 'peer_timeout': PATIENCE,
+                'robot_room': 'E' if behaviour == 'surveillance' else '',
             },
             'reasoner': {'urgency_threshold': 60, 'deadline.answer': PATIENCE},
             'initial_state': {'map_source': 'configuration', **place_parameters()},

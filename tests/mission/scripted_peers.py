@@ -7,8 +7,11 @@ import threading
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 from geometry_msgs.msg import Point
 
+from surveillance_controllers.map_knowledge import MapKnowledge
+from surveillance_controllers.motion.place_recording import PlaceRecorder
 from surveillance_interfaces.action import ComputePath, Control, FollowPath, Plan
 from surveillance_runtime.action_server import GoalAbortedError, GoalRun, GoalServer
 from surveillance_runtime.node import PatrolNode
@@ -23,23 +26,16 @@ class ScriptedMotion(PatrolNode):
 
     Args:
         positions: Where the places are, metres.
-        arrived: Told the place that ``motion/controller`` reached.
     """
 
-    def __init__(
-        self,
-        positions: dict[str, list[float]],
-        arrived: Callable[[str], None],
-        **options: Any,
-    ) -> None:
+    def __init__(self, positions: dict[str, list[float]], **options: Any) -> None:
         super().__init__('scripted_motion', **options)
         self.planning: list[str] = []
         self.moving: list[str] = []
         self.played: list[str] = []
         self._lock = threading.Lock()
         self._positions = positions
-        self._arrived = arrived
-        self._target = ''
+        self._recorder = PlaceRecorder(self, MapKnowledge(self, 5.0), 2.0, 'E')
         self._at = Point()
         for kind, name, execute, script in (
             (ComputePath, 'compute_path', self._compute_path, self.planning),
@@ -84,7 +80,6 @@ class ScriptedMotion(PatrolNode):
         return ComputePath.Result(path=self._path(goal.goal, run))
 
     def _plan(self, goal: Any, run: GoalRun) -> Any:
-        self._target = goal.target
         x, y = self._positions[goal.target][:2]
         return Plan.Result(via_points=self._path(Point(x=x, y=y), run))
 
@@ -93,13 +88,11 @@ class ScriptedMotion(PatrolNode):
         run.sleep(5.0)
         if turn != SHORT:
             self._at = path[-1]
+            self._recorder.tell_point(np.array([self._at.x, self._at.y, 0.0]))
         return self._at
 
     def _follow_path(self, goal: Any, run: GoalRun) -> Any:
         return FollowPath.Result(position=self._drive(goal.path, run))
 
     def _control(self, goal: Any, run: GoalRun) -> Any:
-        end = self._drive(goal.point_set, run)
-        if end == goal.point_set[-1]:
-            self._arrived(self._target)
-        return Control.Result(reached_point=end)
+        return Control.Result(reached_point=self._drive(goal.point_set, run))

@@ -12,8 +12,6 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.task import Future
 from std_srvs.srv import Empty
 
-from surveillance_behaviour.peers.ros_ports import Deadlines, ros_knowledge
-from surveillance_fsm import Interrupt
 from surveillance_interfaces.msg import Decision, FsmTransition, MissionStatus
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import STATE_QOS
@@ -105,15 +103,10 @@ def test_whatever_planner_and_controller_answer_the_mission_goes_on(
         for key, value in parameters.items()
         if key.startswith('room_positions.')
     }
-    knowledge = ros_knowledge(graph.node, Deadlines())
-
-    def arrived(place: str) -> None:
-        knowledge.note_arrival('', place, robot.time.now, Interrupt())
-
     robot.be_impatient()
     robot.configure('battery_controller', random_battery_time=[5000.0, 6000.0])
     robot.begin('planner_controller', 'motion_controller')
-    motion = graph.add(ScriptedMotion, {'use_sim_time': True}, positions=positions, arrived=arrived)
+    motion = graph.add(ScriptedMotion, {'use_sim_time': True}, positions=positions)
     robot.nodes['scripted_motion'] = motion
     motion.planning.extend([GOOD, REJECTED, GOOD, ABORTED, SILENT, EMPTY, ELSEWHERE, NOT_FINITE])
     motion.moving.extend([GOOD, SHORT, GOOD, ABORTED, SILENT, GOOD, REJECTED])

@@ -22,13 +22,13 @@ from surveillance_ontology.armor.protocol import (
 )
 from surveillance_ontology.armor.service import ArmorService
 from surveillance_ontology.map_building import (
-    MapBuilding,
     RoomNote,
     closed_doors,
     extended,
     shown_doors,
 )
-from surveillance_ontology.map_keeper import MapKeeper, Reports
+from surveillance_ontology.map_keeper import MapKeeper, Reports, Source
+from surveillance_ontology.patrol_ontology import PatrolOntology
 from surveillance_runtime.place import Place, PlaceError, make_place
 
 from .seven_rooms import IRI, ONTOLOGY, SEVEN_ROOMS
@@ -63,21 +63,22 @@ EDITS = st.one_of(
 def test_connections_are_those_of_the_place_after_any_edits(edits: list[Edit]) -> None:
     service = ArmorService(warn=lambda _: None)
     client = ArmorClient('test', 'map', InProcessTransport(service))
-    building = MapBuilding(client, ONTOLOGY, IRI)
-    place = building.build(seven(), 100, 'E')
+    ontology = PatrolOntology(client)
+    place = ontology.build(seven(), ONTOLOGY, IRI)
+    ontology.record_place('E', 100)
     for edit in edits:
         try:
             after = edit(place)
         except PlaceError:
             continue
-        building.change(place, after, 200)
+        ontology.change(place, after)
         place = after
     assert client.query.ind_b2_class('LOCATION') == sorted(place.rooms)
     for room in place.rooms:
         neighbours = sorted(set(place.neighbours(room)))
         assert client.query.objectprop_b2_ind('connectedTo', room) == neighbours
     assert client.utils.sync_buffered_reasoner(), 'consistent'
-    assert building.build(place, 300, 'E').closed == {
+    assert ontology.build(place, ONTOLOGY, IRI).closed == {
         door for door in place.closed if len(place.doors[door]) > 1
     }
     service.close()
@@ -146,12 +147,14 @@ def test_the_keeper_goes_on_until_the_server_is_there(tmp_path: Path) -> None:
     service = ArmorService(warn=lambda _: None)
     transport = Flaky(service, away=3)
     client = ArmorClient('test', 'map', transport)
+    ontology = PatrolOntology(client)
     said: dict[str, list[str]] = {'info': [], 'warn': [], 'refused': [], 'failed': []}
     built: list[int] = []
 
     def keeper(path: str) -> MapKeeper:
         return MapKeeper(
-            MapBuilding(client, path, IRI),
+            ontology,
+            Source(path, IRI),
             seven(),
             lambda: 100,
             lambda: False,
@@ -165,9 +168,10 @@ def test_the_keeper_goes_on_until_the_server_is_there(tmp_path: Path) -> None:
     kept.ensure_built()
     assert built == [1], 'it is there'
     assert kept.edit(lambda place: place.with_door('D1', is_open=False)) == ''
-    kept.robot_room = 'C1'
     client.utils.drop_ref()
     kept.ensure_built()
+    assert client.query.objectprop_b2_ind('isIn', 'Robot1') == [], 'who knows it tells it'
+    ontology.record_place('C1', 5)
     assert client.query.objectprop_b2_ind('canReach', 'Robot1') == ['C2', 'E', 'R2']
     transport.away = 100
     assert kept.edit(lambda place: place.with_door('D1', is_open=True)).startswith(

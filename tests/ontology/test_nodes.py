@@ -25,6 +25,7 @@ from surveillance_ontology.armor_client import (
 from surveillance_ontology.armor_server_node import ArmorServer
 from surveillance_ontology.conversions import point_to_ros
 from surveillance_ontology.ontology_map_builder_node import OntologyMapBuilder
+from surveillance_ontology.patrol_ontology import PatrolOntology
 from surveillance_runtime.calls import ServiceCaller
 from surveillance_runtime.node import PatrolNode, StartError
 from surveillance_runtime.qos import STATE_QOS
@@ -78,7 +79,16 @@ def built(graph: Any, call: Caller) -> OntologyMapBuilder:
     graph.add(ArmorServer)
     builder: OntologyMapBuilder = graph.add(OntologyMapBuilder, PLACE)
     assert call('reference_name').name == 'surveillance'
+    PatrolOntology(ArmorClient(graph.node, 'test', 'surveillance')).record_place('E', 1)
     return builder
+
+
+def connected(armor: ArmorClient) -> list[str]:
+    """What C1 is connected to; nothing while there is no ontology."""
+    try:
+        return armor.query.objectprop_b2_ind('connectedTo', 'C1')
+    except ArmorServiceInternalError:
+        return []
 
 
 def reach(armor: ArmorClient) -> list[str]:
@@ -289,23 +299,49 @@ def test_the_builder_waits_for_the_server_and_its_clients_for_the_builder(
     graph.add(ArmorServer)
     graph.until(lambda: answers)
     assert answers == ['surveillance']
-    assert reach(armor) == ['C1', 'C2']
+    assert armor.query.objectprop_b2_ind('connectedTo', 'E') == ['C1', 'C2']
     assert armor.query.ind_b2_class('CORRIDOR') == ['C1', 'C2', 'E']
-    assert armor.query.ind_b2_class('URGENT') == [], 'every place starts as just visited'
+    assert armor.query.objectprop_b2_ind('isIn', 'Robot1') == [], 'that is for who knows it'
+
+
+@pytest.mark.parametrize('urgent_at_start', [True, False])
+def test_places_that_nobody_visited_are_urgent_at_the_start_or_not(
+    graph: Any, call: Caller, armor: ArmorClient, urgent_at_start: bool
+) -> None:
+    graph.add(ArmorServer)
+    graph.add(OntologyMapBuilder, {**PLACE, 'urgent_at_start': urgent_at_start})
+    assert call('reference_name').name == 'surveillance'
+    visits = {
+        value for room in SEVEN_ROOMS for value in armor.query.dataprop_b2_ind('visitedAt', room)
+    }
+    assert (visits == {'"0"^^xsd:long'}) is urgent_at_start
+    assert armor.query.ind_b2_class('URGENT') == (sorted(SEVEN_ROOMS) if urgent_at_start else [])
 
 
 def test_a_server_that_comes_back_empty_gets_the_map_again(
     graph: Any, call: Caller, armor: ArmorClient, built: OntologyMapBuilder
 ) -> None:
     assert call('set_door', door='D1', open=False).success
-    armor.manipulation.replace_objectprop_b2_ind('isIn', 'Robot1', 'C1', 'E')
-    armor.utils.sync_buffered_reasoner()
-    assert reach(armor) == ['C2', 'E', 'R2']
-    graph.until(lambda: built._keeper.robot_room == 'C1')
     armor.utils.drop_ref()
     graph.until(lambda: armor.utils.get_all_refs())
-    graph.until(lambda: armor.query.ind_b2_class('CORRIDOR') and reach(armor))
-    assert reach(armor) == ['C2', 'E', 'R2'], 'where the robot was, with the door still closed'
+    graph.until(lambda: armor.query.objectprop_b2_ind('connectedTo', 'C1'))
+    assert armor.query.objectprop_b2_ind('connectedTo', 'C1') == ['C2', 'E', 'R2'], 'still closed'
+    assert armor.query.objectprop_b2_ind('isIn', 'Robot1') == [], 'no start value for the robot'
+
+
+def test_an_ontology_that_contradicts_itself_is_built_anew_once(
+    graph: Any, call: Caller, armor: ArmorClient, built: OntologyMapBuilder, capfd: Any
+) -> None:
+    assert call('set_door', door='D1', open=False).success
+    armor.manipulation.add_ind_to_class('R1', 'DOOR')
+    assert not armor.utils.sync_buffered_reasoner()
+    graph.until(lambda: armor.utils.get_all_refs() and connected(armor) == ['C2', 'E', 'R2'])
+    assert armor.utils.sync_buffered_reasoner()
+    lines = [line for line in capfd.readouterr().err.splitlines() if 'contradicts itself' in line]
+    assert len(lines) == 1
+    assert 'is built anew: ' in lines[0]
+    assert 'DOOR' in lines[0]
+    assert 'R1' in lines[0]
 
 
 def test_a_builder_that_comes_back_keeps_what_the_ontology_knows(
@@ -378,6 +414,7 @@ def test_a_map_comes_over_the_topic_in_parts(graph: Any, armor: ArmorClient, cal
     first = [room('E', ('A', 'D1')), room('A', ('E', 'D1'), ('B', 'D2'))]
     publisher.publish(OntologyMap(places=first, robot_room='E'))
     assert call('reference_name').name == 'surveillance'
+    PatrolOntology(armor).record_place('E', 1)
     assert reach(armor) == ['A']
     publisher.publish(OntologyMap(places=[room('X', ('X', 'D7'))]))
     publisher.publish(OntologyMap(places=[room('B', ('A', 'D2'), ('E', 'D3'))]))
@@ -428,4 +465,4 @@ def test_a_server_that_dies_and_comes_back_gets_the_map_again(
     graph.add(ArmorServer)
     graph.until(lambda: armor.utils.get_all_refs() and armor.query.check_ind_exists('C1'))
     assert call('reference_name').name == 'surveillance'
-    graph.until(lambda: reach(armor) == ['C1', 'C2'])
+    graph.until(lambda: armor.query.objectprop_b2_ind('connectedTo', 'E') == ['C1', 'C2'])

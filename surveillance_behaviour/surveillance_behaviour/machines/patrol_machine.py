@@ -130,7 +130,7 @@ class Pointing(MovingState):
 
 
 class Controlling(MovingState):
-    """Drives through the via points; the motion controller notes the visit."""
+    """Drives through the via points and notes the visit."""
 
     task = 'controlling'
 
@@ -170,9 +170,7 @@ def drive(
     mission.departs()
     end = state.routine.control(via_points, interrupt)
     check_arrival(end, via_points[-1], mission.settings.arrival_tolerance, peer)
-    place = mission.ports.knowledge.robot_place(interrupt)
-    if place != target:
-        raise PeerError(peer, f'the robot is in {place} instead of {target}')
+    mission.make_sure_of(target, interrupt)
     return path_length(via_points)
 
 

@@ -137,21 +137,16 @@ class Move(MissionState):
         self._outcome = outcome
 
     def move(self, place: str, interrupt: fsm.Interrupt) -> str:
-        """Moves the robot and tells the ontology where it is.
+        """Moves the robot.
 
         Raises:
             PeerError: It did not get there.
         """
         mission = self.mission
-        before = mission.place
-        if mission.owes_arrival(place):
-            mission.tell_arrival(before, place, interrupt)
-            return self._outcome
-        mission.ports.knowledge.note_visit(before, mission.now(), interrupt)
-        mission.chooser.saw(before, mission.now())
-        path = self._drive(before, place, interrupt)
-        mission.reached(place, path_length(path), path)
-        mission.tell_arrival(before, place, interrupt)
+        if not mission.astray:
+            mission.leaves()
+        path = self._drive(mission.place, place, interrupt)
+        mission.arrived(place, path_length(path), path)
         return self._outcome
 
     def _drive(self, before: str, place: str, interrupt: fsm.Interrupt) -> list[Point]:
@@ -168,6 +163,7 @@ class Move(MissionState):
         mission.departs()
         end = motion.follow(path, interrupt)
         check_arrival(end, path[-1], mission.settings.arrival_tolerance, 'follow_path')
+        mission.make_sure_of(place, interrupt)
         return path
 
     def _stops(self, before: str, place: str, goal: Point, interrupt: fsm.Interrupt) -> list[Point]:

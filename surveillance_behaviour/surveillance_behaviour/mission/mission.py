@@ -12,7 +12,6 @@ from surveillance_behaviour.mission.recovery import Failure, Recovery, RecoveryL
 from surveillance_behaviour.mission.resumption import CutOff
 from surveillance_behaviour.peers.ports import (
     InterruptedWaitError,
-    LostRobotError,
     PeerError,
     Point,
     Ports,
@@ -93,7 +92,7 @@ class Mission:
         self._told_threshold: float | None = None
         self._warned = ''
         self._sent_to_charge = ''
-        self._owed: tuple[str, str, float] | None = None
+        self._visits: dict[str, float] = {}
         gauge.watch(self._learn_draw)
 
     # The way of the mission.
@@ -118,6 +117,7 @@ class Mission:
         before, self._cut_off = self._cut_off, None
         if before is None or before.time > self.now():
             return
+        self._visits = {**before.visits, **self._visits}
         self.astray = before.left
         if before.charging and not self.charged_enough():
             self._sent_to_charge = before.charging
@@ -126,7 +126,7 @@ class Mission:
         self.say(f'going on: {before}')
 
     def look(self, interrupt: Interrupt) -> Situation:
-        """What the ontology says now; an ontology that lost the robot is told where it is.
+        """What the ontology says now; it is told what it does not know of the robot's visits.
 
         Raises:
             PeerError: The ontology cannot be asked.
@@ -136,23 +136,11 @@ class Mission:
         if self._sent_to_charge and self.charged_enough():
             self._sent_to_charge = ''
         try:
-            self._tell_what_is_owed(interrupt)
-        except PeerError as error:
-            # An ontology that is away says so to what follows; waiting here as well would only
-            # cost the battery.
-            self.say(str(error), warning=True)
-        if threshold != self._told_threshold:
-            knowledge.set_urgency_threshold(threshold, interrupt)
-            self._told_threshold = threshold
-        avoided = self.recovery.avoided(now)
-        try:
-            situation = self.chooser.look(now, interrupt, avoided)
-        except LostRobotError as error:
-            if not self.place:
-                raise
-            self.say(f'{error}; it was last in {self.place}', warning=True)
-            knowledge.note_arrival('', self.place, now, interrupt)
-            situation = self.chooser.look(now, interrupt, avoided)
+            if threshold != self._told_threshold:
+                knowledge.set_urgency_threshold(threshold, interrupt)
+                self._told_threshold = threshold
+            avoided = self.recovery.avoided(now)
+            situation = self.chooser.look(now, interrupt, avoided, self._visits)
         except PeerError:
             # The ontology that comes back may be another one.
             self._told_threshold = None
@@ -231,48 +219,40 @@ class Mission:
         self.astray = True
 
     def arrived(self, place: str, distance: float, path: Sequence[Point] = ()) -> None:
-        """The robot is in ``place``, as the ontology knows; see `reached`."""
-        self.reached(place, distance, path)
-        self._settled(place)
-
-    def _settled(self, place: str) -> None:
-        self.recovery.arrived(place)
-        self.failure = None
-
-    def reached(self, place: str, distance: float, path: Sequence[Point] = ()) -> None:
         """The robot is in ``place``, after ``distance`` metres along ``path``."""
         self.place = place
         self.astray = False
         self._explored = 0.0
-        self.chooser.saw(place, self.now())
+        self._visit(place)
         way = {'path': [[round(x, 2), round(y, 2)] for x, y, *_ in path]} if path else {}
         self._write('visit', place=place, distance=distance, **way)
         self.say(f'arrived in {place}')
+        self.recovery.arrived(place)
+        self.failure = None
 
-    def tell_arrival(self, before: str, place: str, interrupt: Interrupt) -> None:
-        """Tells the ontology that the robot came from ``before`` to ``place``.
+    def leaves(self) -> None:
+        """The robot was in its place until now."""
+        self._visit(self.place)
+
+    def _visit(self, place: str) -> None:
+        """Notes a visit, which the ontology is told of with the next question."""
+        self._visits[place] = self.now()
+        self.chooser.saw(place, self.now())
+
+    def make_sure_of(self, place: str, interrupt: Interrupt) -> None:
+        """Makes sure that a move ended in ``place``.
 
         Raises:
-            PeerError: It cannot be told now; it will be when it is next asked for anything.
+            PeerError: The robot is elsewhere.
         """
-        if not self.owes_arrival(place):
-            self._owed = before, place, self.now()
-        self._tell_what_is_owed(interrupt)
-        self._settled(place)
-
-    def owes_arrival(self, place: str) -> bool:
-        """Whether the ontology has yet to be told that the robot has come to ``place``."""
-        return self._owed is not None and self._owed[1] == place
-
-    def _tell_what_is_owed(self, interrupt: Interrupt) -> None:
-        if self._owed is not None:
-            self.ports.knowledge.note_arrival(*self._owed, interrupt)
-            self._owed = None
+        found = self.ports.knowledge.await_place(place, self.settings.settle_seconds, interrupt)
+        if found not in (place, ''):
+            raise PeerError('robot_place', f'the robot is in {found} instead of {place}')
 
     def came_back(self, distance: float) -> None:
         """The robot is again where it was last known to be, after ``distance`` metres."""
         self.astray = False
-        self.chooser.saw(self.place, self.now())
+        self._visit(self.place)
         self._write('visit', place=self.place, distance=distance)
         self.say(f'back in {self.place}')
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from surveillance_behaviour.mission.record import Event
 from surveillance_behaviour.policy.rules import RECHARGE
@@ -20,6 +20,7 @@ class CutOff:
         explored: Seconds for which it had explored that place; inf when it was done there.
         left: Another place had been chosen since, so that it may be anywhere by now.
         charging: Why it had been sent to charge and has not been charged since; empty: it was not.
+        visits: When the robot was in each place last, seconds.
     """
 
     time: float
@@ -27,6 +28,7 @@ class CutOff:
     explored: float = 0.0
     left: bool = False
     charging: str = ''
+    visits: dict[str, float] = field(default_factory=dict)
 
     def __str__(self) -> str:
         parts = [f'the robot was in {self.place}']
@@ -60,7 +62,11 @@ def _after(known: CutOff | None, event: Event) -> CutOff | None:
             place = event.text('place')
             if event.name == 'start' and known is not None and known.place == place:
                 return known
-            return CutOff(event.time, place, charging=known.charging if known else '')
+            visits = known.visits if known else {}
+            if event.name == 'visit':
+                visits[place] = event.time
+            charging = known.charging if known else ''
+            return CutOff(event.time, place, charging=charging, visits=visits)
     if known is None:
         return None
     match event.name:

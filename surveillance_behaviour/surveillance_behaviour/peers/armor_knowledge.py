@@ -1,13 +1,11 @@
-"""The ontology behind the machines' port: ARMOR directives, sent in batches.
-
-A batch is carried out in one piece, so what it answers is all of one moment, and a node that is
-killed leaves nothing half written. Of the map only the answers are believed: places, ways and
-classes are whatever the ontology infers now.
-"""
+"""The ontology behind the machines' port, and where the robot is by the topic `robot_place`."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Protocol
 
 import surveillance_fsm as fsm
@@ -15,21 +13,15 @@ from surveillance_behaviour.peers.ports import (
     AwayError,
     Beliefs,
     InterruptedWaitError,
-    LostRobotError,
     PeerError,
 )
 from surveillance_ontology.armor.client import (
     ArmorClient,
     ArmorServiceCallError,
+    ArmorServiceInternalError,
     Transport,
-    name_in,
-    value_in,
 )
-from surveillance_ontology.armor.protocol import DirectiveResponse
-
-ROBOT = 'Robot1'
-Directive = tuple[str, ...]
-"""A directive's words, ``QUERY OBJECTPROP IND``, and its arguments."""
+from surveillance_ontology.patrol_ontology import OntologyNotReadyError, PatrolOntology
 
 
 class Wake(Protocol):
@@ -42,6 +34,58 @@ class Wake(Protocol):
         """Lets the next call run."""
 
 
+class Whereabouts:
+    """The last that was told on `robot_place`; written in the executor's thread.
+
+    Attributes:
+        place: Where the robot is; empty when that is not known.
+        stamp: When it was seen in the last place that was known, nanoseconds of ROS time; 0: never.
+    """
+
+    def __init__(self) -> None:
+        self._changed = threading.Condition()
+        self._heard = False
+        self.place = ''
+        self.stamp = 0
+
+    def note(self, place: str, stamp: int) -> None:
+        """Takes a message: the place, empty when it is not known, and nanoseconds of ROS time."""
+        with self._changed:
+            self._heard, self.place = True, place
+            if place:
+                self.stamp = stamp
+            self._changed.notify_all()
+
+    def await_place(self, place: str, seconds: float, interrupt: fsm.Interrupt) -> str:
+        """Waits until the robot is in a place.
+
+        Args:
+            place: The place.
+            seconds: How long at most, steady time.
+            interrupt: Ends the wait early.
+
+        Returns:
+            Where it is then; empty when nobody said so far.
+        """
+        deadline = time.monotonic() + seconds
+
+        def wake() -> None:
+            with self._changed:
+                self._changed.notify_all()
+
+        forget = interrupt.subscribe(wake)
+        try:
+            with self._changed:
+                while self.place != place and not interrupt.is_set():
+                    left = deadline - time.monotonic()
+                    if left <= 0.0 or not self._heard:
+                        break
+                    self._changed.wait(left)
+                return self.place
+        finally:
+            forget()
+
+
 class ArmorKnowledge:
     """Asks and tells ARMOR; one thread at a time.
 
@@ -50,6 +94,9 @@ class ArmorKnowledge:
         transport: How directives travel to the server.
         wake: Ends the transport's call when it is raised.
         reference: Waits until the map is built and gives the ontology's reference name.
+        whereabouts: Where the robot is.
+        patience: How long an ontology that was just built, or contradicts itself, may take until it
+            knows where the robot is, seconds of steady time.
     """
 
     def __init__(
@@ -58,11 +105,15 @@ class ArmorKnowledge:
         transport: Transport,
         wake: Wake,
         reference: Callable[[fsm.Interrupt], str],
+        whereabouts: Whereabouts | None = None,
+        patience: float = 0.0,
     ) -> None:
         self._armor = ArmorClient(client_id, '', transport)
+        self._ontology = PatrolOntology(self._armor)
         self._wake = wake
         self._ask_reference = reference
-        self._places: tuple[str, ...] = ()
+        self._whereabouts = whereabouts or Whereabouts()
+        self._patience = patience
 
     def wait_until_built(self, interrupt: fsm.Interrupt) -> None:
         """Asks for the name of the ontology, which is answered once the map is built."""
@@ -70,162 +121,66 @@ class ArmorKnowledge:
 
     def set_urgency_threshold(self, seconds: float, interrupt: fsm.Interrupt) -> None:
         """Replaces the robot's urgencyThreshold."""
-        answers = self._send([_query('urgencyThreshold', ROBOT)], interrupt)
-        change = _replace('urgencyThreshold', ROBOT, answers[0].queried_objects, seconds)
-        self._send([*change, ('REASON',)], interrupt)
+        with self._talking(interrupt):
+            self._ontology.set_urgency_threshold(seconds)
 
-    def robot_place(self, interrupt: fsm.Interrupt) -> str:
-        """Where the ontology has the robot."""
-        (answer,) = self._send([('QUERY OBJECTPROP IND', 'isIn', ROBOT)], interrupt)
-        return _one_place(answer.queried_objects)
+    def await_place(self, place: str, seconds: float, interrupt: fsm.Interrupt) -> str:
+        """Waits until the robot is in ``place``; where it is then, empty when nobody says."""
+        found = self._whereabouts.await_place(place, seconds, interrupt)
+        if interrupt.is_set():
+            raise InterruptedWaitError
+        return found
 
-    def beliefs(self, classes: Sequence[str], now: float, interrupt: fsm.Interrupt) -> Beliefs:
-        """Sets the robot's ``now``, reasons, and asks for all that a decision needs."""
-        (old,) = self._send([_query('now', ROBOT)], interrupt)
-        head: list[Directive] = [
-            *_replace('now', ROBOT, old.queried_objects, now),
-            ('REASON',),
-            ('QUERY OBJECTPROP IND', 'isIn', ROBOT),
-            ('QUERY OBJECTPROP IND', 'canReach', ROBOT),
-            ('QUERY IND CLASS', 'LOCATION'),
-            *(('QUERY IND CLASS', name) for name in classes),
-        ]
-        while True:
-            asked = self._places
-            tail: list[Directive] = []
-            for place in asked:
-                tail.append(('QUERY OBJECTPROP IND', 'connectedTo', place))
-                tail.append(_query('visitedAt', place))
-            answers = self._send([*head, *tail], interrupt)[-(3 + len(classes) + len(tail)) :]
-            is_in, can_reach, locations = (answer.queried_objects for answer in answers[:3])
-            if not answers[0].is_consistent:
-                # With the robot in several places at once: that can be mended, see `note_arrival`.
-                _one_place(is_in)
-                raise PeerError('armor', f'ontology {self._armor.reference_name} is inconsistent')
-            self._places = _names(locations)
-            if asked == self._places:
-                break
-        members = {
-            name: frozenset(_names(answer.queried_objects))
-            for name, answer in zip(classes, answers[3:], strict=False)
-        }
-        per_place = answers[3 + len(classes) :]
+    def beliefs(
+        self,
+        classes: Sequence[str],
+        now: float,
+        interrupt: fsm.Interrupt,
+        visits: Mapping[str, float] | None = None,
+    ) -> Beliefs:
+        """Tells the time and what the ontology does not know of ``visits``; asks what follows.
+
+        The answer knows where the robot is by the last that was heard of it.
+        """
+        with self._talking(interrupt):
+            found = self._ontology.snapshot(
+                now,
+                classes,
+                not_before=self._whereabouts.stamp,
+                visits=visits,
+                patience=self._patience,
+                interrupt=interrupt,
+            )
         return Beliefs(
-            place=_one_place(is_in),
-            reachable=_names(can_reach),
-            classes={
-                place: frozenset(name for name in classes if place in members[name])
-                for place in asked
-            },
-            visited_at=_visits(asked, per_place[1::2]),
-            connections={
-                place: _names(answer.queried_objects)
-                for place, answer in zip(asked, per_place[::2], strict=True)
-            },
+            place=found.place,
+            reachable=found.reachable,
+            classes=found.classes,
+            visited_at=found.visited_at,
+            connections=found.connections,
         )
 
-    def note_visit(self, place: str, now: float, interrupt: fsm.Interrupt) -> None:
-        """Replaces the place's visitedAt and the robot's now."""
-        self._write(place, now, [], interrupt)
-
-    def note_arrival(self, before: str, place: str, now: float, interrupt: fsm.Interrupt) -> None:
-        """Replaces the robot's isIn, wherever it was thought to be, and notes the visit."""
-        (answer,) = self._send([('QUERY OBJECTPROP IND', 'isIn', ROBOT)], interrupt)
-        changes: list[Directive] = [
-            ('REMOVE OBJECTPROP IND', 'isIn', ROBOT, other)
-            for other in _names(answer.queried_objects)
-            if other != place
-        ]
-        changes.append(('ADD OBJECTPROP IND', 'isIn', ROBOT, place))
-        self._write(place, now, changes, interrupt)
-
-    def _write(
-        self, place: str, now: float, changes: Sequence[Directive], interrupt: fsm.Interrupt
-    ) -> None:
-        visited, told = self._send([_query('visitedAt', place), _query('now', ROBOT)], interrupt)
-        self._send(
-            [
-                *changes,
-                *_replace('visitedAt', place, visited.queried_objects, now),
-                *_replace('now', ROBOT, told.queried_objects, now),
-                ('REASON',),
-            ],
-            interrupt,
-        )
-
-    def _send(
-        self, directives: Sequence[Directive], interrupt: fsm.Interrupt
-    ) -> Sequence[DirectiveResponse]:
-        """Sends one batch; the answers in its order.
+    @contextmanager
+    def _talking(self, interrupt: fsm.Interrupt) -> Iterator[None]:
+        """Heeds the interrupt, and turns what went wrong into the ports' errors.
 
         Raises:
-            PeerError: ARMOR is away, or refuses one of them.
+            PeerError: ARMOR is away, refuses something, or the ontology is not ready.
             InterruptedWaitError: The interrupt was raised.
         """
         if not self._armor.reference_name:
             self.wait_until_built(interrupt)
         forget = interrupt.subscribe(self._wake.set)
         try:
-            answer = self._armor.batch([self._armor.request(*words) for words in directives])
-        except ArmorServiceCallError as error:
+            yield
+        except (ArmorServiceCallError, OntologyNotReadyError) as error:
             if interrupt.is_set():
                 raise InterruptedWaitError from None
-            raise AwayError('armor', str(error)) from None
+            kind = AwayError if isinstance(error, ArmorServiceCallError) else PeerError
+            raise kind('armor', str(error)) from None
+        except ArmorServiceInternalError as error:
+            # A server that was started anew does not know the ontology yet.
+            self._armor.reference_name = ''
+            raise PeerError('armor', str(error)) from None
         finally:
             forget()
             self._wake.clear()
-        if len(answer.responses) != len(directives):
-            raise PeerError(
-                'armor', f'{len(answer.responses)} answers to {len(directives)} directives'
-            )
-        for words, response in zip(directives, answer.responses, strict=True):
-            if not response.success:
-                # A server that was started anew does not know the ontology yet.
-                self._armor.reference_name = ''
-                raise PeerError(
-                    'armor', f'{" ".join(words)}: {response.error_description or "refused"}'
-                )
-        return answer.responses
-
-
-def _query(prop: str, individual: str) -> Directive:
-    return 'QUERY DATAPROP IND', prop, individual
-
-
-def _replace(prop: str, individual: str, old: Sequence[str], seconds: float) -> list[Directive]:
-    """Removes all old values and adds the new one, in whole seconds."""
-    new = str(int(seconds))
-    kept = [value for value in old if value == f'"{new}"^^xsd:long']
-    changes: list[Directive] = [
-        ('REMOVE DATAPROP IND', prop, individual, 'LONG', value)
-        for value in old
-        if value not in kept
-    ]
-    if not kept:
-        changes.append(('ADD DATAPROP IND', prop, individual, 'LONG', new))
-    return changes
-
-
-def _names(rendered: Sequence[str]) -> tuple[str, ...]:
-    return tuple(sorted(name_in(text) for text in rendered))
-
-
-def _visits(places: Sequence[str], answers: Sequence[DirectiveResponse]) -> Mapping[str, float]:
-    visits = {}
-    for place, answer in zip(places, answers, strict=True):
-        try:
-            times = [float(value_in(value)) for value in answer.queried_objects]
-        except ValueError:
-            raise PeerError(
-                'armor', f'visitedAt of {place} is {answer.queried_objects}, expected seconds'
-            ) from None
-        if times:
-            visits[place] = max(times)
-    return visits
-
-
-def _one_place(rendered: Sequence[str]) -> str:
-    found = _names(rendered)
-    if len(found) != 1:
-        raise LostRobotError('armor', f'{ROBOT} isIn {" and ".join(found) or "no place"}')
-    return found[0]

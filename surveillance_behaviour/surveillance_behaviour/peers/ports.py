@@ -41,10 +41,6 @@ class UnknownPlaceError(PeerError):
     """A place is not there, or not any more."""
 
 
-class LostRobotError(PeerError):
-    """The ontology has the robot in no place, or in several."""
-
-
 class InterruptedWaitError(Exception):
     """The interrupt was raised while a port was at work; what ran on the peer was cancelled."""
 
@@ -57,7 +53,7 @@ class Beliefs:
         place: Where the robot is.
         reachable: Where it can go from there in one move.
         classes: The classes of every place, as far as the rules ask for them.
-        visited_at: When each place was visited last, seconds.
+        visited_at: When each place was visited last, seconds; without those that never were.
         connections: The neighbours of every place.
     """
 
@@ -77,17 +73,17 @@ class Knowledge(Protocol):
     def set_urgency_threshold(self, seconds: float, interrupt: Interrupt) -> None:
         """Sets the time after which a place becomes URGENT."""
 
-    def beliefs(self, classes: Sequence[str], now: float, interrupt: Interrupt) -> Beliefs:
-        """Tells the ontology the time and asks what follows."""
+    def beliefs(
+        self,
+        classes: Sequence[str],
+        now: float,
+        interrupt: Interrupt,
+        visits: Mapping[str, float] | None = None,
+    ) -> Beliefs:
+        """Tells the ontology the time and the visits that it does not know; asks what follows."""
 
-    def robot_place(self, interrupt: Interrupt) -> str:
-        """Where the robot is."""
-
-    def note_visit(self, place: str, now: float, interrupt: Interrupt) -> None:
-        """The robot is in ``place`` at ``now``."""
-
-    def note_arrival(self, before: str, place: str, now: float, interrupt: Interrupt) -> None:
-        """The robot came from ``before`` to ``place``."""
+    def await_place(self, place: str, seconds: float, interrupt: Interrupt) -> str:
+        """Waits until the robot is in ``place``, for a while; where it is then, empty: unknown."""
 
 
 class Places(Protocol):

@@ -14,7 +14,7 @@ from std_srvs.srv import Empty
 
 from surveillance_behaviour import conversions
 from surveillance_behaviour.mission.battery_gauge import BatteryGauge
-from surveillance_behaviour.peers.armor_knowledge import ArmorKnowledge
+from surveillance_behaviour.peers.armor_knowledge import ArmorKnowledge, Whereabouts
 from surveillance_behaviour.peers.ports import (
     InterruptedWaitError,
     PeerError,
@@ -24,11 +24,14 @@ from surveillance_behaviour.peers.ports import (
 from surveillance_behaviour.peers.ros_calls import ask, call, run
 from surveillance_fsm import Interrupt
 from surveillance_interfaces.action import ComputePath, Control, FollowPath, Plan
+from surveillance_interfaces.msg import RobotPlace
 from surveillance_interfaces.srv import Reason, ReferenceName, RoomPosition
 from surveillance_ontology.armor_client import RosTransport
 from surveillance_runtime import waiting
 from surveillance_runtime.calls import GoalCaller, ServiceCaller
+from surveillance_runtime.conversions import nanoseconds_of
 from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.qos import STATE_QOS
 
 
 @dataclass(frozen=True)
@@ -65,7 +68,16 @@ def ros_knowledge(node: PatrolNode, deadlines: Deadlines) -> ArmorKnowledge:
     transport = RosTransport(
         node, 'armor_interface_srv', 'armor_interface_serialized_srv', deadlines.answer, wake
     )
-    return ArmorKnowledge(node.get_name(), transport, wake, reference)
+    whereabouts = Whereabouts()
+    node.create_subscription(
+        RobotPlace,
+        'robot_place',
+        lambda told: whereabouts.note(told.place, nanoseconds_of(told.header.stamp)),
+        STATE_QOS,
+    )
+    return ArmorKnowledge(
+        node.get_name(), transport, wake, reference, whereabouts, deadlines.answer
+    )
 
 
 class RosPlaces:

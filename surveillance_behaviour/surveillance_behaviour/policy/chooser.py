@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from surveillance_behaviour.peers.ports import (
@@ -20,9 +20,6 @@ from surveillance_behaviour.policy.policies import DEFAULT_POLICY, make_policy
 from surveillance_behaviour.policy.rules import Rules, decide, decide_to_charge, tour_warning
 from surveillance_behaviour.policy.situation import Decision, Situation
 from surveillance_fsm import Interrupt
-
-FORGOTTEN = 2.0
-"""Seconds by which the ontology and the robot may differ about a visit."""
 
 
 @dataclass
@@ -77,7 +74,6 @@ class Chooser:
         self._since: float | None = None
         self._target: str | None = None
         self._seen: dict[str, float] = {}
-        self._own: dict[str, float] = {}
 
     @property
     def graph(self) -> PatrolGraph:
@@ -90,9 +86,19 @@ class Chooser:
         return self._all
 
     def look(
-        self, now: float, interrupt: Interrupt, avoided: frozenset[str] = frozenset()
+        self,
+        now: float,
+        interrupt: Interrupt,
+        avoided: frozenset[str] = frozenset(),
+        visits: Mapping[str, float] | None = None,
     ) -> Situation:
         """Asks the ontology and brings the map up to date.
+
+        Args:
+            now: Seconds on the mission's clock.
+            interrupt: Ends the wait for the ontology.
+            avoided: Places that could not be reached lately.
+            visits: When the robot visited places; an ontology that does not know is told.
 
         Raises:
             PeerError: The ontology or the positions cannot be had, or do not fit together.
@@ -100,10 +106,7 @@ class Chooser:
         if self._since is None or now < self._since:
             self._since = now
             self._seen.clear()
-            self._own.clear()
-        beliefs = self._knowledge.beliefs(self.settings.rules.classes, now, interrupt)
-        if self._restore(beliefs, interrupt):
-            beliefs = self._knowledge.beliefs(self.settings.rules.classes, now, interrupt)
+        beliefs = self._knowledge.beliefs(self.settings.rules.classes, now, interrupt, visits)
         graph = self._map_of(beliefs, interrupt)
         for place, seconds in beliefs.visited_at.items():
             # The ontology counts whole seconds.
@@ -122,23 +125,6 @@ class Chooser:
             avoided=avoided,
             rules=self.settings.rules.classes,
         )
-
-    def _restore(self, beliefs: Beliefs, interrupt: Interrupt) -> bool:
-        """Tells an ontology that was built anew when this robot was where; whether it had to.
-
-        The builder of a map counts all places as visited then. One place that was visited later
-        than the robot knows may be somebody's wish; most of them are not.
-        """
-        forgotten = {
-            place: seconds
-            for place, seconds in self._own.items()
-            if place != beliefs.place and beliefs.visited_at.get(place, 0.0) > seconds + FORGOTTEN
-        }
-        if len(forgotten) < 2 or 2 * len(forgotten) < len(self._own):
-            return False
-        for place, seconds in sorted(forgotten.items()):
-            self._knowledge.note_visit(place, seconds, interrupt)
-        return True
 
     def _map_of(self, beliefs: Beliefs, interrupt: Interrupt) -> PatrolGraph:
         positions = {}
@@ -175,7 +161,7 @@ class Chooser:
 
     def saw(self, place: str, now: float) -> None:
         """The robot was in ``place``; finer than the ontology's whole seconds."""
-        self._seen[place] = self._own[place] = now
+        self._seen[place] = now
         if place == self._target:
             self._target = None
 

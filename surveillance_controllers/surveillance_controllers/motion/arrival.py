@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
+
 import numpy as np
 
 from surveillance_controllers.geometry.polyline import Points
 from surveillance_controllers.manual import request_texts
-from surveillance_controllers.map_knowledge import MapKnowledge
-from surveillance_runtime.action_server import GoalRun
 
 
 class MotionFailed(Exception):
@@ -23,26 +24,37 @@ class MotionFailed(Exception):
         self.end = end
 
 
-def nearest_place(knowledge: MapKnowledge, end: Points, reach: float, run: GoalRun) -> str:
-    """The place whose point is nearest to where a motion ended.
+def nearest_place(places: Mapping[str, Points], point: Points) -> tuple[str | None, float]:
+    """The place whose point is nearest, and its distance in metres.
 
     Args:
-        knowledge: Map and ontology.
+        places: A point in each place, shape (3,), metres.
+        point: Where the robot is, shape (3,), metres.
+
+    Returns:
+        None and infinity when there is no place.
+    """
+    gaps = {name: float(np.linalg.norm(point - at)) for name, at in places.items()}
+    nearest = min(gaps, key=lambda name: gaps[name], default=None)
+    return nearest, math.inf if nearest is None else gaps[nearest]
+
+
+def place_reached(places: Mapping[str, Points], end: Points, reach: float) -> str:
+    """The place in which a motion ended.
+
+    Args:
+        places: A point in each place, shape (3,), metres.
         end: Where the robot is, shape (3,), metres.
         reach: A place further away than this is not taken, metres.
-        run: The goal that is carried out.
 
     Raises:
         MotionFailed: No place is within reach.
-        KnowledgeError: Map or ontology do not answer.
     """
-    places = knowledge.places(run.interrupt)
-    gaps = {name: float(np.linalg.norm(end - at)) for name, at in places.items()}
-    nearest = min(gaps, key=lambda name: gaps[name], default=None)
-    if nearest is None or gaps[nearest] > reach:
+    nearest, gap = nearest_place(places, end)
+    if nearest is None or gap > reach:
         raise MotionFailed(
             f'the robot stopped at {request_texts.point(end)}: expected a place within {reach:g} m'
-            + (f', {nearest} is {gaps[nearest]:.2f} m away' if nearest else ''),
+            + (f', {nearest} is {gap:.2f} m away' if nearest else ''),
             end,
         )
     return nearest

@@ -16,7 +16,7 @@ from surveillance_controllers import conversions
 from surveillance_controllers.controller_parameters import MotionSettings
 from surveillance_controllers.geometry.polyline import Points
 from surveillance_controllers.map_knowledge import MapKnowledge
-from surveillance_controllers.motion.arrival import MotionFailed, nearest_place
+from surveillance_controllers.motion.arrival import MotionFailed, place_reached
 from surveillance_runtime.action_server import GoalRun
 from surveillance_runtime.calls import CallError, GoalCaller
 from surveillance_runtime.node import PatrolNode, StartError
@@ -101,7 +101,7 @@ class Nav2Motion:
             MotionFailed: No place is within reach.
             KnowledgeError: Map or ontology do not answer.
         """
-        return nearest_place(self._knowledge, end, self._place_reach, run)
+        return place_reached(self._knowledge.places(run.interrupt), end, self._place_reach)
 
     def look_around(self, _run: GoalRun) -> None:
         """Nothing: Nav2's own behaviours turn the robot where that is wanted."""

@@ -6,11 +6,9 @@ the robot is (`amcl_pose`) and what stands about that the map does not have (`ob
 
 from __future__ import annotations
 
-import math
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
 from typing import Any
 
 from geometry_msgs.msg import PoseWithCovarianceStamped, Twist
@@ -34,28 +32,9 @@ from surveillance_runtime.waiting import Interrupt
 POSE_PERIOD = 0.19
 """Least time between two messages on amcl_pose, seconds: with every second scan at 10 Hz."""
 
-LONGEST_HOLD = 0.25
-"""How long answers are held until the ontology knows the robot's place, seconds; the drive counts
-on commands that are no older."""
-
 
 class RobotSilent(Exception):
     """What the robot's sensors must give does not come; the text names the topic."""
-
-
-@dataclass(frozen=True)
-class Answer:
-    """What a scan leads to.
-
-    Attributes:
-        measured: When the scan was made, seconds.
-        velocity: The velocity to command; None when there is no task.
-        estimate: Where the robot is; None when that was told a moment ago, or is not known yet.
-    """
-
-    measured: float
-    velocity: Velocity | None
-    estimate: PoseWithCovarianceStamped | None
 
 
 class RobotBase:
@@ -65,8 +44,8 @@ class RobotBase:
         node: The motion controller's node.
         pilot: What steers.
         sensor_timeout: How long the sensors may be silent during a task, seconds of steady time.
-        on_place: Called in the executor's thread when the robot's place changed; returns whether
-            somebody writes it down and will call `release`.
+        on_place: Told in the executor's thread in which place a scan found the robot, when that
+            changed (None: not known any more), and the scan's stamp; must not block.
     """
 
     def __init__(
@@ -74,7 +53,7 @@ class RobotBase:
         node: PatrolNode,
         pilot: Pilot,
         sensor_timeout: float,
-        on_place: Callable[[], bool],
+        on_place: Callable[[str | None, Any], None],
     ) -> None:
         self._node = node
         self._pilot = pilot
@@ -84,8 +63,6 @@ class RobotBase:
         self._stepped = threading.Condition(self._lock)
         self._steps = 0
         self._pose_sent = float('-inf')
-        self._held: Answer | None = None
-        self._holding_since: float | None = None
         self._was_lost = False
         self._jumps = 0
         self._commands = node.create_publisher(Twist, 'cmd_vel', 1)
@@ -116,18 +93,6 @@ class RobotBase:
         """Takes the places: a point in each."""
         with self._lock:
             self._pilot.set_positions(positions)
-
-    def release(self, place: str | None) -> None:
-        """Goes on: the ontology knows that the robot is in a place, or does not answer."""
-        with self._lock:
-            if place == self.place:
-                self._release()
-
-    def _release(self) -> None:
-        with self._lock:
-            held, self._held, self._holding_since = self._held, None, None
-            if held is not None:
-                self._give(held)
 
     def drive(
         self,
@@ -235,37 +200,29 @@ class RobotBase:
             self._pilot.believe(pose)
 
     def _on_scan(self, message: LaserScan) -> None:
-        measured = seconds_of(message.header.stamp)
+        stamp = message.header.stamp
+        measured = seconds_of(stamp)
         with self._stepped:
-            place = self.place
+            before = self.place
             velocity = self._pilot.see(conversions.scan_from(message), measured)
-            answer = Answer(measured, velocity, self._estimate(measured, message.header.stamp))
-            if self.place != place and self._on_place():
-                # In another place now: the ontology shall know before anybody goes on.
-                self._holding_since = measured
-            self._held = answer
-            held_for = measured - (self._holding_since or -math.inf)
-            if not 0 <= held_for < LONGEST_HOLD:
-                self._release()
+            if velocity is not None and self._pilot.task is not None:
+                self._commands.publish(conversions.twist_from(velocity))
+            self._publish_pose(measured, stamp)
+            if self.place != before:
+                self._on_place(self.place, stamp)
             self._steps += 1
             self._stepped.notify_all()
-        self._tell(message.header.stamp)
+        self._tell(stamp)
 
-    def _give(self, answer: Answer) -> None:
-        if answer.velocity is not None and self._pilot.task is not None:
-            self._commands.publish(conversions.twist_from(answer.velocity))
-        if answer.estimate is not None:
-            self._pose_sent = answer.measured
-            self._poses.publish(answer.estimate)
-
-    def _estimate(self, measured: float, stamp: Any) -> PoseWithCovarianceStamped | None:
+    def _publish_pose(self, measured: float, stamp: Any) -> None:
         pilot = self._pilot
         if pilot.pose is None or 0 <= measured - self._pose_sent < POSE_PERIOD:
-            return None
+            return
         deviation = (5.0, 3.0) if pilot.lost else (0.03, 0.02)
         estimate = conversions.pose_estimate(pilot.pose, *deviation)
         estimate.header.stamp = stamp
-        return estimate
+        self._pose_sent = measured
+        self._poses.publish(estimate)
 
     def _tell(self, stamp: Any) -> None:
         pilot = self._pilot

@@ -6,18 +6,22 @@ from surveillance_controllers.controller_parameters import MotionSettings
 from surveillance_controllers.map_knowledge import MapKnowledge
 from surveillance_controllers.motion.docking import DockingMotion, Motion
 from surveillance_controllers.motion.nav2 import Nav2Motion
+from surveillance_controllers.motion.place_recording import PlaceRecorder
 from surveillance_controllers.motion.robot_parameters import robot_settings
 from surveillance_controllers.motion.simulated_motion import SimulatedMotion
 from surveillance_runtime.node import PatrolNode
 
 
-def make_motion(node: PatrolNode, settings: MotionSettings, knowledge: MapKnowledge) -> Motion:
+def make_motion(
+    node: PatrolNode, settings: MotionSettings, knowledge: MapKnowledge, recorder: PlaceRecorder
+) -> Motion:
     """The way to move that the parameters ask for.
 
     Args:
         node: The motion controller's node.
         settings: What it is told.
         knowledge: Map and ontology.
+        recorder: Is told the place that the robot is in.
 
     Raises:
         ParameterError: A value is of the wrong type or out of range.
@@ -27,7 +31,7 @@ def make_motion(node: PatrolNode, settings: MotionSettings, knowledge: MapKnowle
     if settings.navigator == 'nav2':
         motion = Nav2Motion(node, knowledge, settings)
     else:
-        motion = SimulatedMotion(node, robot_settings(node, settings), knowledge)
+        motion = SimulatedMotion(node, robot_settings(node, settings), knowledge, recorder)
     if settings.docking == 'none':
         return motion
     return DockingMotion(

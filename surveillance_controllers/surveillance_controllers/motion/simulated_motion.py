@@ -1,4 +1,4 @@
-"""Motion for `motion_controller` in SIMULATED mode: the base drives, and the ontology follows
+"""Motion for `motion_controller` in SIMULATED mode: the base drives, and `robot_place` follows
 it."""
 
 from __future__ import annotations
@@ -10,18 +10,20 @@ import numpy as np
 from surveillance_controllers import conversions
 from surveillance_controllers.geometry.polyline import Points
 from surveillance_controllers.geometry.poses import Pose
-from surveillance_controllers.map_knowledge import MapKnowledge
+from surveillance_controllers.map_knowledge import KnowledgeError, MapKnowledge
 from surveillance_controllers.motion.arrival import MotionFailed
 from surveillance_controllers.motion.driving import Drive, Spin, State
 from surveillance_controllers.motion.pilot import Pilot
-from surveillance_controllers.motion.place_tracking import PlaceTracking
+from surveillance_controllers.motion.place_recording import RETRY_PERIOD, PlaceRecorder
 from surveillance_controllers.motion.robot_base import RobotBase, RobotSilent
 from surveillance_controllers.motion.robot_parameters import RobotSettings
 from surveillance_controllers.planning.grid_planning import NoPath
 from surveillance_interfaces.action import ComputePath
+from surveillance_ontology.patrol_ontology import DOORS
 from surveillance_runtime.action_server import GoalRun
 from surveillance_runtime.calls import CallError, GoalCaller
 from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.waiting import Interrupt
 
 
 class SimulatedMotion:
@@ -31,16 +33,30 @@ class SimulatedMotion:
         node: The motion controller's node.
         settings: The robot, and how long to wait for its sensors and peers.
         knowledge: Map and ontology.
+        recorder: Is told the place that the robot is in.
     """
 
-    def __init__(self, node: PatrolNode, settings: RobotSettings, knowledge: MapKnowledge) -> None:
+    def __init__(
+        self,
+        node: PatrolNode,
+        settings: RobotSettings,
+        knowledge: MapKnowledge,
+        recorder: PlaceRecorder,
+    ) -> None:
+        self._node = node
         self._settings = settings
+        self._knowledge = knowledge
+        self._recorder = recorder
         self._wait_for_peer = settings.peer_timeout
         self._planner = GoalCaller(node, ComputePath, 'compute_path')
         pilot = Pilot(settings.doors, guesses=[settings.station])
-        self._base = RobotBase(node, pilot, settings.sensor_timeout, self._on_place)
+        tell = recorder.tell if settings.track_place else lambda _place, _stamp: None
+        self._base = RobotBase(node, pilot, settings.sensor_timeout, tell)
         self._base.set_positions(settings.positions)
-        self._tracking = PlaceTracking(node, self._base, knowledge, settings)
+        knowledge.assume(settings.positions)
+        self._news = Interrupt()
+        node.stopping.subscribe(self._news.set)
+        node.spawn(self._follow_map, name='map follower')
 
     def follow(self, path: Points, run: GoalRun, report: Callable[[Points], None]) -> Points:
         """Drives along a path of shape (n, 3).
@@ -71,6 +87,7 @@ class SimulatedMotion:
         if drive.state is State.FAILED:
             raise MotionFailed(drive.reason, end)
         report(end)
+        self._recorder.tell(self._base.place_at(end))
         return end
 
     def place_reached(self, goal: Points, end: Points, _run: GoalRun) -> str:
@@ -105,9 +122,23 @@ class SimulatedMotion:
         pose = self._base.pose
         return None if pose is None else _point(pose)
 
-    def _on_place(self) -> bool:
-        self._tracking.wake()
-        return self._settings.track_place
+    def _follow_map(self) -> None:
+        """Takes the places that come and go: they change what the robot's place can be."""
+        stopping, watched = self._node.stopping, False
+        while not stopping.is_set():
+            self._news.clear()
+            if stopping.is_set():
+                return
+            try:
+                if not watched:
+                    self._knowledge.watch(DOORS, stopping, self._news.set)
+                    watched = True
+                self._base.set_positions(self._knowledge.places(stopping))
+            except KnowledgeError as error:
+                self._node.get_logger().debug(f'places as they were: {error}')
+                stopping.wait(RETRY_PERIOD)
+            else:
+                self._news.wait()
 
     def _ask_planner(self, start: Points, goal: Points, run: GoalRun) -> Points:
         request = ComputePath.Goal(

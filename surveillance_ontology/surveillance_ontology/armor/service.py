@@ -54,11 +54,8 @@ class ArmorService:
     ) -> None:
         self.session = Session(settings or Settings(), screen, warn, store)
         self._store = store
-        if store:
-            for ref in store.recover():
-                self.session.register(ref)
-            for note in store.notes:
-                warn(note)
+        for ref in store.recover() if store else ():
+            self.session.register(ref)
 
     @property
     def settings(self) -> Settings:

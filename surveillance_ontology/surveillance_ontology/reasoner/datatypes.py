@@ -41,7 +41,7 @@ _MOMENT = re.compile(
 )
 _MAX_DIGITS = 4000
 
-BOUNDS: dict[str, tuple[int | None, int | None]] = {
+_BOUNDS: dict[str, tuple[int | None, int | None]] = {
     'integer': (None, None),
     'nonNegativeInteger': (0, None),
     'nonPositiveInteger': (None, 0),
@@ -139,7 +139,7 @@ def parse_value(literal: Literal) -> Value:
         return ('langString', plain, language.lower()) if language else plain
     if datatype.startswith(XSD):
         name = datatype[len(XSD) :]
-        bounds = BOUNDS.get(name)
+        bounds = _BOUNDS.get(name)
         if bounds is not None:
             text = text.strip()
             if not _INTEGER.fullmatch(text) or len(text) > _MAX_DIGITS:
@@ -235,11 +235,6 @@ def literal_of(value: Value) -> Literal:
     return Literal(value[2], value[1])
 
 
-def is_decimal(number: Fraction) -> bool:
-    """Whether a number is a decimal: its digits end."""
-    return _terminating(number) is not None
-
-
 def _terminating(number: Fraction) -> str | None:
     twos = fives = 0
     rest = number.denominator
@@ -287,8 +282,8 @@ def _datatype_test(datatype: str) -> Test | None:
     if not datatype.startswith(XSD):
         return None
     name = datatype[len(XSD) :]
-    if name in BOUNDS:
-        low, high = BOUNDS[name]
+    if name in _BOUNDS:
+        low, high = _BOUNDS[name]
         if low is None and high is None:
             return lambda value: isinstance(value, int)
         if high is None:
@@ -325,8 +320,7 @@ def comparable(value: Value) -> tuple[str, Any]:
     return value[0], value[1:]
 
 
-def facet_test(facet: str, bound: Literal) -> Test | None:
-    """A predicate on values for one facet; None when the facet is not supported."""
+def _facet_test(facet: str, bound: Literal) -> Test | None:
     name = facet[len(XSD) :] if facet.startswith(XSD) else facet
     limit = value_of(bound)
     if name in ('minInclusive', 'maxInclusive', 'minExclusive', 'maxExclusive'):
@@ -374,7 +368,7 @@ def range_test(data_range: DataRange) -> Test | None:
         return None if inner is None else lambda value: not inner(value)
     if isinstance(data_range, DatatypeRestriction):
         tests = [range_test(data_range.datatype)]
-        tests += [facet_test(facet, bound) for facet, bound in data_range.facets]
+        tests += [_facet_test(facet, bound) for facet, bound in data_range.facets]
     else:
         tests = [range_test(operand) for operand in data_range.operands]
     if any(test is None for test in tests):

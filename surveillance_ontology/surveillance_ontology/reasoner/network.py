@@ -19,7 +19,6 @@ from surveillance_ontology.reasoner.clauses import (
     Program,
     SameAtom,
 )
-from surveillance_ontology.reasoner.context_index import ContextIndex
 from surveillance_ontology.reasoner.difference import (
     AsymmetricEvidence,
     Difference,
@@ -50,7 +49,6 @@ class Network:
             changed.
         touch_related: Like these, for individuals that differ because their values do.
         thresholds: The rules run by a sorted index.
-        contexts: What follows from individuals that must exist, where that takes an index.
         counters: The watchers of upper bounds.
     """
 
@@ -94,13 +92,6 @@ class Network:
             self._attach(clause)
         self._attach_disjoint()
         self._attach_evidence()
-        self.contexts: ContextIndex | None = None
-        if program.contexts is not None:
-            index = ContextIndex(program, program.contexts, enqueue, overdelete, merge)
-            self.contexts = index
-            difference.evidence.append(index)
-            for predicate in program.relevant:
-                predicate.touching = (1,)
 
     # --- clauses ---
 

@@ -1,0 +1,279 @@
+"""Userdata: the dictionary a container's states share, and the view each state has of it.
+
+A `Remapper` shows a state the keys it declared, under the state's own names. Its class is made
+once per combination of keys, with one property per key, so that ``userdata.count += 1`` costs two
+dictionary accesses and no name checks: what a state may read and write is settled when the class
+is made, not on every access.
+"""
+
+from __future__ import annotations
+
+import copy
+import re
+from collections.abc import Callable, Iterable, Mapping
+from functools import lru_cache
+from typing import Any
+
+from surveillance_fsm.exceptions import InvalidUserCodeError, MissingKeyError
+from surveillance_fsm.log import logerr
+
+
+class UserData:
+    """Userdata of one scope: attributes and items are the same thing."""
+
+    __slots__ = ('_data',)
+
+    _data: dict[str, Any]
+
+    def __init__(self) -> None:
+        object.__setattr__(self, '_data', {})
+
+    def update(self, other_userdata: UserData) -> None:
+        """Take over every key of `other_userdata`, overwriting equal names."""
+        self._data.update(other_userdata._data)
+
+    def extract(self, keys: Iterable[str], remapping: Mapping[str, str]) -> UserData:
+        """Copy `keys` into new userdata, named by the inverse of `remapping` (inner -> outer)."""
+        inner = {outer: name for name, outer in remapping.items()}
+        if len(inner) != len(remapping):
+            logerr(f'Userdata remapping is not one-to-one: {dict(remapping)}')
+        extracted = UserData()
+        for key in keys:
+            extracted[inner.get(key, key)] = copy.copy(self[key])
+        return extracted
+
+    def merge(self, ud: UserData, keys: Iterable[str], remapping: Mapping[str, str]) -> None:
+        """Copy `keys` of `ud` into this scope, renamed by `remapping` (inner -> outer)."""
+        for key in keys:
+            self[remapping.get(key, key)] = copy.copy(ud[key])
+
+    def keys(self) -> list[str]:
+        """The keys that have a value."""
+        return list(self._data)
+
+    def __contains__(self, key: object) -> bool:
+        return key in self._data
+
+    def __getitem__(self, key: str) -> Any:
+        try:
+            return self._data[key]
+        except KeyError:
+            raise MissingKeyError(
+                f"Userdata key '{key}' is not set; the keys set are {sorted(self._data)}"
+            ) from None
+
+    def __setitem__(self, key: str, item: Any) -> None:
+        self._data[key] = item
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith('_'):
+            raise AttributeError(name)
+        return self[name]
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if name.startswith('_'):
+            object.__setattr__(self, name, value)
+        else:
+            self._data[name] = value
+
+    def __repr__(self) -> str:
+        return f'UserData({self._data!r})'
+
+
+class Remapper:
+    """A state's view of userdata: only declared keys, under the state's own names.
+
+    Reading a key that is not an input, and writing one that is not an output, raise
+    `InvalidUserCodeError`; reading a declared key nobody wrote raises `MissingKeyError`. SMACH
+    drops such a write with a line in the log and wraps objects of input-only keys in a ``Const``
+    on which no method can be called; here the object itself is read.
+
+    Args:
+        ud: A `UserData`, a `Remapper`, or any object with items.
+        input_keys: The state's names of the keys it reads.
+        output_keys: The state's names of the keys it writes.
+        remapping: From the state's names to those in `ud`.
+        constants: Values of input keys that come from no userdata.
+        where: The state's path, for error messages.
+    """
+
+    __slots__ = ('_constants', '_data', '_input', '_map', '_output', '_ud', '_where')
+
+    _constants: Mapping[str, Any]
+    _data: Any
+    _input: tuple[str, ...]
+    _map: Mapping[str, str]
+    _output: tuple[str, ...]
+    _ud: Any
+    _where: str
+
+    def __new__(
+        cls,
+        ud: Any,
+        input_keys: Iterable[str] = (),
+        output_keys: Iterable[str] = (),
+        remapping: Mapping[str, str] | Iterable[Any] = (),
+        constants: Mapping[str, Any] | None = None,
+        where: str = '',
+    ) -> Remapper:
+        inputs, outputs = tuple(input_keys), tuple(output_keys)
+        # Copied: SMACH's own states pass an empty list for "no remapping".
+        renamed = dict(remapping)
+        fixed = dict(constants or {})
+        view_class = _view_class(
+            frozenset(inputs), frozenset(outputs), frozenset(renamed.items()), frozenset(fixed)
+        )
+        view = object.__new__(view_class)
+        view._constants = fixed
+        view._data = ud._data if isinstance(ud, UserData) else ud
+        view._input, view._output = inputs, outputs
+        view._map = renamed
+        view._ud = ud
+        view._where = where
+        return view
+
+    def update(self, other_userdata: UserData) -> None:
+        """Take over every key of `other_userdata` into the scope behind the view."""
+        self._ud.update(other_userdata)
+
+    def keys(self) -> list[str]:
+        """The state's names of its input keys that have a value."""
+        return [key for key in self._input if key in self]
+
+    def __contains__(self, key: object) -> bool:
+        if key not in self._input:
+            return False
+        return key in self._constants or self._map.get(str(key), key) in self._data
+
+    def __getitem__(self, key: str) -> Any:
+        if key not in self._input:
+            raise self._undeclared('read', key)
+        if key in self._constants:
+            return self._constants[key]
+        try:
+            return self._data[self._map.get(key, key)]
+        except KeyError:
+            raise self._missing(key) from None
+
+    def __setitem__(self, key: str, item: Any) -> None:
+        if key not in self._output or key in self._constants:
+            raise self._undeclared('write', key)
+        self._data[self._map.get(key, key)] = item
+
+    def __getattr__(self, name: str) -> Any:
+        # Only names without a property come here: undeclared ones.
+        if name.startswith('_'):
+            raise AttributeError(name)
+        raise self._undeclared('read', name)
+
+    def _undeclared(self, deed: str, key: str) -> InvalidUserCodeError:
+        kind, declared = ('input', self._input) if deed == 'read' else ('output', self._output)
+        state = f"State '{self._where}'" if self._where else 'A state'
+        if key in self._constants:
+            return InvalidUserCodeError(f"{state} cannot write userdata key '{key}': a constant")
+        return InvalidUserCodeError(
+            f"{state} cannot {deed} userdata key '{key}': not among its {kind} keys "
+            f'{sorted(declared)}'
+        )
+
+    def _missing(self, key: str) -> MissingKeyError:
+        outer = self._map.get(key, key)
+        renamed = f" (remapped to '{outer}')" if outer != key else ''
+        available = sorted(self._data.keys()) if hasattr(self._data, 'keys') else []
+        state = f"State '{self._where}'" if self._where else 'A state'
+        return MissingKeyError(
+            f"{state} reads userdata key '{key}'{renamed}, which nothing has written; the keys "
+            f'set are {available}'
+        )
+
+    def _revoke(self) -> None:
+        """Cut the view off its userdata, for a state that was left behind."""
+        self._data = self._ud = _Revoked(self._where)
+
+
+class _Revoked:
+    """What a left-behind state finds in place of userdata."""
+
+    def __init__(self, where: str) -> None:
+        self._where = where
+
+    def _refuse(self, *_: Any) -> Any:
+        raise InvalidUserCodeError(
+            f"State '{self._where}' uses userdata after the machine went on without it"
+        )
+
+    __getitem__ = __setitem__ = __contains__ = keys = update = _refuse
+
+
+@lru_cache(maxsize=4096)
+def _view_class(
+    inputs: frozenset[str],
+    outputs: frozenset[str],
+    remapping: frozenset[tuple[str, str]],
+    constants: frozenset[str],
+) -> type[Remapper]:
+    outer = dict(remapping)
+    namespace: dict[str, Any] = {'__slots__': ()}
+    for key in inputs | outputs:
+        # Names of methods stay methods, as in SMACH: such keys are reached as items.
+        if key.startswith('_') or hasattr(Remapper, key):
+            continue
+        if key in constants:
+            namespace[key] = property(_constant(key), _refused_write(key))
+        else:
+            name = outer.get(key, key)
+            read = _reader(key, name) if key in inputs else _refused_read(key)
+            write = _writer(name) if key in outputs else _refused_write(key)
+            namespace[key] = property(read, write)
+    return type(_VIEW_NAME, (Remapper,), namespace)
+
+
+def _reader(key: str, name: str) -> Callable[[Remapper], Any]:
+    def read(view: Remapper) -> Any:
+        try:
+            return view._data[name]
+        except KeyError:
+            raise view._missing(key) from None
+
+    return read
+
+
+def _writer(name: str) -> Callable[[Remapper, Any], None]:
+    def write(view: Remapper, value: Any) -> None:
+        view._data[name] = value
+
+    return write
+
+
+def _constant(key: str) -> Callable[[Remapper], Any]:
+    return lambda view: view._constants[key]
+
+
+def _refused_read(key: str) -> Callable[[Remapper], Any]:
+    def read(view: Remapper) -> Any:
+        raise view._undeclared('read', key)
+
+    return read
+
+
+def _refused_write(key: str) -> Callable[[Remapper, Any], None]:
+    def write(view: Remapper, value: Any) -> None:
+        raise view._undeclared('write', key)
+
+    return write
+
+
+_VIEW_NAME = 'StateUserData'
+_UNKNOWN_ATTRIBUTE = re.compile(rf"'{_VIEW_NAME}' object has no attribute '(\w+)'")
+
+
+def undeclared_write(view: object, error: BaseException) -> InvalidUserCodeError | None:
+    """Tell which undeclared key an ``AttributeError`` out of a state was about.
+
+    A view has no ``__setattr__`` of its own, which would cost every write a function call; the
+    interpreter itself refuses unknown names, and this puts its refusal in the engine's words.
+    """
+    if not isinstance(view, Remapper) or not isinstance(error, AttributeError):
+        return None
+    match = _UNKNOWN_ATTRIBUTE.search(str(error))
+    return view._undeclared('write', match.group(1)) if match else None

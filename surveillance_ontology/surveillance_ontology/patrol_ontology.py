@@ -1,0 +1,475 @@
+"""What a patrol robot and its ontology say to each other.
+
+This is the only module that spells the patrol's vocabulary (``isIn``, ``visitedAt``, ``now``, ...)
+and the robot's name. Everything is told as one batch, which the server carries out in one piece:
+
+    ontology = PatrolOntology(ArmorClient('me', 'surveillance', transport))
+    ontology.build(place, path, uri)                # rooms and doors
+    ontology.record_place('C1', stamp)              # by the one node that knows where the robot is
+    ontology.record_visits({'C1': 120.0}, 120.0)    # by the one node that decides
+    ontology.snapshot(130.0, ['URGENT'])            # what follows, all of one moment
+
+A fact is replaced by ``SET``, so the robot cannot be told to be in two places, whoever tells it.
+Every method blocks while the server answers and belongs on a worker thread; one thread at a time
+may take snapshots.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+from surveillance_ontology.armor.client import (
+    ArmorClient,
+    ArmorServiceInternalError,
+    name_in,
+    value_in,
+)
+from surveillance_ontology.armor.protocol import DirectiveRequest, DirectiveResponse, ExitCode
+from surveillance_ontology.map_building import closed_doors, shown_doors
+from surveillance_runtime.place import Place
+
+ROBOT = 'Robot1'
+"""The robot's name where nobody gives another one."""
+NEVER = 0
+"""The time of visit of a place that nobody has visited yet, seconds."""
+DOORS = 'hasDoor(?, ?)'
+"""The facts, for a subscription, that change with the map and its closed doors."""
+CHUNK = 2000
+"""Directives in one batch while a map is built."""
+RETRY_PERIOD = 0.05
+"""Pause between two looks at an ontology that is not yet as new as was asked for, seconds."""
+
+
+class OntologyNotReadyError(Exception):
+    """The ontology does not know (yet) what was asked for; the text is one clause."""
+
+
+class InconsistentOntologyError(OntologyNotReadyError):
+    """The ontology contradicts itself."""
+
+
+class Waiting(Protocol):
+    """What ends a wait early; a `threading.Event` is one."""
+
+    def wait(self, timeout: float) -> bool:
+        """Waits; True when the wait is to end."""
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """What the ontology says, all of one moment.
+
+    Attributes:
+        place: Where the robot is.
+        seen_at: When the robot was seen there, nanoseconds of ROS time; 0: nobody said.
+        reachable: Where it can go from there in one move.
+        classes: The classes of every place, among those that were asked for.
+        visited_at: When each place was visited last, seconds; without those that never were.
+        connections: The neighbours of every place.
+    """
+
+    place: str
+    seen_at: int
+    reachable: tuple[str, ...]
+    classes: Mapping[str, frozenset[str]]
+    visited_at: Mapping[str, float]
+    connections: Mapping[str, tuple[str, ...]]
+
+
+class PatrolOntology:
+    """One robot's view of one ontology.
+
+    Args:
+        armor: A client of the ontology's reference.
+        robot: The robot's name.
+    """
+
+    def __init__(self, armor: ArmorClient, robot: str = ROBOT) -> None:
+        self._armor = armor
+        self._robot = robot
+        self._places: tuple[str, ...] = ()
+        self._visited: dict[str, int] = {}
+
+    @property
+    def reference(self) -> str:
+        """The ontology's reference name."""
+        return self._armor.reference_name
+
+    @property
+    def robot_place_facts(self) -> str:
+        """The facts, for a subscription, that say where the robot is."""
+        return f'isIn({self._robot}, ?)'
+
+    # --- the map ---
+
+    def is_loaded(self) -> bool:
+        """Tell whether the server has the reference."""
+        return self.reference in self._armor.utils.get_all_refs()
+
+    def build(
+        self, place: Place, path: str, uri: str, first_visit: int = NEVER, now: int | None = None
+    ) -> Place:
+        """Load the ontology and enter a place, as far as it is not there yet.
+
+        Where the robot is, and when it visited which place, is left to those who know.
+
+        Args:
+            place: Rooms and doors.
+            path: The ontology to start from.
+            uri: Its IRI.
+            first_visit: Time of visit of places that the ontology does not know, seconds.
+            now: The robot's time in an ontology that knows none of the places, seconds; None
+                leaves it as it is.
+
+        Returns:
+            The place with the closed doors that the ontology has.
+
+        Raises:
+            ArmorServiceCallError: The server does not answer.
+            ArmorServiceInternalError: It refuses, for example because there is no such file.
+        """
+        self._armor.utils.load_ref_from_file(path, uri, False, 'PELLET', True)
+        known = self._known_doors(place)
+        place = replace(place, closed=closed_doors(place, known))
+        mine = {
+            room: [door for door in doors if door in place.rooms[room]]
+            for room, doors in known.items()
+        }
+        todo = self._differences(mine, shown_doors(place), first_visit)
+        if not known and now is not None:
+            todo.append(self._set_value('now', self._robot, now))
+        self._carry_out(
+            [
+                *todo,
+                self._request('REASON'),
+                self._request('DISJOINT IND CLASS', 'ROOM'),
+                self._request('DISJOINT IND CLASS', 'DOOR'),
+                self._request('REASON'),
+            ]
+        )
+        return place
+
+    def change(self, before: Place, after: Place, first_visit: int = NEVER) -> None:
+        """Bring the ontology from one place to another: rooms and doors added, closed, taken away.
+
+        Args:
+            before: What the ontology has.
+            after: What it is to have.
+            first_visit: Time of visit of new rooms, seconds.
+
+        Raises:
+            ArmorServiceCallError: The server does not answer.
+            ArmorServiceInternalError: It refuses.
+        """
+        todo = self._differences(shown_doors(before), shown_doors(after), first_visit)
+        todo += [
+            self._request('REMOVE IND', name)
+            for name in (*before.rooms, *before.doors)
+            if name not in after.rooms and name not in after.doors
+        ]
+        todo.append(self._request('REASON'))
+        if any(room not in before.rooms for room in after.rooms):
+            todo.append(self._request('DISJOINT IND CLASS', 'ROOM'))
+        if any(door not in before.doors for door in after.doors):
+            todo.append(self._request('DISJOINT IND CLASS', 'DOOR'))
+        if todo[-1].command != 'REASON':
+            todo.append(self._request('REASON'))
+        self._carry_out(todo)
+
+    def forget(self) -> None:
+        """Drop the ontology from the server."""
+        self._armor.utils.drop_ref()
+
+    def contradiction(self) -> str:
+        """Which facts of the ontology clash, as a sentence; empty when it is consistent.
+
+        Raises:
+            ArmorServiceCallError: The server does not answer.
+            ArmorServiceInternalError: It refuses.
+        """
+        answer = self._carry_out(
+            [self._request('REASON'), self._request('QUERY EXPLAIN INCONSISTENCY')]
+        )[-1]
+        if answer.is_consistent:
+            return ''
+        return answer.queried_objects[0] if answer.queried_objects else 'for no known reason'
+
+    def places(self) -> tuple[str, ...]:
+        """The names of all places.
+
+        Raises:
+            ArmorServiceCallError: The server does not answer.
+            ArmorServiceInternalError: It refuses.
+        """
+        (answer,) = self._carry_out([self._request('QUERY IND CLASS', 'LOCATION')])
+        return _names(answer)
+
+    def doors(self) -> dict[str, set[str]]:
+        """The places that each door leads into.
+
+        Raises:
+            ArmorServiceCallError: The server does not answer.
+            ArmorServiceInternalError: It refuses.
+        """
+        places = self.places()
+        answers = self._carry_out(
+            [self._request('QUERY OBJECTPROP IND', 'hasDoor', place) for place in places]
+        )
+        rooms_of: dict[str, set[str]] = {}
+        for place, answer in zip(places, answers, strict=True):
+            for door in _names(answer):
+                rooms_of.setdefault(door, set()).add(place)
+        return rooms_of
+
+    # --- the robot ---
+
+    def robot_places(self) -> tuple[str, ...]:
+        """Where the ontology has the robot: one place, or none yet.
+
+        Raises:
+            ArmorServiceCallError: The server does not answer.
+            ArmorServiceInternalError: It refuses.
+        """
+        (answer,) = self._carry_out([self._request('QUERY OBJECTPROP IND', 'isIn', self._robot)])
+        return _names(answer)
+
+    def record_place(self, place: str, stamp: int) -> None:
+        """Tell where the robot is, instead of wherever it was thought to be.
+
+        Args:
+            place: The place.
+            stamp: When the robot was seen there, nanoseconds of ROS time.
+
+        Raises:
+            ArmorServiceCallError: The server does not answer.
+            ArmorServiceInternalError: It refuses, for example because it has no such ontology.
+        """
+        self._carry_out(
+            [
+                self._request('SET OBJECTPROP IND', 'isIn', self._robot, place),
+                self._set_value('seenAt', self._robot, stamp),
+                self._request('REASON'),
+            ]
+        )
+
+    def record_visits(self, visits: Mapping[str, float], now: float) -> None:
+        """Tell when the robot visited places, and its time.
+
+        Args:
+            visits: Time of visit by place, seconds; the ontology keeps whole ones.
+            now: The robot's time, seconds.
+
+        Raises:
+            ArmorServiceCallError: The server does not answer.
+            ArmorServiceInternalError: It refuses.
+        """
+        self._carry_out(
+            [
+                *(self._set_value('visitedAt', place, int(at)) for place, at in visits.items()),
+                self._set_value('now', self._robot, int(now)),
+                self._request('REASON'),
+            ]
+        )
+
+    def set_urgency_threshold(self, seconds: float) -> None:
+        """Set how long a place may go unvisited before it is URGENT.
+
+        Raises:
+            ArmorServiceCallError: The server does not answer.
+            ArmorServiceInternalError: It refuses.
+        """
+        self._carry_out(
+            [
+                self._set_value('urgencyThreshold', self._robot, int(seconds)),
+                self._request('REASON'),
+            ]
+        )
+
+    def snapshot(
+        self,
+        now: float,
+        classes: Sequence[str],
+        *,
+        not_before: int = 0,
+        visits: Mapping[str, float] | None = None,
+        patience: float = 0.0,
+        interrupt: Waiting | None = None,
+    ) -> Snapshot:
+        """Tell the time, and ask for all that a decision needs; mostly one round trip.
+
+        It takes a second one when the map has changed, or when the ontology had forgotten visits.
+
+        Args:
+            now: The robot's time, seconds.
+            classes: The classes of places that matter.
+            not_before: The answer must know where the robot was at this time, nanoseconds of ROS
+                time; it is waited for.
+            visits: When the robot visited places, seconds; the ontology is told what it does not
+                know of that. Somebody else's later visit stays.
+            patience: How long to wait for an ontology that is consistent and knows where the
+                robot is, seconds of steady time.
+            interrupt: Ends the wait early.
+
+        Raises:
+            ArmorServiceCallError: The server does not answer.
+            ArmorServiceInternalError: It refuses.
+            OntologyNotReadyError: The patience came to its end.
+        """
+        pause = interrupt or threading.Event()
+        deadline = time.monotonic() + patience
+        while True:
+            try:
+                found = self._ask(now, classes, visits or {})
+                if found.seen_at >= not_before:
+                    return found
+                raise OntologyNotReadyError(
+                    f'nobody told it where the robot is since {not_before / 1e9:.1f} s'
+                )
+            except OntologyNotReadyError:
+                if time.monotonic() >= deadline or pause.wait(RETRY_PERIOD):
+                    raise
+
+    def _ask(self, now: float, classes: Sequence[str], visits: Mapping[str, float]) -> Snapshot:
+        request, robot = self._request, self._robot
+        while True:
+            asked = self._places
+            owed = {
+                place: int(at)
+                for place, at in visits.items()
+                if place in asked and int(at) > self._visited.get(place, NEVER)
+            }
+            told = [self._set_value('visitedAt', place, at) for place, at in owed.items()]
+            told += [self._set_value('now', robot, int(now)), request('REASON')]
+            questions = [
+                request('QUERY OBJECTPROP IND', 'isIn', robot),
+                request('QUERY DATAPROP IND', 'seenAt', robot),
+                request('QUERY OBJECTPROP IND', 'canReach', robot),
+                *(request('QUERY IND CLASS', name) for name in ('LOCATION', *classes)),
+                *(request('QUERY OBJECTPROP IND', 'connectedTo', place) for place in asked),
+                *(request('QUERY DATAPROP IND', 'visitedAt', place) for place in asked),
+            ]
+            answers = self._carry_out([*told, *questions], whole=True)[len(told) :]
+            is_in, seen_at, can_reach, locations, *rest = answers
+            members, rest = rest[: len(classes)], rest[len(classes) :]
+            self._places = _names(locations)
+            self._visited = {
+                place: _time(f'visitedAt of {place}', answer)
+                for place, answer in zip(asked, rest[len(asked) :], strict=True)
+            }
+            forgotten = any(
+                int(at) > self._visited[place]
+                for place, at in visits.items()
+                if place in self._visited and place not in owed
+            )
+            if asked == self._places and not forgotten:
+                break
+        if not is_in.is_consistent:
+            raise InconsistentOntologyError(f'ontology {self.reference} is inconsistent')
+        where = _names(is_in)
+        if len(where) != 1:
+            what = f'in {" and ".join(where)}' if where else 'in no place'
+            raise OntologyNotReadyError(f'ontology {self.reference} has {robot} {what}')
+        among = {name: set(_names(answer)) for name, answer in zip(classes, members, strict=True)}
+        return Snapshot(
+            place=where[0],
+            seen_at=_time(f'seenAt of {robot}', seen_at),
+            reachable=_names(can_reach),
+            classes={
+                place: frozenset(name for name in classes if place in among[name])
+                for place in asked
+            },
+            visited_at={place: float(at) for place, at in self._visited.items() if at != NEVER},
+            connections={place: _names(answer) for place, answer in zip(asked, rest, strict=False)},
+        )
+
+    # --- directives ---
+
+    def _request(self, words: str, *args: str) -> DirectiveRequest:
+        return self._armor.request(words, *args)
+
+    def _set_value(self, prop: str, individual: str, value: int) -> DirectiveRequest:
+        return self._request('SET DATAPROP IND', prop, individual, 'LONG', str(value))
+
+    def _known_doors(self, place: Place) -> dict[str, list[str]]:
+        """The doors of the rooms that the ontology has already; empty when it has none of them."""
+        rooms = tuple(place.rooms)
+        answers = self._carry_out(
+            [
+                *(self._request('QUERY DATAPROP IND', 'visitedAt', room) for room in rooms),
+                *(self._request('QUERY OBJECTPROP IND', 'hasDoor', room) for room in rooms),
+            ]
+        )
+        return {
+            room: list(_names(doors))
+            for room, visit, doors in zip(rooms, answers, answers[len(rooms) :], strict=False)
+            if visit.queried_objects
+        }
+
+    def _differences(
+        self,
+        before: Mapping[str, Sequence[str]],
+        after: Mapping[str, Sequence[str]],
+        first_visit: int,
+    ) -> list[DirectiveRequest]:
+        request = self._request
+        todo: list[DirectiveRequest] = []
+        for room, doors in after.items():
+            old = before.get(room, ())
+            todo += [
+                request('REMOVE OBJECTPROP IND', 'hasDoor', room, door)
+                for door in old
+                if door not in doors
+            ]
+            todo += [
+                request('ADD OBJECTPROP IND', 'hasDoor', room, door)
+                for door in doors
+                if door not in old
+            ]
+            if room not in before:
+                todo.append(self._set_value('visitedAt', room, first_visit))
+        return todo
+
+    def _carry_out(
+        self, requests: Sequence[DirectiveRequest], *, whole: bool = False
+    ) -> list[DirectiveResponse]:
+        """Sends the directives in one batch; in several where there are very many, unless all must
+        be of one moment."""
+        answers: list[DirectiveResponse] = []
+        size = len(requests) if whole else CHUNK
+        for start in range(0, len(requests), size):
+            chunk = requests[start : start + size]
+            found = self._armor.batch(chunk).responses
+            if len(found) != len(chunk):
+                raise ArmorServiceInternalError(
+                    f'{len(found)} answers to {len(chunk)} directives', ExitCode.INVALID_COMMAND
+                )
+            for wanted, answer in zip(chunk, found, strict=True):
+                if not answer.success:
+                    words = ' '.join((wanted.words, *wanted.args[:3]))
+                    raise ArmorServiceInternalError(
+                        f'{words}: {answer.error_description or "refused"}', answer.exit_code
+                    )
+            answers += found
+        return answers
+
+
+def _names(answer: DirectiveResponse) -> tuple[str, ...]:
+    return tuple(sorted(name_in(text) for text in answer.queried_objects))
+
+
+def _time(what: str, answer: DirectiveResponse) -> int:
+    """The latest of the times in an answer.
+
+    Raises:
+        OntologyNotReadyError: One of them is none.
+    """
+    try:
+        return max((int(value_in(value)) for value in answer.queried_objects), default=0)
+    except ValueError:
+        raise OntologyNotReadyError(
+            f'{what} is {", ".join(answer.queried_objects)}: expected a whole number'
+        ) from None

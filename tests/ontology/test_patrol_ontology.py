@@ -1,0 +1,220 @@
+"""What robot and ontology say to each other, against the project's own server in this process."""
+
+from __future__ import annotations
+
+import itertools
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from surveillance_ontology.armor.client import (
+    ArmorClient,
+    ArmorServiceInternalError,
+    InProcessTransport,
+)
+from surveillance_ontology.armor.service import ArmorService
+from surveillance_ontology.patrol_ontology import (
+    InconsistentOntologyError,
+    OntologyNotReadyError,
+    PatrolOntology,
+)
+from surveillance_runtime.place import read_place
+
+from .seven_rooms import IRI, ONTOLOGY
+
+PLACE = read_place(Path(__file__).parents[2] / 'config' / 'seven_rooms.yaml')
+RULES = ('URGENT', 'CORRIDOR', 'ROOM')
+
+
+class Counting(InProcessTransport):
+    """Counts what goes to the server and comes back."""
+
+    trips = 0
+
+    def call(self, request):  # type: ignore[no-untyped-def]
+        self.trips += 1
+        return super().call(request)
+
+    def call_list(self, requests):  # type: ignore[no-untyped-def]
+        self.trips += 1
+        return super().call_list(requests)
+
+
+@pytest.fixture
+def transport() -> Iterator[Counting]:
+    service = ArmorService(warn=lambda _: None)
+    yield Counting(service)
+    service.close()
+
+
+@pytest.fixture
+def armor(transport: Counting) -> ArmorClient:
+    return ArmorClient('test', 'map', transport)
+
+
+@pytest.fixture
+def ontology(armor: ArmorClient) -> PatrolOntology:
+    ontology = PatrolOntology(armor)
+    ontology.build(PLACE, ONTOLOGY, IRI, now=100)
+    ontology.record_place('E', 100)
+    ontology.set_urgency_threshold(30.0)
+    return ontology
+
+
+def test_a_snapshot_is_what_the_ontology_infers(ontology: PatrolOntology) -> None:
+    found = ontology.snapshot(110.7, RULES)
+    assert (found.place, found.seen_at, found.reachable) == ('E', 100, ('C1', 'C2'))
+    assert found.connections['C1'] == ('C2', 'E', 'R1', 'R2')
+    assert found.classes['C1'] == {'URGENT', 'CORRIDOR', 'ROOM'}
+    assert found.classes['R1'] == {'URGENT', 'ROOM'}
+    assert found.visited_at == {}, 'nobody has visited anything'
+
+
+@pytest.mark.parametrize(('now', 'urgent'), [(130.0, False), (131.0, True)])
+def test_places_become_urgent_beyond_the_threshold(
+    ontology: PatrolOntology, now: float, urgent: bool
+) -> None:
+    ontology.record_visits({'R1': 100.0}, 100.0)
+    assert ('URGENT' in ontology.snapshot(now, RULES).classes['R1']) is urgent
+
+
+def test_each_verb_is_one_round_trip(ontology: PatrolOntology, transport: Counting) -> None:
+    ontology.snapshot(110.0, RULES)
+    before = transport.trips
+    ontology.record_place('C1', 200)
+    ontology.snapshot(120.0, RULES, visits={'E': 115.0, 'C1': 119.5}, not_before=200)
+    ontology.record_visits({'C1': 121.0}, 121.0)
+    ontology.set_urgency_threshold(20.0)
+    assert transport.trips - before == 4
+
+
+def test_the_robot_is_in_one_place_whoever_tells_it(transport: Counting) -> None:
+    # Two clients, an ontology that is built again in between, and foreign assertions.
+    first, second = (PatrolOntology(ArmorClient(name, 'map', transport)) for name in ('one', 'two'))
+    armor = ArmorClient('foreign', 'map', transport)
+    for order in itertools.permutations(('build', 'first', 'second', 'foreign')):
+        first.build(PLACE, ONTOLOGY, IRI, now=100)
+        first.forget()
+        first.build(PLACE, ONTOLOGY, IRI, now=100)
+        for step in order:
+            match step:
+                case 'build':
+                    first.build(PLACE, ONTOLOGY, IRI)
+                case 'first':
+                    first.record_place('E', 1)
+                case 'second':
+                    second.record_place('C1', 2)
+                case 'foreign':
+                    armor.manipulation.add_objectprop_to_ind('isIn', 'Robot1', 'R4')
+        second.record_place('C2', 3)
+        assert second.robot_places() == ('C2',)
+        assert second.snapshot(5.0, RULES).place == 'C2'
+
+
+def test_a_server_that_comes_back_empty_during_a_leg_never_has_two_places(
+    ontology: PatrolOntology, transport: Counting, armor: ArmorClient
+) -> None:
+    """The defect: the builder entered the start, the behaviour its arrival, for good."""
+    ontology.record_visits({'E': 110.0}, 110.0)
+    ontology.forget()
+    builder = PatrolOntology(ArmorClient('builder', 'map', transport))
+    builder.build(PLACE, ONTOLOGY, IRI, now=115)
+    with pytest.raises(OntologyNotReadyError, match='has Robot1 in no place'):
+        ontology.snapshot(116.0, RULES, not_before=116)
+    ontology.record_place('C1', 116)
+    builder.build(PLACE, ONTOLOGY, IRI, now=117)
+    found = ontology.snapshot(118.0, RULES, visits={'E': 110.0, 'C1': 116.0}, not_before=116)
+    assert found.place == 'C1'
+    assert found.visited_at == {'E': 110.0, 'C1': 116.0}, 'no visit is invented'
+    assert armor.utils.sync_buffered_reasoner(), 'consistent'
+
+
+def test_visits_that_the_ontology_forgot_are_told_and_later_ones_are_left(
+    ontology: PatrolOntology,
+) -> None:
+    visits = {'E': 105.0, 'C1': 109.9, 'R9': 3.0}
+    ontology.snapshot(110.0, RULES, visits=visits)
+    ontology.record_visits({'E': 111.0}, 111.0)
+    found = ontology.snapshot(112.0, RULES, visits=visits)
+    assert found.visited_at == {'E': 111.0, 'C1': 109.0}
+    ontology.forget()
+    ontology.build(PLACE, ONTOLOGY, IRI)
+    ontology.record_place('E', 112)
+    found = ontology.snapshot(113.0, RULES, visits=visits)
+    assert found.visited_at == {'E': 105.0, 'C1': 109.0}
+    assert 'R9' not in found.connections, 'a place that is not on the map does not come to be'
+
+
+def test_a_snapshot_waits_for_the_place_that_is_on_its_way(ontology: PatrolOntology) -> None:
+    ontology.snapshot(110.0, RULES)
+    with pytest.raises(OntologyNotReadyError, match='nobody told it where'):
+        ontology.snapshot(110.0, RULES, not_before=500_000_000)
+    late = threading.Timer(0.1, lambda: ontology.record_place('C1', 500_000_000))
+    late.start()
+    found = ontology.snapshot(111.0, RULES, not_before=500_000_000, patience=10.0)
+    late.join()
+    assert found.place == 'C1'
+    ended = threading.Event()
+    ended.set()
+    with pytest.raises(OntologyNotReadyError):
+        ontology.snapshot(111.0, RULES, not_before=10**18, patience=10.0, interrupt=ended)
+
+
+def test_what_clashes_is_named(ontology: PatrolOntology, armor: ArmorClient) -> None:
+    assert ontology.contradiction() == ''
+    armor.manipulation.add_ind_to_class('R1', 'DOOR')
+    with pytest.raises(InconsistentOntologyError, match='ontology map is inconsistent'):
+        ontology.snapshot(110.0, RULES)
+    assert 'R1 is LOCATION and R1 is DOOR' in ontology.contradiction()
+
+
+def test_a_time_of_visit_that_is_none_is_named(
+    ontology: PatrolOntology, armor: ArmorClient
+) -> None:
+    armor.manipulation.add_dataprop_to_ind('visitedAt', 'R1', 'STRING', 'yesterday')
+    with pytest.raises(OntologyNotReadyError, match=r'inconsistent|visitedAt of R1'):
+        ontology.snapshot(110.0, RULES)
+
+
+def test_a_map_that_is_built_after_the_robot_told_its_place_keeps_its_closed_doors(
+    armor: ArmorClient,
+) -> None:
+    armor.utils.load_ref_from_file(ONTOLOGY, IRI, False, 'PELLET', True)
+    ontology = PatrolOntology(armor)
+    ontology.record_place('C1', 1)
+    ontology.record_visits({'C1': 90.0}, 90.0)
+    closed = PLACE.with_door('D1', is_open=False)
+    assert ontology.build(closed, ONTOLOGY, IRI).closed == {'D1'}
+    found = ontology.snapshot(110.0, RULES)
+    assert (found.place, found.visited_at) == ('C1', {'C1': 90.0})
+    assert found.reachable == ('C2', 'E', 'R2')
+
+
+def test_a_place_that_joins_is_in_the_next_snapshot(
+    ontology: PatrolOntology, armor: ArmorClient
+) -> None:
+    before = ontology.snapshot(110.0, RULES)
+    armor.manipulation.add_objectprop_to_ind('hasDoor', 'R9', 'D1')
+    armor.manipulation.add_dataprop_to_ind('visitedAt', 'R9', 'LONG', '105')
+    after = ontology.snapshot(111.0, RULES)
+    assert set(after.connections) == {*before.connections, 'R9'}
+
+
+def test_several_robots_share_an_ontology(transport: Counting) -> None:
+    one = PatrolOntology(ArmorClient('one', 'map', transport))
+    two = PatrolOntology(ArmorClient('two', 'map', transport), robot='Robot2')
+    one.build(PLACE, ONTOLOGY, IRI)
+    one.record_place('E', 1)
+    two.record_place('C1', 2)
+    two.record_visits({'C1': 50.0}, 50.0)
+    assert (one.snapshot(60.0, RULES).place, two.snapshot(60.0, RULES).place) == ('E', 'C1')
+    assert two.snapshot(60.0, RULES).reachable == ('C2', 'E', 'R1', 'R2')
+    assert one.snapshot(60.0, RULES).visited_at == {'C1': 50.0}
+
+
+def test_an_ontology_that_is_not_there_is_refused_with_its_name(transport: Counting) -> None:
+    ontology = PatrolOntology(ArmorClient('one', 'none', transport))
+    with pytest.raises(ArmorServiceInternalError, match="unknown reference 'none'"):
+        ontology.record_place('E', 1)
