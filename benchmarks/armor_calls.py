@@ -142,7 +142,7 @@ def servers() -> Any:
     """The processes that answer."""
     module = 'surveillance_ontology.'
     arguments = [
-        ['-m', module + 'armor_server_node'],
+        ['-m', module + 'armor_server_node', '--ros-args', '-p', 'store:=none'],
         ['-m', module + 'ontology_map_builder_node', '--ros-args', '--params-file', str(PLACE)],
         ['-c', TRIGGER],
     ]

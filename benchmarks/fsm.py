@@ -25,7 +25,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent / 'surveillance_be
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / 'surveillance_runtime'))
 
 import surveillance_fsm as fsm
-from surveillance_fsm.record import TransitionFeed
+from surveillance_fsm.history import TransitionFeed
 
 RING = 3
 LEVELS = 3

@@ -105,6 +105,12 @@ NODES = (
         'shows a running mission in the terminal',
     ),
     Node(
+        'mission_page',
+        'surveillance_operator',
+        'MissionPage',
+        'shows a running mission in browsers',
+    ),
+    Node(
         'mission_recorder',
         'surveillance_operator',
         'MissionRecorder',

@@ -28,6 +28,7 @@ DISCOVERY = Path(__file__).with_name('discovery.xml')
 PLACES = {'surveillance': 'seven_rooms.yaml', 'patrol': 'patrol_world.yaml'}
 RECORD = 'mission.jsonl'
 ONTOLOGIES = 'ontologies'
+STORE = 'armor_store'
 COMPOSED = 'composed'
 BEHAVIOUR_NODE = 'robot_behavior'
 _NAMESPACE = re.compile(r'/?[A-Za-z]\w*(/[A-Za-z]\w*)*\Z', re.ASCII)
@@ -211,7 +212,10 @@ def write_own_parameters(folder: Path, run: Run) -> Path:
     """Writes what the command line says as parameters, for the nodes that it concerns."""
     own: dict[str, dict[str, Any]] = {
         BEHAVIOUR_NODE: {'behaviour': run.behaviour, 'record': str(folder / RECORD)},
-        'armor_server': {'ontologies_folder': str(folder.resolve() / ONTOLOGIES)},
+        'armor_server': {
+            'ontologies_folder': str(folder.resolve() / ONTOLOGIES),
+            'store': str(folder.resolve() / STORE),
+        },
     }
     # Without one that was asked for, the mode is what the parameter files say.
     if run.mode:

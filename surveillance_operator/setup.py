@@ -6,7 +6,7 @@ setup(
     name=package_name,
     version='0.1.0',
     packages=find_packages(),
-    package_data={'': ['py.typed']},
+    package_data={'': ['py.typed', 'page/static/*']},
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/' + package_name]),
         ('share/' + package_name, ['package.xml']),
@@ -19,6 +19,7 @@ setup(
     entry_points={
         'console_scripts': [
             'console = surveillance_operator.console_node:main',
+            'mission_page = surveillance_operator.mission_page_node:main',
             'mission_recorder = surveillance_operator.mission_recorder_node:main',
             'mission_view = surveillance_operator.mission_view_node:main',
         ],

@@ -16,12 +16,12 @@ from surveillance_behaviour.machines import MACHINES
 from surveillance_behaviour.mission.battery_gauge import BatteryGauge
 from surveillance_behaviour.mission.mission import Mission, MissionSettings
 from surveillance_behaviour.peers.ports import Ports
-from surveillance_fsm.active import ActiveContainer
+from surveillance_fsm import Container
+from surveillance_fsm.clock import WALL_CLOCK
 from surveillance_fsm.export import to_ascii, to_graphviz, to_mermaid
-from surveillance_fsm.verification import Finding, verify
-from surveillance_fsm.waiting import WALL_CLOCK
+from surveillance_fsm.verify import Finding, verify
 
-DRAWINGS: dict[str, Callable[[ActiveContainer], str]] = {
+DRAWINGS: dict[str, Callable[[Container], str]] = {
     'mermaid': to_mermaid,
     'graphviz': to_graphviz,
     'ascii': to_ascii,
@@ -35,7 +35,7 @@ class _Nobody:
         raise AttributeError(f'no peer to ask for {name!r} while a machine is only checked')
 
 
-def build(name: str) -> ActiveContainer:
+def build(name: str) -> Container:
     """Build one of the robot's machines with nobody to talk to, or one given as ``module:factory``.
 
     Args:
@@ -63,7 +63,7 @@ def build(name: str) -> ActiveContainer:
         if not callable(factory):
             raise ValueError(f"machine '{name}': '{module_name}' has no function '{factory_name}'")
         machine = factory()
-    if not isinstance(machine, ActiveContainer):
+    if not isinstance(machine, Container):
         raise ValueError(f"machine '{name}' is a {type(machine).__name__}, expected a container")
     if machine.get_name() == type(machine).__name__:
         machine.set_name(name.rpartition(':')[2].upper())

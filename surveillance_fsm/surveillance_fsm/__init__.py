@@ -1,13 +1,15 @@
 """A state machine engine with SMACH's interface and without ROS.
 
-``import surveillance_fsm as smach`` runs machines written for SMACH.
+``import surveillance_fsm as smach`` runs machines written for SMACH. The rest is in modules of
+their own: `verify`, `export`, `history`, `testing`, and `surveillance_fsm.ros` for ROS 2.
 """
 
 from __future__ import annotations
 
+from surveillance_fsm.clock import Clock, Interrupt, WallClock
 from surveillance_fsm.concurrence import Concurrence
 from surveillance_fsm.container import Container
-from surveillance_fsm.engine import RESUME
+from surveillance_fsm.control import is_shutdown, set_shutdown_check
 from surveillance_fsm.exceptions import (
     InvalidConstructionError,
     InvalidStateError,
@@ -17,8 +19,7 @@ from surveillance_fsm.exceptions import (
     PreemptIgnoredError,
     SmachError,
 )
-from surveillance_fsm.interface import CBInterface, cb_interface, has_smach_interface
-from surveillance_fsm.iterator import Iterator
+from surveillance_fsm.execution import RESUME
 from surveillance_fsm.log import (
     logdebug,
     logerr,
@@ -27,12 +28,15 @@ from surveillance_fsm.log import (
     reset_loggers,
     set_loggers,
 )
-from surveillance_fsm.sequence import Sequence
-from surveillance_fsm.shutdown import is_shutdown, set_shutdown_check
-from surveillance_fsm.state import CBState, State
-from surveillance_fsm.state_machine import StateMachine
-from surveillance_fsm.user_data import Remapper, UserData
-from surveillance_fsm.waiting import Clock, Interrupt, WallClock
+from surveillance_fsm.state import (
+    CBInterface,
+    CBState,
+    State,
+    cb_interface,
+    has_smach_interface,
+)
+from surveillance_fsm.state_machine import Iterator, Sequence, StateMachine
+from surveillance_fsm.userdata import Remapper, UserData
 
 __all__ = [
     'RESUME',

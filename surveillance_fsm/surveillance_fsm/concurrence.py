@@ -1,47 +1,176 @@
-"""The concurrence: all children at the same time, one outcome made of theirs."""
+"""The concurrence: all states at the same time, one outcome made of theirs.
+
+`OutcomePolicy` makes the outcome, `Concurrence` is the container, and `ConcurrentFrame` runs it:
+each state on a logical thread of its own, which the concurrence's thread watches.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Mapping
-from collections.abc import Sequence as LabelSequence
+from collections.abc import Callable, Hashable, Iterable, Mapping
+from collections.abc import Sequence as Labels
 from typing import Any
 
 from surveillance_fsm import log
-from surveillance_fsm.active import ActiveContainer, forget, stop_for_now
-from surveillance_fsm.children import Children
-from surveillance_fsm.engine import (
-    LOWEST,
-    NO_USERDATA,
-    RESUME,
-    SUSPENDED,
-    Branch,
-    Exit,
-    Frame,
-    History,
-    Node,
-    SpecialStep,
-)
+from surveillance_fsm.clock import Interrupt
+from surveillance_fsm.container import Container, forget, forget_progress, stop_for_now
 from surveillance_fsm.exceptions import (
     InvalidStateError,
     InvalidTransitionError,
+    InvalidUserCodeError,
     SmachError,
+    describe,
+    shown,
 )
-from surveillance_fsm.limits import Limits, make_limits
-from surveillance_fsm.nodes import make_node, user_fault, wrong_outcome
-from surveillance_fsm.outcome_policy import (
-    ChildTerminationCallback,
-    OutcomeCallback,
-    OutcomePolicy,
+from surveillance_fsm.execution import (
+    NO_USERDATA,
+    RESUMPTION,
+    SUSPENDED,
+    ExecutionThread,
+    Exit,
+    Frame,
+    History,
+    LeftBehind,
+    Node,
+    SpecialStep,
 )
-from surveillance_fsm.run import LeftBehind, Strand
-from surveillance_fsm.state import State
-from surveillance_fsm.user_data import UserData
-from surveillance_fsm.waiting import Clock
+from surveillance_fsm.state import State, structure_version
+from surveillance_fsm.timeouts import make_limits, supervise
+from surveillance_fsm.userdata import UserData, raw
 
-_TOGETHER = Exit('')
+Outcomes = dict[str, str | None]
+ChildTerminationCallback = Callable[[Outcomes], bool | Iterable[str] | None]
+OutcomeCallback = Callable[[Outcomes], str | None]
+
+TOGETHER = Exit('')
+"""Where every outcome of a concurrence's state leads: it has ended."""
 
 
-class Concurrence(ActiveContainer):
+class OutcomePolicy:
+    """The default outcome, the outcome map and the callbacks of a concurrence.
+
+    Args:
+        outcomes: The concurrence's outcomes.
+        default: See `Concurrence`.
+        outcome_map: See `Concurrence`.
+        outcome_cb: See `Concurrence`.
+        child_termination_cb: See `Concurrence`.
+
+    Raises:
+        InvalidStateError: It names outcomes that are not declared, or a callback cannot be called.
+    """
+
+    def __init__(
+        self,
+        outcomes: Iterable[str],
+        default: str,
+        outcome_map: Mapping[str, Mapping[str, str]] | None,
+        outcome_cb: OutcomeCallback | None,
+        child_termination_cb: ChildTerminationCallback | None,
+    ) -> None:
+        self._outcomes = outcomes = frozenset(outcomes)
+        self.default = default
+        self._outcome_cb = outcome_cb
+        self._child_termination_cb = child_termination_cb
+        self.outcome_map = {key: dict(value) for key, value in (outcome_map or {}).items()}
+        faults = [
+            f'{shown(outcome)} is not one of its outcomes {sorted(outcomes)}'
+            for outcome in (default, *self.outcome_map)
+            if outcome not in outcomes
+        ]
+        for name, callback in (
+            ('outcome_cb', outcome_cb),
+            ('child_termination_cb', child_termination_cb),
+        ):
+            if callback is not None and not callable(callback):
+                faults.append(f'{name} {shown(callback)} cannot be called')
+        if faults:
+            raise InvalidStateError(
+                f'The outcome policy of a Concurrence is wrong: {"; ".join(faults)}'
+            )
+
+    def faults(self, states: Mapping[str, State]) -> list[str]:
+        """What the outcome map asks of states that they cannot do."""
+        faults = []
+        for outcome, wanted in self.outcome_map.items():
+            for label, end in wanted.items():
+                state = states.get(label)
+                if state is None:
+                    faults.append(f"outcome '{outcome}' asks for state '{label}', which it lacks")
+                elif end not in state.get_registered_outcomes():
+                    faults.append(
+                        f"outcome '{outcome}' asks for '{end}' of state '{label}', whose outcomes "
+                        f'are {sorted(state.get_registered_outcomes())}'
+                    )
+        return faults
+
+    def possible_outcomes(self) -> set[str]:
+        """The outcomes that may come of it; all of them, if a callback decides."""
+        if self._outcome_cb is not None:
+            return set(self._outcomes)
+        return {self.default, *self.outcome_map}
+
+    def to_stop(self, path: str, ends: Outcomes) -> frozenset[str]:
+        """Labels of the states to stop now that one has ended.
+
+        Args:
+            path: The concurrence's path, for errors.
+            ends: The outcomes of all states; None for those that run.
+
+        Raises:
+            InvalidUserCodeError: The callback raised, or returned no labels of states.
+        """
+        if self._child_termination_cb is None:
+            return frozenset()
+        try:
+            stop = self._child_termination_cb(dict(ends))
+        except Exception as error:
+            raise InvalidUserCodeError(
+                f"The child_termination_cb of '{path}' raised {describe(error)}"
+            ) from error
+        if isinstance(stop, str):
+            stop = [stop]
+        if not isinstance(stop, Iterable):
+            # SMACH looks at the truth of what is returned.
+            return frozenset(ends) if stop else frozenset()
+        labels = list(stop)
+        unknown = [label for label in labels if not isinstance(label, str) or label not in ends]
+        if unknown:
+            raise InvalidUserCodeError(
+                f"The child_termination_cb of '{path}' returned {shown(unknown)}: expected True, "
+                f'False or labels among {sorted(ends)}'
+            )
+        return frozenset(labels)
+
+    def decide(self, path: str, ends: Outcomes) -> str:
+        """The concurrence's outcome, all states having ended.
+
+        Raises:
+            InvalidUserCodeError: The callback raised.
+            InvalidTransitionError: It returned an outcome that is not declared.
+        """
+        outcome, most = self.default, 0
+        for name, wanted in self.outcome_map.items():
+            if len(wanted) >= most and all(ends[label] == end for label, end in wanted.items()):
+                outcome, most = name, len(wanted)
+        if self._outcome_cb is None:
+            return outcome
+        try:
+            chosen = self._outcome_cb(dict(ends))
+        except Exception as error:
+            raise InvalidUserCodeError(
+                f"The outcome_cb of '{path}' raised {describe(error)}"
+            ) from error
+        if not chosen:
+            return outcome
+        if not isinstance(chosen, Hashable) or chosen not in self._outcomes:
+            raise InvalidTransitionError(
+                f"The outcome_cb of '{path}' returned {shown(chosen)}: the outcomes are "
+                f'{sorted(self._outcomes)}'
+            )
+        return chosen
+
+
+class Concurrence(Container):
     """Executes all its states at the same time and ends when all have ended.
 
     Args:
@@ -59,7 +188,7 @@ class Concurrence(ActiveContainer):
         InvalidStateError: The outcome policy names outcomes that are not declared.
     """
 
-    _fsm_bounds_itself = True
+    together = True
 
     def __init__(
         self,
@@ -72,11 +201,8 @@ class Concurrence(ActiveContainer):
         child_termination_cb: ChildTerminationCallback | None = None,
     ) -> None:
         super().__init__(outcomes, input_keys, output_keys)
-        self._children = Children(self._states)
-        self._remappings: dict[str, dict[str, str]] = {}
-        self._limits: dict[str, Limits] = {}
-        self._policy = OutcomePolicy(
-            frozenset(self._outcomes),
+        self.policy = OutcomePolicy(
+            self._outcomes,
             default_outcome,
             outcome_map,
             outcome_cb,
@@ -109,249 +235,80 @@ class Concurrence(ActiveContainer):
             InvalidConstructionError: No concurrence is open.
             InvalidStateError: The label is taken, or the state is none.
         """
-        concurrence = Concurrence._currently_opened_container()
-        path = concurrence._path_of(label)
-        concurrence._check_new(label, state)
+        return Concurrence._currently_opened_container().add_state(
+            label,
+            state,
+            remapping,
+            timeout=timeout,
+            deadline=deadline,
+            retry=retry,
+            retry_on=retry_on,
+        )
+
+    def add_state(
+        self,
+        label: str,
+        state: State,
+        remapping: Mapping[str, str] | None = None,
+        *,
+        timeout: float | None = None,
+        deadline: float | None = None,
+        retry: int = 0,
+        retry_on: Iterable[str] = ('aborted',),
+    ) -> State:
+        """Add a state to a concurrence at hand, open or not; for the arguments see `add`."""
+        self._check_new(label, state)
+        path = self.fsm_path_of(label)
         limits = make_limits(path, state, {}, timeout, deadline, retry, retry_on)
         if limits is not None:
-            concurrence._limits[label] = limits
-        concurrence._states[label] = state
-        concurrence._remappings[label] = dict(remapping or {})
+            self.fsm_limits[label] = limits
+        self.fsm_states[label] = state
+        if remapping:
+            self.fsm_remappings[label] = dict(remapping)
+        structure_version.changed()
         return state
 
     def check_consistency(self) -> None:
-        """Raise `InvalidTransitionError` when the outcome map does not fit the states."""
-        faults = [] if self._states else ['it has no states']
-        faults += self._policy.faults(self._states)
-        faults += self._branch_faults()
+        """Raise an error naming all that keeps the concurrence from running.
+
+        Raises:
+            InvalidStateError: It has no states.
+            InvalidTransitionError: The outcome map or an interrupt does not fit the states.
+        """
+        if not self.fsm_states:
+            raise InvalidStateError(f"Concurrence '{self.fsm_path}' cannot run: it has no states")
+        faults = self.policy.faults(self.fsm_states) + self._branch_faults()
         if faults:
             raise InvalidTransitionError(
-                f"Concurrence '{self._fsm_path}' cannot run: {'; '.join(faults)}"
+                f"Concurrence '{self.fsm_path}' cannot run: {'; '.join(faults)}"
             )
-
-    def _has_limits(self) -> bool:
-        return bool(self._limits) or any(
-            isinstance(state, ActiveContainer) and state._has_limits()
-            for state in self._states.values()
-        )
 
     # Running.
 
-    def _enter(self, strand: Strand, parent_ud: Any) -> Any:
-        self._fsm_path = strand.path_inside()
-        self.check_consistency()
-        run = strand.run
-        frame = Frame(self, strand, self._fsm_path, _TOGETHER, parent_ud)
-        with run.condition:
-            if self._frame is not None:
-                raise InvalidStateError(f"'{self._fsm_path}' is running already")
-            self._frame = frame
-        strand.push(frame)
-        history, self._fsm_history = self._fsm_history, None
-        try:
-            self._heed_suspension(frame)
-            if history is None:
-                self._copy_input_keys(parent_ud, self.userdata)
-            with run.condition:
-                self._children.begin(history.outcomes if history is not None else {})
-            if log.chatty():
-                log.loginfo(f"'{self._fsm_path}' starts {sorted(self._states)} together")
-            if history is None:
-                self.call_start_cbs()
-            if frame.trace is not None:
-                step = SpecialStep(self._fsm_path, '', '', 'start')
-                frame.trace((step, '', frame.now(), NO_USERDATA))
-            outcome = self._run_children(frame)
-            if outcome is not SUSPENDED:
-                self.call_termination_cbs(list(self._states), outcome)
-                self._copy_output_keys(self.userdata, parent_ud)
-            return outcome
-        finally:
-            with run.condition:
-                strand.pop(frame)
-                if self._frame is frame:
-                    self._frame = None
-                run.condition.notify_all()
+    def fsm_make_table(self) -> dict[str, Node]:
+        """Make the nodes of all states."""
+        table = {}
+        for label, state in self.fsm_states.items():
+            node = table[label] = self.fsm_node(label, state)
+            for outcome in state.get_registered_outcomes():
+                node.targets[outcome] = TOGETHER
+            if node.limits is not None and node.limits.late_outcome:
+                node.targets.setdefault(node.limits.late_outcome, TOGETHER)
+        return table
 
-    def _run_children(self, frame: Frame) -> Any:
-        """Run children, and interrupts in between, until there is an outcome."""
-        children = self._children
-        while True:
-            with frame.strand.run.condition:
-                branch = self._next_branch(frame)
-            if branch is None:
-                self._start_children(frame)
-                error = children.wait(
-                    frame,
-                    lambda: self._policy.to_stop(self._fsm_path, children.outcomes),
-                    lambda label, outcome: self._tell_end(frame, label, outcome),
-                )
-                if error is not None:
-                    raise error
-                with frame.strand.run.condition:
-                    if frame.suspending and not self._preempt_requested:
-                        self._fsm_history = History(outcomes=children.ended())
-                        return SUSPENDED
-                    if children.all_ended():
-                        break
-                continue
-            outcome = self._run_branch(frame, branch)
-            if outcome is not None:
-                return outcome
-        if children.served_preempt(self._fsm_path, preempted=self._preempt_requested):
-            self.service_preempt()
-        return self._policy.decide(self._fsm_path, children.outcomes)
-
-    def _start_children(self, frame: Frame) -> None:
-        run = frame.strand.run
-        with run.condition:
-            nodes = self._children.make_strands(
-                run, self._fsm_path, lambda label, state: self._node(label, state, run.clock)
-            )
-        self.call_transition_cbs()
-        self._children.start(nodes, self._execute)
-        with run.condition:
-            # What was asked before there was anybody to ask.
-            if self._preempt_requested:
-                self._children.preempt()
-            elif frame.suspending or self._urgent(frame):
-                self._cut(frame)
-
-    def _node(self, label: str, state: State, clock: Clock, priority: float = LOWEST) -> Node:
-        node = make_node(
-            self._path_of(label),
-            state,
-            self.userdata,
-            clock,
-            remapping=self._remappings.get(label),
-            limits=self._limits.get(label),
-            priority=priority,
-        )
-        for outcome in state.get_registered_outcomes():
-            node.targets[outcome] = _TOGETHER
-        if node.limits is not None and node.limits.late_outcome:
-            node.targets.setdefault(node.limits.late_outcome, _TOGETHER)
-        return node
-
-    def _execute(self, node: Node) -> Any:
-        path = self._path_of(node.label)
-        try:
-            outcome = node.execute(node.view)
-        except SmachError:
-            raise
-        except Exception as error:
-            raise user_fault(path, node, error) from error
-        if not isinstance(outcome, Hashable) or outcome not in node.targets:
-            raise wrong_outcome(path, node, outcome)
-        return outcome
-
-    def _tell_end(self, frame: Frame, label: str, outcome: str) -> None:
-        if frame.trace is not None:
-            step = SpecialStep(frame.path, label, '', 'ended')
-            frame.trace((step, outcome, frame.now(), self.userdata._data.copy()))
-        if log.chatty():
-            log.loginfo(f"'{frame.path}': '{label}' ended with '{outcome}'")
-        self.call_transition_cbs()
-
-    # Preempts and interrupts.
-
-    def _fsm_woken(self) -> None:
-        self._children.wakeup.set()
-
-    def request_preempt(self) -> None:
-        """Ask all children that run to stop."""
-        super().request_preempt()
-        frame = self._frame
-        if frame is None:
-            return
-        with frame.strand.run.condition:
-            current = frame.current
-            if isinstance(current, Node):
-                frame.strand.asked()
-                current.state.request_preempt()
-            self._children.preempt()
-            frame.strand.run.condition.notify_all()
-
-    def _urgent(self, frame: Frame) -> bool:
-        return any(branch.priority > frame.current.priority for branch in self._fsm_raised)
-
-    def _interrupted(self) -> None:
-        frame = self._frame
-        if frame is not None and self._urgent(frame):
-            self._cut(frame)
-
-    def _suspend(self) -> None:
-        frame = self._frame
-        if frame is None:
-            self._fsm_aside = True
-            return
-        frame.suspending = True
-        self._cut(frame)
-
-    def _cut(self, frame: Frame) -> None:
-        current = frame.current
-        if isinstance(current, Node):
-            frame.cut = current
-            frame.strand.asked()
-            stop_for_now(current.state)
-        else:
-            self._children.make_way()
-
-    def _next_branch(self, frame: Frame) -> Branch | None:
-        if self._preempt_requested or not self._fsm_raised:
-            return None
-        branch = max(self._fsm_raised, key=lambda raised: raised.priority)
-        self._fsm_raised.remove(branch)
-        return branch
-
-    def _run_branch(self, frame: Frame, branch: Branch) -> Any:
-        """Run an interrupt's state; None to go on with the children."""
-        run = frame.strand.run
-        self._remappings[branch.label] = branch.remapping
-        node = self._node(branch.label, branch.state, run.clock, branch.priority)
-        with run.condition:
-            frame.cut = None
-            frame.current = node
-            if self._preempt_requested:
-                branch.state.request_preempt()
-            elif frame.suspending or self._urgent(frame):
-                self._cut(frame)
-        outcome = self._execute(node)
-        with run.condition:
-            if frame.stale:
-                raise LeftBehind
-            frame.strand.heeded()
-            frame.current = _TOGETHER
-            pending = branch.state.preempt_requested()
-            served = not pending or outcome == 'preempted'
-            forced, frame.forced = frame.forced, None
-            if forced is not None:
-                outcome = forced[1]
-            branch.state.recall_preempt()
-            if forced is None and (outcome is SUSPENDED or (frame.cut is node and served)):
-                self._fsm_raised.append(branch)
-                if frame.suspending:
-                    self._fsm_history = History(outcomes=self._children.ended())
-                    return SUSPENDED
-                return None
-            forget(branch.state)
-            if forced is None and self._preempt_requested and not pending:
-                self.service_preempt()
-        target = branch.transitions.get(outcome, RESUME)
-        if target == RESUME:
-            return None
-        for state in self._states.values():
-            forget(state)
-        return target
+    def fsm_make_frame(self, thread: ExecutionThread, path: str, parent_ud: Any) -> ConcurrentFrame:
+        """Make the frame of an execution that is about to begin."""
+        self.fsm_current_table(path, thread.run.clock)
+        return ConcurrentFrame(self, thread, path, TOGETHER, parent_ud)
 
     # The container's interface.
 
     def get_initial_states(self) -> list[str]:
         """The labels of all states."""
-        return list(self._states)
+        return list(self.fsm_states)
 
     def set_initial_state(
-        self, initial_states: LabelSequence[str], userdata: UserData | None = None
+        self, initial_states: Labels[str], userdata: UserData | None = None
     ) -> None:
         """Add to the concurrence's userdata; all states always begin."""
         for label in initial_states:
@@ -359,16 +316,350 @@ class Concurrence(ActiveContainer):
         if userdata is not None:
             self.userdata.update(userdata)
 
-    def get_active_states(self) -> list[str]:
-        """The labels of the states that run."""
-        if self._frame is None:
-            return []
-        return [label for label, outcome in self._children.outcomes.items() if outcome is None]
-
     def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
         """The outcome map as (child outcome, label, outcome)."""
         return [
             (child_outcome, label, outcome)
-            for outcome, wanted in self._policy.outcome_map.items()
+            for outcome, wanted in self.policy.outcome_map.items()
             for label, child_outcome in wanted.items()
         ]
+
+
+class ConcurrentFrame(Frame):
+    """One execution of a concurrence.
+
+    Attributes:
+        outcomes: What each state ended with; None for those that have not ended.
+    """
+
+    bounds_itself = True
+    container: Concurrence
+    current: Node | Exit
+
+    def __init__(
+        self,
+        container: Concurrence,
+        thread: ExecutionThread,
+        path: str,
+        current: Node | Exit,
+        parent_ud: Any,
+    ) -> None:
+        super().__init__(container, thread, path, current, parent_ud)
+        self.outcomes: Outcomes = {}
+        self._wakeup = Interrupt()
+        self._threads: dict[str, ExecutionThread] = {}
+        self._making_way: set[str] = set()
+        self._told_to_stop: set[str] = set()
+        self._left_behind: set[str] = set()
+
+    # From the beginning to the end.
+
+    def execute(self, history: History | None) -> Any:
+        """Run all states to their ends, and interrupts in between; the outcome or `SUSPENDED`."""
+        container, run = self.container, self.run
+        if history is None:
+            container.fsm_copy_input_keys(self.parent_ud)
+        outcomes: Outcomes = dict.fromkeys(container.fsm_states)
+        outcomes.update(history.outcomes if history is not None else {})
+        with run.condition:
+            self.outcomes = outcomes
+        if run.chatty:
+            log.loginfo(f"'{self.path}' starts {sorted(container.fsm_states)} together")
+        if history is None:
+            container.call_start_cbs()
+        if run.trace is not None:
+            self.note((SpecialStep(self.path, '', '', 'start'), '', run.now(), NO_USERDATA))
+        outcome = self._run_states()
+        if outcome is not SUSPENDED:
+            container.call_termination_cbs(list(container.fsm_states), outcome)
+            container.fsm_copy_output_keys(self.parent_ud)
+        return outcome
+
+    def proceed(self, outcome: Any) -> Any:
+        """Never: the concurrence's own thread waits for the states, and does not hang."""
+        raise NotImplementedError
+
+    def _run_states(self) -> Any:
+        container = self.container
+        while True:
+            with self.run.condition:
+                node = self._next_branch()
+            if node is not None:
+                outcome = self._run_branch(node)
+                if outcome is not None:
+                    return outcome
+                continue
+            self._start_states()
+            error = self._await_states()
+            if error is not None:
+                raise error
+            with self.run.condition:
+                if self.suspending and not container.preempt_requested():
+                    container.fsm_history = self.where()
+                    return SUSPENDED
+                if all(end is not None for end in self.outcomes.values()):
+                    return self._decide()
+
+    def _decide(self) -> str:
+        """The outcome, all states having ended; a preempt that one of them served has its own."""
+        container = self.container
+        preempted = container.preempt_requested()
+        served = self._served_preempt(preempted=preempted)
+        outcome = container.policy.decide(self.path, self.outcomes)
+        if not (preempted and served):
+            # A request that came too late for all of them stays, for what runs next.
+            return outcome
+        if 'preempted' in container.get_registered_outcomes():
+            outcome = 'preempted'
+        elif outcome == container.policy.default:
+            # Nothing says that the outcome stands for a preempt: what runs next is asked.
+            return outcome
+        container.service_preempt()
+        return outcome
+
+    def _served_preempt(self, *, preempted: bool) -> bool:
+        """Take back the requests that were not acknowledged; whether a state acknowledged one."""
+        # A state that was left behind keeps the request, so that it ends some time.
+        ignored = [
+            label
+            for label, state in self.container.fsm_states.items()
+            if state.preempt_requested() and label not in self._left_behind
+        ]
+        for label in ignored:
+            self.container.fsm_states[label].recall_preempt()
+        if preempted and ignored:
+            log.logwarn(f"'{self.path}': {ignored} did not acknowledge the preempt")
+        return bool(self._told_to_stop.difference(ignored))
+
+    # The states.
+
+    def _start_states(self) -> None:
+        """Start those that have not ended, each on a thread of its own."""
+        run, table = self.run, self.container.fsm_table
+        nodes = []
+        with run.condition:
+            self._making_way.clear()
+            self._told_to_stop.clear()
+            self._left_behind.clear()
+            self._threads = {}
+            for label, end in self.outcomes.items():
+                if end is None:
+                    node = table[label]
+                    nodes.append(node)
+                    self._threads[label] = ExecutionThread(run, node.path, self._wakeup, leaf=node)
+        self.container.call_transition_cbs()
+        for node in nodes:
+            self._threads[node.label].start(lambda node=node: _execute(node))  # type: ignore[misc]
+        with run.condition:
+            # What was asked before there was anybody to ask.
+            if self.container.preempt_requested():
+                self._preempt_states()
+            elif self.suspending or self.container.fsm_urgent(self.current.priority):
+                self._cut()
+
+    def _await_states(self) -> BaseException | None:
+        """Watch the states until all have ended or made way.
+
+        Returns:
+            The first error of one of them, which stopped the others.
+
+        Raises:
+            LeftBehind: The machine went on without the concurrence.
+        """
+        running = dict(self._threads)
+        first_error: BaseException | None = None
+        while running:
+            supervise(self.run, list(running.values()), self._wakeup)
+            if self.stale:
+                self._abandon(running)
+            for label in [label for label, thread in running.items() if thread.done]:
+                thread = running.pop(label)
+                if thread.error is not None:
+                    first_error = first_error or thread.error
+                    self._stop(running, _preempt)
+                    continue
+                with self.run.condition:
+                    ended = self._note_end(label, thread)
+                if ended is not None:
+                    self._tell_end(label, ended)
+                if first_error is None:
+                    first_error = self._stop_others(running)
+        with self.run.condition:
+            self._threads = {}
+        return first_error
+
+    def _stop_others(self, running: Mapping[str, ExecutionThread]) -> SmachError | None:
+        """Stop the states that are to stop now that one has ended; the error of deciding that."""
+        error = None
+        try:
+            stop: Iterable[str] = self.container.policy.to_stop(self.path, self.outcomes)
+        except SmachError as raised:
+            error, stop = raised, list(running)
+        self._stop({label: running[label] for label in stop if label in running}, _preempt)
+        return error
+
+    def _note_end(self, label: str, thread: ExecutionThread) -> str | None:
+        """Note what a state ended with; None when it only made way."""
+        state, outcome = self.container.fsm_states[label], thread.outcome
+        if thread.without_leaf:
+            self._left_behind.add(label)
+        if thread.forced is not None:
+            # A preempt that it was asked for, too, is not served by that.
+            outcome = thread.forced[1]
+            self._told_to_stop.discard(label)
+            forget(state)
+            if label not in self._left_behind:
+                state.recall_preempt()
+        elif outcome is SUSPENDED:
+            return None
+        elif label in self._making_way:
+            made_way = not state.preempt_requested() or outcome == 'preempted'
+            if label not in self._left_behind:
+                state.recall_preempt()
+            if made_way:
+                return None
+            # Nor by ending by itself.
+            self._told_to_stop.discard(label)
+        forget_progress(state)
+        self.outcomes[label] = outcome
+        return str(outcome)
+
+    def _tell_end(self, label: str, outcome: str) -> None:
+        if self.run.trace is not None:
+            step = SpecialStep(self.path, label, '', 'ended')
+            self.note((step, outcome, self.run.now(), raw(self.container.userdata).copy()))
+        if self.run.chatty:
+            log.loginfo(f"'{self.path}': '{label}' ended with '{outcome}'")
+        self.container.call_transition_cbs()
+
+    def _stop(self, threads: Mapping[str, ExecutionThread], ask: Callable[[State], object]) -> None:
+        for label, thread in threads.items():
+            if not thread.done:
+                thread.wanted = True
+                thread.asked()
+                ask(self.container.fsm_states[label])
+
+    def _abandon(self, running: Mapping[str, ExecutionThread]) -> None:
+        self._stop(running, _preempt)
+        for thread in running.values():
+            thread.disown()
+        raise LeftBehind
+
+    # Interrupts.
+
+    def _next_branch(self) -> Node | None:
+        if self.container.preempt_requested():
+            return None
+        branch = self.container.fsm_take_raised()
+        return None if branch is None else self.container.fsm_table[branch.label]
+
+    def _run_branch(self, node: Node) -> Any:
+        """Run an interrupt's state; None to go on with the states."""
+        container, run = self.container, self.run
+        branch = container.fsm_branches[node.label]
+        with run.condition:
+            self.cut = None
+            self.current = node
+            if container.preempt_requested():
+                branch.state.request_preempt()
+            elif self.suspending or container.fsm_urgent(node.priority):
+                self._cut()
+        outcome = _execute(node)
+        with run.condition:
+            if self.stale:
+                raise LeftBehind
+            self.thread.heeded()
+            self.current = TOGETHER
+            pending = branch.state.preempt_requested()
+            served = not pending or outcome == 'preempted'
+            forced, self.forced = self.forced, None
+            if forced is not None:
+                outcome = forced[1]
+            branch.state.recall_preempt()
+            if forced is None and (outcome is SUSPENDED or (self.cut is node and served)):
+                container.fsm_raise(branch)
+                if self.suspending:
+                    container.fsm_history = self.where()
+                    return SUSPENDED
+                return None
+            forget(branch.state)
+            if forced is None and container.preempt_requested() and not pending:
+                container.service_preempt()
+        target = node.target(outcome)
+        if target is RESUMPTION:
+            return None
+        for state in container.fsm_states.values():
+            forget(state)
+        return target.label
+
+    # What others want; under the run's condition.
+
+    def preempt(self) -> None:
+        """Ask all states that run to stop."""
+        current = self.current
+        if isinstance(current, Node):
+            self.thread.asked()
+            current.state.request_preempt()
+        self._preempt_states()
+        self.run.condition.notify_all()
+
+    def _preempt_states(self) -> None:
+        """Ask those that run to stop, each once: again could come after it served the first."""
+        asked = {
+            label: thread
+            for label, thread in self._threads.items()
+            if not thread.done and label not in self._told_to_stop
+        }
+        self._told_to_stop.update(asked)
+        self._stop(asked, _preempt)
+
+    def interrupted(self) -> None:
+        """Make way for the container's raised interrupts."""
+        if self.container.fsm_urgent(self.current.priority):
+            self._cut()
+
+    def suspend(self) -> None:
+        """Have the container put aside with its history."""
+        self.suspending = True
+        self._cut()
+
+    def _cut(self) -> None:
+        current = self.current
+        if isinstance(current, Node):
+            self.cut = current
+            self.thread.asked()
+            stop_for_now(current.state)
+            return
+        going_on = [label for label, thread in self._threads.items() if not thread.done]
+        self._making_way.update(going_on)
+        self._stop(self._threads, stop_for_now)
+
+    def woken(self) -> None:
+        """Wake the thread that waits for the states: it was left behind."""
+        self._wakeup.set()
+
+    def where(self) -> History | None:
+        """Where the container would go on if its process ended now."""
+        return History(
+            outcomes={label: end for label, end in self.outcomes.items() if end is not None}
+        )
+
+    def active_labels(self) -> list[str]:
+        """The labels of the states that run."""
+        return [label for label, outcome in self.outcomes.items() if outcome is None]
+
+
+def _execute(node: Node) -> Any:
+    """Execute a state on a thread of its own; its outcome."""
+    try:
+        outcome = node.execute(node.view)
+    except SmachError:
+        raise
+    except Exception as error:
+        raise node.user_fault(error) from error
+    node.target(outcome)
+    return outcome
+
+
+def _preempt(state: State) -> None:
+    state.request_preempt()

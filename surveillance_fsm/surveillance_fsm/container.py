@@ -1,4 +1,9 @@
-"""What all containers share: construction under ``with``, callbacks, userdata in and out."""
+"""The container: a state that runs other states, built under ``with``.
+
+`Container` holds what its kinds have in common: construction, callbacks, userdata in and out, the
+beginning of an execution, interrupts. How the states inside are run is the matter of the frame that
+each kind makes for an execution (`sequential`, `concurrence`).
+"""
 
 from __future__ import annotations
 
@@ -6,17 +11,40 @@ import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
+from surveillance_fsm.clock import Clock, Interrupt
+from surveillance_fsm.control import Control
 from surveillance_fsm.exceptions import (
     InvalidConstructionError,
     InvalidStateError,
     InvalidTransitionError,
-    SmachError,
+    describe,
+    shown,
+)
+from surveillance_fsm.execution import (
+    DEFAULT_PREEMPT_TIMEOUT,
+    LOWEST,
+    RESUME,
+    RESUMPTION,
+    Branch,
+    ExecutionThread,
+    Exit,
+    Frame,
+    History,
+    LeftBehind,
+    Node,
+    Run,
 )
 from surveillance_fsm.log import logerr, logwarn
-from surveillance_fsm.state import State
-from surveillance_fsm.user_data import UserData
+from surveillance_fsm.state import (
+    State,
+    has_smach_interface,
+    structure_version,
+    this_thread,
+)
+from surveillance_fsm.timeouts import Limits, keep_out, limited, supervise
+from surveillance_fsm.userdata import Remapper, UserData, raw
 
 
 class _Construction(threading.local):
@@ -27,6 +55,8 @@ class _Construction(threading.local):
 
 
 _construction = _Construction()
+_entry_lock = threading.Lock()
+_raise_lock = threading.Lock()
 
 Callback = tuple[Callable[..., Any], tuple[Any, ...]]
 
@@ -34,11 +64,49 @@ Callback = tuple[Callable[..., Any], tuple[Any, ...]]
 class Container(State):
     """Base of the states that run other states.
 
+    A container that is executed by user code is a root: it runs on a thread of its own while the
+    caller watches over it. One that a container of the engine executes joins that run.
+
     Args:
         outcomes: What the container may end with.
         input_keys: Keys copied from the parent's userdata on entry.
         output_keys: Keys copied to the parent's userdata on exit.
+
+    Attributes:
+        userdata: What the states inside share.
+        fsm_states: The states by label.
+        fsm_branches: The interrupts by label.
+        fsm_remappings: From the states' userdata keys to the container's, by label.
+        fsm_constants: Values of the states' input keys that come from no userdata, by label.
+        fsm_limits: The states' time limits and retries, by label.
+        fsm_transition_cbs: The registered callbacks, and likewise the others.
+        fsm_frame: The execution of the container, while there is one.
+        fsm_history: Where the next execution goes on, when the last one was put aside.
+        fsm_raised: Interrupts that have been raised and have not begun.
+        fsm_aside: The container was asked to be put aside in the moment before it began.
+        fsm_table: The nodes of states and interrupts by label, as they were last made.
     """
+
+    together = False
+    """Whether all states run at the same time."""
+
+    fsm_frame: Frame | None = None
+    fsm_history: History | None = None
+    fsm_raised: tuple[Branch, ...] = ()
+    fsm_aside = False
+    fsm_table: Mapping[str, Node] = {}
+    _table_made_for: tuple[int, dict[str, Any], Clock, str] | None = None
+    _control: Control | None = None
+    _preempt_timeout: float | None = DEFAULT_PREEMPT_TIMEOUT
+    fsm_of_execution: ClassVar[frozenset[str]] = State.fsm_of_execution | {
+        'fsm_frame',
+        'fsm_history',
+        'fsm_raised',
+        'fsm_aside',
+        'fsm_table',
+        '_table_made_for',
+        '_control',
+    }
 
     def __init__(
         self,
@@ -48,31 +116,26 @@ class Container(State):
     ) -> None:
         super().__init__(outcomes, input_keys, output_keys)
         self.userdata = UserData()
-        self._start_cbs: list[Callback] = []
-        self._transition_cbs: list[Callback] = []
-        self._termination_cbs: list[Callback] = []
-        self._fsm_path = type(self).__name__
+        self.fsm_states: dict[str, State] = {}
+        self.fsm_branches: dict[str, Branch] = {}
+        self.fsm_remappings: dict[str, Mapping[str, str]] = {}
+        self.fsm_constants: dict[str, Mapping[str, Any]] = {}
+        self.fsm_limits: dict[str, Limits] = {}
+        self.fsm_start_cbs: list[Callback] = []
+        self.fsm_transition_cbs: list[Callback] = []
+        self.fsm_termination_cbs: list[Callback] = []
+        self.fsm_path = type(self).__name__
 
     # What each kind of container defines.
-
-    def __getitem__(self, key: str) -> State:
-        """The child with label `key`."""
-        raise NotImplementedError
-
-    def get_children(self) -> dict[str, State]:
-        """The children by label."""
-        raise NotImplementedError
 
     def get_initial_states(self) -> list[str]:
         """Labels of the children a run begins with."""
         raise NotImplementedError
 
-    def set_initial_state(self, initial_states: Sequence[str], userdata: UserData) -> None:
+    def set_initial_state(
+        self, initial_states: Sequence[str], userdata: UserData | None = None
+    ) -> None:
         """Choose the children a run begins with, and add to the container's userdata."""
-        raise NotImplementedError
-
-    def get_active_states(self) -> list[str]:
-        """Labels of the children that are running."""
         raise NotImplementedError
 
     def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
@@ -83,39 +146,110 @@ class Container(State):
         """Raise `InvalidTransitionError` when the container cannot run."""
         raise NotImplementedError
 
+    def fsm_make_frame(self, thread: ExecutionThread, path: str, parent_ud: Any) -> Frame:
+        """Make the frame of an execution that is about to begin."""
+        raise NotImplementedError
+
+    # States by label.
+
+    def __getitem__(self, key: str) -> State:
+        try:
+            return self.fsm_states[key]
+        except KeyError:
+            raise KeyError(
+                f"'{self.fsm_path}' has no state '{key}': its states are {sorted(self.fsm_states)}"
+            ) from None
+
+    def get_children(self) -> dict[str, State]:
+        """The children by label."""
+        return dict(self.fsm_states)
+
+    def get_active_states(self) -> list[str]:
+        """Labels of the children that are running."""
+        frame = self.fsm_frame
+        return [] if frame is None else frame.active_labels()
+
     def is_running(self) -> bool:
         """Whether the container is executing."""
-        raise NotImplementedError
+        return self.fsm_frame is not None
+
+    # Settings.
+
+    @property
+    def control(self) -> Control:
+        """Pausing, stepping, forcing outcomes and watching transitions, while this is the root."""
+        control = self._control
+        if control is None:
+            with _entry_lock:
+                control = self._control = self._control or Control(self)
+        return control
+
+    @property
+    def preempt_timeout(self) -> float | None:
+        """Seconds (steady time) that a state may ignore a preempt while this is the root.
+
+        After that the run goes on as if the state had ended with ``preempted`` (or ``aborted``, if
+        it has only that), and the log names it. With None a state is waited for as long as it
+        takes, as SMACH does, and a root without time limits runs in the thread that executes it.
+        """
+        return self._preempt_timeout
+
+    @preempt_timeout.setter
+    def preempt_timeout(self, seconds: float | None) -> None:
+        if seconds is not None and not seconds > 0:
+            raise InvalidStateError(
+                f"'{self.fsm_path}': preempt_timeout is {seconds!r}, expected seconds above 0 or "
+                'None'
+            )
+        self._preempt_timeout = seconds
+
+    def set_clock(self, clock: Clock) -> None:
+        """Give a root the clock that `State.wait` and the states' time limits go by."""
+        self.fsm_clock = clock
+
+    def set_name(self, name: str) -> None:
+        """Name a root: paths begin with it.
+
+        Raises:
+            InvalidStateError: The name is no string, or empty.
+        """
+        if not isinstance(name, str) or not name:
+            raise InvalidStateError(f'Name {shown(name)} must be a string that is not empty')
+        self.fsm_path = name
+
+    def get_name(self) -> str:
+        """The path of the container: a root's name, or where a run found it."""
+        return self.fsm_path
 
     # Callbacks.
 
     def register_start_cb(self, start_cb: Callable[..., Any], cb_args: Iterable[Any] = ()) -> None:
         """Call ``start_cb(userdata, initial_states, *cb_args)`` on entry."""
-        self._start_cbs.append((start_cb, tuple(cb_args)))
+        self.fsm_start_cbs.append((start_cb, tuple(cb_args)))
 
     def register_transition_cb(
         self, transition_cb: Callable[..., Any], cb_args: Iterable[Any] = ()
     ) -> None:
         """Call ``transition_cb(userdata, active_states, *cb_args)`` on every transition inside."""
-        self._transition_cbs.append((transition_cb, tuple(cb_args)))
+        self.fsm_transition_cbs.append((transition_cb, tuple(cb_args)))
 
     def register_termination_cb(
         self, termination_cb: Callable[..., Any], cb_args: Iterable[Any] = ()
     ) -> None:
         """Call ``termination_cb(userdata, terminal_states, outcome, *cb_args)`` on exit."""
-        self._termination_cbs.append((termination_cb, tuple(cb_args)))
+        self.fsm_termination_cbs.append((termination_cb, tuple(cb_args)))
 
     def call_start_cbs(self) -> None:
         """Call the start callbacks; what they raise is logged."""
-        self._call(self._start_cbs, 'start', self.get_initial_states)
+        self._call(self.fsm_start_cbs, 'start', self.get_initial_states)
 
     def call_transition_cbs(self) -> None:
         """Call the transition callbacks; what they raise is logged."""
-        self._call(self._transition_cbs, 'transition', self.get_active_states)
+        self._call(self.fsm_transition_cbs, 'transition', self.get_active_states)
 
     def call_termination_cbs(self, terminal_states: Sequence[str], outcome: str | None) -> None:
         """Call the termination callbacks; what they raise is logged."""
-        self._call(self._termination_cbs, 'termination', lambda: list(terminal_states), outcome)
+        self._call(self.fsm_termination_cbs, 'termination', lambda: list(terminal_states), outcome)
 
     def _call(
         self,
@@ -129,29 +263,45 @@ class Container(State):
                 callback(self.userdata, states(), *further, *args)
             except Exception as error:
                 logerr(
-                    f"{kind.capitalize()} callback {callback!r} of '{self._fsm_path}' raised "
-                    f'{type(error).__name__}: {error}'
+                    f"{kind.capitalize()} callback {shown(callback)} of '{self.fsm_path}' raised "
+                    f'{describe(error)}'
                 )
 
     # Userdata in and out.
 
-    def _copy_input_keys(self, parent_ud: Any, ud: UserData) -> None:
-        if parent_ud is None:
+    def fsm_copy_input_keys(self, parent_ud: Any) -> None:
+        """Take the input keys over from the parent's userdata."""
+        if parent_ud is None or not self._input_keys:
             return
-        for key in self._input_keys:
-            try:
-                ud._data[key] = parent_ud[key]
-            except KeyError:
-                logwarn(f"'{self._fsm_path}' starts without its input key '{key}': nobody set it")
+        data = raw(self.userdata)
+        if isinstance(parent_ud, Remapper):
+            missing = parent_ud.fsm_copy_to(data, self._input_keys)
+        else:
+            missing = []
+            for key in self._input_keys:
+                try:
+                    data[key] = parent_ud[key]
+                except KeyError:
+                    missing.append(key)
+        for key in missing:
+            logwarn(f"'{self.fsm_path}' starts without its input key '{key}': nobody set it")
 
-    def _copy_output_keys(self, ud: UserData, parent_ud: Any) -> None:
-        if parent_ud is None:
+    def fsm_copy_output_keys(self, parent_ud: Any) -> None:
+        """Hand the output keys over to the parent's userdata."""
+        if parent_ud is None or not self._output_keys:
             return
-        for key in self._output_keys:
-            if key in ud._data:
-                parent_ud[key] = ud._data[key]
-            else:
-                logwarn(f"'{self._fsm_path}' ends without its output key '{key}': nobody set it")
+        data = raw(self.userdata)
+        if isinstance(parent_ud, Remapper):
+            missing = parent_ud.fsm_take_from(data, self._output_keys)
+        else:
+            missing = []
+            for key in self._output_keys:
+                if key in data:
+                    parent_ud[key] = data[key]
+                else:
+                    missing.append(key)
+        for key in missing:
+            logwarn(f"'{self.fsm_path}' ends without its output key '{key}': nobody set it")
 
     # Construction.
 
@@ -193,9 +343,7 @@ class Container(State):
     def close(self) -> None:
         """End construction and log what the container still lacks to be run."""
         if not self.is_opened():
-            raise InvalidStateError(
-                f"Cannot close '{self._fsm_path}': it is not the open container"
-            )
+            raise InvalidStateError(f"Cannot close '{self.fsm_path}': it is not the open container")
         self._leave_construction()
         try:
             self.check_consistency()
@@ -209,9 +357,7 @@ class Container(State):
     def assert_opened(self, msg: str = '') -> None:
         """Raise `InvalidConstructionError` unless the container is open."""
         if not self.is_opened():
-            raise InvalidConstructionError(
-                msg or f"'{self._fsm_path}' is not open for construction"
-            )
+            raise InvalidConstructionError(msg or f"'{self.fsm_path}' is not open for construction")
 
     def _leave_construction(self) -> None:
         # Everything opened inside and left open by an error goes with it.
@@ -230,7 +376,7 @@ class Container(State):
         container = _construction.stack[-1][0]
         if not isinstance(container, cls):
             raise InvalidConstructionError(
-                f"{cls.__name__}: the open container '{container._fsm_path}' is a "
+                f"{cls.__name__}: the open container '{container.fsm_path}' is a "
                 f'{type(container).__name__}'
             )
         return container
@@ -240,9 +386,345 @@ class Container(State):
         transitions: Mapping[str, str] = _construction.stack[-1][1].get('transitions', {})
         return transitions
 
+    def _check_new(self, label: str, state: State) -> None:
+        """Raise `InvalidStateError` when `state` cannot be added as `label`."""
+        if not isinstance(label, str) or not label or '/' in label:
+            raise InvalidStateError(
+                f"Label {shown(label)} in '{self.fsm_path}' must be a string that is not empty and "
+                'has no slash: it is a part of paths'
+            )
+        path = self.fsm_path_of(label)
+        if label in self.fsm_states or label in self.fsm_branches:
+            raise InvalidStateError(f"State '{path}' is already there: a label names one state")
+        if not has_smach_interface(state) or not callable(getattr(state, 'execute', None)):
+            raise InvalidStateError(
+                f"State '{path}' must be an instance of State, not {shown(state)}"
+            )
 
-def describe(error: BaseException) -> str:
-    """One line for an exception raised by user code."""
-    if isinstance(error, SmachError):
-        return str(error)
-    return f'{type(error).__name__}: {error}' if str(error) else type(error).__name__
+    def fsm_path_of(self, label: str) -> str:
+        """The path of the state with a label."""
+        return f'{self.fsm_path}/{label}'
+
+    # Nodes.
+
+    def fsm_view(self, node: Node) -> Remapper:
+        """Make a state's view of the container's userdata."""
+        branch = self.fsm_branches.get(node.label)
+        remapping = self.fsm_remappings.get(node.label) if branch is None else branch.remapping
+        return Remapper(
+            self.userdata,
+            node.state.get_registered_input_keys(),
+            node.state.get_registered_output_keys(),
+            remapping or (),
+            self.fsm_constants.get(node.label),
+            node,
+        )
+
+    def fsm_node(self, label: str, state: State, priority: float = LOWEST) -> Node:
+        """Make the node of one state; its targets are left to the container's kind."""
+        node = Node(self, label, state, priority)
+        clock = self.fsm_clock
+        if isinstance(state, State) and state.fsm_clock is not clock:
+            state.fsm_clock = clock
+        left = getattr(state, 'fsm_left', None)
+        if left is not None and left.is_going_on():
+            keep_out(node, left)
+        limits = node.limits = self.fsm_limits.get(label)
+        if limits is not None:
+            node.execute = limited(node, limits)
+        return node
+
+    def fsm_make_table(self) -> dict[str, Node]:
+        """Make the nodes of the states by label, and say where their outcomes lead."""
+        raise NotImplementedError
+
+    def fsm_current_table(self, path: str, clock: Clock) -> Mapping[str, Node]:
+        """The nodes of states and interrupts by label, made anew if anything has changed.
+
+        Args:
+            path: The path at which the container is executed.
+            clock: What waits go by.
+
+        Raises:
+            InvalidTransitionError: The container cannot run.
+        """
+        made_for = self._table_made_for
+        data = raw(self.userdata)
+        if (
+            made_for is None
+            or made_for[0] != structure_version.number
+            or made_for[1] is not data
+            or made_for[2] is not clock
+            or made_for[3] != path
+        ):
+            self.check_consistency()
+            self.fsm_path, self.fsm_clock = path, clock
+            # A registration that comes meanwhile must not be taken for one that came before.
+            version = structure_version.number
+            self.fsm_table = self._with_branches(self.fsm_make_table())
+            self._table_made_for = (version, data, clock, path)
+        return self.fsm_table
+
+    def _with_branches(self, table: dict[str, Node]) -> dict[str, Node]:
+        """Add the nodes of interrupts to those of states."""
+        states = dict(table) if self.fsm_branches else table
+        for branch in self.fsm_branches.values():
+            node = table[branch.label] = self.fsm_node(branch.label, branch.state, branch.priority)
+            for outcome in branch.state.get_registered_outcomes():
+                name = branch.transitions.get(outcome, RESUME)
+                if name == RESUME:
+                    node.targets[outcome] = RESUMPTION
+                else:
+                    node.targets[outcome] = states.get(name) or Exit(name)
+        return table
+
+    def has_limits(self) -> bool:
+        """Whether a state inside has limits that somebody must watch."""
+        return bool(self.fsm_limits) or any(
+            isinstance(state, Container) and state.has_limits()
+            for state in (
+                *self.fsm_states.values(),
+                *(branch.state for branch in self.fsm_branches.values()),
+            )
+        )
+
+    # Running.
+
+    def execute(self, parent_ud: Any = None) -> Any:
+        """Run to an outcome.
+
+        Args:
+            parent_ud: Userdata that input keys come from and output keys go to.
+
+        Returns:
+            The outcome; None when the shutdown check ended the run.
+
+        Raises:
+            InvalidTransitionError: The container cannot run, or a state returned an outcome that
+                it does not have.
+            InvalidUserCodeError: A state raised an exception, or broke the userdata contract.
+            InvalidStateError: The container is running already.
+            PreemptIgnoredError: A state ignored a preempt, and no outcome was there to end with.
+        """
+        here = this_thread
+        thread: ExecutionThread | None = here.thread
+        if thread is not None and thread.executes_next(self, here.stack):
+            return self._enter(thread, here.stack, parent_ud)
+        return self._execute_as_root(parent_ud)
+
+    def _execute_as_root(self, parent_ud: Any) -> Any:
+        """Begin a run of its own, and watch it to its end."""
+        control, wakeup = self.control, Interrupt()
+        run = Run(control.condition, self.fsm_clock, self._preempt_timeout, control.trace)
+        thread = ExecutionThread(run, self.fsm_path, wakeup, self)
+
+        def body() -> Any:
+            return self._enter(thread, this_thread.stack, parent_ud)
+
+        control.begin(run)
+        try:
+            if self._preempt_timeout is None and not self.has_limits():
+                return thread.run_here(body)
+            thread.start(body)
+            try:
+                while not thread.done:
+                    supervise(run, [thread], wakeup)
+            except BaseException:
+                # An interrupt from the keyboard, as a rule: stop what runs before passing it on.
+                self.request_preempt()
+                while not thread.done:
+                    supervise(run, [thread], wakeup)
+                raise
+        finally:
+            control.end(run)
+        if thread.error is not None:
+            raise thread.error
+        return thread.outcome
+
+    def _enter(self, thread: ExecutionThread, stack: list[Frame], parent_ud: Any) -> Any:
+        """Run as part of a thread of execution."""
+        if stack:
+            path = stack[-1].current.path  # type: ignore[union-attr]
+        else:
+            path = thread.path
+        frame = self.fsm_make_frame(thread, path, parent_ud)
+        with _entry_lock:
+            if self.fsm_frame is not None:
+                raise InvalidStateError(f"'{self.fsm_path}' is running already")
+            self.fsm_frame = frame
+        # Whoever takes the thread over gives it another stack, and afterwards looks at this one.
+        stack.append(frame)
+        try:
+            if stack is not thread.stack:
+                raise LeftBehind
+            history, self.fsm_history = self.fsm_history, None
+            if self.fsm_aside:
+                with thread.run.condition:
+                    frame.suspending = frame.suspending or self.fsm_aside
+                    self.fsm_aside = False
+            return frame.execute(history)
+        finally:
+            if stack and stack[-1] is frame:
+                stack.pop()
+            if self.fsm_frame is frame:
+                self.fsm_frame = None
+
+    def request_preempt(self) -> None:
+        """Ask the container to stop: the request reaches what runs inside at once."""
+        super().request_preempt()
+        frame = self.fsm_frame
+        if frame is None:
+            return
+        with frame.run.condition:
+            frame = self.fsm_frame
+            if frame is not None:
+                frame.preempt()
+
+    # Interrupts.
+
+    def add_interrupt(
+        self,
+        label: str,
+        state: State,
+        priority: float = 0,
+        transitions: Mapping[str, str] | None = None,
+        remapping: Mapping[str, str] | None = None,
+    ) -> State:
+        """Declare an interrupt: a state that `raise_interrupt` runs in place of all else inside.
+
+        What runs is asked to stop and keeps its history: nested containers the state they were in,
+        states their `State.progress`. After the interrupt's state the container goes on there,
+        unless the outcome leads elsewhere.
+
+        Args:
+            label: The interrupt's name, among those of the states.
+            state: What runs.
+            priority: An interrupt cuts short states and interrupts of lower priority.
+            transitions: From outcomes to `RESUME`, to labels of the container's states, or to its
+                outcomes. Outcomes that are not bound lead to `RESUME`, but ``preempted`` to the
+                container's outcome of that name if it has one.
+            remapping: From the state's userdata keys to the container's.
+
+        Raises:
+            InvalidStateError: The label is taken.
+            InvalidTransitionError: `transitions` binds an outcome the state does not have.
+        """
+        self._check_new(label, state)
+        path = self.fsm_path_of(label)
+        bound = dict(transitions or {})
+        for outcome in bound:
+            if outcome not in state.get_registered_outcomes():
+                raise InvalidTransitionError(
+                    f"Interrupt '{path}' has no outcome '{outcome}' to bind: its outcomes are "
+                    f'{sorted(state.get_registered_outcomes())}'
+                )
+        for outcome in state.get_registered_outcomes():
+            ends = outcome == 'preempted' and outcome in self._outcomes
+            bound.setdefault(outcome, outcome if ends else RESUME)
+        self.fsm_branches[label] = Branch(label, state, priority, bound, dict(remapping or {}))
+        structure_version.changed()
+        return state
+
+    def raise_interrupt(self, label: str) -> None:
+        """Run an interrupt as soon as what runs makes way; from any thread.
+
+        Raised while the container does not run, it is the first thing that runs. Raised again
+        before it began, it runs once.
+
+        Raises:
+            InvalidStateError: There is no such interrupt.
+        """
+        branch = self.fsm_branches.get(label)
+        if branch is None:
+            raise InvalidStateError(
+                f"'{self.fsm_path}' has no interrupt '{label}': its interrupts are "
+                f'{sorted(self.fsm_branches)}'
+            )
+        self.fsm_raise(branch)
+        # A run that begins from here on finds it by itself.
+        frame = self.fsm_frame
+        if frame is not None:
+            with frame.run.condition:
+                frame = self.fsm_frame
+                if frame is not None:
+                    frame.interrupted()
+
+    def withdraw_interrupt(self, label: str) -> bool:
+        """Take back an interrupt that has not begun; tells whether there was one."""
+        with _raise_lock:
+            left = tuple(branch for branch in self.fsm_raised if branch.label != label)
+            there, self.fsm_raised = len(left) < len(self.fsm_raised), left
+        return there
+
+    def fsm_raise(self, branch: Branch) -> None:
+        """Note an interrupt as raised, once."""
+        with _raise_lock:
+            if branch not in self.fsm_raised:
+                self.fsm_raised = (*self.fsm_raised, branch)
+
+    def fsm_take_raised(self, above: float = LOWEST) -> Branch | None:
+        """Take the most urgent raised interrupt, if it is more urgent than `above`."""
+        with _raise_lock:
+            if not self.fsm_raised:
+                return None
+            urgent = max(self.fsm_raised, key=lambda branch: branch.priority)
+            if urgent.priority <= above:
+                return None
+            self.fsm_raised = tuple(each for each in self.fsm_raised if each is not urgent)
+            return urgent
+
+    def fsm_urgent(self, priority: float) -> bool:
+        """Whether an interrupt was raised that is more urgent than `priority`."""
+        return any(branch.priority > priority for branch in self.fsm_raised)
+
+    def fsm_suspend(self) -> None:
+        """Have the container put aside with its history; under the run's condition."""
+        # Noted first: an execution that begins in this moment looks after it has become visible.
+        self.fsm_aside = True
+        frame = self.fsm_frame
+        if frame is not None:
+            self.fsm_aside = False
+            frame.suspend()
+
+    def _branch_faults(self) -> list[str]:
+        names = {*self.fsm_states, *self.get_registered_outcomes(), RESUME}
+        return [
+            f"outcome '{outcome}' of interrupt '{branch.label}' leads to '{target}', which is "
+            f"neither a state, nor an outcome, nor '{RESUME}'"
+            for branch in self.fsm_branches.values()
+            for outcome, target in branch.transitions.items()
+            if target not in names
+        ]
+
+
+def stop_for_now(state: State) -> None:
+    """Ask a state to make way: a container keeps its history, any other state is preempted."""
+    if isinstance(state, Container):
+        state.fsm_suspend()
+    else:
+        state.request_preempt()
+
+
+def let_go(state: State) -> None:
+    """Take `stop_for_now` back from a state that had not begun."""
+    if isinstance(state, Container):
+        state.fsm_aside = False
+    else:
+        state.recall_preempt()
+
+
+def forget(state: State) -> None:
+    """Drop the history of a state that will not be resumed."""
+    forget_progress(state)
+    if isinstance(state, Container):
+        state.fsm_history = None
+        for child in state.fsm_states.values():
+            forget(child)
+        for branch in state.fsm_branches.values():
+            forget(branch.state)
+
+
+def forget_progress(state: State) -> None:
+    """Drop how far a state has come."""
+    if getattr(state, 'fsm_progress', None) is not None:
+        state.fsm_progress = None

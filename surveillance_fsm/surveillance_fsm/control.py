@@ -1,17 +1,43 @@
-"""Watching and steering a root from outside: transitions, pausing, stepping, forced outcomes."""
+"""Watching and steering a root from outside: transitions, pausing, stepping, forced outcomes.
+
+And the shutdown check: a machine asks it between two states, and ends with None when it is true.
+"""
 
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any
 
-from surveillance_fsm.engine import Frame, Node, RawTransition, Trace
-from surveillance_fsm.exceptions import InvalidStateError, InvalidTransitionError
+from surveillance_fsm.exceptions import InvalidStateError, InvalidTransitionError, describe
+from surveillance_fsm.execution import (
+    ExecutionThread,
+    Frame,
+    Node,
+    RawTransition,
+    Run,
+    Trace,
+    Work,
+)
+from surveillance_fsm.log import logerr
 
-if TYPE_CHECKING:
-    from surveillance_fsm.run import Run, Strand
+shutdown_check: Callable[[], bool] | None = None
+"""What was set with `set_shutdown_check`."""
+
+
+def is_shutdown() -> bool:
+    """Whether the check set with `set_shutdown_check` says that the program is shutting down."""
+    return shutdown_check is not None and bool(shutdown_check())
+
+
+def set_shutdown_check(cb: Callable[[], bool] | None) -> None:
+    """Set the function that tells of a shutdown, for example ``lambda: not rclpy.ok()``.
+
+    Args:
+        cb: Called between any two states; None takes the check away.
+    """
+    global shutdown_check
+    shutdown_check = cb
 
 
 class Control:
@@ -28,7 +54,7 @@ class Control:
         self._paused = False
         self._traces: list[Trace] = []
         self._trace: Trace | None = None
-        self._left: list[tuple[str, threading.Thread]] = []
+        self._left: list[tuple[str, Work]] = []
 
     @property
     def trace(self) -> Trace | None:
@@ -39,7 +65,8 @@ class Control:
         """Report every transition to `trace`, in the thread that makes it.
 
         Args:
-            trace: Takes each transition as the loop notes it; `engine.unfold` says it in full.
+            trace: Takes each transition as the loop notes it; `history.unfold` says it in full.
+                What it raises is logged.
 
         Returns:
             A function that ends the reports.
@@ -61,7 +88,10 @@ class Control:
 
         def tell_all(raw: RawTransition) -> None:
             for trace in traces:
-                trace(raw)
+                try:
+                    trace(raw)
+                except Exception as error:
+                    logerr(f'Trace {trace!r} raised {describe(error)}')
 
         self._trace = None if not traces else traces[0] if len(traces) == 1 else tell_all
         if self._run is not None:
@@ -99,7 +129,7 @@ class Control:
             run = self._run
             if run is None or not run.paused:
                 raise InvalidStateError(
-                    f"'{self._container._fsm_path}' cannot step: it is not "
+                    f"'{self._container.get_name()}' cannot step: it is not "
                     f'{"running" if run is None else "paused"}'
                 )
             run.steps += 1
@@ -139,7 +169,7 @@ class Control:
                 )
             place.forced = (node, outcome)
             if isinstance(place, Frame):
-                place.strand.asked()
+                place.thread.asked()
             else:
                 place.wanted = True
                 place.asked()
@@ -151,13 +181,13 @@ class Control:
         with self.condition:
             return list(self._active())
 
-    def _active(self) -> dict[str, tuple[Frame | Strand, Node]]:
+    def _active(self) -> dict[str, tuple[Frame | ExecutionThread, Node]]:
         """The active states by path: where an outcome is forced, and their nodes."""
-        active: dict[str, tuple[Frame | Strand, Node]] = {}
-        for strand in self._run.strands if self._run is not None else ():
-            if strand.leaf is not None:
-                active[strand.path] = strand, strand.leaf
-            for frame in strand.stack:
+        active: dict[str, tuple[Frame | ExecutionThread, Node]] = {}
+        for thread in self._run.threads if self._run is not None else ():
+            if thread.leaf is not None:
+                active[thread.path] = thread, thread.leaf
+            for frame in tuple(thread.stack):
                 if isinstance(frame.current, Node):
                     active[f'{frame.path}/{frame.current.label}'] = frame, frame.current
         return active
@@ -167,21 +197,24 @@ class Control:
         with self.condition:
             run = self._run
             left = run.left_behind if run is not None else self._left
-            return [path for path, thread in left if thread.is_alive()]
+            return [path for path, work in left if work.is_going_on()]
 
-    @contextmanager
-    def begun(self, run: Run) -> Iterator[None]:
-        """Have `run` controlled while it lasts."""
+    def begin(self, run: Run) -> None:
+        """Have `run` controlled until `end`.
+
+        Raises:
+            InvalidStateError: Another run has not ended.
+        """
         with self.condition:
             if self._run is not None:
-                raise InvalidStateError(f"'{self._container._fsm_path}' is running already")
+                raise InvalidStateError(f"'{self._container.get_name()}' is running already")
             run.paused = self._paused
             run.trace = self._trace
             self._run = run
-        try:
-            yield
-        finally:
-            with self.condition:
-                self._left = run.left_behind
-                self._run = None
-                self.condition.notify_all()
+
+    def end(self, run: Run) -> None:
+        """Let go of a run that has ended."""
+        with self.condition:
+            self._left = run.left_behind
+            self._run = None
+            self.condition.notify_all()

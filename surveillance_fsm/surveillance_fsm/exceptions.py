@@ -45,3 +45,22 @@ class MissingKeyError(InvalidUserCodeError, KeyError):
 
 class PreemptIgnoredError(SmachError):
     """A state ignored a preempt beyond its bound and no outcome was there to go on with."""
+
+
+def describe(error: BaseException) -> str:
+    """Return one line for an exception raised by user code."""
+    try:
+        text = str(error)
+    except Exception as broken:
+        text = f'its message cannot be shown ({type(broken).__name__})'
+    if isinstance(error, SmachError):
+        return text
+    return f'{type(error).__name__}: {text}' if text else type(error).__name__
+
+
+def shown(value: object) -> str:
+    """A value as an error message shows it, whatever its own ``__repr__`` does."""
+    try:
+        return repr(value)
+    except Exception:
+        return f'<{type(value).__name__} that cannot be shown>'

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable
 
 from surveillance_fsm.container import Container
-from surveillance_fsm.engine import RESUME
+from surveillance_fsm.execution import RESUME
 from surveillance_fsm.structure import Edge, Structure, structure_of
 
 
@@ -19,7 +19,7 @@ def to_mermaid(container: Container) -> str:
 
 
 def _mermaid(structure: Structure, lines: list[str], indent: str) -> None:
-    for label in structure.all_states():
+    for label in structure.members:
         name = _id(f'{structure.path}/{label}')
         inner = structure.inner.get(label)
         if inner is None:
@@ -74,7 +74,7 @@ def _graphviz(structure: Structure, lines: list[str], indent: str) -> None:
         name = _quoted(f'{structure.path}:{outcome}')
         look = 'shape=oval, style=filled, fillcolor=lightgrey'
         lines.append(f'{inside}{name} [label={_quoted(outcome)}, {look}];')
-    for label in structure.all_states():
+    for label in structure.members:
         inner = structure.inner.get(label)
         if inner is not None:
             _graphviz(inner, lines, inside)
@@ -104,7 +104,7 @@ def _entry(structure: Structure, label: str) -> tuple[str, str]:
     inner = structure.inner.get(label)
     if inner is None:
         return path, ''
-    first = (inner.initial or sorted(inner.all_states()) or [''])[0]
+    first = (inner.initial or sorted(inner.members) or [''])[0]
     return (_entry(inner, first)[0] if first else path), f'cluster_{path}'
 
 
@@ -123,7 +123,7 @@ def to_ascii(container: Container, active: Iterable[str] | None = None) -> str:
 
 
 def _ascii(structure: Structure, marked: set[str], lines: list[str], indent: str) -> None:
-    labels = list(structure.all_states())
+    labels = list(structure.members)
     for label in labels:
         path = f'{structure.path}/{label}'
         last = label == labels[-1]

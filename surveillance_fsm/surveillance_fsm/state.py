@@ -1,4 +1,8 @@
-"""The state: outcomes, userdata keys, an ``execute`` method, and a preempt it can wait on."""
+"""The state: outcomes, userdata keys, an ``execute`` method, and a preempt it can wait on.
+
+Attributes whose names begin with ``fsm_`` belong to the engine's own modules; a state's code has no
+need of them.
+"""
 
 from __future__ import annotations
 
@@ -6,13 +10,123 @@ import threading
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, ClassVar
 
-from surveillance_fsm.interface import has_smach_interface
-from surveillance_fsm.this_thread import this_thread
-from surveillance_fsm.waiting import WALL_CLOCK, Clock, Interrupt
+from surveillance_fsm.clock import WALL_CLOCK, Clock, Interrupt, elapsed_of
+from surveillance_fsm.exceptions import InvalidStateError, shown
 
 # Guards the preempt flags of all states: it is held for a few instructions, on preempts and waits
 # only, and never while user code runs.
 _preempt_lock = threading.Lock()
+
+_shared_names: dict[frozenset[str], frozenset[str]] = {}
+
+
+class StructureVersion:
+    """Counts the changes to states and containers after which tables must be made anew."""
+
+    def __init__(self) -> None:
+        self.number = 0
+
+    def changed(self) -> None:
+        """Have every container make its table anew before its next execution."""
+        self.number += 1
+
+
+structure_version = StructureVersion()
+
+
+class _ThisThread(threading.local):
+    """What the current thread executes for a machine: the logical thread, and its frames.
+
+    The list of frames says which of a logical thread's successive threads this one is: whoever
+    takes an execution over gives it another list.
+    """
+
+    thread: Any = None
+    stack: Any = None
+
+
+this_thread = _ThisThread()
+
+
+def names(what: str, given: Iterable[str]) -> frozenset[str]:
+    """Check names of outcomes or keys; equal sets of names are one object.
+
+    Raises:
+        InvalidStateError: One string stands where a list of them is expected, or a name is none.
+    """
+    if isinstance(given, str):
+        raise InvalidStateError(f'{what} is the string {given!r}: expected a list of strings')
+    try:
+        found = frozenset(given)
+    except TypeError:
+        raise InvalidStateError(f'{what} is {shown(given)}: expected a list of strings') from None
+    for name in found:
+        if not isinstance(name, str):
+            raise InvalidStateError(f'{what} has {shown(name)}: expected strings')
+    return _shared_names.setdefault(found, found)
+
+
+def has_smach_interface(obj: object) -> bool:
+    """Whether `obj` tells its outcomes and userdata keys the way a state does."""
+    return (
+        hasattr(obj, 'get_registered_input_keys')
+        and hasattr(obj, 'get_registered_output_keys')
+        and hasattr(obj, 'get_registered_outcomes')
+    )
+
+
+class CBInterface:
+    """A callable together with the outcomes and userdata keys it adds to a state."""
+
+    def __init__(
+        self,
+        cb: Callable[..., Any],
+        outcomes: Iterable[str] | None = None,
+        input_keys: Iterable[str] | None = None,
+        output_keys: Iterable[str] | None = None,
+        io_keys: Iterable[str] | None = None,
+    ) -> None:
+        both = names('io_keys', io_keys or ())
+        self._cb = cb
+        self._outcomes = names('outcomes', outcomes or ())
+        self._input_keys = names('input_keys', input_keys or ()) | both
+        self._output_keys = names('output_keys', output_keys or ()) | both
+
+    @property
+    def function(self) -> Callable[..., Any]:
+        """The callable itself."""
+        return self._cb
+
+    def __call__(self, *args: Any, **kwargs: Any) -> Any:
+        return self._cb(*args, **kwargs)
+
+    def get_registered_input_keys(self) -> tuple[str, ...]:
+        """The userdata keys the callback reads."""
+        return tuple(self._input_keys)
+
+    def get_registered_output_keys(self) -> tuple[str, ...]:
+        """The userdata keys the callback writes."""
+        return tuple(self._output_keys)
+
+    def get_registered_outcomes(self) -> tuple[str, ...]:
+        """The outcomes the callback may return."""
+        return tuple(self._outcomes)
+
+
+class cb_interface:  # noqa: N801 - SMACH's name
+    """Decorator that gives a function a `CBInterface`."""
+
+    def __init__(
+        self,
+        outcomes: Iterable[str] | None = None,
+        input_keys: Iterable[str] | None = None,
+        output_keys: Iterable[str] | None = None,
+        io_keys: Iterable[str] | None = None,
+    ) -> None:
+        self._declared = (outcomes, input_keys, output_keys, io_keys)
+
+    def __call__(self, cb: Callable[..., Any]) -> CBInterface:
+        return CBInterface(cb, *self._declared)
 
 
 class State:
@@ -22,22 +136,40 @@ class State:
     container holds it to both. A state that takes its time looks at `preempt_requested` or, better,
     sleeps with `wait`, which a preempt ends at once.
 
+    A state may be copied and pickled. The copy begins anew: it is on the wall clock, nothing is
+    asked of it, and it has come nowhere yet.
+
     Args:
         outcomes: What `execute` may return.
         input_keys: Userdata keys that are read.
         output_keys: Userdata keys that are written.
         io_keys: Userdata keys that are both.
+
+    Raises:
+        InvalidStateError: Outcomes or keys are not lists of strings.
     """
 
-    # Class attributes, so that a subclass that never calls this constructor again still works
-    # after copying, and so that the names stay out of the subclass's way.
+    # Class attributes, so that a state costs no memory for what it does not use, and so that a
+    # subclass works that never calls this constructor.
+    _outcomes: frozenset[str] = frozenset()
+    _input_keys: frozenset[str] = frozenset()
+    _output_keys: frozenset[str] = frozenset()
     _preempt_requested: bool = False
-    _fsm_interrupt: Interrupt | None = None
-    _fsm_clock: Clock = WALL_CLOCK
-    _fsm_progress: dict[str, Any] | None = None
-    _fsm_waiting: tuple[str, float] | None = None
-    _fsm_left: threading.Event | None = None
-    _fsm_registrations: ClassVar[list[int]] = [0]
+    fsm_clock: Clock = WALL_CLOCK
+    fsm_interrupt: Interrupt | None = None
+    fsm_progress: dict[str, Any] | None = None
+    fsm_waiting: tuple[str, float] | None = None
+    fsm_left: Any = None
+    fsm_of_execution: ClassVar[frozenset[str]] = frozenset(
+        {
+            '_preempt_requested',
+            'fsm_clock',
+            'fsm_interrupt',
+            'fsm_progress',
+            'fsm_waiting',
+            'fsm_left',
+        }
+    )
 
     def __init__(
         self,
@@ -46,11 +178,22 @@ class State:
         output_keys: Iterable[str] = (),
         io_keys: Iterable[str] = (),
     ) -> None:
-        both = tuple(io_keys)
-        self._outcomes: set[str] = set(outcomes)
-        self._input_keys: set[str] = {*input_keys, *both}
-        self._output_keys: set[str] = {*output_keys, *both}
-        self._preempt_requested = False
+        both = names('io_keys', io_keys)
+        self._outcomes = names('outcomes', outcomes)
+        self._input_keys = names('input_keys', both.union(names('input_keys', input_keys)))
+        self._output_keys = names('output_keys', both.union(names('output_keys', output_keys)))
+
+    def __getstate__(self) -> Any:
+        """What a copy takes over: all but what belongs to an execution."""
+        whole: Any = super().__getstate__()
+        if isinstance(whole, tuple):
+            attributes, slots = whole
+            return self._without_execution(attributes or {}), slots
+        return self._without_execution(whole or {})
+
+    def _without_execution(self, attributes: dict[str, Any]) -> dict[str, Any]:
+        dropped = self.fsm_of_execution
+        return {name: value for name, value in attributes.items() if name not in dropped}
 
     def execute(self, ud: Any) -> str | None:
         """Do the state's work; called on entry.
@@ -65,8 +208,8 @@ class State:
 
     def register_outcomes(self, new_outcomes: Iterable[str]) -> None:
         """Add outcomes."""
-        self._outcomes = self._outcomes.union(new_outcomes)
-        self._fsm_registrations[0] += 1
+        self._outcomes = names('outcomes', self._outcomes.union(names('outcomes', new_outcomes)))
+        structure_version.changed()
 
     def get_registered_outcomes(self) -> tuple[str, ...]:
         """The outcomes the state may return."""
@@ -74,15 +217,14 @@ class State:
 
     def register_io_keys(self, keys: Iterable[str]) -> None:
         """Add keys that are read and written."""
-        keys = tuple(keys)
-        self._input_keys = self._input_keys.union(keys)
-        self._output_keys = self._output_keys.union(keys)
-        self._fsm_registrations[0] += 1
+        keys = names('keys', keys)
+        self.register_input_keys(keys)
+        self.register_output_keys(keys)
 
     def register_input_keys(self, keys: Iterable[str]) -> None:
         """Add keys that are read."""
-        self._input_keys = self._input_keys.union(keys)
-        self._fsm_registrations[0] += 1
+        self._input_keys = names('keys', self._input_keys.union(names('keys', keys)))
+        structure_version.changed()
 
     def get_registered_input_keys(self) -> tuple[str, ...]:
         """The userdata keys the state reads."""
@@ -90,8 +232,8 @@ class State:
 
     def register_output_keys(self, keys: Iterable[str]) -> None:
         """Add keys that are written."""
-        self._output_keys = self._output_keys.union(keys)
-        self._fsm_registrations[0] += 1
+        self._output_keys = names('keys', self._output_keys.union(names('keys', keys)))
+        structure_version.changed()
 
     def get_registered_output_keys(self) -> tuple[str, ...]:
         """The userdata keys the state writes."""
@@ -101,7 +243,7 @@ class State:
         """Ask the state to stop; a `wait` under way, or the next one, ends at once."""
         with _preempt_lock:
             self._preempt_requested = True
-            interrupt = self._fsm_interrupt
+            interrupt = self.fsm_interrupt
         if interrupt is not None:
             interrupt.set()
 
@@ -132,33 +274,36 @@ class State:
         Returns:
             True when the full time passed, False when a preempt ended the wait.
         """
-        clock = self._fsm_clock
+        clock = self.fsm_clock
+        elapsed = elapsed_of(clock)
         before = self.progress.get(progress, 0.0) if progress is not None else 0.0
-        start = clock.now() - before
+        start = elapsed() - before
         if progress is not None:
-            self._fsm_waiting = (progress, start)
+            self.fsm_waiting = (progress, start)
         while True:
             interrupt = self._armed_interrupt()
-            finished = clock.sleep(max(0.0, start + seconds - clock.now()), interrupt)
+            finished = clock.sleep(max(0.0, start + seconds - elapsed()), interrupt)
             # A preempt that was serviced meanwhile may wake a wait it was not meant for.
             if finished or self._preempt_requested:
                 break
         if progress is not None:
-            self._fsm_waiting = None
-            self.progress[progress] = seconds if finished else clock.now() - start
+            self.fsm_waiting = None
+            self.progress[progress] = seconds if finished else elapsed() - start
         return finished
 
     @property
     def progress(self) -> dict[str, Any]:
         """How far the state has come: kept while an interrupt cuts it short, and in checkpoints.
 
-        A state that can go on where it was writes JSON values here and looks at them when it is
+        A state that can go on where it was writes values here and looks at them when it is
         executed. Any other end of the state empties it.
         """
-        if self._fsm_progress is None:
-            self._fsm_progress = {}
-            note_progress()
-        return self._fsm_progress
+        if self.fsm_progress is None:
+            self.fsm_progress = {}
+            # The loop that executes the state looks at it when it ends.
+            if this_thread.stack:
+                this_thread.stack[-1].attention = True
+        return self.fsm_progress
 
     @property
     def interrupt(self) -> Interrupt:
@@ -167,9 +312,9 @@ class State:
 
     def _armed_interrupt(self) -> Interrupt:
         with _preempt_lock:
-            interrupt = self._fsm_interrupt
+            interrupt = self.fsm_interrupt
             if interrupt is None:
-                interrupt = self._fsm_interrupt = Interrupt()
+                interrupt = self.fsm_interrupt = Interrupt()
             # The flag alone decides: code written for SMACH clears it by assignment.
             if not self._preempt_requested:
                 interrupt.clear()
@@ -181,15 +326,8 @@ class State:
     def _drop_preempt(self) -> None:
         with _preempt_lock:
             self._preempt_requested = False
-            if self._fsm_interrupt is not None:
-                self._fsm_interrupt.clear()
-
-
-def note_progress() -> None:
-    """Have the loop look at the state that executes here when it ends: it has progress."""
-    strand = this_thread.strand
-    if strand is not None and strand.stack:
-        strand.stack[-1].attention = True
+            if self.fsm_interrupt is not None:
+                self.fsm_interrupt.clear()
 
 
 class CBState(State):
@@ -225,6 +363,11 @@ class CBState(State):
             self.register_input_keys(declared.get_registered_input_keys())
             self.register_output_keys(declared.get_registered_output_keys())
             self.register_outcomes(declared.get_registered_outcomes())
+
+    @property
+    def function(self) -> Callable[..., Any]:
+        """The function itself, out of its `CBInterface` if it has one."""
+        return self._cb.function if isinstance(self._cb, CBInterface) else self._cb
 
     def execute(self, ud: Any) -> str | None:
         """Call the function."""

@@ -1,19 +1,37 @@
-"""The finite state machine: a container in which one state runs at a time."""
+"""The containers that run one state at a time: state machine, sequence, iterator.
+
+They differ in how states lead to each other; how they run is the matter of `sequential`.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Sequence as Labels
 from typing import Any
 
-from surveillance_fsm.driven import DrivenContainer
-from surveillance_fsm.engine import Exit, Node
-from surveillance_fsm.exceptions import InvalidStateError, InvalidTransitionError
-from surveillance_fsm.limits import TIMEOUT, Limits, make_limits
-from surveillance_fsm.state import State
-from surveillance_fsm.user_data import UserData
+from surveillance_fsm.container import Container
+from surveillance_fsm.exceptions import (
+    InvalidStateError,
+    InvalidTransitionError,
+    InvalidUserCodeError,
+    describe,
+)
+from surveillance_fsm.execution import (
+    SUSPENDED,
+    ExecutionThread,
+    Exit,
+    Node,
+)
+from surveillance_fsm.log import logwarn
+from surveillance_fsm.sequential import SequentialFrame
+from surveillance_fsm.state import State, structure_version
+from surveillance_fsm.timeouts import TIMEOUT, make_limits
+from surveillance_fsm.userdata import UserData, raw
+
+Items = Iterable[Any] | Callable[[], Iterable[Any]]
 
 
-class StateMachine(DrivenContainer):
+class StateMachine(Container):
     """A finite state machine.
 
     States are added inside ``with machine:`` by `add`. A transition leads from an outcome to the
@@ -36,13 +54,10 @@ class StateMachine(DrivenContainer):
         output_keys: Iterable[str] = (),
     ) -> None:
         super().__init__(outcomes, input_keys, output_keys)
-        self._transitions: dict[str, dict[str, str | None]] = {}
-        self._remappings: dict[str, dict[str, str]] = {}
-        self._constants: dict[str, dict[str, Any]] = {}
+        self._transitions: dict[str, Mapping[str, str | None]] = {}
         self._initial_state_label: str | None = None
         self._last_added_label: str | None = None
         self._connector_outcomes: list[str] = []
-        self._limits: dict[str, Limits] = {}
 
     # Construction.
 
@@ -85,8 +100,17 @@ class StateMachine(DrivenContainer):
             InvalidTransitionError: `transitions` binds an outcome the state does not have.
         """
         machine = StateMachine._currently_opened_container()
-        limits = (timeout, deadline, retry, tuple(retry_on))
-        return machine._add(label, state, transitions, remapping, constants, limits)
+        return machine.add_state(
+            label,
+            state,
+            transitions,
+            remapping,
+            constants,
+            timeout=timeout,
+            deadline=deadline,
+            retry=retry,
+            retry_on=retry_on,
+        )
 
     @staticmethod
     def add_auto(
@@ -102,51 +126,80 @@ class StateMachine(DrivenContainer):
         `transitions` that bind one of them have precedence. For the rest see `add`.
         """
         machine = StateMachine._currently_opened_container()
+        return machine.add_connected(
+            label, state, connector_outcomes, transitions, remapping, limits
+        )
+
+    def add_connected(
+        self,
+        label: str,
+        state: State,
+        connector_outcomes: Iterable[str],
+        transitions: Mapping[str, str | None] | None,
+        remapping: Mapping[str, str] | None,
+        limits: Mapping[str, Any],
+    ) -> State:
+        """Add a state that goes on to the next one, to a machine at hand; see `add_auto`."""
         connectors = list(connector_outcomes)
         unknown = [name for name in connectors if name not in state.get_registered_outcomes()]
         if unknown:
             raise InvalidStateError(
-                f"State '{machine._path_of(label)}' cannot be connected by {unknown}: its outcomes "
+                f"State '{self.fsm_path_of(label)}' cannot be connected by {unknown}: its outcomes "
                 f'are {sorted(state.get_registered_outcomes())}'
             )
-        StateMachine.add(label, state, transitions, remapping, **limits)
-        machine._last_added_label = label
-        machine._connector_outcomes = connectors
+        self.add_state(label, state, transitions, remapping, **limits)
+        self._last_added_label = label
+        self._connector_outcomes = connectors
         return state
 
-    def _add(
+    def add_state(
         self,
         label: str,
         state: State,
-        transitions: Mapping[str, str | None] | None,
-        remapping: Mapping[str, str] | None,
-        constants: Mapping[str, Any] | None,
-        limits: tuple[float | None, float | None, int, tuple[str, ...]],
+        transitions: Mapping[str, str | None] | None = None,
+        remapping: Mapping[str, str] | None = None,
+        constants: Mapping[str, Any] | None = None,
+        *,
+        timeout: float | None = None,
+        deadline: float | None = None,
+        retry: int = 0,
+        retry_on: Iterable[str] = ('aborted',),
     ) -> State:
+        """Add a state to a machine at hand, open or not; for the arguments see `add`."""
         self._check_new(label, state)
         bound = dict(transitions or {})
-        made = make_limits(self._path_of(label), state, bound, *limits)
-        declared = {k: v for k, v in bound.items() if made is None or k != TIMEOUT}
+        limits = make_limits(
+            self.fsm_path_of(label), state, bound, timeout, deadline, retry, retry_on
+        )
+        declared = {k: v for k, v in bound.items() if limits is None or k != TIMEOUT}
         self.check_state_spec(label, state, declared)
-        if made is not None:
-            self._limits[label] = made
+        if limits is not None:
+            self.fsm_limits[label] = limits
         group = self._group_transitions() if self.is_opened() else {}
         for outcome in sorted(state.get_registered_outcomes()):
             bound.setdefault(outcome, group.get(outcome))
-        self._states[label] = state
+        self.fsm_states[label] = state
         self._transitions[label] = bound
-        self._remappings[label] = dict(remapping or {})
-        self._constants[label] = dict(constants or {})
-        self._table_version += 1
+        if remapping:
+            self.fsm_remappings[label] = dict(remapping)
+        if constants:
+            self.fsm_constants[label] = dict(constants)
+        structure_version.changed()
         if self._initial_state_label is None:
             self._initial_state_label = label
         if self._last_added_label is not None:
             for outcome in self._connector_outcomes:
-                if not self._transitions[self._last_added_label][outcome]:
-                    self._transitions[self._last_added_label][outcome] = label
+                self.connect(self._last_added_label, outcome, label)
             self._last_added_label = None
             self._connector_outcomes = []
         return state
+
+    def connect(self, label: str, outcome: str, target: str) -> None:
+        """Have an outcome of a state lead to `target`, unless it is bound already."""
+        transitions = self._transitions[label]
+        if not transitions.get(outcome):
+            self._transitions[label] = {**transitions, outcome: target}
+            structure_version.changed()
 
     def check_state_spec(
         self, label: str, state: State, transitions: Mapping[str, str | None]
@@ -156,7 +209,7 @@ class StateMachine(DrivenContainer):
         for outcome in transitions:
             if outcome not in outcomes:
                 raise InvalidTransitionError(
-                    f"State '{self._path_of(label)}' has no outcome '{outcome}' to bind: its "
+                    f"State '{self.fsm_path_of(label)}' has no outcome '{outcome}' to bind: its "
                     f'outcomes are {sorted(outcomes)}'
                 )
 
@@ -166,7 +219,7 @@ class StateMachine(DrivenContainer):
         outcomes = self.get_registered_outcomes()
         if self._initial_state_label is None:
             faults.append('it has no states')
-        elif self._initial_state_label not in self._states:
+        elif self._initial_state_label not in self.fsm_states:
             faults.append(f"its initial state '{self._initial_state_label}' does not exist")
         for label, transitions in self._transitions.items():
             for outcome, target in transitions.items():
@@ -176,7 +229,7 @@ class StateMachine(DrivenContainer):
                             f"outcome '{outcome}' of state '{label}' is bound to nothing and is "
                             'not an outcome of the machine'
                         )
-                elif target not in self._states and target not in outcomes:
+                elif target not in self.fsm_states and target not in outcomes:
                     faults.append(
                         f"outcome '{outcome}' of state '{label}' leads to '{target}', which is "
                         'neither a state nor an outcome of the machine'
@@ -184,42 +237,39 @@ class StateMachine(DrivenContainer):
         faults += self._branch_faults()
         if faults:
             raise InvalidTransitionError(
-                f"State machine '{self._fsm_path}' cannot run: {'; '.join(faults)} (states: "
-                f'{sorted(self._states)}, outcomes: {sorted(outcomes)})'
+                f"State machine '{self.fsm_path}' cannot run: {'; '.join(faults)} (states: "
+                f'{sorted(self.fsm_states)}, outcomes: {sorted(outcomes)})'
             )
 
-    # The table.
+    # Running.
 
-    def _initial_label(self) -> str:
-        return str(self._initial_state_label)
-
-    def _make_table(self) -> dict[str, Node]:
-        table = {
-            label: self._node(
-                label,
-                state,
-                remapping=self._remappings[label],
-                constants=self._constants[label],
-                limits=self._limits.get(label),
-            )
-            for label, state in self._states.items()
-        }
+    def fsm_make_table(self) -> dict[str, Node]:
+        """Make the nodes of all states and interrupts."""
+        table = {label: self.fsm_node(label, state) for label, state in self.fsm_states.items()}
         exits = {outcome: Exit(outcome) for outcome in self.get_registered_outcomes()}
         for label, transitions in self._transitions.items():
-            node = table[label]
+            targets = table[label].targets
             for outcome, target in transitions.items():
-                name = target or outcome
-                node.targets[outcome] = table.get(name) or exits[name]
+                # What is not bound leads out, also where a state has the outcome's name.
+                targets[outcome] = (table.get(target) if target else None) or exits[
+                    target or outcome
+                ]
         return table
+
+    def fsm_make_frame(self, thread: ExecutionThread, path: str, parent_ud: Any) -> SequentialFrame:
+        """Make the frame of an execution that is about to begin."""
+        table = self.fsm_current_table(path, thread.run.clock)
+        first = table[self._initial_state_label]  # type: ignore[index]
+        return SequentialFrame(self, thread, path, first, parent_ud)
 
     # The container's interface.
 
     def get_initial_states(self) -> list[str]:
         """The label of the state a run begins with."""
-        return [str(self._initial_state_label)]
+        return [self._initial_state_label] if self._initial_state_label is not None else []
 
     def set_initial_state(
-        self, initial_states: Sequence[str], userdata: UserData | None = None
+        self, initial_states: Labels[str], userdata: UserData | None = None
     ) -> None:
         """Choose the state the next run begins with, and add to the machine's userdata.
 
@@ -228,13 +278,14 @@ class StateMachine(DrivenContainer):
         """
         if len(initial_states) > 1:
             raise InvalidStateError(
-                f"State machine '{self._fsm_path}' begins with one state, not {initial_states}"
+                f"State machine '{self.fsm_path}' begins with one state, not {initial_states}"
             )
         for label in initial_states:
-            if label not in self._states:
+            # While it has no states, as in SMACH, they may be added later.
+            if self.fsm_states and label not in self.fsm_states:
                 raise InvalidStateError(
-                    f"State machine '{self._fsm_path}' cannot begin with '{label}': its states are "
-                    f'{sorted(self._states)}'
+                    f"State machine '{self.fsm_path}' cannot begin with '{label}': its states are "
+                    f'{sorted(self.fsm_states)}'
                 )
             self._initial_state_label = label
         if userdata is not None:
@@ -247,3 +298,341 @@ class StateMachine(DrivenContainer):
             for label, transitions in self._transitions.items()
             for outcome, target in transitions.items()
         ]
+
+
+class Sequence(StateMachine):
+    """A state machine in which one outcome leads from each state to the next.
+
+    Args:
+        outcomes: What the sequence may end with.
+        connector_outcome: The outcome that leads on to the next state.
+        input_keys: See `StateMachine`.
+        output_keys: See `StateMachine`.
+    """
+
+    def __init__(
+        self,
+        outcomes: Iterable[str],
+        connector_outcome: str,
+        input_keys: Iterable[str] = (),
+        output_keys: Iterable[str] = (),
+    ) -> None:
+        super().__init__(outcomes, input_keys, output_keys)
+        self._connector_outcome = connector_outcome
+        self._last_added_seq_label: str | None = None
+
+    @staticmethod
+    def add(
+        label: str,
+        state: State,
+        transitions: Mapping[str, str | None] | None = None,
+        remapping: Mapping[str, str] | None = None,
+        constants: Mapping[str, Any] | None = None,
+        **limits: Any,
+    ) -> State:
+        """Add a state after the last one; for the arguments see `StateMachine.add`.
+
+        The last state's connector outcome leads here, unless its own transitions bind it.
+        """
+        sequence = Sequence._currently_opened_container()
+        return sequence.append_state(label, state, transitions, remapping, constants, **limits)
+
+    def append_state(
+        self,
+        label: str,
+        state: State,
+        transitions: Mapping[str, str | None] | None = None,
+        remapping: Mapping[str, str] | None = None,
+        constants: Mapping[str, Any] | None = None,
+        **limits: Any,
+    ) -> State:
+        """Add a state to a sequence at hand, open or not; for the arguments see `add`."""
+        last = self._last_added_seq_label
+        self.add_state(label, state, transitions, remapping, constants, **limits)
+        if last is not None:
+            self.connect(last, self._connector_outcome, label)
+        self._last_added_seq_label = label
+        return state
+
+
+class _Exhausted:
+    """What the loop is told when no item is left; shown as the outcome that this has."""
+
+    def __init__(self, outcome: str) -> None:
+        self._outcome = outcome
+
+    def __str__(self) -> str:
+        return self._outcome
+
+
+class Iterator(Container):
+    """Executes its state once per item, until an outcome breaks the loop or no item is left.
+
+    Args:
+        outcomes: What the iterator may end with; `exhausted_outcome` is added.
+        input_keys: Keys copied from the parent's userdata on entry.
+        output_keys: Keys copied to the parent's userdata on exit.
+        it: The items, or a function that gives them when the iterator is entered.
+        it_label: The userdata key that holds the current item.
+        exhausted_outcome: What the iterator ends with when no item is left.
+    """
+
+    def __init__(
+        self,
+        outcomes: Iterable[str],
+        input_keys: Iterable[str],
+        output_keys: Iterable[str],
+        it: Items = (),
+        it_label: str = 'it_data',
+        exhausted_outcome: str = 'exhausted',
+    ) -> None:
+        super().__init__([*outcomes, exhausted_outcome], input_keys, output_keys)
+        self._items: Items = it
+        self._items_label = it_label
+        self._exhausted_outcome = exhausted_outcome
+        self._exhausted = _Exhausted(exhausted_outcome)
+        self._state_label = ''
+        self._loop_outcomes: list[str] = []
+        self._break_outcomes: list[str] = []
+        self._final_outcome_map: dict[str, str] = {}
+
+    @staticmethod
+    def set_iteritems(it: Items, it_label: str = 'it_data') -> None:
+        """Set the items of the open iterator, and the userdata key that holds the current one."""
+        Iterator._currently_opened_container().set_items(it, it_label)
+
+    def set_items(self, it: Items, it_label: str = 'it_data') -> None:
+        """Set the items of an iterator at hand; see `set_iteritems`."""
+        self._items = it
+        self._items_label = it_label
+
+    @staticmethod
+    def set_contained_state(
+        label: str,
+        state: State,
+        loop_outcomes: Iterable[str] = (),
+        break_outcomes: Iterable[str] = (),
+        final_outcome_map: Mapping[str, str] | None = None,
+        *,
+        timeout: float | None = None,
+        deadline: float | None = None,
+        retry: int = 0,
+        retry_on: Iterable[str] = ('aborted',),
+    ) -> State:
+        """Set the state of the open iterator.
+
+        Args:
+            label: The state's name in the iterator.
+            state: The state.
+            loop_outcomes: Outcomes after which the next item follows; all others break the loop.
+            break_outcomes: Outcomes that break the loop, all others leading to the next item; if
+                given, they count and `loop_outcomes` do not.
+            final_outcome_map: From outcomes that end the iterator to outcomes of the iterator.
+            timeout: See `StateMachine.add`.
+            deadline: See `StateMachine.add`.
+            retry: See `StateMachine.add`.
+            retry_on: See `StateMachine.add`.
+
+        Raises:
+            InvalidStateError: The iterator has a state already.
+            InvalidTransitionError: An outcome is named that the state does not have.
+        """
+        return Iterator._currently_opened_container().set_state(
+            label,
+            state,
+            loop_outcomes,
+            break_outcomes,
+            final_outcome_map,
+            timeout=timeout,
+            deadline=deadline,
+            retry=retry,
+            retry_on=retry_on,
+        )
+
+    def set_state(
+        self,
+        label: str,
+        state: State,
+        loop_outcomes: Iterable[str] = (),
+        break_outcomes: Iterable[str] = (),
+        final_outcome_map: Mapping[str, str] | None = None,
+        *,
+        timeout: float | None = None,
+        deadline: float | None = None,
+        retry: int = 0,
+        retry_on: Iterable[str] = ('aborted',),
+    ) -> State:
+        """Set the state of an iterator at hand, open or not; see `set_contained_state`."""
+        path = self.fsm_path_of(label)
+        if self.fsm_states:
+            raise InvalidStateError(
+                f"Iterator '{self.fsm_path}' has the state '{self._state_label}' already"
+            )
+        self._check_new(label, state)
+        loop, breaking = list(loop_outcomes), list(break_outcomes)
+        limits = make_limits(
+            path, state, dict.fromkeys([*loop, *breaking]), timeout, deadline, retry, retry_on
+        )
+        outcomes = list(state.get_registered_outcomes())
+        if limits is not None and limits.late_outcome == TIMEOUT and TIMEOUT not in outcomes:
+            outcomes.append(TIMEOUT)
+        for outcome in (*loop, *breaking):
+            if outcome not in outcomes:
+                raise InvalidTransitionError(
+                    f"State '{path}' has no outcome '{outcome}' to loop or break on: its outcomes "
+                    f'are {sorted(outcomes)}'
+                )
+        if loop and breaking:
+            logwarn(f"Iterator '{self.fsm_path}' has loop and break outcomes: the latter count")
+        if breaking:
+            loop = [outcome for outcome in outcomes if outcome not in breaking]
+        else:
+            breaking = [outcome for outcome in outcomes if outcome not in loop]
+        self._state_label = label
+        self.fsm_states[label] = state
+        self._loop_outcomes, self._break_outcomes = loop, breaking
+        self._final_outcome_map = dict(final_outcome_map or {})
+        if limits is not None:
+            self.fsm_limits[label] = limits
+        structure_version.changed()
+        return state
+
+    def check_consistency(self) -> None:
+        """Raise `InvalidTransitionError` when the iterator has no state or a wrong interrupt."""
+        faults = [] if self.fsm_states else ['it has no state']
+        faults += self._branch_faults()
+        if faults:
+            raise InvalidTransitionError(
+                f"Iterator '{self.fsm_path}' cannot run: {'; '.join(faults)}"
+            )
+
+    # Running: the state leads back to itself until something breaks the loop.
+
+    def fsm_make_table(self) -> dict[str, Node]:
+        """Make the nodes of the state and of all interrupts."""
+        node = self.fsm_node(self._state_label, self.fsm_states[self._state_label])
+        for outcome in self._loop_outcomes:
+            node.targets[outcome] = node
+        for outcome in self._break_outcomes:
+            node.targets[outcome] = Exit(self.ending(outcome))
+        node.targets[self._exhausted] = Exit(self.ending(self._exhausted_outcome))
+        within_limits = node.execute if node.limits is not None else None
+
+        def execute_for_item(view: Any) -> Any:
+            frame = self.fsm_frame
+            assert isinstance(frame, IteratorFrame)
+            if not frame.draw():
+                return self._exhausted
+            outcome = within_limits(view) if within_limits is not None else node.enter(view)
+            frame.repeat = outcome is SUSPENDED
+            return outcome
+
+        node.execute = execute_for_item
+        return {self._state_label: node}
+
+    def fsm_make_frame(self, thread: ExecutionThread, path: str, parent_ud: Any) -> IteratorFrame:
+        """Make the frame of an execution that is about to begin."""
+        table = self.fsm_current_table(path, thread.run.clock)
+        return IteratorFrame(self, thread, path, table[self._state_label], parent_ud)
+
+    @property
+    def items(self) -> Items:
+        """The items, or the function that gives them."""
+        return self._items
+
+    @property
+    def items_label(self) -> str:
+        """The userdata key that holds the current item."""
+        return self._items_label
+
+    @property
+    def exhausted_outcome(self) -> str:
+        """What the iterator ends with when no item is left, before the final outcome map."""
+        return self._exhausted_outcome
+
+    def ending(self, outcome: str) -> str:
+        """The iterator's outcome when its state's `outcome` ends the loop."""
+        return self._final_outcome_map.get(outcome, outcome)
+
+    # The container's interface.
+
+    def get_initial_states(self) -> list[str]:
+        """The state's label."""
+        return [self._state_label]
+
+    def set_initial_state(
+        self, initial_states: Labels[str], userdata: UserData | None = None
+    ) -> None:
+        """Add to the iterator's userdata; it always begins with its only state."""
+        for label in initial_states:
+            self[label]
+        if userdata is not None:
+            self.userdata.update(userdata)
+
+    def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
+        """Loop and break outcomes as (outcome, label, label or outcome of the iterator)."""
+        edges: list[tuple[str, str, str | None]] = [
+            (outcome, self._state_label, self._state_label) for outcome in self._loop_outcomes
+        ]
+        for outcome in self._break_outcomes:
+            ending = self._final_outcome_map.get(outcome)
+            edges.append((outcome, self._state_label, None if ending == outcome else ending))
+        return edges
+
+
+class IteratorFrame(SequentialFrame):
+    """One execution of an iterator."""
+
+    container: Iterator
+
+    def draw(self) -> bool:
+        """Put the next item into userdata, or the current one again if it has not ended.
+
+        Returns:
+            Whether there is one.
+
+        Raises:
+            InvalidUserCodeError: The items raised.
+        """
+        if self.repeat and self.items is not None:
+            return True
+        iterator = self.container
+        begun = self.index
+        wanted = begun if self.repeat and begun else begun + 1
+        try:
+            if self.items is None:
+                items = iterator.items
+                self.items = iter(items() if callable(items) else items)
+                # Resumed in another process: the items before were dealt with.
+                skipped = wanted - 1
+            else:
+                skipped = 0
+            for _ in range(skipped):
+                next(self.items)
+            item = next(self.items)
+        except StopIteration:
+            return False
+        except Exception as error:
+            raise InvalidUserCodeError(
+                f"The items of iterator '{self.path}' raised {describe(error)} after {begun} items"
+            ) from error
+        self.index, self.repeat = wanted, True
+        data = raw(iterator.userdata)
+        if wanted > begun or iterator.items_label not in data:
+            data[iterator.items_label] = item
+        return True
+
+    def _end_of_loop(self, outcome: Any, target: Node | Exit) -> Node | Exit:
+        """End the loop when a preempt came while it would go on.
+
+        The iterator ends with ``preempted``, or, if it has no such outcome, with what the state's
+        outcome stands for. If it has not that either, the request is not served: the iterator ends
+        as if no item were left, and the request goes to the next state of its container.
+        """
+        iterator = self.container
+        outcomes = iterator.get_registered_outcomes()
+        for ending in ('preempted', iterator.ending(outcome)):
+            if ending in outcomes:
+                iterator.service_preempt()
+                return Exit(ending)
+        return Exit(iterator.ending(iterator.exhausted_outcome))

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import cached_property
 
-from surveillance_fsm.active import ActiveContainer
-from surveillance_fsm.concurrence import Concurrence
 from surveillance_fsm.container import Container
-from surveillance_fsm.engine import RESUME
-from surveillance_fsm.iterator import Iterator as IteratorContainer
+from surveillance_fsm.execution import RESUME
 from surveillance_fsm.state import State
+from surveillance_fsm.state_machine import Iterator as IteratorContainer
 
 
 @dataclass(frozen=True)
@@ -64,7 +63,7 @@ class Structure:
     @property
     def together(self) -> bool:
         """Whether all states run at the same time."""
-        return isinstance(self.container, Concurrence)
+        return self.container.together
 
     def walk(self) -> Iterator[Structure]:
         """This container and all inside, outermost first."""
@@ -72,27 +71,26 @@ class Structure:
         for inner in self.inner.values():
             yield from inner.walk()
 
-    def all_states(self) -> dict[str, State]:
+    @cached_property
+    def members(self) -> dict[str, State]:
         """States and interrupts by label."""
         return {**self.states, **self.interrupts}
 
 
 def structure_of(container: Container, path: str | None = None) -> Structure:
     """Describe a container and all inside it."""
-    path = container._fsm_path if path is None else path
+    path = container.get_name() if path is None else path
     states = dict(container.get_children())
     outcomes = sorted(container.get_registered_outcomes())
-    branches = []
-    if isinstance(container, ActiveContainer):
-        branches = sorted(container._branches.values(), key=lambda branch: -branch.priority)
+    branches = sorted(container.fsm_branches.values(), key=lambda branch: -branch.priority)
     interrupts = {branch.label: branch.state for branch in branches}
     edges = []
     for outcome, source, target in container.get_internal_edges():
-        name = target or outcome
-        edges.append(Edge(source, outcome, name, name not in states))
+        # What is not bound leads out, also where a state has the outcome's name.
+        edges.append(Edge(source, outcome, target or outcome, not target or target not in states))
     if isinstance(container, IteratorContainer):
-        ending = container._ending(container._exhausted_outcome).label
-        edges += [Edge(label, container._exhausted_outcome, ending, True) for label in states]
+        exhausted = container.exhausted_outcome
+        edges += [Edge(label, exhausted, container.ending(exhausted), True) for label in states]
     for branch in branches:
         for outcome, name in sorted(branch.transitions.items()):
             edges.append(Edge(branch.label, outcome, name, name not in states and name != RESUME))
@@ -114,21 +112,28 @@ def structure_of(container: Container, path: str | None = None) -> Structure:
     )
 
 
+def children_of(state: State) -> dict[str, State]:
+    """The states and interrupts inside a container by label; none inside any other state."""
+    if not isinstance(state, Container):
+        return {}
+    branches = {label: branch.state for label, branch in state.fsm_branches.items()}
+    return {**state.fsm_states, **branches}
+
+
 def state_at(container: Container, path: str) -> State:
     """The state at a path that begins with the container's own.
 
     Raises:
         KeyError: There is none; the message names the part that is missing.
     """
-    root, *labels = path.split('/')
-    if root != container._fsm_path:
-        raise KeyError(f"Path '{path}' begins with '{root}', expected '{container._fsm_path}'")
+    root = container.get_name()
+    if path != root and not path.startswith(f'{root}/'):
+        raise KeyError(f"Path '{path}' does not begin with '{root}'")
     state: State = container
     walked = root
+    labels = path[len(root) + 1 :].split('/') if path != root else []
     for label in labels:
-        children = state.get_children() if isinstance(state, Container) else {}
-        if isinstance(state, ActiveContainer):
-            children |= {name: branch.state for name, branch in state._branches.items()}
+        children = children_of(state)
         if label not in children:
             raise KeyError(f"'{walked}' has no state '{label}': its states are {sorted(children)}")
         state = children[label]

@@ -18,13 +18,13 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
-from surveillance_fsm.active import ActiveContainer
+from surveillance_fsm.clock import Interrupt
 from surveillance_fsm.container import Container
-from surveillance_fsm.engine import RawTransition, unfold
 from surveillance_fsm.exceptions import InvalidStateError, InvalidTransitionError
+from surveillance_fsm.execution import RawTransition
+from surveillance_fsm.history import unfold
 from surveillance_fsm.state import State
 from surveillance_fsm.structure import state_at, structure_of
-from surveillance_fsm.waiting import Interrupt
 
 
 class FakeClock:
@@ -99,7 +99,7 @@ Scripted = str | Callable[[Any], str]
 
 
 def script(
-    machine: ActiveContainer, outcomes: Mapping[str, Iterable[Scripted]], repeat_last: bool = False
+    machine: Container, outcomes: Mapping[str, Iterable[Scripted]], repeat_last: bool = False
 ) -> None:
     """Have states return given outcomes in place of doing their work.
 
@@ -130,7 +130,7 @@ def script(
 
 
 def _play(
-    machine: ActiveContainer, path: str, state: State, turns: deque[Scripted], repeat_last: bool
+    machine: Container, path: str, state: State, turns: deque[Scripted], repeat_last: bool
 ) -> None:
     def execute(ud: Any) -> str:
         assert turns, f"State '{path}' is executed more often than it has scripted outcomes"
@@ -153,9 +153,10 @@ class Watched:
         self._structure = structure_of(machine)
         self.transitions: list[tuple[str, str, str, str]] = []
 
-    def _saw(self, raw: RawTransition) -> None:
+    def saw(self, raw: RawTransition) -> None:
+        """Take a transition as the machine notes it."""
         noted = unfold(raw)
-        if noted.kind != 'start':
+        if noted.is_transition:
             self.transitions.append((noted.path, noted.source, noted.outcome, noted.target))
 
     def path(self, container: str | None = None) -> list[str]:
@@ -212,10 +213,10 @@ class Watched:
 
 
 @contextmanager
-def watching(machine: ActiveContainer) -> Iterator[Watched]:
+def watching(machine: Container) -> Iterator[Watched]:
     """Note the transitions of a root while the block runs, over any number of executions."""
     watched = Watched(machine)
-    remove = machine.control.add_trace(watched._saw)
+    remove = machine.control.add_trace(watched.saw)
     try:
         yield watched
     finally:

@@ -7,6 +7,7 @@ first reasoning) goes to a worker thread, so that other clients are not kept wai
 from __future__ import annotations
 
 import sys
+from functools import partial
 from typing import Any
 
 from rclpy.callback_groups import ReentrantCallbackGroup
@@ -26,16 +27,23 @@ from surveillance_runtime.waiting import AwaitedWork
 
 PUBLISH_DELAY = 0.005
 """Seconds by which changes are told later, so that this delays no client's next directive."""
+SWITCH_INTERVAL = 0.0005
+"""Seconds after which a thread that computes lets another one run; Python's default is 0.005."""
 WORKERS = 4
 """Threads for directives that may take long, and as many for SPARQL queries."""
 
 
 class ArmorServer(PatrolNode):
-    """Serves ARMOR directives."""
+    """Serves ARMOR directives.
 
-    def __init__(self, **node_options: Any) -> None:
+    Args:
+        keep: Whether the store is on by default; the parameter `store` decides.
+        node_options: As for `PatrolNode`.
+    """
+
+    def __init__(self, *, keep: bool = False, **node_options: Any) -> None:
         super().__init__('armor_server', **node_options)
-        self._service = described_service(self)
+        self._service = described_service(self, keep=keep)
         self._feed = ChangeFeed(self._service, self._soon)
         self._subscribers = 0
         self._untold: list[NumberedChange] = []
@@ -115,7 +123,9 @@ class ArmorServer(PatrolNode):
 
 def main(args: list[str] | None = None) -> int:
     """Run the node as a process."""
-    return run_node(ArmorServer, args)
+    # A LOAD runs for seconds in Python; others are to get the interpreter often meanwhile.
+    sys.setswitchinterval(SWITCH_INTERVAL)
+    return run_node(partial(ArmorServer, keep=True), args)
 
 
 if __name__ == '__main__':

@@ -32,7 +32,7 @@ from surveillance_ontology.owl.axioms import (
 from surveillance_ontology.owl.entities import entities_of, renamed
 from surveillance_ontology.owl.expressions import ClassExpression, Literal
 from surveillance_ontology.owl.vocabulary import THING
-from surveillance_ontology.reasoner.classification import Schema
+from surveillance_ontology.reasoner.classification import Classification
 from surveillance_ontology.reasoner.clauses import Fact as StoredFact
 from surveillance_ontology.reasoner.clauses import Predicate
 from surveillance_ontology.reasoner.engine import Engine, FactView, is_public
@@ -173,7 +173,7 @@ class KnowledgeBase:
     def __init__(self, iri: str, axioms: Iterable[Axiom] = ()) -> None:
         self.iri = iri
         self._told = Assertions()
-        self._schema: Schema | None = None
+        self._classification: Classification | None = None
         self._engine: Engine | None = None
         self._consistent = True
         self._snapshots: dict[str, frozenset[str]] = {}
@@ -233,7 +233,9 @@ class KnowledgeBase:
         """One sentence for each asserted axiom (or part) that the reasoner does not use, as of
         `reason`.
         """
-        return () if self._schema is None else tuple(self._schema.program.unsupported)
+        return (
+            () if self._classification is None else tuple(self._classification.program.unsupported)
+        )
 
     # --- queries ---
 
@@ -310,15 +312,15 @@ class KnowledgeBase:
 
     def subclasses(self, cls: str) -> set[str]:
         """Named classes strictly below, direct and indirect, as of the last `reason`."""
-        if self._schema is None:
+        if self._classification is None:
             return set()
         if cls == THING:
-            return self._schema.classes()
-        return self._schema.subclasses(cls)
+            return self._classification.classes()
+        return self._classification.subclasses(cls)
 
     def superclasses(self, cls: str) -> set[str]:
         """Named classes strictly above, direct and indirect, as of the last `reason`."""
-        return set() if self._schema is None else self._schema.superclasses(cls)
+        return set() if self._classification is None else self._classification.superclasses(cls)
 
     def object_values(self, prop: str, individual: str) -> set[str]:
         """What an individual is related to by an object property."""
@@ -524,8 +526,8 @@ class KnowledgeBase:
     def _rebuild(self, old: Engine | None) -> Engine:
         axioms = tuple(self._told.axioms)
         assertions = [axiom for axiom in axioms if is_assertion(axiom)]
-        self._schema = Schema(axioms, *Engine.needs_of(assertions))
-        engine = self._engine = Engine(self._schema.program, self._told.mentioning)
+        self._classification = Classification(axioms, *Engine.needs_of(assertions))
+        engine = self._engine = Engine(self._classification.program, self._told.mentioning)
         if old is not None:
             engine.take_spelling(old)
         self._told.settle()

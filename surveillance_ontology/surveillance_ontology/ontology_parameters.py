@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from surveillance_ontology.armor.access import DATA, Settings
+from surveillance_ontology.armor.access import DATA, Settings, state_folder
 from surveillance_ontology.armor.service import ArmorService
 from surveillance_ontology.armor.store import JournalError, Store
 from surveillance_runtime.node import PatrolNode, StartError
@@ -35,8 +35,12 @@ _SERVICE = {
 }
 
 
-def described_service(node: PatrolNode) -> ArmorService:
+def described_service(node: PatrolNode, *, keep: bool = False) -> ArmorService:
     """Make the service that a node's parameters describe; it logs through the node.
+
+    Args:
+        node: The node.
+        keep: Whether the store is on by default.
 
     Raises:
         ParameterError: A parameter is of the wrong type or out of range.
@@ -45,16 +49,27 @@ def described_service(node: PatrolNode) -> ArmorService:
     settings = declare_fields(node, Settings(), _SERVICE)
     stored = node.parameter(
         'store',
-        '',
-        'Directory in which references and their changes are kept over a restart; empty: none.',
+        'auto' if keep else 'none',
+        'Directory in which references and their changes are kept over a restart; auto: one for '
+        "this domain and name in the user's state folder; none: nothing is kept.",
         read_only=True,
     )
     log = node.get_logger()
+    folder = _own_folder(node) if stored == 'auto' else Path(stored).expanduser()
     try:
-        store = Store(Path(stored).expanduser()) if stored else None
-        return ArmorService(settings, log.info, log.warn, store)
+        store = None if stored in ('', 'none') else Store(folder)
+        service = ArmorService(settings, log.info, log.warn, store)
+        if store:
+            kept = ', '.join(service.references.names()) or 'nothing'
+            log.info(f'store {folder}, which holds {kept}; "-p store:=none" keeps nothing')
+        return service
     except JournalError as error:
         raise StartError(f'{node.get_name()}: parameter store: {error}') from None
+
+
+def _own_folder(node: PatrolNode) -> Path:
+    name = node.get_fully_qualified_name().strip('/').replace('/', '.')
+    return state_folder() / 'armor' / f'{node.context.get_domain_id()}.{name}'
 
 
 @dataclass(frozen=True)

@@ -170,10 +170,10 @@ def path_from(message: PathMessage) -> NDArray[np.float64]:
     return np.array(points, dtype=float).reshape(-1, 2)
 
 
-def scan_from(message: LaserScan, pose: Pose) -> NDArray[np.float64]:
-    """Return where a lidar's beams end, seen from a pose, shape (n, 2), metres, map frame.
+def scan_from(message: LaserScan) -> NDArray[np.float64]:
+    """Return where a lidar's beams end, shape (n, 2), metres, in the lidar's frame.
 
-    Beams that hit nothing are left out; the lidar is taken to sit in the robot's middle.
+    Beams that hit nothing are left out.
 
     Raises:
         ValueError: Its angles are not finite.
@@ -183,11 +183,11 @@ def scan_from(message: LaserScan, pose: Pose) -> NDArray[np.float64]:
         raise ValueError('a scan whose angles are not finite')
     step = max(1, -(-min(count, MOST_POINTS) // MOST_BEAMS))
     ranges = np.asarray(message.ranges[:MOST_POINTS:step], dtype=float)
-    angles = pose[2] + message.angle_min + message.angle_increment * step * np.arange(len(ranges))
+    angles = message.angle_min + message.angle_increment * step * np.arange(len(ranges))
     with np.errstate(invalid='ignore'):
         good = np.isfinite(ranges) & (ranges >= message.range_min) & (ranges < message.range_max)
     ranges, angles = ranges[good], angles[good]
-    return np.stack([pose[0] + ranges * np.cos(angles), pose[1] + ranges * np.sin(angles)], axis=1)
+    return np.stack([ranges * np.cos(angles), ranges * np.sin(angles)], axis=1)
 
 
 def containers_from(message: FsmStructure) -> tuple[Container, ...]:

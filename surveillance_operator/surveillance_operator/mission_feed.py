@@ -49,6 +49,7 @@ from surveillance_operator import conversions
 from surveillance_operator.polled_subscription import PolledSubscription
 from surveillance_operator.snapshot import NO_POINTS, Change, Pose, Snapshot, follow
 from surveillance_runtime.calls import CallError, ServiceCaller
+from surveillance_runtime.conversions import seconds_of
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 
@@ -59,6 +60,8 @@ TIMEOUT = 2.0
 TRAIL_STEP, TRAIL_POINTS = 0.05, 3000
 """Least distance of two points of the trail, metres, and how many are kept."""
 KEPT_TRANSITIONS = 60
+SAME_MOMENT = 0.03
+"""Most seconds between the stamps of a pose and a scan that belong together."""
 
 BUILDER = 'ontology_map_builder'
 PLANNER = 'planner_controller'
@@ -100,7 +103,7 @@ class MissionFeed:
 
     Args:
         node: The node that watches.
-        period: Seconds of steady time between two looks at the topics.
+        period: Seconds of steady time between two looks at the topics, or what tells them.
         on_change: Called on the feed's thread with each new snapshot and what changed.
         streams: Follow the lidar, too.
     """
@@ -108,13 +111,13 @@ class MissionFeed:
     def __init__(
         self,
         node: PatrolNode,
-        period: float,
+        period: float | Callable[[], float],
         on_change: Callable[[Snapshot, Sequence[Change]], None] = lambda _new, _told: None,
         *,
         streams: bool = False,
     ) -> None:
         self._node = node
-        self._period = period
+        self._period = period if callable(period) else lambda: period
         self._on_change = on_change
         namespace = node.get_namespace().strip('/')
         where = f'ROS domain {node.context.get_domain_id()}'
@@ -172,7 +175,7 @@ class MissionFeed:
             if time.monotonic() >= self._next_look:
                 self._next_look = time.monotonic() + LOOK_PERIOD
                 self._look()
-            stopping.wait(self._period)
+            stopping.wait(self._period())
 
     def _take(self) -> Callable[[Snapshot], Snapshot] | None:
         """Return what all messages that came change together."""
@@ -261,8 +264,27 @@ def _on_transition(message: FsmTransition, old: Snapshot) -> Fields:
     return {'transitions': (*old.transitions, transition)[-KEPT_TRANSITIONS:]}
 
 
+def _on_pose(message: PoseWithCovarianceStamped, old: Snapshot) -> Fields:
+    at = seconds_of(message.header.stamp)
+    fields = moved(conversions.pose_from(message.pose.pose), old)
+    return {**fields, **_seen(fields['pose'], at, old.lidar), 'localised': True, 'pose_time': at}
+
+
 def _on_scan(message: LaserScan, old: Snapshot) -> Fields:
-    return {} if old.pose is None else {'scan': conversions.scan_from(message, old.pose)}
+    lidar = seconds_of(message.header.stamp), conversions.scan_from(message)
+    return {'lidar': lidar, **_seen(old.pose, old.pose_time, lidar)}
+
+
+def _seen(pose: Pose | None, at: float, lidar: tuple[float, Any] | None) -> Fields:
+    """Return what the lidar sees in the map's frame, where pose and scan are of one moment.
+
+    The lidar is taken to sit in the robot's middle.
+    """
+    if pose is None or lidar is None or abs(lidar[0] - at) > SAME_MOMENT:
+        return {}
+    x, y, yaw = pose
+    turn = np.array([[math.cos(yaw), math.sin(yaw)], [-math.sin(yaw), math.cos(yaw)]])
+    return {'scan': lidar[1] @ turn + (x, y)}
 
 
 def _on_parameters(message: ParameterEvent, _old: Snapshot) -> Fields:
@@ -317,12 +339,7 @@ TOPICS: tuple[Topic, ...] = (
     Topic(
         'obstacles', PointCloud2, STATE_QOS, lambda m, _: {'obstacles': conversions.cloud_from(m)}
     ),
-    Topic(
-        'amcl_pose',
-        PoseWithCovarianceStamped,
-        STATE_QOS,
-        lambda m, old: {'localised': True, **moved(conversions.pose_from(m.pose.pose), old)},
-    ),
+    Topic('amcl_pose', PoseWithCovarianceStamped, STATE_QOS, _on_pose),
     Topic('plan', PathMessage, STATE_QOS, lambda m, _: {'plan': conversions.path_from(m)}),
     Topic('scan', LaserScan, _STREAM, _on_scan, stream=True),
     Topic(

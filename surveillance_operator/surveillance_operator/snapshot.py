@@ -199,6 +199,8 @@ class Snapshot:
         localised: Whether somebody estimates that from sensors.
         trail: Where it drove, shape (n, 2), metres, oldest first.
         plan: The planned path, shape (n, 2), metres.
+        pose_time: The stamp of the pose, seconds.
+        lidar: The latest scan: its stamp, and its points in the robot's frame.
         scan: What the lidar sees, shape (n, 2), metres, map frame.
         obstacles: What stands about, shape (n, 2), metres.
         containers: The state machine, outermost container first.
@@ -238,6 +240,8 @@ class Snapshot:
     localised: bool = False
     trail: NDArray[np.float64] = field(default_factory=lambda: NO_POINTS)
     plan: NDArray[np.float64] = field(default_factory=lambda: NO_POINTS)
+    pose_time: float = 0.0
+    lidar: tuple[float, NDArray[np.float64]] | None = None
     scan: NDArray[np.float64] = field(default_factory=lambda: NO_POINTS)
     obstacles: NDArray[np.float64] | None = None
     containers: tuple[Container, ...] = ()

@@ -1,9 +1,7 @@
-"""How threads and callbacks wait: sleeps on ROS time, work on threads, events.
+"""What callbacks await while the executor goes on: work in order, and events.
 
-`ClockWait` sleeps on a node's clock, so that under `use_sim_time` a mission runs as fast as
-`/clock` does; it needs the node to be spun by an executor then. `work_aside`, `AwaitedWork` and
-`AwaitedEvent` are for callbacks, which `await` while the executor goes on. A future that another
-thread completes does not wake the executor, so whoever completes one here wakes it.
+What needs no `PatrolNode` is in `surveillance_fsm.ros` and offered here as well: `ClockWait`,
+which sleeps on ROS time, `Interrupt`, which ends a sleep, and `work_aside`.
 """
 
 from __future__ import annotations
@@ -13,87 +11,15 @@ import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from rclpy.clock import ClockType, JumpThreshold
-from rclpy.duration import Duration
-from rclpy.node import Node
 from rclpy.task import Future
 
-from surveillance_runtime.interrupt import Interrupt as Interrupt
+from surveillance_fsm import Interrupt as Interrupt
+from surveillance_fsm.ros.waiting import ClockWait as ClockWait
+from surveillance_fsm.ros.waiting import reported, wake_executor
+from surveillance_fsm.ros.waiting import work_aside as work_aside
 
 if TYPE_CHECKING:
     from surveillance_runtime.node import PatrolNode
-
-
-class ClockWait:
-    """Sleeps on a node's clock that an `Interrupt` ends early.
-
-    Args:
-        node: The node whose clock counts; wall time, or `/clock` under `use_sim_time`.
-    """
-
-    def __init__(self, node: Node) -> None:
-        self._clock = node.get_clock()
-        self._changed = threading.Condition()
-        # rclpy hands the handle's address to C, so it must live as long as the clock.
-        self._jumps = self._clock.create_jump_callback(
-            JumpThreshold(min_forward=Duration(nanoseconds=1), min_backward=None),
-            post_callback=self._on_jump,
-        )
-
-    def now(self) -> float:
-        """Return the clock's time in seconds."""
-        return float(self._clock.now().nanoseconds) / 1e9
-
-    def sleep(self, seconds: float, interrupt: Interrupt | None = None) -> bool:
-        """Block for a time on the node's clock; never call it from a callback.
-
-        Args:
-            seconds: How long to sleep; zero or less only looks at the interrupt.
-            interrupt: Ends the sleep early when it is raised.
-
-        Returns:
-            True when the whole time passed, False when the interrupt came first.
-        """
-        deadline = self._clock.now().nanoseconds + round(seconds * 1e9)
-        remove = interrupt.subscribe(self._wake) if interrupt is not None else None
-        try:
-            with self._changed:
-                while True:
-                    if interrupt is not None and interrupt.is_set():
-                        return False
-                    remaining = deadline - self._clock.now().nanoseconds
-                    if remaining <= 0:
-                        return True
-                    self._changed.wait(None if self._follows_topic() else remaining / 1e9)
-        finally:
-            if remove is not None:
-                remove()
-
-    def _follows_topic(self) -> bool:
-        return bool(self._clock.clock_type == ClockType.ROS_TIME and self._clock.ros_time_is_active)
-
-    def _on_jump(self, _jump: Any) -> None:
-        self._wake()
-
-    def _wake(self) -> None:
-        with self._changed:
-            self._changed.notify_all()
-
-
-def work_aside(node: PatrolNode, work: Callable[[], Any], name: str) -> Future:
-    """Do work on a thread of its own.
-
-    Args:
-        node: The node whose callback awaits; it joins the thread when it stops.
-        work: What to do; it may block, and must heed the node's `stopping`.
-        name: The thread's name.
-
-    Returns:
-        What the work returns or raises, to be awaited in a callback.
-    """
-    future, report = _reported(node, work)
-    node.spawn(report, name)
-    return future
 
 
 class AwaitedWork:
@@ -117,7 +43,7 @@ class AwaitedWork:
 
     def run(self, work: Callable[[], Any]) -> Future:
         """Have work done; its result, or what it raised, is to be awaited in a callback."""
-        future, report = _reported(self._node, work)
+        future, report = reported(self._node, work)
         self._queue.put(report)
         return future
 
@@ -168,25 +94,4 @@ class AwaitedEvent:
             futures, self._futures = self._futures, set()
         for future in futures:
             future.set_result(None)
-        _wake(self._node)
-
-
-def _reported(node: PatrolNode, work: Callable[[], Any]) -> tuple[Future, Callable[[], None]]:
-    """A future, and the work that completes it."""
-    future = Future()
-
-    def report() -> None:
-        try:
-            result = work()
-        except Exception as error:
-            future.set_exception(error)
-        else:
-            future.set_result(result)
-        _wake(node)
-
-    return future, report
-
-
-def _wake(node: PatrolNode) -> None:
-    if node.executor is not None:
-        node.executor.wake()
+        wake_executor(self._node)

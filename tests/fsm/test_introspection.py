@@ -9,7 +9,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_srvs.srv import Trigger
 
 import surveillance_fsm as fsm
-from surveillance_fsm.record import Transition
+from surveillance_fsm.history import Transition
 from surveillance_fsm.ros import IntrospectionServer
 from surveillance_fsm.ros.conversions import transition_from, transition_message
 from surveillance_interfaces.msg import FsmStatus, FsmStructure, FsmTransition

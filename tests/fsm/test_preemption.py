@@ -233,11 +233,11 @@ def test_without_a_bound_a_state_is_waited_for_in_the_callers_thread():
 
 
 def test_an_interrupt_of_the_calling_thread_preempts_before_it_is_passed_on(monkeypatch):
-    from surveillance_fsm import active
+    from surveillance_fsm import container
 
     waiter = Waiter()
     root, _ = chain(waiter)
-    supervise, calls = active.supervise, []
+    supervise, calls = container.supervise, []
 
     def interrupted(*arguments):
         calls.append(1)
@@ -246,7 +246,7 @@ def test_an_interrupt_of_the_calling_thread_preempts_before_it_is_passed_on(monk
             raise KeyboardInterrupt
         supervise(*arguments)
 
-    monkeypatch.setattr(active, 'supervise', interrupted)
+    monkeypatch.setattr(container, 'supervise', interrupted)
     with pytest.raises(KeyboardInterrupt):
         root.execute()
     assert not root.is_running()

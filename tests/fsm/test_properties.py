@@ -9,10 +9,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import surveillance_fsm as fsm
-from surveillance_fsm import checkpoint
-from surveillance_fsm.record import Transition, replay
+from surveillance_fsm import history as checkpoint
+from surveillance_fsm.history import Transition, replay
 from surveillance_fsm.testing import watching
-from surveillance_fsm.verification import verify
+from surveillance_fsm.verify import verify
 
 OUTCOMES = ('a', 'b', 'c')
 SETTINGS = settings(

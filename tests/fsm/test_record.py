@@ -9,15 +9,15 @@ import threading
 import pytest
 
 import surveillance_fsm as fsm
-from surveillance_fsm import record
-from surveillance_fsm.engine import unfold
-from surveillance_fsm.record import (
+from surveillance_fsm import history as record
+from surveillance_fsm.history import (
     Recorder,
     RecordError,
     TransitionFeed,
     play,
     read_record,
     replay,
+    unfold,
 )
 from surveillance_fsm.testing import FakeClock, script, watching
 

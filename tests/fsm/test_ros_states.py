@@ -407,7 +407,7 @@ def test_a_condition_callback_that_raises_makes_a_topic_invalid(graph, caplog):
 def test_a_condition_is_checked_so_often_and_no_longer(graph):
     checks = []
     state = ConditionState(
-        graph.node, lambda ud: checks.append(1) and False, poll_rate=0.01, max_checks=3
+        graph.node, lambda ud: checks.append(1) and False, poll_rate=100.0, max_checks=3
     )
     assert machine_of(state).execute() == 'false'
     assert len(checks) == 3
@@ -415,7 +415,7 @@ def test_a_condition_is_checked_so_often_and_no_longer(graph):
     state = ConditionState(
         graph.node,
         lambda ud: checks.append(1) or len(checks) == 2,
-        poll_rate=Duration(seconds=0.01),
+        poll_rate=100,
         max_checks=-1,
     )
     assert machine_of(state).execute() == 'true'
@@ -425,7 +425,7 @@ def test_a_condition_is_checked_so_often_and_no_longer(graph):
 
 def test_a_preempt_ends_checking_a_condition(graph):
     checked = threading.Event()
-    state = ConditionState(graph.node, lambda ud: checked.set(), poll_rate=1000.0, max_checks=-1)
+    state = ConditionState(graph.node, lambda ud: checked.set(), poll_rate=0.001, max_checks=-1)
     machine = machine_of(state)
     run = Background(machine)
     assert checked.wait(5.0)

@@ -11,7 +11,7 @@ import time
 import pytest
 
 import surveillance_fsm as fsm
-from surveillance_fsm import checkpoint
+from surveillance_fsm import history as checkpoint
 
 SECONDS = float(os.environ.get('FSM_STRESS_SECONDS', '1.5'))
 

@@ -9,7 +9,7 @@ import pytest
 import surveillance_fsm as fsm
 from surveillance_behaviour import check_command
 from surveillance_fsm.export import to_ascii, to_graphviz, to_mermaid
-from surveillance_fsm.verification import verify
+from surveillance_fsm.verify import verify
 
 from .states import Answer, Waiter
 

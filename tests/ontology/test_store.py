@@ -219,12 +219,45 @@ def test_references_that_come_and_go_while_a_snapshot_begins_are_not_mistaken(
     assert names(server.ask('QUERY IND CLASS', 'DOOR')) == ['X', 'Y']
 
 
-def test_a_store_that_cannot_be_read_is_reported(tmp_path: Path) -> None:
+def test_a_store_of_a_newer_version_is_refused(tmp_path: Path) -> None:
+    journal = Journal(tmp_path / 'store')
+    journal.append([['more', 'map', []]])
+    journal.close()
+    with pytest.raises(JournalError, match=r'cannot be read: unknown kind .more.'):
+        Server(tmp_path / 'store')
+
+
+def test_changes_of_a_reference_that_is_lost_are_left_out_with_one_line(tmp_path: Path) -> None:
     journal = Journal(tmp_path / 'store')
     journal.append([['change', 'nowhere', []]])
+    journal.append([['mount', 'nowhere', 'a']])
     journal.close()
-    with pytest.raises(JournalError, match='cannot be read'):
-        Server(tmp_path / 'store')
+    server = Server(tmp_path / 'store')
+    assert server.ask('GET ALL REFS').queried_objects == []
+    (note,) = server.notes
+    assert '2 changes of references that are not there' in note
+
+
+def test_damage_costs_what_was_damaged_and_no_more(tmp_path: Path) -> None:
+    server = Server(tmp_path / 'store')
+    server.ask(*LOAD, 'false', '', 'true')
+    for number in range(20):
+        server.ask('ADD IND CLASS', f'X{number}', 'DOOR')
+    server.service.close()
+    (path,) = (tmp_path / 'store').glob('journal-*.log')
+    whole = path.read_bytes()
+    header = whole.index(b'\n')
+    seed = random.Random(3)
+    for byte in [10, header // 2, *(seed.randrange(len(whole)) for _ in range(20))]:
+        data = bytearray(whole)
+        data[byte] ^= 1 << seed.randrange(8)
+        path.write_bytes(data)
+        server.notes.clear()
+        server.start()
+        doors = names(server.ask('QUERY IND CLASS', 'DOOR'))
+        assert len(server.notes) <= 1, 'one line'
+        assert len(doors) >= 19, byte
+        server.service.close()
 
 
 WRITER = """

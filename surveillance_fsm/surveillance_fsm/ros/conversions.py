@@ -3,20 +3,26 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from typing import Any
 
-from surveillance_fsm.active import ActiveContainer
+from std_msgs.msg import Header
+
+from surveillance_fsm.container import Container
+from surveillance_fsm.exceptions import InvalidStateError
 from surveillance_fsm.export import to_mermaid
-from surveillance_fsm.record import Transition
-from surveillance_fsm.structure import structure_of
+from surveillance_fsm.history import Transition, presentable
+from surveillance_fsm.structure import Structure, structure_of
+from surveillance_fsm.userdata import UserData, raw
 from surveillance_interfaces.msg import (
     FsmContainer,
     FsmEdge,
     FsmStatus,
     FsmStructure,
     FsmTransition,
+    SmachContainerStatus,
+    SmachContainerStructure,
 )
-from surveillance_runtime.conversions import seconds_of
 
 
 def transition_message(transition: Transition, active: list[str], stamp: Any) -> FsmTransition:
@@ -41,7 +47,7 @@ def transition_from(message: FsmTransition) -> Transition:
     """The transition of a message; its time is the time of publishing, in seconds."""
     return Transition(
         sequence=message.sequence,
-        time=seconds_of(message.stamp),
+        time=message.stamp.sec + message.stamp.nanosec / 1e9,
         path=message.path,
         from_state=message.from_state,
         outcome=message.outcome,
@@ -56,7 +62,7 @@ def transition_from(message: FsmTransition) -> Transition:
     )
 
 
-def status_message(root: ActiveContainer, sequence: int, stamp: Any) -> FsmStatus:
+def status_message(root: Container, sequence: int, stamp: Any) -> FsmStatus:
     """What a machine's root is doing, after the transition with number `sequence`."""
     return FsmStatus(
         stamp=stamp,
@@ -69,7 +75,7 @@ def status_message(root: ActiveContainer, sequence: int, stamp: Any) -> FsmStatu
     )
 
 
-def structure_message(root: ActiveContainer, stamp: Any) -> FsmStructure:
+def structure_message(root: Container, stamp: Any) -> FsmStructure:
     """A machine's root and all its containers."""
     return FsmStructure(
         stamp=stamp,
@@ -91,3 +97,72 @@ def structure_message(root: ActiveContainer, stamp: Any) -> FsmStructure:
         ],
         mermaid=to_mermaid(root),
     )
+
+
+def userdata_from(text: str) -> UserData:
+    """Userdata of a JSON object; an empty text has none.
+
+    Raises:
+        InvalidStateError: It is no JSON object.
+    """
+    try:
+        values = json.loads(text or '{}')
+    except (ValueError, RecursionError) as error:
+        raise InvalidStateError(f'userdata must be a JSON object: {error}') from None
+    if not isinstance(values, dict):
+        raise InvalidStateError(f'userdata must be a JSON object, not {text[:80]!r}')
+    userdata = UserData()
+    raw(userdata).update(values)
+    return userdata
+
+
+def userdata_text(userdata: UserData) -> str:
+    """Userdata as a JSON object, as far as JSON can show it."""
+    return json.dumps(presentable(dict(raw(userdata))))
+
+
+# SMACH's own messages.
+
+
+def smach_path(path: str) -> str:
+    """A path as SMACH's introspection writes it."""
+    return f'/{path}'
+
+
+def smach_structure_messages(root: Container, stamp: Any) -> list[SmachContainerStructure]:
+    """A machine's root and all its containers, a message each."""
+    return [
+        SmachContainerStructure(
+            header=Header(stamp=stamp),
+            path=smach_path(structure.path),
+            children=list(structure.members),
+            internal_outcomes=[edge.outcome for edge in structure.edges],
+            outcomes_from=[edge.source for edge in structure.edges],
+            outcomes_to=[edge.target for edge in structure.edges],
+            container_outcomes=structure.outcomes,
+        )
+        for structure in structure_of(root).walk()
+    ]
+
+
+def smach_status_messages(
+    structures: Iterable[Structure], info: str, stamp: Any
+) -> list[SmachContainerStatus]:
+    """What containers are doing, a message each.
+
+    Args:
+        structures: The containers.
+        info: What has changed.
+        stamp: The time of publishing.
+    """
+    return [
+        SmachContainerStatus(
+            header=Header(stamp=stamp),
+            path=smach_path(structure.path),
+            initial_states=structure.container.get_initial_states(),
+            active_states=structure.container.get_active_states(),
+            local_data=userdata_text(structure.container.userdata),
+            info=info,
+        )
+        for structure in structures
+    ]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import surveillance_fsm as fsm
-from surveillance_fsm.container import describe
+from surveillance_fsm.exceptions import describe
 
 
 def seconds(duration: Any) -> float | None:

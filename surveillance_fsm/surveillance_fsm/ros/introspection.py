@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable
+import threading
+import time
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 from rclpy.node import Node
@@ -11,20 +12,44 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_srvs.srv import Trigger
 
 import surveillance_fsm as fsm
-from surveillance_fsm.active import ActiveContainer
+from surveillance_fsm.container import Container
 from surveillance_fsm.export import to_ascii
-from surveillance_fsm.record import Transition, TransitionFeed
+from surveillance_fsm.history import Transition, TransitionFeed
 from surveillance_fsm.ros.conversions import (
+    smach_path,
+    smach_status_messages,
+    smach_structure_messages,
     status_message,
     structure_message,
     transition_message,
+    userdata_from,
+    userdata_text,
 )
-from surveillance_fsm.structure import state_at
-from surveillance_interfaces.msg import FsmStatus, FsmStructure, FsmTransition
+from surveillance_fsm.ros.exchange import seconds
+from surveillance_fsm.structure import Structure, state_at, structure_of
+from surveillance_interfaces.msg import (
+    FsmStatus,
+    FsmStructure,
+    FsmTransition,
+    SmachContainerInitialStatusCmd,
+    SmachContainerStatus,
+    SmachContainerStructure,
+)
 from surveillance_interfaces.srv import ForceOutcome, SetInitialState
 
 HISTORY = 200
 """Transitions that a viewer receives that comes late."""
+
+STRUCTURE_TOPIC = '/smach/container_structure'
+STATUS_TOPIC = '/smach/container_status'
+INIT_STATUS_TOPIC = '/smach/container_init'
+"""The names of SMACH's topics below the server's."""
+
+INITIAL_STATE_SET = 'initial state set'
+"""What a status says when a message has set where its container begins."""
+
+CONTAINERS = 1000
+"""Containers of which SMACH's topics keep the last message for a viewer that comes late."""
 
 _LATCHED = QoSProfile(
     depth=1,
@@ -33,6 +58,11 @@ _LATCHED = QoSProfile(
 )
 _TRANSITIONS = QoSProfile(
     depth=HISTORY,
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.TRANSIENT_LOCAL,
+)
+_CONTAINERS = QoSProfile(
+    depth=CONTAINERS,
     reliability=ReliabilityPolicy.RELIABLE,
     durability=DurabilityPolicy.TRANSIENT_LOCAL,
 )
@@ -45,6 +75,10 @@ class IntrospectionServer:
     and ``fsm/structure``, all latched, and the services ``fsm/pause``, ``fsm/step``,
     ``fsm/resume``, ``fsm/force_outcome`` and ``fsm/set_initial_state``.
 
+    Beside them, SMACH's own topics with the fields of its messages: ``smach/container_structure``,
+    ``smach/container_status`` (both a message for each container) and ``smach/container_init``,
+    which sets where a container begins.
+
     Args:
         node: The node that serves.
         server_name: Prefix of the names; empty for none.
@@ -53,7 +87,7 @@ class IntrospectionServer:
             the root has.
     """
 
-    def __init__(self, node: Node, server_name: str, state: ActiveContainer, path: str) -> None:
+    def __init__(self, node: Node, server_name: str, state: Container, path: str) -> None:
         self._node = node
         self._root = state
         if path.strip('/'):
@@ -67,6 +101,20 @@ class IntrospectionServer:
         )
         self._status = node.create_publisher(FsmStatus, f'{prefix}/status', _LATCHED)
         self._structure = node.create_publisher(FsmStructure, f'{prefix}/structure', _LATCHED)
+        smach = server_name.rstrip('/') if server_name else ''
+        self._smach_structure = node.create_publisher(
+            SmachContainerStructure, f'{smach}{STRUCTURE_TOPIC}'.lstrip('/'), _CONTAINERS
+        )
+        self._smach_status = node.create_publisher(
+            SmachContainerStatus, f'{smach}{STATUS_TOPIC}'.lstrip('/'), _CONTAINERS
+        )
+        self._smach_init = node.create_subscription(
+            SmachContainerInitialStatusCmd,
+            f'{smach}{INIT_STATUS_TOPIC}'.lstrip('/'),
+            self._on_initial_state,
+            10,
+        )
+        self._containers: dict[str, Structure] = {}
         control = state.control
         for name, action in (
             ('pause', control.pause),
@@ -81,6 +129,10 @@ class IntrospectionServer:
         """Draw the machine in the log, on level debug, and begin to publish."""
         self._node.get_logger().debug(f'state machine:\n{to_ascii(self._root)}')
         self._structure.publish(structure_message(self._root, self._stamp()))
+        for message in smach_structure_messages(self._root, self._stamp()):
+            self._smach_structure.publish(message)
+        self._containers = {each.path: each for each in structure_of(self._root).walk()}
+        self._publish_smach(self._containers.values(), 'initial state')
         self._feed = TransitionFeed(self._root, self._publish)
         self._root.register_start_cb(self._changed)
         self._root.register_termination_cb(self._changed)
@@ -100,15 +152,46 @@ class IntrospectionServer:
         message = transition_message(transition, self._root.control.active_paths(), self._stamp())
         self._transitions.publish(message)
         self._publish_status()
+        place = self._containers.get(transition.path)
+        if place is not None:
+            info = f'{transition.from_state}: {transition.outcome} -> {transition.to_state}'
+            entered = place.inner.get(transition.to_state)
+            left = place.inner.get(transition.from_state)
+            self._publish_smach(
+                (place, *(each for each in (left, entered) if each is not None)), info
+            )
 
     def _publish_status(self) -> None:
         self._status.publish(status_message(self._root, self._sequence, self._stamp()))
+
+    def _publish_smach(self, containers: Iterable[Structure], info: str) -> None:
+        for message in smach_status_messages(containers, info, self._stamp()):
+            self._smach_status.publish(message)
 
     def _changed(self, *_: Any) -> None:
         if self._feed is not None:
             self._publish_status()
 
-    def _trigger(self, action: Callable[[], None]) -> Callable[[Any, Any], Any]:
+    def _on_initial_state(self, message: SmachContainerInitialStatusCmd) -> None:
+        path = message.path.strip('/')
+        try:
+            container = self._set_initial(path, message.initial_states, message.local_data)
+        except (fsm.SmachError, KeyError) as error:
+            self._node.get_logger().warn(f'{INIT_STATUS_TOPIC}: {_said(error)}')
+            return
+        self._publish_smach(
+            [each for each in self._containers.values() if each.container is container],
+            INITIAL_STATE_SET,
+        )
+
+    def _set_initial(self, path: str, labels: Sequence[str], userdata: str) -> fsm.Container:
+        container = state_at(self._root, path)
+        if not isinstance(container, fsm.Container):
+            raise fsm.InvalidStateError(f"'{path}' is not a container")
+        container.set_initial_state(list(labels), userdata_from(userdata))
+        return container
+
+    def _trigger(self, action: Callable[[], object]) -> Callable[[Any, Any], Any]:
         def serve(_request: Any, response: Any) -> Any:
             return self._answer(response, action)
 
@@ -120,29 +203,108 @@ class IntrospectionServer:
         )
 
     def _set_initial_state(self, request: Any, response: Any) -> Any:
-        def act() -> None:
-            container = state_at(self._root, request.path)
-            if not isinstance(container, fsm.Container):
-                raise fsm.InvalidStateError(f"'{request.path}' is not a container")
-            userdata = fsm.UserData()
-            values = json.loads(request.userdata or '{}')
-            if not isinstance(values, dict):
-                raise fsm.InvalidStateError(
-                    f'userdata must be a JSON object, not {request.userdata!r}'
-                )
-            for key, value in values.items():
-                userdata[key] = value
-            container.set_initial_state(list(request.initial_states), userdata)
+        return self._answer(
+            response,
+            lambda: self._set_initial(request.path, request.initial_states, request.userdata),
+        )
 
-        return self._answer(response, act)
-
-    def _answer(self, response: Any, action: Callable[[], None]) -> Any:
+    def _answer(self, response: Any, action: Callable[[], object]) -> Any:
         try:
             action()
-        except (fsm.SmachError, KeyError, ValueError) as error:
+        except (fsm.SmachError, KeyError) as error:
             response.success = False
-            response.message = str(error.args[0] if isinstance(error, KeyError) else error)
+            response.message = _said(error)
             return response
         response.success = True
         self._publish_status()
         return response
+
+
+def _said(error: Exception) -> str:
+    """What an error says; a KeyError alone would show it in quotes."""
+    if isinstance(error, KeyError) and not isinstance(error, fsm.SmachError):
+        return str(error.args[0])
+    return str(error)
+
+
+class IntrospectionClient:
+    """Finds introspection servers and sets where their containers begin, with SMACH's methods.
+
+    Args:
+        node: The node that looks; an executor must spin it in another thread.
+    """
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self._changed = threading.Condition()
+        self._publishers: dict[str, Any] = {}
+        self._subscriptions: list[Any] = []
+        self._told: set[tuple[str, str, tuple[str, ...]]] = set()
+
+    def get_servers(self) -> list[str]:
+        """The names of the servers that are there, fully resolved."""
+        wanted = 'surveillance_interfaces/msg/SmachContainerStructure'
+        return sorted(
+            name[: -len(STRUCTURE_TOPIC)]
+            for name, types in self._node.get_topic_names_and_types()
+            if name.endswith(STRUCTURE_TOPIC)
+            and wanted in types
+            and self._node.count_publishers(name)
+        )
+
+    def set_initial_state(
+        self,
+        server: str,
+        path: str,
+        initial_states: Sequence[str],
+        initial_userdata: fsm.UserData | None = None,
+        timeout: Any = 10.0,
+    ) -> bool:
+        """Set where a container begins, and add to its userdata.
+
+        Args:
+            server: The server's name.
+            path: The container's path, with or without a slash before it.
+            initial_states: Labels of the states to begin with.
+            initial_userdata: Userdata that JSON can hold.
+            timeout: Seconds of steady time (or an rclpy ``Duration``) for the server to say that it
+                has done so.
+
+        Returns:
+            Whether it said so.
+        """
+        wanted = (server, smach_path(path.strip('/')), tuple(initial_states))
+        userdata = initial_userdata if initial_userdata is not None else fsm.UserData()
+        command = SmachContainerInitialStatusCmd(
+            path=wanted[1], initial_states=list(wanted[2]), local_data=userdata_text(userdata)
+        )
+        publisher = self._connect(server)
+        deadline = time.monotonic() + (seconds(timeout) or 0.0)
+        with self._changed:
+            self._told.discard(wanted)
+            while wanted not in self._told and time.monotonic() < deadline:
+                if publisher.get_subscription_count():
+                    publisher.publish(command)
+                self._changed.wait(0.1)
+            return wanted in self._told
+
+    def _connect(self, server: str) -> Any:
+        """Make both ends of a server's topics, once: none may go while a node spins."""
+        with self._changed:
+            if server not in self._publishers:
+
+                def told(message: SmachContainerStatus) -> None:
+                    if message.info == INITIAL_STATE_SET:
+                        with self._changed:
+                            self._told.add((server, message.path, tuple(message.initial_states)))
+                            self._changed.notify_all()
+
+                self._publishers[server] = self._node.create_publisher(
+                    SmachContainerInitialStatusCmd, f'{server}{INIT_STATUS_TOPIC}', 10
+                )
+                self._subscriptions.append(
+                    self._node.create_subscription(
+                        SmachContainerStatus, f'{server}{STATUS_TOPIC}', told, 10
+                    )
+                )
+            return self._publishers[server]

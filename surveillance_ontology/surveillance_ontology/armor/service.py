@@ -54,8 +54,11 @@ class ArmorService:
     ) -> None:
         self.session = Session(settings or Settings(), screen, warn, store)
         self._store = store
-        for ref in store.recover() if store else ():
-            self.session.register(ref)
+        if store:
+            for ref in store.recover():
+                self.session.register(ref)
+            for note in store.notes:
+                warn(note)
 
     @property
     def settings(self) -> Settings:

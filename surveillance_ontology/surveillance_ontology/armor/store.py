@@ -5,10 +5,11 @@ and go, not the directives, so that recovery gives the same ontology whatever th
 then. Now and then a snapshot takes the place of the records before it.
 
 A journal is a directory with numbered segments, ``journal-<n>.log``, and at most one snapshot in
-use, ``snapshot-<n>.log``, which stands for everything before segment n. Each line is ``<crc32>
-<text>`` with a list of records, and is on the disk when `Journal.append` returns. A line that was
-cut off by a crash is the last of the last segment; it was never answered for, and is removed when
-the journal is opened.
+use, ``snapshot-<n>.log``, which stands for everything before segment n. Each record is a line,
+``<crc32> <length> <text>``, with a ``+`` behind the length where the next line belongs to the same
+batch; it is on the disk when `Journal.append` returns. A batch that was cut off by a crash is the
+last of the last segment; it was never answered for, and is removed when the journal is opened. What
+is damaged in any other way is put aside, into ``damaged-<time>-<name>``, and what is whole is kept.
 """
 
 from __future__ import annotations
@@ -17,9 +18,11 @@ import fcntl
 import json
 import os
 import re
+import shutil
 import threading
+import time
 import zlib
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import fields, is_dataclass
 from pathlib import Path
@@ -43,6 +46,8 @@ from surveillance_ontology.reasoner.java_reasoning import JavaReasonerError
 
 Record = list[Any]
 """``[what, reference name, ...]``."""
+CHUNK = 100
+"""Axioms in one record of a snapshot."""
 COMPACT_FROM = 1 << 20
 """Bytes of journal from which on a snapshot is written, if the last one is not larger."""
 _NAME = re.compile(r'(journal|snapshot)-(\d+)\.log\Z')
@@ -59,15 +64,17 @@ class Journal:
         directory: Where they are; made if it is not there. One process at a time may have it open.
 
     Raises:
-        JournalError: In use by another process, not readable, or damaged other than by a crash.
+        JournalError: In use by another process, or not readable.
 
     Attributes:
+        notes: One line for each part that was found damaged or missing.
         size: Bytes of the segments since the snapshot.
         snapshot_size: Bytes of the snapshot.
     """
 
     def __init__(self, directory: Path) -> None:
         self._directory = directory
+        self.notes: list[str] = []
         self._parts_lock = threading.Lock()
         try:
             directory.mkdir(parents=True, exist_ok=True)
@@ -92,13 +99,13 @@ class Journal:
                 numbers[match[1]].append(int(match[2]))
         start = max(numbers['snapshot'], default=0)
         segments = sorted(n for n in numbers['journal'] if n >= start) or [start]
-        for number in range(start, segments[-1]):
-            if number not in segments:
-                raise JournalError(f'{self._path("journal", number)}: is missing')
+        missing = [n for n in range(start, segments[-1]) if n not in segments]
+        self.notes += [f'{self._path("journal", n)}: is missing' for n in missing]
         self._parts = [self._path('snapshot', start)] if start else []
         self._parts += [self._path('journal', number) for number in segments]
-        for _ in self.records():
-            pass
+        self._found: list[Any] | None = []
+        for path in self._parts:
+            self._found += self._mended(path, last=path == self._parts[-1])
         self.snapshot_size = self._path('snapshot', start).stat().st_size if start else 0
         sizes = [path.stat().st_size for path in self._parts if path.exists()]
         self.size = sum(sizes) - self.snapshot_size
@@ -111,11 +118,15 @@ class Journal:
         """Give the records, oldest first.
 
         Raises:
-            JournalError: Not readable, or damaged.
+            JournalError: Not readable.
         """
         with self._parts_lock:
+            found, self._found = self._found, None
+            if found is not None:
+                yield from found
+                return
             for path in self._parts:
-                yield from self._read(path, last=path == self._parts[-1])
+                yield from _Contents(self._bytes(path), last=path == self._parts[-1]).records
 
     def append(self, records: Iterable[Any]) -> None:
         """Write records as one: after a crash all of them are there or none.
@@ -125,10 +136,12 @@ class Journal:
         """
         if self._file.closed:
             raise JournalError(f'{self._directory}: closed')
-        line = _line(list(records))
+        self._found = None
+        *first, last = records
+        lines = b''.join([*(_line(record, more=True) for record in first), _line(last)])
         try:
             self._cut()
-            rest = memoryview(line)
+            rest = memoryview(lines)
             while rest:
                 # A disk that is almost full takes a part without an error.
                 rest = rest[self._file.write(rest) :]
@@ -137,8 +150,8 @@ class Journal:
             with suppress(OSError):
                 self._cut()
             raise JournalError(f'{self._directory}: {error.strerror}') from None
-        self._end += len(line)
-        self.size += len(line)
+        self._end += len(lines)
+        self.size += len(lines)
 
     def begin_snapshot(self) -> int:
         """Start a new segment; a snapshot of the state as it is now may then be written.
@@ -167,7 +180,7 @@ class Journal:
         try:
             with temporary.open('wb') as file:
                 for record in records:
-                    file.write(_line([record]))
+                    file.write(_line(record))
                 file.flush()
                 os.fsync(file.fileno())
                 self.snapshot_size = file.tell()
@@ -210,39 +223,117 @@ class Journal:
             if path.suffix == '.tmp' or (match and int(match[2]) < number):
                 path.unlink(missing_ok=True)
 
-    def _read(self, path: Path, *, last: bool) -> Iterator[Any]:
+    def _bytes(self, path: Path) -> bytes:
         try:
-            data = path.read_bytes()
+            return path.read_bytes()
         except FileNotFoundError:
-            if last:
-                return
-            raise JournalError(f'{path}: is missing') from None
+            return b''
         except OSError as error:
             raise JournalError(f'{path}: {error.strerror}') from None
-        start = 0
+
+    def _mended(self, path: Path, *, last: bool) -> list[Any]:
+        """Read a part; afterwards it holds whole records only."""
+        contents = _Contents(self._bytes(path), last=last)
+        if contents.damage:
+            first, count = contents.damage[0][0], len(contents.damage)
+            place = f'{path}: {count} damaged entr{"y" if count == 1 else "ies"}, from byte {first}'
+            kept = f'{len(contents.records)} whole ones are kept'
+            stamp = time.strftime('%Y%m%d-%H%M%S')
+            aside = self._directory / f'damaged-{stamp}-{path.name}'
+            try:
+                shutil.copyfile(path, aside)
+                self._rewrite(path, contents.records)
+            except OSError as error:
+                self.notes.append(f'{place}; {kept}; not put aside: {error.strerror}')
+            else:
+                self.notes.append(f'{place}, put aside in {aside.name}; {kept}')
+        elif contents.end is not None:
+            os.truncate(path, contents.end)
+        elif contents.unended:
+            with path.open('ab') as file:
+                file.write(b'\n')
+        return contents.records
+
+    def _rewrite(self, path: Path, records: Iterable[Any]) -> None:
+        temporary = path.with_suffix('.tmp')
+        with temporary.open('wb') as file:
+            for record in records:
+                file.write(_line(record))
+            file.flush()
+            os.fsync(file.fileno())
+        temporary.rename(path)
+        self._sync_directory()
+
+
+class _Contents:
+    """What a part of a journal holds.
+
+    Args:
+        data: The part.
+        last: A crash may have cut off its end.
+
+    Attributes:
+        records: The whole ones.
+        damage: Where what cannot be read begins and ends, bytes.
+        end: Where a batch begins that was cut off; None: there is none.
+        unended: All that is lacking is the last line's end.
+    """
+
+    def __init__(self, data: bytes, *, last: bool) -> None:
+        self.records: list[Any] = []
+        self.damage: list[tuple[int, int]] = []
+        self.end: int | None = None
+        self.unended = False
+        batch: list[Any] = []
+        start = begin = 0
         while start < len(data):
-            end = data.find(b'\n', start)
-            records = _parsed(data[start:end]) if end >= 0 else None
-            if records is None:
-                if last and (end < 0 or end == len(data) - 1):
-                    os.truncate(path, start)
-                    return
-                raise JournalError(f'{path}: damaged at byte {start}')
-            yield from records
-            start = end + 1
+            entry = _entry(data, start)
+            if entry is not None:
+                found, more, start = entry
+                batch += found
+                if not more:
+                    self.records += batch
+                    batch, begin = [], start
+                continue
+            newline = data.find(b'\n', start)
+            if newline < 0 and last and _CUT_OFF.fullmatch(data, start):
+                self.end = begin
+                return
+            end = newline + 1 if newline >= 0 else len(data)
+            self.damage.append((start, end))
+            start = end
+        self.unended = start > len(data)
+        if batch and last and not self.damage:
+            self.end = begin
+        else:
+            self.records += batch
 
 
-def _line(records: list[Any]) -> bytes:
-    text = json.dumps(records, separators=(',', ':')).encode()
-    return b'%08x %s\n' % (zlib.crc32(text), text)
+_HEAD = re.compile(rb'([0-9a-f]{8}) (\d{1,10})(\+?) ')
+_CUT_OFF = re.compile(rb'[0-9a-f]{1,8}|[0-9a-f]{8} (\d{0,10}\+?|\d+\+? [ -~]*|\[[ -~]*)')
 
 
-def _parsed(line: bytes) -> list[Any] | None:
-    text = line[9:]
-    if line[8:9] != b' ' or line[:8] != b'%08x' % zlib.crc32(text):
+def _line(record: Any, *, more: bool = False) -> bytes:
+    text = json.dumps(record, separators=(',', ':')).encode()
+    body = b'%d%s %s' % (len(text), b'+' if more else b'', text)
+    return b'%08x %s\n' % (zlib.crc32(body), body)
+
+
+def _entry(data: bytes, start: int) -> tuple[list[Any], bool, int] | None:
+    """Return the records of a line, whether the batch goes on, and where the next line begins."""
+    head = _HEAD.match(data, start)
+    if head is not None:
+        end = head.end() + int(head[2])
+        if end <= len(data) and b'%08x' % zlib.crc32(data[start + 9 : end]) == head[1]:
+            # Not looked for: the line's end may be what is damaged.
+            return [json.loads(data[head.end() : end])], bool(head[3]), end + 1
         return None
-    records: list[Any] = json.loads(text)
-    return records
+    # Before version 0.3 a line was a whole batch and had no length.
+    end = data.find(b'\n', start)
+    line = data[start:end] if end >= 0 else b''
+    if line[8:10] == b' [' and line[:8] == b'%08x' % zlib.crc32(line[9:]):
+        return json.loads(line[9:]), False, end + 1
+    return None
 
 
 _RECORDS: dict[str, type] = {
@@ -304,10 +395,16 @@ class Store:
 
     Raises:
         JournalError: The directory cannot be used.
+
+    Attributes:
+        directory: Where the journal is.
+        notes: One line for each thing that was found damaged.
     """
 
     def __init__(self, directory: Path, compact_from: int = COMPACT_FROM) -> None:
+        self.directory = directory
         self._journal = Journal(directory)
+        self.notes = list(self._journal.notes)
         self._compact_from = compact_from
         self._lock = threading.Lock()
         self._batch = threading.local()
@@ -326,9 +423,15 @@ class Store:
             for record in self._journal.records():
                 try:
                     recovery.take(record)
-                except (KeyError, IndexError, TypeError, ValueError) as error:
+                except (IndexError, TypeError, ValueError) as error:
                     raise JournalError(f'record {record!r:.80} cannot be read: {error}') from None
             self._names = set(recovery.references)
+        self.notes = list(self._journal.notes)
+        if recovery.orphans:
+            self.notes.append(
+                f'{self.directory}: {recovery.orphans} changes of references that are not there '
+                'were left out'
+            )
         for ref in recovery.references.values():
             with suppress(JavaReasonerError):
                 ref.kb.reason()
@@ -336,7 +439,7 @@ class Store:
 
     def loaded(self, ref: Reference) -> None:
         """Remember a new reference."""
-        self._write(_load_record(ref))
+        self._write(*_records(*_state(ref)))
 
     def dropped(self, name: str) -> None:
         """Forget a reference."""
@@ -397,7 +500,8 @@ class Store:
                         return  # One came or went meanwhile; the next change tries again.
                     number = journal.begin_snapshot()
                     states = [_state(ref) for ref in kept]
-                journal.finish_snapshot(number, (_record(*state) for state in states))
+                records = (record for state in states for record in _records(*state))
+                journal.finish_snapshot(number, records)
             except JournalError as error:
                 failed(str(error))
 
@@ -413,14 +517,14 @@ class Store:
             self._snapshot.join()
         self._journal.close()
 
-    def _write(self, record: Record) -> None:
+    def _write(self, *records: Record) -> None:
         pending: list[Record] | None = getattr(self._batch, 'records', None)
         if pending is not None:
-            pending.append(record)
+            pending += records
             return
-        self._append([record])
+        self._append(records)
 
-    def _append(self, records: list[Record]) -> None:
+    def _append(self, records: Sequence[Record]) -> None:
         with self._lock:
             self._journal.append(records)
             for what, name, *_ in records:
@@ -447,46 +551,59 @@ def _state(ref: Reference) -> _State:
     return ref.name, settings, list(ref.kb.axioms()), list(ref.queue)
 
 
-def _record(
+def _records(
     name: str, settings: dict[str, Any], axioms: list[Axiom], queue: list[Change]
-) -> Record:
-    return ['load', name, settings, [encode(a) for a in axioms], [encode(c) for c in queue]]
+) -> Iterator[Record]:
+    """Return the records of a reference: short ones, since damage costs a whole record."""
+    yield ['load', name, settings, [], [encode(change) for change in queue]]
+    for start in range(0, len(axioms), CHUNK):
+        yield ['axioms', name, [encode(axiom) for axiom in axioms[start : start + CHUNK]]]
+    # Once more, should damage have hit the first.
+    yield ['loaded', name, settings]
 
 
-def _load_record(ref: Reference) -> Record:
-    return _record(*_state(ref))
+_KINDS = frozenset({'axioms', 'mount', 'change', 'flush', 'buffer'})
 
 
 class _Recovery:
+    """Makes references from records.
+
+    Attributes:
+        references: Those that there are, by name.
+        orphans: Records of references that are not there.
+    """
+
     def __init__(self) -> None:
         self.references: dict[str, Reference] = {}
+        self.orphans = 0
+        self._early: dict[str, list[Axiom]] = {}
 
     def take(self, record: Record) -> None:
         what, name, *rest = record
         if what == 'load':
             settings, axioms, queue = rest
-            self.references[name] = Reference(
-                name,
-                knowledge_base(
-                    settings['iri'], [decode(axiom) for axiom in axioms], settings['reasoner']
-                ),
-                Origin(
-                    settings['path'],
-                    settings['format'],
-                    settings['prefixes'],
-                    settings['reasoner'],
-                ),
-                settings['buffered_manipulation'],
-                settings['buffered_reasoner'],
-                settings['mounted'],
-                [decode(change) for change in queue],
-            )
+            self._load(name, settings, [decode(axiom) for axiom in axioms])
+            self.references[name].queue = [decode(change) for change in queue]
+            return
+        if what == 'loaded':
+            if name not in self.references:
+                self._load(name, rest[0], self._early.pop(name, []))
             return
         if what == 'drop':
             self.references.pop(name, None)
             return
-        ref = self.references[name]
-        if what == 'mount':
+        ref = self.references.get(name)
+        if what not in _KINDS:
+            raise ValueError(f'unknown kind {what!r}')
+        if what == 'axioms':
+            added = [decode(axiom) for axiom in rest[0]]
+            if ref is None:
+                self._early.setdefault(name, []).extend(added)
+            else:
+                ref.kb.change(added)
+        elif ref is None:
+            self.orphans += 1
+        elif what == 'mount':
             ref.mounted = rest[0]
         elif what == 'change':
             changes = [decode(change) for change in rest[0]]
@@ -500,8 +617,24 @@ class _Recovery:
             ref.buffered_manipulation = rest[0]
             if not rest[0]:
                 self._flush(ref)
-        else:
-            raise ValueError(f'unknown kind {what!r}')
+
+    def _load(self, name: str, settings: dict[str, Any], axioms: list[Axiom]) -> None:
+        try:
+            self.references[name] = Reference(
+                name,
+                knowledge_base(settings['iri'], axioms, settings['reasoner']),
+                Origin(
+                    settings['path'],
+                    settings['format'],
+                    settings['prefixes'],
+                    settings['reasoner'],
+                ),
+                settings['buffered_manipulation'],
+                settings['buffered_reasoner'],
+                settings['mounted'],
+            )
+        except KeyError as error:
+            raise ValueError(f'no setting {error}') from None
 
     def _flush(self, ref: Reference) -> None:
         queue, ref.queue = ref.queue, []

@@ -9,11 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from surveillance_ontology.owl.axioms import Axiom
 from surveillance_ontology.owl.expressions import ClassExpression, PropertyExpression
 from surveillance_ontology.reasoner.datatypes import Test, Value
+from surveillance_ontology.reasoner.value_sets import ValueSet
+
+if TYPE_CHECKING:
+    from surveillance_ontology.reasoner.contexts import Contexts
 
 Fact: TypeAlias = 'tuple[Any, ...]'
 Premises: TypeAlias = 'tuple[Fact, ...]'
@@ -153,8 +157,11 @@ class SameAtom:
 
 @dataclass(frozen=True, slots=True)
 class RangeAtom:
+    """`values` holds what passes the test."""
+
     test: Test
     terms: tuple[Term]
+    values: ValueSet = field(compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,18 +182,24 @@ HeadAtom: TypeAlias = PredicateAtom | SameAtom
 
 @dataclass(frozen=True, slots=True)
 class Clause:
-    """If the whole body holds, the head does. `origin` is the axiom to name in an explanation."""
+    """If the whole body holds, the head does.
+
+    `origin` is the axiom to name in an explanation. `named_only`: a SWRL rule, whose variables
+    stand for named individuals.
+    """
 
     body: tuple[BodyAtom, ...]
     head: HeadAtom
     origin: Axiom | None = field(default=None, compare=False)
+    named_only: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class AtLeast:
     """`head` holds of what has `n` pairwise different related individuals (values) in the filler.
 
-    `inverse` counts along the property backwards; `filler` None admits every individual.
+    `inverse` counts along the property backwards; `filler` None admits every individual; `values`
+    is what a test as filler admits.
     """
 
     head: Predicate
@@ -195,6 +208,7 @@ class AtLeast:
     inverse: bool
     filler: Predicate | Test | None
     origin: Axiom | None = field(default=None, compare=False)
+    values: ValueSet | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -209,6 +223,7 @@ class AtMost:
     inverse: bool
     filler: Predicate | Test | None
     origin: Axiom | None = field(default=None, compare=False)
+    values: ValueSet | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -222,15 +237,16 @@ class Key:
 
 @dataclass(frozen=True, slots=True)
 class Existential:
-    """What `label` holds of has at least `n` related individuals (or a value) in the filler, known
-    or not.
+    """What `label` holds of has at least `n` related individuals (values) in the filler, known or
+    not.
     """
 
     label: Predicate
     n: int
     prop: Predicate
     inverse: bool
-    filler: ClassExpression | object
+    filler: Predicate | ValueSet | None
+    origin: Axiom | None = field(default=None, compare=False)
 
 
 @dataclass
@@ -244,6 +260,9 @@ class Program:
         thing, nothing, different, same: The predicates with fixed meaning; `same` only ever names a
             premise.
         uses_thing: Whether the extension of owl:Thing must be kept.
+        contexts: Completes what an individual is by all its classes together; None where each
+            class alone says all.
+        relevant: The classes that matter to `contexts`.
     """
 
     classes: dict[str, Predicate] = field(default_factory=dict)
@@ -261,6 +280,8 @@ class Program:
     negatives: dict[Predicate, Predicate] = field(default_factory=dict)
     unsupported: list[str] = field(default_factory=list)
     uses_thing: bool = False
+    contexts: Contexts | None = None
+    relevant: frozenset[Predicate] = frozenset()
     thing: Predicate = field(default_factory=lambda: Predicate('class', 'owl:Thing'))
     nothing: Predicate = field(default_factory=lambda: Predicate('class', 'owl:Nothing'))
     different: Predicate = field(default_factory=lambda: Predicate('different', 'different from'))

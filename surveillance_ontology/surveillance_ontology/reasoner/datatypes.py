@@ -41,7 +41,7 @@ _MOMENT = re.compile(
 )
 _MAX_DIGITS = 4000
 
-_BOUNDS: dict[str, tuple[int | None, int | None]] = {
+BOUNDS: dict[str, tuple[int | None, int | None]] = {
     'integer': (None, None),
     'nonNegativeInteger': (0, None),
     'nonPositiveInteger': (None, 0),
@@ -139,7 +139,7 @@ def parse_value(literal: Literal) -> Value:
         return ('langString', plain, language.lower()) if language else plain
     if datatype.startswith(XSD):
         name = datatype[len(XSD) :]
-        bounds = _BOUNDS.get(name)
+        bounds = BOUNDS.get(name)
         if bounds is not None:
             text = text.strip()
             if not _INTEGER.fullmatch(text) or len(text) > _MAX_DIGITS:
@@ -235,6 +235,11 @@ def literal_of(value: Value) -> Literal:
     return Literal(value[2], value[1])
 
 
+def is_decimal(number: Fraction) -> bool:
+    """Whether a number is a decimal: its digits end."""
+    return _terminating(number) is not None
+
+
 def _terminating(number: Fraction) -> str | None:
     twos = fives = 0
     rest = number.denominator
@@ -282,8 +287,8 @@ def _datatype_test(datatype: str) -> Test | None:
     if not datatype.startswith(XSD):
         return None
     name = datatype[len(XSD) :]
-    if name in _BOUNDS:
-        low, high = _BOUNDS[name]
+    if name in BOUNDS:
+        low, high = BOUNDS[name]
         if low is None and high is None:
             return lambda value: isinstance(value, int)
         if high is None:
@@ -320,7 +325,8 @@ def comparable(value: Value) -> tuple[str, Any]:
     return value[0], value[1:]
 
 
-def _facet_test(facet: str, bound: Literal) -> Test | None:
+def facet_test(facet: str, bound: Literal) -> Test | None:
+    """A predicate on values for one facet; None when the facet is not supported."""
     name = facet[len(XSD) :] if facet.startswith(XSD) else facet
     limit = value_of(bound)
     if name in ('minInclusive', 'maxInclusive', 'minExclusive', 'maxExclusive'):
@@ -368,7 +374,7 @@ def range_test(data_range: DataRange) -> Test | None:
         return None if inner is None else lambda value: not inner(value)
     if isinstance(data_range, DatatypeRestriction):
         tests = [range_test(data_range.datatype)]
-        tests += [_facet_test(facet, bound) for facet, bound in data_range.facets]
+        tests += [facet_test(facet, bound) for facet, bound in data_range.facets]
     else:
         tests = [range_test(operand) for operand in data_range.operands]
     if any(test is None for test in tests):

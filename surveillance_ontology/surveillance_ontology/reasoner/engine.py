@@ -96,6 +96,8 @@ class Engine:
         for index in self._network.thresholds:
             index.proves = self.proofs.proves
         self._flushes = [index.flush for index in self._network.thresholds]
+        if self._network.contexts is not None:
+            self._flushes.append(self._network.contexts.flush)
         for predicate in dict.fromkeys(program.predicates()):
             self._attach_touching(predicate)
         self._start()
@@ -417,28 +419,6 @@ class Engine:
     def _start(self) -> None:
         for fire in self._network.initial:
             fire()
-
-    def restart(self, facts: Iterable[Fact]) -> None:
-        """Forgets everything, then takes these facts for asserted."""
-        for predicate in self.program.predicates():
-            predicate.clear()
-        for index in self._network.thresholds:
-            index.clear()
-        for container in (self.asserted, self.conflicts, self._touched, self._requests):
-            container.clear()
-        self.equality.clear()
-        self.difference.clear()
-        self._start()
-        self.supply(facts)
-
-    def supply(self, facts: Iterable[Fact]) -> None:
-        """Takes more facts for asserted."""
-        self.proofs.reset()
-        for fact in facts:
-            fact = self.current(fact)
-            self.asserted[fact] = self.asserted.get(fact, 0) + 1
-            self._queue.append(fact)
-        self._propagate()
 
     # --- updates ---
 

@@ -19,6 +19,7 @@ from surveillance_ontology.reasoner.clauses import (
     Program,
     SameAtom,
 )
+from surveillance_ontology.reasoner.context_index import ContextIndex
 from surveillance_ontology.reasoner.difference import (
     AsymmetricEvidence,
     Difference,
@@ -49,6 +50,7 @@ class Network:
             changed.
         touch_related: Like these, for individuals that differ because their values do.
         thresholds: The rules run by a sorted index.
+        contexts: What follows from individuals that must exist, where that takes an index.
         counters: The watchers of upper bounds.
     """
 
@@ -92,6 +94,13 @@ class Network:
             self._attach(clause)
         self._attach_disjoint()
         self._attach_evidence()
+        self.contexts: ContextIndex | None = None
+        if program.contexts is not None:
+            index = ContextIndex(program, program.contexts, enqueue, overdelete, merge)
+            self.contexts = index
+            difference.evidence.append(index)
+            for predicate in program.relevant:
+                predicate.touching = (1,)
 
     # --- clauses ---
 

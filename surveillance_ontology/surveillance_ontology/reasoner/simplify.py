@@ -29,7 +29,7 @@ def simplify(program: Program, asserted: Iterable[Predicate]) -> None:
     program.clauses = list(dict.fromkeys(program.clauses))
     _replace_aliases(program, kept)
     _prune(program, kept)
-    _drop_implied_atoms(program)
+    drop_implied_atoms(program)
     program.clauses = list(dict.fromkeys(program.clauses))
 
 
@@ -61,6 +61,8 @@ def _replace_aliases(program: Program, kept: set[Predicate]) -> None:
             atom = _source(clause)
             if atom is None or atom.predicate is label or atom.predicate in alias:
                 continue
+            if clause.named_only or atom.predicate in (program.thing, program.nothing):
+                continue
             if label not in alias.values():
                 alias[label] = atom.predicate
         if not alias:
@@ -79,7 +81,7 @@ def _substitute(program: Program, alias: dict[Predicate, Predicate]) -> None:
         body = tuple(dict.fromkeys(map(atom_of, clause.body)))
         head = atom_of(clause.head)
         if head not in body:
-            clauses[Clause(body, head, clause.origin)] = None  # type: ignore[arg-type]
+            clauses[Clause(body, head, clause.origin, clause.named_only)] = None  # type: ignore[arg-type]
     program.clauses = list(clauses)
     program.at_least = [
         replace(condition, filler=alias.get(condition.filler, condition.filler))  # type: ignore[arg-type]
@@ -148,11 +150,13 @@ def _prune(program: Program, kept: set[Predicate]) -> None:
             return
 
 
-def _drop_implied_atoms(program: Program) -> None:
+def drop_implied_atoms(program: Program) -> None:
+    """Leaves out of each body what its other atoms imply."""
     simple: dict[Predicate, list[Clause]] = {}
     for clause in program.clauses:
         facts = [atom for atom in clause.body if isinstance(atom, PredicateAtom)]
-        if len(facts) == len(clause.body) == 1 and isinstance(clause.head, PredicateAtom):
+        is_simple = len(facts) == len(clause.body) == 1 and not clause.named_only
+        if is_simple and isinstance(clause.head, PredicateAtom):
             simple.setdefault(facts[0].predicate, []).append(clause)
 
     def implied(atoms: list[PredicateAtom]) -> set[PredicateAtom]:

@@ -36,8 +36,9 @@ from surveillance_ontology.reasoner.clauses import (
     Term,
     property_atom,
 )
-from surveillance_ontology.reasoner.datatypes import Test, Value, includes, range_test, value_of
+from surveillance_ontology.reasoner.datatypes import Test, range_test, value_of
 from surveillance_ontology.reasoner.swrl_builtins import builtin
+from surveillance_ontology.reasoner.value_sets import EVERY, ValueSet, value_set
 
 _POSITIVE = (
     ex.ObjectSomeValuesFrom,
@@ -173,6 +174,10 @@ class PropertyHierarchy:
                     pending.append(sup)
         return found
 
+    def above_role(self, iri: str, inverted: bool) -> set[_Directed]:
+        """A directed property and everything it is included in."""
+        return self.above(ex.ObjectInverseOf(iri) if inverted else iri)
+
     def is_functional(self, prop: PropertyExpression) -> bool:
         """Whether an individual has at most one value, by this property or one above it."""
         return not self._functional.isdisjoint(self.above(prop))
@@ -184,22 +189,19 @@ class PropertyHierarchy:
 
 Body = tuple[BodyAtom, ...]
 _X, _Y, _Z = 0, 1, 2
+_RELATING = (
+    ex.ObjectSomeValuesFrom,
+    ex.ObjectMinCardinality,
+    ex.ObjectHasValue,
+    ex.ObjectHasSelf,
+    ex.DataSomeValuesFrom,
+    ex.DataMinCardinality,
+    ex.DataHasValue,
+)
 
 
 class UnsupportedError(Exception):
     """Part of an axiom is outside the fragment; the text says which."""
-
-
-class _Outside:
-    """The complement of a test, comparable so that equal conditions fall together."""
-
-    __slots__ = ('_test',)
-
-    def __init__(self, test: Test) -> None:
-        self._test = test
-
-    def __call__(self, value: Value) -> bool:
-        return not self._test(value)
 
 
 class _Terms:
@@ -246,6 +248,11 @@ def _computed(atom: ex.BuiltinAtom, terms: _Terms) -> ComputedAtom:
     return ComputedAtom(name, holds, solve, tuple(map(terms.value, atom.arguments)))
 
 
+def _range_atom(admitted: tuple[Test, ValueSet], term: Term) -> RangeAtom:
+    test, values = admitted
+    return RangeAtom(test, (term,), values)
+
+
 class Translation:
     """Builds a `Program` from axioms that are not assertions.
 
@@ -253,7 +260,6 @@ class Translation:
         axioms: The ontology's axioms; assertions and annotations among them are passed over.
         asserted: Complex class expressions that individuals are asserted to belong to.
         negated: Properties with negative assertions, as pairs (kind, IRI), kind 'object' or 'data'.
-        abstract: Whether values may be stand-ins ('some', range) for an unknown value in a range.
 
     Attributes:
         program: The result.
@@ -265,14 +271,13 @@ class Translation:
         axioms: Iterable[Axiom],
         asserted: Iterable[ClassExpression] = (),
         negated: Iterable[tuple[str, str]] = (),
-        abstract: bool = False,
     ) -> None:
         tbox = [axiom for axiom in axioms if not isinstance(axiom, (ax.Assertion, ax.Annotation))]
         self.program = Program()
-        self._abstract = abstract
         self._variables = _Y
         self._described: set[ClassExpression] = set()
         self._recognised: set[ClassExpression] = set()
+        self._required: set[ClassExpression] = set()
         self._complements: dict[str, Predicate] = {}
         self._origin: Axiom | None = None
         self._context = 'the ontology'
@@ -288,7 +293,7 @@ class Translation:
         self._origin = None
         for expression in asserted:
             self._context = f'assertions of {expression_text(expression)}'
-            self._attempt(self.label_asserted, expression)
+            self.required(expression)
         for kind, iri in negated:
             self._negate(kind, iri)
         self._complement_labels()
@@ -322,7 +327,8 @@ class Translation:
         for term in dict.fromkeys(loose):
             program.uses_thing = True
             body = (*body, PredicateAtom(program.thing, (term,)))
-        program.clauses.append(Clause(tuple(dict.fromkeys(body)), head, self._origin))
+        named_only = isinstance(self._origin, ax.Rule)
+        program.clauses.append(Clause(tuple(dict.fromkeys(body)), head, self._origin, named_only))
 
     def _label(self, expression: ClassExpression) -> Predicate:
         if isinstance(expression, str):
@@ -355,23 +361,19 @@ class Translation:
             return self.program.object(prop), False
         return self.program.object(prop.prop), True
 
-    def test(self, data_range: ex.DataRange) -> Test | None:
-        """The test of a range, None where it admits every value."""
+    def test(self, data_range: ex.DataRange) -> tuple[Test, ValueSet] | None:
+        """The test of a range and the values that pass it, None where it admits every value.
+
+        Raises:
+            UnsupportedError: The range is not supported.
+        """
         data_range = self._defined(data_range, ())
         if data_range == TOP_LITERAL:
             return None
-        test = range_test(data_range)
-        if test is None:
+        test, values = range_test(data_range), value_set(data_range)
+        if test is None or values is None:
             raise UnsupportedError(f'the data range {expression_text(data_range)} is not supported')
-        if not self._abstract:
-            return test
-
-        def abstract_test(value: Value) -> bool:
-            if isinstance(value, tuple) and value[0] == 'some':
-                return includes(data_range, value[1])
-            return test(value)
-
-        return abstract_test
+        return test, values
 
     def _defined(self, data_range: ex.DataRange, seen: tuple[str, ...]) -> ex.DataRange:
         if isinstance(data_range, str):
@@ -402,8 +404,7 @@ class Translation:
                 return [(PredicateAtom(self.program.nothing, (x,)),)]
             return [(PredicateAtom(self.program.cls(expression), (x,)),)]
         if isinstance(expression, ex.ObjectIntersectionOf):
-            parts = [self.bodies(operand, x) for operand in expression.operands]
-            return [tuple(atom for part in parts for atom in part) for parts in product(*parts)]
+            return self._intersection(expression.operands, x)
         if isinstance(expression, ex.ObjectUnionOf):
             return [body for operand in expression.operands for body in self.bodies(operand, x)]
         if isinstance(expression, ex.ObjectOneOf):
@@ -426,13 +427,46 @@ class Translation:
 
     def _related(self, prop: ex.PropertyExpression, filler: ClassExpression, x: Term) -> list[Body]:
         y = self.fresh()
-        return [(self.property(prop, x, y), *body) for body in self.bodies(filler, y)]
+        return [(self.property(prop, x, y), *body) for body in self._simple_bodies(filler, y)]
+
+    def _simple_bodies(self, expression: ClassExpression, y: Term) -> list[Body]:
+        """Bodies that relate `y` to nothing: restrictions in the expression become labels.
+
+        So every clause speaks of one individual and what it is directly related to, which is what
+        `classification` needs.
+        """
+        expression = normal(expression)
+        if isinstance(expression, (str, ex.ObjectOneOf)):
+            return self.bodies(expression, y)
+        if isinstance(expression, ex.ObjectIntersectionOf) and all(
+            isinstance(operand, str) for operand in expression.operands
+        ):
+            return self.bodies(expression, y)
+        if isinstance(expression, ex.ObjectUnionOf):
+            parts = [self._simple_bodies(operand, y) for operand in expression.operands]
+            return [body for part in parts for body in part]
+        return [(PredicateAtom(self._recognise(expression), (y,)),)]
+
+    def _intersection(self, operands: tuple[ClassExpression, ...], x: Term) -> list[Body]:
+        """Bodies for what is in every operand, at most one of which is spelt out as a relation."""
+        relating = [operand for operand in operands if isinstance(operand, _RELATING)]
+        unions = [operand for operand in operands if isinstance(operand, ex.ObjectUnionOf)]
+        parts: list[list[Body]] = []
+        for operand in operands:
+            labelled = (operand in relating and len(relating) + len(unions) > 1) or (
+                operand in unions and len(relating) + len(unions) > 1
+            )
+            if labelled:
+                parts.append([(PredicateAtom(self._recognise(operand), (x,)),)])
+            else:
+                parts.append(self.bodies(operand, x))
+        return [tuple(atom for part in choice for atom in part) for choice in product(*parts)]
 
     def _valued(self, prop: str, data_range: ex.DataRange, x: Term) -> Body:
         v = self.fresh()
         atom = PredicateAtom(self.program.data(prop), (x, v))
-        test = self.test(data_range)
-        return (atom,) if test is None else (atom, RangeAtom(test, (v,)))
+        admitted = self.test(data_range)
+        return (atom,) if admitted is None else (atom, _range_atom(admitted, v))
 
     def _labelled_bodies(self, expression: ClassExpression, x: Term) -> list[Body]:
         """Bodies for an expression that needs a label beside them."""
@@ -482,14 +516,14 @@ class Translation:
         if expression in self._recognised:
             return
         self._recognised.add(expression)
-        filler: Predicate | Test | None
         if isinstance(expression, ex.ObjectMinCardinality):
             prop, inverse = self._direction(expression.prop)
             filler = self._filler(expression.filler)
+            condition = AtLeast(label, expression.n, prop, inverse, filler, self._origin)
         else:
-            prop, inverse = self.program.data(expression.prop), False
-            filler = self.test(expression.range)
-        condition = AtLeast(label, expression.n, prop, inverse, filler, self._origin)
+            prop = self.program.data(expression.prop)
+            test, values = self.test(expression.range) or (None, None)
+            condition = AtLeast(label, expression.n, prop, False, test, self._origin, values)
         self.program.at_least.append(condition)
 
     # --- consequents ---
@@ -536,10 +570,7 @@ class Translation:
         for operand in expression.operands:
             opposite = negated(operand)
             if is_positive(opposite) and not is_positive(operand):
-                alternatives = self.bodies(opposite, x)
-                if len(alternatives) != 1:
-                    raise UnsupportedError('a union on the right side needs reasoning by cases')
-                body = (*body, *alternatives[0])
+                body = (*body, PredicateAtom(self._recognise(opposite), (x,)))
             else:
                 positive.append(operand)
         if len(positive) > 1:
@@ -559,19 +590,17 @@ class Translation:
                 )
             elif n > 0:
                 prop, inverse = self._direction(expression.prop)
-                program.existentials.append(Existential(label, n, prop, inverse, filler))
-                if n == 1 and self.hierarchy.is_functional(expression.prop):
-                    y = self.fresh()
-                    self.imply((*body, self.property(expression.prop, x, y)), filler, y)
+                required = None if filler == THING else self.required(filler)
+                program.existentials.append(
+                    Existential(label, n, prop, inverse, required, self._origin)
+                )
         elif isinstance(expression, (ex.DataSomeValuesFrom, ex.DataMinCardinality)):
             n = expression.n if isinstance(expression, ex.DataMinCardinality) else 1
             data = program.data(expression.prop)
             if n > 0:
-                self.test(expression.range)
-                value_range = self._defined(expression.range, ())
-                program.existentials.append(Existential(label, n, data, False, value_range))
-            if n > 0 and self.hierarchy.is_functional(expression.prop):
-                self.only(body, expression.prop, expression.range)
+                admitted = self.test(expression.range)
+                every = EVERY if admitted is None else admitted[1]
+                program.existentials.append(Existential(label, n, data, False, every, self._origin))
         elif isinstance(expression, ex.ObjectAllValuesFrom):
             y = self.fresh()
             self.imply((*body, self.property(expression.prop, x, y)), expression.filler, y)
@@ -592,16 +621,18 @@ class Translation:
             if expression.n == 0:
                 self.contradict((*body, *self._valued(expression.prop, expression.range, x)), x)
             else:
-                test = self.test(expression.range)
-                program.at_most.append(AtMost(label, expression.n, data, False, test, self._origin))
+                test, values = self.test(expression.range) or (None, None)
+                program.at_most.append(
+                    AtMost(label, expression.n, data, False, test, self._origin, values)
+                )
         elif isinstance(expression, ex.ObjectExactCardinality):
             parts = (expression.n, expression.prop, expression.filler)
             self.imply(body, ex.ObjectMinCardinality(*parts), x)
             self.imply(body, ex.ObjectMaxCardinality(*parts), x)
         elif isinstance(expression, ex.DataExactCardinality):
-            values = (expression.n, expression.prop, expression.range)
-            self.imply(body, ex.DataMinCardinality(*values), x)
-            self.imply(body, ex.DataMaxCardinality(*values), x)
+            counted = (expression.n, expression.prop, expression.range)
+            self.imply(body, ex.DataMinCardinality(*counted), x)
+            self.imply(body, ex.DataMaxCardinality(*counted), x)
         elif isinstance(expression, ex.ObjectComplementOf):
             if isinstance(expression.operand, str):
                 self._disjoint(label, program.cls(expression.operand))
@@ -610,11 +641,12 @@ class Translation:
                     self.contradict((*body, *other), x)
 
     def only(self, body: Body, prop: str, data_range: ex.DataRange) -> None:
-        test = self.test(data_range)
-        if test is not None:
+        if self.test(data_range) is not None:
+            outside = self.test(ex.DataComplementOf(data_range))
+            assert outside is not None
             v = self.fresh()
             atom = PredicateAtom(self.program.data(prop), (_X, v))
-            self.contradict((*body, atom, RangeAtom(_Outside(test), (v,))), _X)
+            self.contradict((*body, atom, _range_atom(outside, v)), _X)
 
     def _disjoint(self, first: Predicate, second: Predicate) -> None:
         if first is second:
@@ -634,12 +666,12 @@ class Translation:
         body = (PredicateAtom(prop, (_X, _Y)), PredicateAtom(negative, (_X, _Y)))
         self.contradict(body, _X)
 
-    def label_asserted(self, expression: ClassExpression) -> Predicate:
-        """The label of an expression that individuals are asserted to belong to, with what it
-        implies.
-        """
+    def required(self, expression: ClassExpression) -> Predicate:
+        """The label of an expression that an individual must belong to, with what that implies."""
         label = self._label(expression)
-        self.imply((PredicateAtom(label, (_X,)),), expression, _X)
+        if not isinstance(expression, str) and expression not in self._required:
+            self._required.add(expression)
+            self._attempt(self.imply, (PredicateAtom(label, (_X,)),), expression, _X)
         return label
 
     def _complement_labels(self) -> None:
@@ -787,9 +819,9 @@ class Translation:
             if isinstance(atom, ex.ClassAtom):
                 alternatives.append(self.bodies(atom.cls, terms.individual(atom.argument)))
             elif isinstance(atom, ex.DataRangeAtom):
-                term, test = terms.value(atom.argument), self.test(atom.range)
-                if test is not None:
-                    alternatives.append([(RangeAtom(test, (term,)),)])
+                term, admitted = terms.value(atom.argument), self.test(atom.range)
+                if admitted is not None:
+                    alternatives.append([(_range_atom(admitted, term),)])
             elif isinstance(atom, ex.ObjectPropertyAtom):
                 pair = terms.individual(atom.first), terms.individual(atom.second)
                 alternatives.append([(self.property(atom.prop, *pair),)])

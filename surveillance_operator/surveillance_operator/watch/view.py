@@ -25,10 +25,10 @@ from rich.segment import Segment
 from rich.style import Style
 from rich.text import Text
 
+from surveillance_fsm import Interrupt
 from surveillance_operator.snapshot import Box, Snapshot, decision_line
 from surveillance_operator.watch import raster
 from surveillance_operator.watch.raster import Canvas, Frame, rasterise
-from surveillance_runtime.interrupt import Interrupt
 
 SIDE_BY_SIDE = 76
 """From this many columns on the panel stands beside the map, else below."""

@@ -1,0 +1,441 @@
+#!/usr/bin/env python3
+"""Kill, stop and end nodes of a whole mission at random, and compare it with the truth.
+
+    .venv/bin/python benchmarks/campaign.py --quick
+    .venv/bin/python benchmarks/campaign.py --hours 1 --seed 3 --behaviour patrol
+
+`python3 launch.py` runs the mission as it does for a user, in a ROS domain of its own. One or two
+nodes at a time get SIGKILL, SIGSTOP or SIGTERM; now and then the launcher is killed with all it
+started, and started again with `--resume`. A node that was hit is back when another process answers
+for it. At the end three things must agree:
+
+- the simulator's `ground_truth`: where the robot really was, and when;
+- the mission's record: a visit that the truth does not know is *invented*; a visit that a reader
+  saw once in the record and that is gone later is *lost*;
+- the ontology's `visitedAt`: later than the record's last visit is *invented*, earlier is *lost*.
+
+The exit code is 1 when something was lost or invented, or a node stayed away.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import json
+import math
+import os
+import random
+import re
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[1]
+if str(ROOT) not in sys.path:
+    sys.path.insert(0, str(ROOT))
+
+import rclpy  # noqa: E402
+from geometry_msgs.msg import PoseStamped  # noqa: E402
+from rcl_interfaces.srv import ListParameters  # noqa: E402
+from rclpy.executors import SingleThreadedExecutor  # noqa: E402
+from rclpy.node import Node  # noqa: E402
+from rclpy.qos import qos_profile_sensor_data  # noqa: E402
+from std_msgs.msg import UInt32  # noqa: E402
+
+from surveillance_interfaces.srv import ArmorDirective  # noqa: E402
+from surveillance_runtime.place import read_place  # noqa: E402
+from surveillance_runtime.qos import STATE_QOS  # noqa: E402
+from surveillance_runtime.testing import claim_domain  # noqa: E402
+
+PLACES = {'surveillance': 'seven_rooms.yaml', 'patrol': 'patrol_world.yaml'}
+STARTED = re.compile(r'started (\w+) \(process (\d+)\)')
+NEAR = 1.6
+"""How far from a place's point the robot may be and count as having visited it, metres."""
+CLOSE_IN_TIME = 4.0
+"""By how much a record's time may differ from when the robot was there, seconds."""
+PATIENCE = 60.0
+"""After how long a node that was hit counts as staying away, seconds."""
+
+
+class Launcher:
+    """`python3 launch.py` as a process, read line by line.
+
+    Attributes:
+        processes: The process id of each node that was started last.
+    """
+
+    def __init__(self, words: Sequence[str], domain: int, log: Path) -> None:
+        environ = {**os.environ, 'ROS_DOMAIN_ID': str(domain)}
+        self.processes: dict[str, int] = {}
+        self.folder: Path | None = None
+        self._log = log.open('a')
+        self.process = subprocess.Popen(
+            [sys.executable, str(ROOT / 'launch.py'), *words],
+            cwd=ROOT,
+            env=environ,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            start_new_session=True,
+        )
+        self._thread = threading.Thread(target=self._read, daemon=True)
+        self._thread.start()
+
+    def _read(self) -> None:
+        assert self.process.stdout is not None
+        for line in self.process.stdout:
+            self._log.write(line)
+            self._log.flush()
+            if found := STARTED.search(line):
+                self.processes[found.group(1)] = int(found.group(2))
+            elif self.folder is None and (found := re.search(r'files in (\S+)', line)):
+                self.folder = ROOT / found.group(1)
+
+    def end(self) -> None:
+        """Stop the mission as Ctrl-C does."""
+        if self.process.poll() is None:
+            self.process.send_signal(signal.SIGINT)
+            try:
+                self.process.wait(20)
+            except subprocess.TimeoutExpired:
+                self.process.kill()
+        self._thread.join(5)
+        self._log.close()
+
+
+class Watcher:
+    """Sees the truth, and asks nodes whether they are there.
+
+    Attributes:
+        truth: (simulated seconds, x, y) of the robot, as the simulator has it.
+        collisions: That the simulator counted.
+    """
+
+    def __init__(self, domain: int) -> None:
+        self.context = rclpy.Context()
+        rclpy.init(
+            args=['--ros-args', '--log-level', 'fatal'], context=self.context, domain_id=domain
+        )
+        self.node = Node('campaign', context=self.context, use_global_arguments=False)
+        self.truth: list[tuple[float, float, float]] = []
+        self.collisions = 0
+        self.node.create_subscription(
+            PoseStamped, 'ground_truth', self._on_truth, qos_profile_sensor_data
+        )
+        self.node.create_subscription(UInt32, 'collisions', self._on_collisions, STATE_QOS)
+        self._armor = self.node.create_client(ArmorDirective, 'armor_interface_srv')
+        self._clients: dict[str, Any] = {}
+        self._executor = SingleThreadedExecutor(context=self.context)
+        self._executor.add_node(self.node)
+        self._thread = threading.Thread(target=self._executor.spin, daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Leave the graph."""
+        self._executor.shutdown()
+        self._thread.join()
+        self.node.destroy_node()
+        rclpy.try_shutdown(context=self.context)
+
+    def _on_truth(self, message: PoseStamped) -> None:
+        stamp, at = message.header.stamp, message.pose.position
+        self.truth.append((stamp.sec + 1e-9 * stamp.nanosec, at.x, at.y))
+
+    def _on_collisions(self, message: UInt32) -> None:
+        self.collisions = max(self.collisions, message.data)
+
+    def answers(self, name: str, seconds: float = 1.0) -> bool:
+        """Whether a node answers a request for its parameters."""
+        client = self._clients.get(name)
+        if client is None:
+            client = self.node.create_client(ListParameters, f'/{name}/list_parameters')
+            self._clients[name] = client
+        return self._ask(client, ListParameters.Request(), seconds) is not None
+
+    def visited_at(self, reference: str, places: Sequence[str]) -> dict[str, int]:
+        """What the ontology has as each place's last visit, seconds."""
+        found = {}
+        for place in places:
+            request = ArmorDirective.Request()
+            asked = request.armor_request
+            asked.client_name, asked.reference_name = 'campaign', reference
+            asked.command, asked.primary_command_spec = 'QUERY', 'DATAPROP'
+            asked.secondary_command_spec, asked.args = 'IND', ['visitedAt', place]
+            answer = self._ask(self._armor, request, 5.0)
+            values = answer.armor_response.queried_objects if answer else []
+            numbers = [
+                int(number) for value in values for number in re.findall(r'"(-?\d+)"', value)
+            ]
+            if numbers:
+                found[place] = max(numbers)
+        return found
+
+    def _ask(self, client: Any, request: Any, seconds: float) -> Any:
+        future = client.call_async(request)
+        done = threading.Event()
+        future.add_done_callback(lambda _: done.set())
+        if not done.wait(seconds):
+            client.remove_pending_request(future)
+            return None
+        return future.result()
+
+
+@dataclass
+class Results:
+    """What the campaign saw."""
+
+    hits: Counter[str] = field(default_factory=Counter)
+    outages: list[tuple[str, float]] = field(default_factory=list)
+    away: list[str] = field(default_factory=list)
+    lost: list[str] = field(default_factory=list)
+    invented: list[str] = field(default_factory=list)
+    resumes: list[float] = field(default_factory=list)
+    growth: dict[str, tuple[float, float]] = field(default_factory=dict)
+
+
+def records(folder: Path) -> list[Path]:
+    """The files of a run's mission record, oldest first."""
+    return sorted(folder.glob('mission*.jsonl')) + sorted(folder.glob('mission/*.jsonl'))
+
+
+def visits(folder: Path) -> list[tuple[float, str]]:
+    """(simulated seconds, place) of every visit in a run's record."""
+    return [
+        (float(event['time']), str(event['place']))
+        for path in records(folder)
+        for event in _events(path)
+        if event.get('event') == 'visit'
+    ]
+
+
+def _events(path: Path) -> Iterator[dict[str, Any]]:
+    for line in path.read_text('utf-8', 'replace').splitlines():
+        try:
+            event = json.loads(line)
+        except ValueError:
+            continue  # the last line of a process that was killed while it wrote
+        if isinstance(event, dict):
+            yield event
+
+
+class Campaign:
+    """One mission and what is done to it."""
+
+    def __init__(self, chosen: argparse.Namespace, scratch: Path) -> None:
+        self._chosen = chosen
+        self._chance = random.Random(chosen.seed)
+        self._domain = claim_domain()
+        self._log = scratch / 'launch.log'
+        self.watcher = Watcher(self._domain)
+        self.results = Results()
+        self._seen: dict[tuple[float, str], None] = {}
+        place = read_place(ROOT / 'config' / PLACES[chosen.behaviour])
+        self._positions = {name: (at[0], at[1]) for name, at in place.positions.items()}
+        self.launcher = self._launch(())
+        self._folder = self._wait_for_folder()
+
+    def _launch(self, more: Sequence[str]) -> Launcher:
+        words = ['--behaviour', self._chosen.behaviour, *more]
+        return Launcher(words, self._domain, self._log)
+
+    def _wait_for_folder(self) -> Path:
+        deadline = time.monotonic() + 30.0
+        while self.launcher.folder is None and time.monotonic() < deadline:
+            time.sleep(0.05)
+        if self.launcher.folder is None:
+            raise SystemExit(f'campaign: the launcher did not start, see {self._log}')
+        return self.launcher.folder
+
+    def run(self, seconds: float) -> None:
+        """Hit nodes until the time is over, then compare."""
+        end = time.monotonic() + seconds
+        self._await_all(PATIENCE)
+        for name, process in self.launcher.processes.items():
+            self.results.growth[name] = (_memory(process), 0.0)
+        while time.monotonic() < end:
+            time.sleep(self._chance.uniform(1.0, self._chosen.pause))
+            self._read_record()
+            if self._chance.random() < self._chosen.restarts:
+                self._kill_everything()
+            else:
+                self._hit_nodes()
+        self._await_all(PATIENCE)
+        time.sleep(5.0)
+        for name, process in self.launcher.processes.items():
+            before = self.results.growth.get(name, (0.0, 0.0))[0]
+            self.results.growth[name] = (before, _memory(process))
+        self._compare()
+
+    def _await_all(self, patience: float) -> None:
+        deadline = time.monotonic() + patience
+        names = list(self.launcher.processes) or ['robot_behavior']
+        while time.monotonic() < deadline:
+            if all(self.watcher.answers(name) for name in names):
+                return
+            names = list(self.launcher.processes) or names
+
+    def _hit_nodes(self) -> None:
+        chance = self._chance
+        names = chance.sample(sorted(self.launcher.processes), 2 if chance.random() < 0.3 else 1)
+        kind = chance.choice((signal.SIGKILL, signal.SIGKILL, signal.SIGSTOP, signal.SIGTERM))
+        began = time.monotonic()
+        for name in names:
+            try:
+                os.kill(self.launcher.processes[name], kind)
+            except ProcessLookupError:
+                continue
+            self.results.hits[signal.Signals(kind).name] += 1
+        before = {name: self.launcher.processes[name] for name in names}
+        for name in names:
+            while time.monotonic() - began < PATIENCE:
+                if self.launcher.processes[name] != before[name] and self.watcher.answers(name):
+                    self.results.outages.append((name, time.monotonic() - began))
+                    break
+                time.sleep(0.05)
+            else:
+                self.results.away.append(f'{name} after {signal.Signals(kind).name}')
+
+    def _kill_everything(self) -> None:
+        self.results.hits['everything'] += 1
+        began = time.monotonic()
+        processes = [self.launcher.process.pid, *self.launcher.processes.values()]
+        for process in processes:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(process, signal.SIGKILL)
+        self.launcher.end()
+        self.launcher = self._launch(('--resume', str(self._folder)))
+        self._wait_for_folder()
+        while 'robot_behavior' not in self.launcher.processes or not self.watcher.answers(
+            'robot_behavior'
+        ):
+            if time.monotonic() - began > PATIENCE:
+                self.results.away.append('everything after SIGKILL')
+                return
+            time.sleep(0.05)
+        self.results.resumes.append(time.monotonic() - began)
+        self._await_all(PATIENCE)
+
+    def _read_record(self) -> None:
+        for visit in visits(self._folder):
+            self._seen.setdefault(visit)
+
+    def _compare(self) -> None:
+        self._read_record()
+        written = visits(self._folder)
+        self.results.lost += [
+            f'{place} at {at:.0f} s is gone from the record'
+            for at, place in self._seen
+            if (at, place) not in set(written)
+        ]
+        for at, place in written:
+            if not self._was_there(place, at):
+                self.results.invented.append(f'{place} at {at:.0f} s stands in the record')
+        last: dict[str, float] = {}
+        for at, place in written:
+            last[place] = max(at, last.get(place, 0.0))
+        for place, seconds in self.watcher.visited_at(
+            'surveillance', list(self._positions)
+        ).items():
+            known = last.get(place)
+            if known is None:
+                if self.watcher.truth and seconds > self.watcher.truth[0][0] + CLOSE_IN_TIME:
+                    self.results.invented.append(f'{place} at {seconds} s stands in the ontology')
+            elif seconds > known + 10.0 and not self._was_there(place, seconds):
+                self.results.invented.append(
+                    f'{place} at {seconds} s stands in the ontology, {known:.0f} s in the record'
+                )
+            elif seconds < known - CLOSE_IN_TIME:
+                self.results.lost.append(
+                    f'{place} at {known:.0f} s stands in the record, {seconds} s in the ontology'
+                )
+
+    def _was_there(self, place: str, at: float) -> bool:
+        x, y = self._positions[place]
+        near = [
+            math.hypot(px - x, py - y) < NEAR
+            for seconds, px, py in self.watcher.truth
+            if abs(seconds - at) < CLOSE_IN_TIME
+        ]
+        # Nobody looked at that time (the simulator itself was away): nothing can be said.
+        return any(near) or not near
+
+    def close(self) -> None:
+        """Stop the mission and leave."""
+        self.launcher.end()
+        self.watcher.close()
+
+
+def _memory(process: int) -> float:
+    try:
+        status = Path(f'/proc/{process}/status').read_text()
+    except OSError:
+        return 0.0
+    resident = [line for line in status.splitlines() if line.startswith('VmRSS')]
+    return int(resident[0].split()[1]) / 1024 if resident else 0.0
+
+
+def _quantile(values: Sequence[float], share: float) -> float:
+    ordered = sorted(values)
+    return ordered[min(len(ordered) - 1, int(share * len(ordered)))] if ordered else math.nan
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    """Run a campaign, print its table, return the exit code."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+    )
+    parser.add_argument('--hours', type=float, default=0.1)
+    parser.add_argument('--seed', type=int, default=1)
+    parser.add_argument('--behaviour', choices=tuple(PLACES), default='surveillance')
+    parser.add_argument('--pause', type=float, default=8.0, help='longest pause between hits, s')
+    parser.add_argument('--restarts', type=float, default=0.1, help='share of hits on everything')
+    parser.add_argument('--quick', action='store_true', help='25 s of hits')
+    parser.add_argument('--keep', type=Path, default=ROOT / 'runs', help='folder for the log')
+    chosen = parser.parse_args(words)
+    if chosen.quick:
+        chosen.hours, chosen.pause = 25.0 / 3600.0, 3.0
+    chosen.keep.mkdir(parents=True, exist_ok=True)
+    scratch = chosen.keep / time.strftime('campaign-%Y%m%d-%H%M%S')
+    scratch.mkdir()
+    campaign = Campaign(chosen, scratch)
+    try:
+        campaign.run(chosen.hours * 3600.0)
+    finally:
+        campaign.close()
+    results = campaign.results
+    outages = [seconds for _, seconds in results.outages]
+    longest = max(results.resumes, default=math.nan)
+    median, late = _quantile(outages, 0.5), _quantile(outages, 0.99)
+    rows = [
+        ('hits', ', '.join(f'{kind} {count}' for kind, count in sorted(results.hits.items()))),
+        ('nodes that stayed away', _named(results.away)),
+        ('outage, median and p99', f'{median:.1f} s, {late:.1f} s'),
+        ('start again after everything was killed, longest', f'{longest:.1f} s'),
+        ('visits seen in the record', str(len(campaign._seen))),
+        ('lost', _named(results.lost)),
+        ('invented', _named(results.invented)),
+        ('collisions', str(campaign.watcher.collisions)),
+        ('memory of all nodes, begin and end', '{:.0f} MB, {:.0f} MB'.format(
+            *(sum(pair[side] for pair in results.growth.values()) for side in (0, 1)))),
+        ('log', str(scratch)),
+    ]  # fmt: skip
+    width = max(len(title) for title, _ in rows)
+    for title, figure in rows:
+        print(f'{title:{width}}  {figure}')
+    return 1 if results.away or results.lost or results.invented else 0
+
+
+def _named(what: Sequence[str]) -> str:
+    return f'{len(what)}' + ''.join(f'\n    {each}' for each in what[:12])
+
+
+if __name__ == '__main__':
+    sys.exit(main())

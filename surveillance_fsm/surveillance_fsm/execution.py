@@ -1,0 +1,698 @@
+"""An execution of a machine: its threads, the frames of the containers they are in, the nodes.
+
+A root's execution is a `Run`. It consists of logical threads, `ExecutionThread`: one for the root,
+and one for each child of a concurrence. A logical thread keeps a stack of frames, one for each
+container that it is in. It runs on one thread of the interpreter after another: when a state hangs,
+that thread is left behind and another one goes on (`timeouts`).
+
+Threads of the interpreter are kept for the next execution, because starting one costs more than
+most machines need for all their states.
+"""
+
+from __future__ import annotations
+
+import contextvars
+import itertools
+import os
+import threading
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from surveillance_fsm import log
+from surveillance_fsm.clock import WALL_CLOCK, Clock, Interrupt, elapsed_of
+from surveillance_fsm.exceptions import (
+    InvalidStateError,
+    InvalidTransitionError,
+    InvalidUserCodeError,
+    SmachError,
+    describe,
+    shown,
+)
+from surveillance_fsm.state import State, this_thread
+from surveillance_fsm.userdata import Remapper
+
+if TYPE_CHECKING:
+    from surveillance_fsm.container import Container
+    from surveillance_fsm.timeouts import Limits, Watch
+
+LOWEST = float('-inf')
+"""The priority of ordinary work, below that of every interrupt."""
+
+DEFAULT_PREEMPT_TIMEOUT = 60.0
+"""Seconds (steady time) that a state may ignore a preempt before the machine goes on."""
+
+IDLE_SECONDS = 10.0
+"""How long a thread waits for the next execution before it ends."""
+
+
+class LeftBehind(BaseException):
+    """Unwinds a thread that the machine went on without."""
+
+
+class _Suspended:
+    """What a container returns when its parent put it aside with its history kept."""
+
+    def __repr__(self) -> str:
+        return 'SUSPENDED'
+
+
+SUSPENDED: Any = _Suspended()
+
+
+# Where outcomes lead.
+
+
+class Exit:
+    """Where a transition leaves the container."""
+
+    __slots__ = ('label',)
+
+    is_exit = True
+    priority = LOWEST
+    kind = 'exit'
+
+    def __init__(self, label: str) -> None:
+        self.label = label
+
+
+RESUME = 'RESUME'
+"""Target of an interrupt's outcome: go on where the interrupt came."""
+
+RESUMPTION = Exit(RESUME)
+
+
+class Node:
+    """One state of a container as the loop needs it.
+
+    Attributes:
+        container: Whose state it is.
+        label: The state's label in its container.
+        state: The state.
+        enter: What runs it; the state's own `execute` as a rule.
+        execute: What the loop calls: `enter`, within the state's limits if it has any.
+        make_view: Makes a view.
+        view: The state's view of the container's userdata.
+        targets: Where each outcome leads.
+        limits: Time limits and retries, if it has any.
+        priority: Of an interrupt's branch; `LOWEST` for ordinary states.
+    """
+
+    __slots__ = (
+        '_path',
+        'container',
+        'enter',
+        'execute',
+        'label',
+        'limits',
+        'priority',
+        'state',
+        'targets',
+        'view',
+    )
+
+    is_exit = False
+    kind = 'transition'
+
+    def __init__(
+        self, container: Container, label: str, state: State, priority: float = LOWEST
+    ) -> None:
+        self.container = container
+        self.label = label
+        self.state = state
+        self.enter: Callable[[Any], Any] = state.execute
+        self.execute: Callable[[Any], Any] = self.enter
+        self.view: Remapper = container.fsm_view(self)
+        self.targets: dict[Any, Node | Exit] = {}
+        self.limits: Limits | None = None
+        self.priority = priority
+        self._path: str | None = None
+
+    @property
+    def path(self) -> str:
+        """The state's path from the root."""
+        if self._path is None:
+            self._path = f'{self.container.get_name()}/{self.label}'
+        return self._path
+
+    def __str__(self) -> str:
+        return self.path
+
+    def step(self, outcome: Any) -> tuple[str, str, str, str]:
+        """What `outcome` leads to by the table: (path of the container, from, to, kind)."""
+        target = self.targets[outcome]
+        return self.container.get_name(), self.label, target.label, target.kind
+
+    def target(self, outcome: Any) -> Node | Exit:
+        """Where `outcome` leads.
+
+        Raises:
+            InvalidTransitionError: The state has no such outcome.
+        """
+        if outcome is SUSPENDED:
+            return self
+        try:
+            return self.targets[outcome]
+        except (KeyError, TypeError):
+            raise self.wrong_outcome(outcome) from None
+
+    def revoke(self) -> None:
+        """Cut the view in use off the userdata, and make a new one for the next execution."""
+        self.view.fsm_revoke()
+        self.view = self.container.fsm_view(self)
+
+    def user_fault(self, error: Exception) -> SmachError:
+        """The engine's error for what the state's code raised; to be raised from that."""
+        return self.view.fsm_explain(error) or InvalidUserCodeError(
+            f"State '{self.path}' of type {type(self.state).__name__} raised {describe(error)}"
+        )
+
+    def wrong_outcome(self, outcome: object) -> InvalidTransitionError:
+        """The error for an outcome that the state did not declare."""
+        returned = 'None instead of an outcome' if outcome is None else f'outcome {shown(outcome)}'
+        return InvalidTransitionError(
+            f"State '{self.path}' of type {type(self.state).__name__} returned {returned}: its "
+            f'outcomes are {sorted(self.state.get_registered_outcomes())}'
+        )
+
+
+@dataclass
+class Branch:
+    """An interrupt declared on a container.
+
+    Attributes:
+        label: Its name.
+        state: What runs when it is raised.
+        priority: It cuts work of lower priority short.
+        transitions: From the state's outcomes to `RESUME`, labels or outcomes of the container.
+        remapping: From the state's userdata keys to the container's.
+    """
+
+    label: str
+    state: State
+    priority: float
+    transitions: dict[str, str]
+    remapping: dict[str, str]
+    order: int = field(default_factory=itertools.count().__next__)
+
+
+# What is told to a trace.
+
+
+class SpecialStep:
+    """A step that is not what the table says, told to a trace in place of the node that was left.
+
+    Args:
+        path: Path of the container.
+        source: Label of the state that was left; empty at the start.
+        target: Label of the state or the outcome reached.
+        kind: See `history.Transition`.
+    """
+
+    __slots__ = ('_step',)
+
+    def __init__(self, path: str, source: str, target: str, kind: str) -> None:
+        self._step = path, source, target, kind
+
+    def step(self, _outcome: Any) -> tuple[str, str, str, str]:
+        """As `Node.step`."""
+        return self._step
+
+
+RawTransition = tuple[Node | SpecialStep, Any, float, dict[str, Any]]
+"""(what was left, outcome, time in seconds, shallow copy of the container's userdata)."""
+
+Trace = Callable[[RawTransition], object]
+"""Takes transitions as the loop notes them, at the least cost to it; see `history.unfold`."""
+
+NO_USERDATA: dict[str, Any] = {}
+"""Stands for a copy of userdata that holds nothing; never written to."""
+
+
+# Frames.
+
+
+@dataclass
+class History:
+    """Where a container that was put aside goes on.
+
+    Attributes:
+        current: Label of the state, or of the outcome when `leaving`.
+        leaving: `current` is an outcome of the container.
+        saved: Of the interrupts under way, where each goes on: (label, leaving).
+        index: How many items an iterator had begun, the current one included.
+        repeat: The current item had not ended.
+        outcomes: Of a concurrence's children that had ended.
+    """
+
+    current: str = ''
+    leaving: bool = False
+    saved: list[tuple[str, bool]] = field(default_factory=list)
+    index: int = 0
+    repeat: bool = True
+    outcomes: dict[str, str] = field(default_factory=dict)
+    # An iterator suspended in this process goes on with its own generator.
+    items: Any = None
+
+
+class Frame:
+    """One execution of a container; `SequentialFrame` and `ConcurrentFrame` are the two kinds.
+
+    The thread that executes writes `current` first and looks at `attention` after; a thread that
+    wants something raises `attention` first and looks at `current` after. So one of the two always
+    sees the other, and the loop needs no lock. Everything else is touched under the run's condition
+    only.
+
+    Attributes:
+        container: Whose execution it is.
+        thread: The logical thread it belongs to.
+        run: The execution that this belongs to.
+        path: The container's path.
+        current: The node that executes, or the exit that was taken.
+        parent_ud: The parent's userdata.
+        attention: Something beside the next state wants to be looked at.
+        stale: The machine went on without the thread that runs this frame.
+        preempted: The node whose state was last asked to stop because of a preempt.
+        cut: The node whose state was asked to stop because of an interrupt.
+        suspending: The parent wants the container put aside.
+        saved: Where to go on after each of the interrupts under way.
+        gone: The node whose state was left behind.
+        forced: A node, and the outcome to take in place of the one that its state returns.
+        items: An iterator's items that are left.
+        index: How many items an iterator has begun.
+        repeat: An iterator's current item has not ended: it is not followed by the next one.
+    """
+
+    # Class attributes: most executions of a container need none of them.
+    attention = False
+    stale = False
+    preempted: Node | None = None
+    cut: Node | None = None
+    suspending = False
+    saved: tuple[Node | Exit, ...] = ()
+    gone: Node | None = None
+    forced: tuple[Node, str] | None = None
+    items: Any = None
+    index = 0
+    repeat = False
+
+    bounds_itself = False
+    """Whether the container itself sees to it that its children heed a preempt in time."""
+
+    def __init__(
+        self,
+        container: Any,
+        thread: ExecutionThread,
+        path: str,
+        current: Node | Exit,
+        parent_ud: Any,
+    ) -> None:
+        self.container = container
+        self.thread = thread
+        self.run = thread.run
+        self.path = path
+        self.current = current
+        self.parent_ud = parent_ud
+
+    # What each kind defines.
+
+    def execute(self, history: History | None) -> Any:
+        """Run the container to its outcome, or to `SUSPENDED`."""
+        raise NotImplementedError
+
+    def proceed(self, outcome: Any) -> Any:
+        """Go on as if the current state had just returned `outcome`, and run to the end."""
+        raise NotImplementedError
+
+    def preempt(self) -> None:
+        """Ask what runs to stop; under the run's condition."""
+        raise NotImplementedError
+
+    def interrupted(self) -> None:
+        """Make way for the container's raised interrupts; under the run's condition."""
+        raise NotImplementedError
+
+    def suspend(self) -> None:
+        """Have the container put aside with its history; under the run's condition."""
+        raise NotImplementedError
+
+    def where(self) -> History | None:
+        """Where the container would go on if its process ended now; under the condition."""
+        raise NotImplementedError
+
+    def active_labels(self) -> list[str]:
+        """Labels of the states that run."""
+        raise NotImplementedError
+
+    def woken(self) -> None:
+        """Wake the thread that runs the frame, if it waits: it was left behind."""
+
+    # What they share.
+
+    def successor(self) -> Frame:
+        """A copy for the thread that takes this execution over."""
+        frame = type(self)(self.container, self.thread, self.path, self.current, self.parent_ud)
+        for name in ('preempted', 'cut', 'suspending', 'forced', 'items', 'index', 'repeat'):
+            setattr(frame, name, getattr(self, name))
+        frame.saved = self.saved
+        return frame
+
+    def history(self, target: Node | Exit) -> History:
+        """Where to go on when the container is put aside before `target`."""
+        return History(
+            target.label,
+            target.is_exit,
+            [(node.label, node.is_exit) for node in self.saved],
+            self.index,
+            self.repeat,
+            items=self.items,
+        )
+
+    def go_on_from(self, history: History, table: Mapping[str, Node]) -> None:
+        """Begin where the container was put aside.
+
+        Raises:
+            InvalidStateError: It has no such state any more.
+        """
+
+        def place(label: str, leaving: bool) -> Node | Exit:
+            if leaving:
+                return Exit(label)
+            if label not in table:
+                raise InvalidStateError(
+                    f"'{self.path}' cannot go on in '{label}': its states are {sorted(table)}"
+                )
+            return table[label]
+
+        self.saved = tuple(place(*saved) for saved in history.saved)
+        self.current = place(history.current, history.leaving)
+        self.index, self.items, self.repeat = history.index, history.items, history.repeat
+
+    @property
+    def wanted(self) -> bool:
+        """Whether somebody wants the current state to end."""
+        return bool(
+            self.container.preempt_requested()
+            or self.cut is not None
+            or self.suspending
+            or self.forced is not None
+        )
+
+    def note(self, raw: RawTransition) -> None:
+        """Tell the run's trace of a transition; what that raises is logged."""
+        trace = self.run.trace
+        if trace is None:
+            return
+        try:
+            trace(raw)
+        except Exception as error:
+            log.logerr(f"Trace {trace!r} of '{self.path}' raised {describe(error)}")
+
+
+# Threads.
+
+
+class Run:
+    """One execution of a root container: what all its threads share.
+
+    Attributes:
+        condition: The one condition of the machine; its lock guards everything slow.
+        clock: The machine's clock.
+        preempt_timeout: See `DEFAULT_PREEMPT_TIMEOUT`; None waits for ever.
+        trace: Where transitions are reported, if anywhere.
+        now: The time of reports and limits.
+        chatty: Transitions are worth a line in the log.
+        paused: No further state is entered.
+        steps: States that may be entered although paused.
+        left_behind: Paths of the states the machine went on without, and the work that hangs.
+        threads: The logical threads that are at work.
+    """
+
+    def __init__(
+        self,
+        condition: threading.Condition,
+        clock: Clock,
+        preempt_timeout: float | None,
+        trace: Trace | None,
+    ) -> None:
+        self.condition = condition
+        self.clock = clock
+        self.preempt_timeout = preempt_timeout
+        self.trace = trace
+        self.now: Callable[[], float] = time.monotonic if clock is WALL_CLOCK else elapsed_of(clock)
+        self.chatty = log.chatty()
+        self.paused = False
+        self.steps = 0
+        self.left_behind: list[tuple[str, Work]] = []
+        self.threads: list[ExecutionThread] = []
+
+    def frames(self) -> list[Frame]:
+        """The frames of all threads, outermost first; under the condition."""
+        return [frame for thread in self.threads for frame in tuple(thread.stack)]
+
+    def call_attention(self) -> None:
+        """Make every thread look up at its next transition, and wake those that pause."""
+        with self.condition:
+            for frame in self.frames():
+                frame.attention = True
+            self.condition.notify_all()
+
+
+class ExecutionThread:
+    """One logical thread of execution through nested containers.
+
+    Attributes:
+        run: The execution it belongs to.
+        path: Path of the state it was started for.
+        root: The container it executes, when it is a root's; None for a concurrence's child.
+        leaf: The node of a concurrence's child that it executes; None for a root.
+        stack: Frames of the containers it is in, outermost first. A thread of the interpreter is
+            the present one as long as this is the list that it began with.
+        done: It has ended.
+        without_leaf: It ended because its own state, outside any container, was left behind.
+        outcome: What it ended with.
+        error: What it was ended by.
+        wakeup: Raised when it has ended, or its limits have changed.
+        watches: Limits at work, outermost first.
+        asked_at: When the state that executes was asked to stop, steady time; None: it was not.
+        work: What its present thread does.
+        wanted: Somebody wants `leaf` to end.
+        forced: `leaf`, and the outcome to take in place of the one that it returns.
+    """
+
+    def __init__(
+        self,
+        run: Run,
+        path: str,
+        wakeup: Interrupt,
+        root: Container | None = None,
+        leaf: Node | None = None,
+    ) -> None:
+        self.run = run
+        self.path = path
+        self.root = root
+        self.leaf = leaf
+        self.wakeup = wakeup
+        self.stack: list[Frame] = []
+        self.watches: list[Watch] = []
+        self.done = False
+        self.without_leaf = False
+        self.outcome: Any = None
+        self.error: BaseException | None = None
+        self.asked_at: float | None = None
+        self.work: Work | None = None
+        self.wanted = False
+        self.forced: tuple[Node, str] | None = None
+        run.threads.append(self)
+
+    # The side of the thread that executes.
+
+    def executes_next(self, container: Container, stack: list[Frame]) -> bool:
+        """Whether `container` is what the engine executes next, not some user code."""
+        if stack:
+            current = stack[-1].current
+            return isinstance(current, Node) and current.state is container
+        if self.leaf is not None:
+            return self.leaf.state is container
+        return self.root is container
+
+    def path_inside(self) -> str:
+        """The path of the state that is being executed."""
+        for frame in reversed(self.stack):
+            if isinstance(frame.current, Node):
+                return frame.current.path
+            return f'{frame.path}/{frame.current.label}'
+        return self.path
+
+    def start(self, body: Callable[[], Any]) -> None:
+        """Run `body` on another thread; its value is the logical thread's outcome."""
+        self.work = Work(self, self.stack, body)
+        self.work.begin()
+
+    def run_here(self, body: Callable[[], Any]) -> Any:
+        """Run `body` on the calling thread, unwatched."""
+        here = this_thread
+        outer = here.thread, here.stack
+        here.thread, here.stack = self, self.stack
+        try:
+            return body()
+        finally:
+            here.thread, here.stack = outer
+            self._retire()
+
+    def end(self, outcome: Any, error: BaseException | None) -> None:
+        """Note what it ended with, and wake whoever watches it; under the condition."""
+        self.outcome, self.error, self.done = outcome, error, True
+        self._retire()
+        self.wakeup.set()
+
+    def _retire(self) -> None:
+        with self.run.condition:
+            if self in self.run.threads:
+                self.run.threads.remove(self)
+
+    def disown(self) -> None:
+        """Leave the present thread behind without a successor."""
+        with self.run.condition:
+            for frame in self.stack:
+                frame.stale = frame.attention = True
+                frame.container.fsm_frame = None
+            self.stack = []
+            self._retire()
+
+    def check(self) -> None:
+        """Raise `LeftBehind` in a thread that is not the present one any more."""
+        if this_thread.thread is self and this_thread.stack is not self.stack:
+            raise LeftBehind
+
+    # The side of whoever asks it to stop.
+
+    def asked(self) -> None:
+        """Note that the state that executes was asked to stop; its bound begins to count.
+
+        Nobody is woken for that: whoever watches looks once in every bound (`timeouts.supervise`).
+        """
+        if self.asked_at is None:
+            self.asked_at = time.monotonic()
+
+    def renew_request(self, node: Node) -> None:
+        """Take the request of an earlier execution back from a state, but not a present one."""
+        with self.run.condition:
+            node.state.recall_preempt()
+            if self.asked_at is not None:
+                node.state.request_preempt()
+
+    def still_gone(self, node: Node) -> None:
+        """Note that a state could not be entered: an earlier execution of it has not ended."""
+        with self.run.condition:
+            if self.stack:
+                self.stack[-1].gone, self.stack[-1].attention = node, True
+            else:
+                self.without_leaf = True
+
+    def heeded(self) -> None:
+        """Note that the state that was asked to stop has returned."""
+        self.asked_at = None
+
+
+class Work:
+    """What a thread of the interpreter does for a logical thread.
+
+    Attributes:
+        stack: The logical thread's list of frames when it began.
+    """
+
+    def __init__(
+        self, thread: ExecutionThread, stack: list[Frame], body: Callable[[], Any]
+    ) -> None:
+        self.stack = stack
+        self._thread = thread
+        self._body = body
+        self._context = contextvars.copy_context()
+        self._ended = False
+        self._going_on = threading.Lock()
+        self._going_on.acquire()
+
+    @property
+    def name(self) -> str:
+        """The path of what the logical thread was started for."""
+        return self._thread.path
+
+    def begin(self) -> None:
+        """Have an idle thread do it, or a new one."""
+        try:
+            worker = _idle.pop()
+        except IndexError:
+            worker = _Worker()
+        worker.give(self)
+
+    def is_going_on(self) -> bool:
+        """Whether it has not ended."""
+        return not self._ended
+
+    def await_end(self, seconds: float | None) -> bool:
+        """Wait for the end, in seconds of steady time; whether it came."""
+        limit = -1.0 if seconds is None else min(seconds, threading.TIMEOUT_MAX)
+        if not self._going_on.acquire(timeout=limit):
+            return False
+        self._going_on.release()
+        return True
+
+    def do(self) -> None:
+        """Do it, on the present thread; never raises."""
+        here, thread = this_thread, self._thread
+        here.thread, here.stack = thread, self.stack
+        outcome, error = None, None
+        try:
+            outcome = self._context.run(self._body)
+        except LeftBehind:
+            return
+        except BaseException as raised:
+            error = raised
+        finally:
+            here.thread = here.stack = None
+            self._ended = True
+            self._going_on.release()
+        with thread.run.condition:
+            if self.stack is thread.stack:
+                thread.end(outcome, error)
+            elif error is not None:
+                log.logwarn(f"'{thread.path}', left behind, ended with {type(error).__name__}")
+
+
+_idle: list[_Worker] = []
+os.register_at_fork(after_in_child=_idle.clear)
+
+
+class _Worker:
+    """A thread of the interpreter that does one piece of work after another."""
+
+    def __init__(self) -> None:
+        self._given = threading.Lock()
+        self._given.acquire()
+        self._work: Work | None = None
+        self._thread = threading.Thread(target=self._serve, name='state machine', daemon=True)
+        self._thread.start()
+
+    def give(self, work: Work) -> None:
+        """Have it do something; it is idle."""
+        self._work = work
+        self._given.release()
+
+    def _serve(self) -> None:
+        while True:
+            if not self._given.acquire(timeout=IDLE_SECONDS):
+                try:
+                    _idle.remove(self)
+                except ValueError:
+                    # Somebody is about to give it something.
+                    self._given.acquire()
+                else:
+                    return
+            work, self._work = self._work, None
+            assert work is not None
+            self._thread.name = work.name
+            work.do()
+            del work
+            _idle.append(self)

@@ -1,0 +1,772 @@
+"""What a machine did, and where it is: transitions, records and their replay, checkpoints.
+
+A `TransitionFeed` brings numbered transitions to a consumer, a `Recorder` writes them as JSON
+Lines, `replay` holds a record against a machine. The machine's thread only appends to a queue;
+numbering, counting and turning userdata into JSON happen where the queue is emptied.
+
+A checkpoint holds, for every container, the state it is in, the interrupts under way, its userdata
+and how far its states have come (`State.progress`). A machine built in the same way takes it over
+and goes on with the state that was active, executed anew, in another process if need be.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import math
+import os
+import threading
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import IO, Any, NamedTuple
+
+from surveillance_fsm.clock import WALL_CLOCK, Clock, Interrupt, elapsed_of
+from surveillance_fsm.container import Container
+from surveillance_fsm.exceptions import SmachError, describe, shown
+from surveillance_fsm.execution import History, RawTransition
+from surveillance_fsm.log import logerr, logwarn
+from surveillance_fsm.state import State
+from surveillance_fsm.structure import Structure, children_of, structure_of
+from surveillance_fsm.userdata import raw
+
+RECORD_FORMAT = 'surveillance-fsm-record'
+RECORD_VERSION = 1
+CHECKPOINT_FORMAT = 'surveillance-fsm-checkpoint'
+CHECKPOINT_VERSION = 2
+QUEUE_LENGTH = 100_000
+"""Transitions that may wait to be written; the oldest are lost beyond that, as numbers show."""
+
+
+# Transitions.
+
+
+class Noted(NamedTuple):
+    """A transition as it was noted.
+
+    Attributes:
+        path: Path of the container.
+        source: Label of the state that was left; empty at the start.
+        outcome: What that ended with.
+        target: Label of the state entered, or the container's outcome.
+        time: Seconds on the machine's clock.
+        userdata: Shallow copy of the container's userdata.
+        kind: See `Transition`; also ``start``, when a container is entered, and ``entered``, when
+            a pause before `target` is over.
+    """
+
+    path: str
+    source: str
+    outcome: str
+    target: str
+    time: float
+    userdata: dict[str, Any]
+    kind: str
+
+    @property
+    def is_transition(self) -> bool:
+        """Whether a state was left, or a child of a concurrence ended."""
+        return self.kind not in ('start', 'entered')
+
+
+def unfold(raw: RawTransition) -> Noted:
+    """Say in full what a trace was given."""
+    left, outcome, time, userdata = raw
+    path, source, target, kind = left.step(outcome)
+    return Noted(path, source, str(outcome), target, time, userdata, kind)
+
+
+class RecordError(SmachError):
+    """A record cannot be read, or does not fit the machine."""
+
+
+@dataclass(frozen=True)
+class Transition:
+    """One transition.
+
+    Attributes:
+        sequence: Counted from 1 over all containers of the root.
+        time: Seconds on the machine's clock.
+        path: Path of the container.
+        from_state: Label of the state that ended.
+        outcome: What it ended with.
+        to_state: Label entered, or the container's outcome when `kind` is ``exit``.
+        kind: ``transition``, ``exit``, ``interrupt``, ``resume``, ``forced``, or ``ended`` for a
+            child of a concurrence.
+        duration: Seconds that `from_state` took.
+        visits: How often `to_state` has been entered, this time included.
+        userdata: The container's userdata as far as JSON can show it.
+    """
+
+    sequence: int
+    time: float
+    path: str
+    from_state: str
+    outcome: str
+    to_state: str
+    kind: str
+    duration: float
+    visits: int
+    userdata: dict[str, Any] = field(default_factory=dict)
+
+
+def presentable(userdata: dict[str, Any]) -> dict[str, Any]:
+    """The part of userdata that JSON can show."""
+    part = {}
+    for key, value in userdata.items():
+        try:
+            json.dumps(value, allow_nan=False)
+        except Exception:
+            # Whatever it is that its class, or a thread that changes it meanwhile, raises.
+            continue
+        part[key] = value
+    return part
+
+
+class TransitionFeed:
+    """Brings a root's transitions to a consumer on a thread of its own.
+
+    Args:
+        machine: The root.
+        consume: Takes each `Transition`, in order, on the feed's thread.
+        show_userdata: Whether transitions carry userdata.
+    """
+
+    def __init__(
+        self,
+        machine: Container,
+        consume: Callable[[Transition], object],
+        show_userdata: bool = True,
+    ) -> None:
+        self._consume = consume
+        self._show_userdata = show_userdata
+        self._queue: deque[RawTransition] = deque()
+        self._lost: deque[None] = deque()
+        self._visits: dict[tuple[str, str], int] = {}
+        self._entered: dict[str, float] = {}
+        self._sequence = 0
+        self._wakeup = threading.Event()
+        self._drained = threading.Condition()
+        self._asleep = False
+        self._closing = False
+        self._thread = threading.Thread(target=self._run, name='fsm transitions', daemon=True)
+        self._thread.start()
+        self._end_reports = machine.control.add_trace(self._make_sink())
+
+    def _make_sink(self) -> Callable[[RawTransition], None]:
+        # Several threads may come here at once: each of these is one step.
+        queue, append, wake = self._queue, self._queue.append, self._wakeup.set
+
+        def sink(raw: RawTransition) -> None:
+            append(raw)
+            if self._asleep:
+                wake()
+            if len(queue) > QUEUE_LENGTH:
+                with suppress(IndexError):
+                    queue.popleft()
+                    self._lost.append(None)
+
+        return sink
+
+    def flush(self, timeout: float | None = None) -> bool:
+        """Wait until everything so far has been consumed; tells whether that was in time."""
+        with self._drained:
+            return self._drained.wait_for(lambda: self._asleep and not self._queue, timeout)
+
+    def close(self, timeout: float = 5.0) -> None:
+        """Stop reporting, consume what is left and end the thread."""
+        self._end_reports()
+        self._closing = True
+        self._wakeup.set()
+        self._thread.join(timeout)
+
+    def _run(self) -> None:
+        queue = self._queue
+        while True:
+            while queue:
+                try:
+                    transition = self._transition(queue.popleft())
+                    if transition is not None:
+                        self._consume(transition)
+                except Exception as error:
+                    logerr(f'Reporting a transition raised {describe(error)}')
+            if self._closing:
+                return
+            self._wakeup.clear()
+            with self._drained:
+                self._asleep = True
+                self._drained.notify_all()
+            # Asleep first, then a last look: the machine does it the other way round.
+            if not queue and not self._closing:
+                self._wakeup.wait()
+            self._asleep = False
+
+    def _transition(self, raw: RawTransition) -> Transition | None:
+        noted = unfold(raw)
+        while self._lost:
+            # What was lost leaves a gap.
+            self._lost.pop()
+            self._sequence += 1
+        if noted.kind == 'entered':
+            self._entered[noted.path] = noted.time
+            return None
+        place = (noted.path, noted.target)
+        visits = self._visits[place] = self._visits.get(place, 0) + 1
+        since = self._entered.get(noted.path, noted.time)
+        if noted.kind != 'ended':
+            self._entered[noted.path] = noted.time
+        if noted.kind == 'start':
+            return None
+        self._sequence += 1
+        return Transition(
+            self._sequence,
+            noted.time,
+            noted.path,
+            noted.source,
+            noted.outcome,
+            noted.target,
+            noted.kind,
+            noted.time - since,
+            visits,
+            presentable(noted.userdata) if self._show_userdata else {},
+        )
+
+
+class Recorder:
+    """Writes a root's transitions to a file, one JSON object per line.
+
+    Args:
+        machine: The root.
+        path: The file; it is overwritten.
+    """
+
+    def __init__(self, machine: Container, path: str | Path) -> None:
+        self._file: IO[str] = open(path, 'w', encoding='utf-8', buffering=1)  # noqa: SIM115
+        root = structure_of(machine).path
+        header = {'format': RECORD_FORMAT, 'version': RECORD_VERSION, 'root': root}
+        self._file.write(json.dumps(header) + '\n')
+        self._feed = TransitionFeed(machine, self._write)
+
+    def _write(self, transition: Transition) -> None:
+        self._file.write(json.dumps(asdict(transition), ensure_ascii=False) + '\n')
+
+    def close(self) -> None:
+        """Write what is left and close the file."""
+        self._feed.close()
+        self._file.close()
+
+    def __enter__(self) -> Recorder:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def read_record(path: str | Path) -> list[Transition]:
+    """Read what a `Recorder` wrote; a last line that was cut off is left out.
+
+    Raises:
+        RecordError: The file is not such a record; the message names file and line.
+    """
+    try:
+        lines = Path(path).read_text(encoding='utf-8').split('\n')
+    except (OSError, UnicodeDecodeError) as error:
+        raise RecordError(f'{path}: {error}') from error
+    try:
+        header = json.loads(lines[0])
+        known = header['format'] == RECORD_FORMAT and header['version'] == RECORD_VERSION
+    except (ValueError, KeyError, TypeError):
+        known = False
+    if not known:
+        raise RecordError(f'{path}:1: not a {RECORD_FORMAT} of version {RECORD_VERSION}')
+    transitions = []
+    for number, line in enumerate(lines[1:], start=2):
+        if not line:
+            continue
+        try:
+            transitions.append(Transition(**json.loads(line)))
+        except (ValueError, TypeError) as error:
+            if number == len(lines):
+                break
+            raise RecordError(f'{path}:{number}: {error}') from error
+    return transitions
+
+
+@dataclass(frozen=True)
+class Step:
+    """A replayed transition.
+
+    Attributes:
+        transition: The transition.
+        active: Paths of all states that are active after it.
+    """
+
+    transition: Transition
+    active: tuple[str, ...]
+
+
+def replay(machine: Container, transitions: Iterable[Transition]) -> Iterator[Step]:
+    """Go through a record on a machine's structure, without executing a state.
+
+    Every transition is held against the machine: a record of another version of it stops at the
+    first difference.
+
+    Args:
+        machine: A machine built like the recorded one.
+        transitions: The record.
+
+    Raises:
+        RecordError: A transition that the machine cannot make.
+    """
+    root = structure_of(machine)
+    containers = {inner.path: inner for inner in root.walk()}
+    active: set[str] = set(_entered(root))
+    for transition in transitions:
+        container = containers.get(transition.path)
+        if container is None:
+            raise RecordError(f"Transition {transition.sequence}: no container '{transition.path}'")
+        _check_transition(container, transition)
+        left = f'{transition.path}/{transition.from_state}'
+        if transition.kind == 'exit' or transition.kind == 'ended':
+            active = {path for path in active if not _within(path, left)}
+        else:
+            active = {path for path in active if not _within(path, left)}
+            place = f'{transition.path}/{transition.to_state}'
+            active.add(place)
+            if place in containers:
+                active |= set(_entered(containers[place]))
+        yield Step(transition, tuple(sorted(active)))
+
+
+def play(
+    steps: Iterable[Step],
+    show: Callable[[Step], object],
+    speed: float = 1.0,
+    clock: Clock = WALL_CLOCK,
+    interrupt: Interrupt | None = None,
+) -> bool:
+    """Show steps at the pace they were recorded at.
+
+    Args:
+        steps: What `replay` gives.
+        show: Takes each step when its time has come.
+        speed: How many times faster.
+        clock: Waits between steps.
+        interrupt: Ends it early.
+
+    Returns:
+        Whether all steps were shown.
+    """
+    interrupt = interrupt or Interrupt()
+    before: float | None = None
+    for step in steps:
+        time = step.transition.time
+        pause = 0.0 if before is None else max(0.0, (time - before) / speed)
+        before = time
+        if not clock.sleep(pause, interrupt):
+            return False
+        show(step)
+    return True
+
+
+def _entered(container: Structure) -> list[str]:
+    paths = []
+    for label in container.initial:
+        paths.append(f'{container.path}/{label}')
+        if label in container.inner:
+            paths += _entered(container.inner[label])
+    return paths
+
+
+def _within(path: str, place: str) -> bool:
+    return path == place or path.startswith(place + '/')
+
+
+def _check_transition(container: Structure, transition: Transition) -> None:
+    what = f'Transition {transition.sequence} in {container.path!r}'
+    states = container.members
+    if transition.from_state not in states:
+        raise RecordError(f'{what}: no state {transition.from_state!r}')
+    if transition.kind in ('interrupt', 'resume'):
+        if transition.to_state not in states:
+            raise RecordError(f'{what}: no state {transition.to_state!r}')
+        return
+    if transition.kind == 'ended':
+        if transition.outcome not in states[transition.from_state].get_registered_outcomes():
+            raise RecordError(
+                f'{what}: {transition.from_state!r} has no outcome {transition.outcome!r}'
+            )
+        return
+    leaving = transition.kind == 'exit'
+    for edge in container.edges:
+        if (
+            edge.source == transition.from_state
+            and edge.leaving == leaving
+            and edge.target == transition.to_state
+        ):
+            return
+    if leaving and transition.to_state in container.outcomes:
+        # An iterator that was preempted, or an interrupt's state that ended where the container
+        # was about to end.
+        return
+    raise RecordError(
+        f'{what}: {transition.from_state!r} does not lead to {transition.to_state!r} by '
+        f'{transition.outcome!r}'
+    )
+
+
+# Checkpoints.
+
+
+class CheckpointError(SmachError):
+    """A checkpoint cannot be written or read, or does not fit the machine."""
+
+
+def capture(machine: Container, leave_out: Iterable[str] = ()) -> dict[str, Any]:
+    """Describe where a machine is; from any thread, while it runs or between runs.
+
+    Userdata and progress may hold None, truth values, numbers, strings, bytes, and lists, tuples,
+    sets and dictionaries of these; all come back exactly as they were, but an object that is held
+    twice comes back as two.
+
+    Args:
+        machine: The root.
+        leave_out: Userdata keys that are not kept.
+
+    Returns:
+        A dictionary that JSON can hold.
+
+    Raises:
+        CheckpointError: A value cannot be kept; the message names its key.
+    """
+    with machine.control.condition:
+        return {
+            'format': CHECKPOINT_FORMAT,
+            'version': CHECKPOINT_VERSION,
+            'root': machine.get_name(),
+            'machine': _capture(machine, machine.get_name(), frozenset(leave_out)),
+        }
+
+
+def _capture(state: State, path: str, leave_out: frozenset[str]) -> dict[str, Any]:
+    entry: dict[str, Any] = {}
+    progress = dict(getattr(state, 'fsm_progress', None) or {})
+    waiting = getattr(state, 'fsm_waiting', None)
+    if waiting is not None:
+        progress[waiting[0]] = elapsed_of(state.fsm_clock)() - waiting[1]
+    if progress:
+        entry['progress'] = _kept(progress, path, 'progress', frozenset())
+    if not isinstance(state, Container):
+        return entry
+    userdata = _kept(dict(raw(state.userdata)), path, 'userdata', leave_out)
+    if userdata:
+        entry['userdata'] = userdata
+    frame = state.fsm_frame
+    history = state.fsm_history if frame is None else frame.where()
+    if history is not None:
+        entry['at'] = {
+            'current': history.current,
+            'leaving': history.leaving,
+            'saved': [list(saved) for saved in history.saved],
+            'index': history.index,
+            'repeat': history.repeat,
+            'outcomes': history.outcomes,
+        }
+    if state.fsm_raised:
+        entry['raised'] = [branch.label for branch in state.fsm_raised]
+    inside = {
+        label: _capture(child, f'{path}/{label}', leave_out)
+        for label, child in children_of(state).items()
+    }
+    inside = {label: child for label, child in inside.items() if child}
+    if inside:
+        entry['states'] = inside
+    return entry
+
+
+_TAG = '!'
+"""The key that tells a value JSON has no form for from a dictionary of the user's."""
+
+
+def _kept(
+    values: dict[str, Any], path: str, what: str, leave_out: frozenset[str]
+) -> dict[str, Any]:
+    kept = {}
+    for key, value in values.items():
+        if key in leave_out:
+            continue
+        try:
+            kept[key] = _encoded(value)
+        except _CannotKeepError as error:
+            raise CheckpointError(
+                f"{what} key '{key}' of '{path}' cannot be kept: {error}"
+            ) from None
+        except RecursionError:
+            raise CheckpointError(
+                f"{what} key '{key}' of '{path}' cannot be kept: it is nested too deep, or holds "
+                'itself'
+            ) from None
+    return kept
+
+
+class _CannotKeepError(Exception):
+    """A value has no exact form in a checkpoint."""
+
+
+def _encoded(value: Any) -> Any:
+    """What JSON holds of a value, so that `_decoded` gives it back exactly."""
+    kind = type(value)
+    if value is None or kind in (bool, int, str):
+        return value
+    if kind is float:
+        return value if math.isfinite(value) else {_TAG: 'float', 'is': repr(value)}
+    if kind is list:
+        return [_encoded(item) for item in value]
+    if kind is dict:
+        if all(type(key) is str for key in value) and _TAG not in value:
+            return {key: _encoded(item) for key, item in value.items()}
+        pairs = [[_encoded(key), _encoded(item)] for key, item in value.items()]
+        return {_TAG: 'dict', 'is': pairs}
+    if kind in (bytes, bytearray):
+        return {_TAG: kind.__name__, 'is': base64.b64encode(value).decode('ascii')}
+    if kind in (tuple, set, frozenset):
+        return {_TAG: kind.__name__, 'is': [_encoded(item) for item in value]}
+    if kind is complex:
+        return {_TAG: 'complex', 'is': [_encoded(value.real), _encoded(value.imag)]}
+    raise _CannotKeepError(
+        f'{shown(value)[:80]} of type {kind.__module__}.{kind.__qualname__}; plain values can be '
+        'kept, or the key left out'
+    )
+
+
+_DECODERS: dict[str, Callable[[Any], Any]] = {
+    'float': float,
+    'bytes': lambda text: base64.b64decode(text, validate=True),
+    'bytearray': lambda text: bytearray(base64.b64decode(text, validate=True)),
+    'tuple': lambda items: tuple(_decoded(item) for item in items),
+    'set': lambda items: {_decoded(item) for item in items},
+    'frozenset': lambda items: frozenset(_decoded(item) for item in items),
+    'dict': lambda pairs: {_decoded(key): _decoded(item) for key, item in pairs},
+    'complex': lambda parts: complex(*(_decoded(part) for part in parts)),
+}
+
+
+def _decoded(value: Any) -> Any:
+    if isinstance(value, list):
+        return [_decoded(item) for item in value]
+    if not isinstance(value, dict):
+        return value
+    if _TAG not in value:
+        return {key: _decoded(item) for key, item in value.items()}
+    return _DECODERS[value[_TAG]](value['is'])
+
+
+def restore(machine: Container, checkpoint: dict[str, Any]) -> None:
+    """Have the machine's next execution go on where a checkpoint was taken.
+
+    Args:
+        machine: A machine built like the one the checkpoint is of, not running.
+        checkpoint: What `capture` gave.
+
+    Raises:
+        CheckpointError: It is not a checkpoint, or not of this machine; nothing is changed then.
+    """
+    path = machine.get_name()
+    if machine.is_running():
+        raise CheckpointError(f"'{path}' is running: it cannot take a checkpoint over")
+    if (
+        not isinstance(checkpoint, dict)
+        or checkpoint.get('format') != CHECKPOINT_FORMAT
+        or checkpoint.get('version') != CHECKPOINT_VERSION
+    ):
+        raise CheckpointError(f'not a {CHECKPOINT_FORMAT} of version {CHECKPOINT_VERSION}')
+    todo: list[Callable[[], None]] = []
+    try:
+        _plan(machine, path, checkpoint.get('machine'), todo)
+    except RecursionError:
+        raise CheckpointError('damaged: nested too deep') from None
+    for step in todo:
+        step()
+
+
+def _expect(holds: bool, path: str, what: str, value: object) -> None:
+    if not holds:
+        raise CheckpointError(f"damaged at '{path}': expected {what}, not {shown(value)[:80]}")
+
+
+def _plan(state: State, path: str, entry: Any, todo: list[Callable[[], None]]) -> None:
+    """Check what a checkpoint says of a state, and add what is to be done to `todo`."""
+    _expect(isinstance(entry, dict), path, 'an object', entry)
+    progress = _read_values(path, 'progress', entry.get('progress', {}))
+    todo.append(lambda: setattr(state, 'fsm_progress', progress or None))
+    if not isinstance(state, Container):
+        for key in ('at', 'states', 'raised', 'userdata'):
+            if key in entry:
+                raise CheckpointError(
+                    f"'{path}' is not a container, but the checkpoint has '{key}'"
+                )
+        return
+    userdata = _read_values(path, 'userdata', entry.get('userdata', {}))
+    children = children_of(state)
+    at = entry.get('at')
+    history = None if at is None else _read_place(state, path, at)
+    raised = entry.get('raised', [])
+    _expect(isinstance(raised, list), path, 'a list of interrupts', raised)
+    for label in raised:
+        if not isinstance(label, str) or label not in state.fsm_branches:
+            raise CheckpointError(f"'{path}' has no interrupt {shown(label)}")
+    branches = tuple(state.fsm_branches[label] for label in raised)
+
+    def resume() -> None:
+        raw(state.userdata).update(userdata)
+        state.fsm_history, state.fsm_raised = history, branches
+
+    todo.append(resume)
+    states = entry.get('states', {})
+    _expect(isinstance(states, dict), path, 'an object of states', states)
+    for label, inside in states.items():
+        if label not in children:
+            raise CheckpointError(
+                f"'{path}' has no state '{label}': its states are {sorted(children)}"
+            )
+        _plan(children[label], f'{path}/{label}', inside, todo)
+
+
+def _read_values(path: str, what: str, values: Any) -> dict[str, Any]:
+    _expect(isinstance(values, dict), path, f'{what} as an object', values)
+    read = {}
+    for key, value in values.items():
+        try:
+            read[key] = _decoded(value)
+        except (KeyError, TypeError, ValueError, RecursionError) as error:
+            raise CheckpointError(
+                f"damaged at '{path}': {what} key '{key}': {describe(error)}"
+            ) from None
+    return read
+
+
+def _read_place(state: Container, path: str, at: Any) -> History:
+    """Where a container goes on.
+
+    Raises:
+        CheckpointError: It is none of its states.
+    """
+    _expect(isinstance(at, dict), path, 'a place as an object', at)
+    current, leaving = at.get('current', ''), at.get('leaving', False)
+    saved, outcomes = at.get('saved', []), at.get('outcomes', {})
+    index, repeat = at.get('index', 0), at.get('repeat', True)
+    _expect(isinstance(saved, list), path, 'a list of places', saved)
+    for place in saved:
+        _expect(isinstance(place, list) and len(place) == 2, path, 'a place', place)
+    _expect(type(index) is int and index >= 0, path, 'a number of items', index)
+    _expect(type(repeat) is bool, path, 'true or false', repeat)
+    _expect(isinstance(outcomes, dict), path, 'outcomes by label', outcomes)
+    labels = children_of(state)
+    for label, leaves in ((current, leaving), *saved):
+        _expect(isinstance(label, str) and type(leaves) is bool, path, 'a place', label)
+        if not (state.together or leaves or label in labels):
+            raise CheckpointError(
+                f"'{path}' has no state '{label}' to resume in: its states are {sorted(labels)}"
+            )
+    for label, outcome in outcomes.items():
+        if label not in state.fsm_states:
+            raise CheckpointError(f"'{path}' has no state '{label}'")
+        _expect(isinstance(outcome, str), f'{path}/{label}', 'an outcome', outcome)
+    places = [(label, leaves) for label, leaves in saved]
+    return History(current, leaving, places, index, repeat, dict(outcomes))
+
+
+def save(machine: Container, path: str | Path, leave_out: Iterable[str] = ()) -> None:
+    """Write a checkpoint; a reader finds the old one or the new one, never half of one.
+
+    When it returns, the checkpoint is on the disk, and outlives a failure of power.
+
+    Raises:
+        CheckpointError: A value cannot be kept, see `capture`.
+        OSError: The file cannot be written.
+    """
+    target = Path(path)
+    text = json.dumps(capture(machine, leave_out), ensure_ascii=False, allow_nan=False)
+    draft = target.with_name(f'.{target.name}.{os.getpid()}.{threading.get_ident()}')
+    try:
+        with open(draft, 'wb') as file:
+            # A lone surrogate is a string of Python, though none of UTF-8.
+            file.write(text.encode('utf-8', 'surrogatepass'))
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(draft, target)
+    except BaseException:
+        draft.unlink(missing_ok=True)
+        raise
+    _sync_folder(target.parent)
+
+
+def _sync_folder(folder: Path) -> None:
+    with suppress(OSError):
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+
+
+def load(machine: Container, path: str | Path) -> None:
+    """Restore a machine from a file that `save` wrote.
+
+    Raises:
+        CheckpointError: The file cannot be read, or does not fit the machine.
+    """
+    try:
+        text = Path(path).read_bytes().decode('utf-8', 'surrogatepass')
+        restore(machine, json.loads(text))
+    except RecursionError:
+        raise CheckpointError(f'{path}: damaged: nested too deep') from None
+    except (OSError, ValueError, CheckpointError) as error:
+        raise CheckpointError(f'{path}: {describe(error)}') from error
+
+
+class Checkpointer:
+    """Saves a machine's checkpoint at its start and after every transition.
+
+    What cannot be kept is an error in the log, with its key, each time; the file then stays as it
+    was.
+
+    Args:
+        machine: The root.
+        path: The file.
+        leave_out: Userdata keys that are not kept.
+    """
+
+    def __init__(self, machine: Container, path: str | Path, leave_out: Iterable[str] = ()) -> None:
+        self._machine = machine
+        self._path = Path(path)
+        self._leave_out = frozenset(leave_out)
+        # A concurrence's children change places in threads of their own: the last word is kept.
+        self._turn = threading.Lock()
+        for container in _containers(machine):
+            container.register_start_cb(self._changed)
+            container.register_transition_cb(self._changed)
+        machine.register_termination_cb(self._ended)
+
+    def _changed(self, *_: Any) -> None:
+        try:
+            with self._turn:
+                save(self._machine, self._path, self._leave_out)
+        except OSError as error:
+            logwarn(f'Checkpoint {self._path} cannot be written: {error.strerror}')
+        except CheckpointError as error:
+            logerr(f'Checkpoint {self._path} cannot be written: {error}')
+
+    def _ended(self, *_: Any) -> None:
+        self._path.unlink(missing_ok=True)
+
+
+def _containers(state: State) -> list[Container]:
+    if not isinstance(state, Container):
+        return []
+    return [
+        state,
+        *(found for child in children_of(state).values() for found in _containers(child)),
+    ]

@@ -1,0 +1,433 @@
+"""Service calls and action goals that always end: with an answer, or with an error in time.
+
+A service is called blocking from a worker thread (`ServiceCaller.call`), or with `await` in a
+callback (`call_async`); a goal is sent from a worker thread (`GoalCaller.run`). Blocking in a
+callback would stop the executor that brings the answer.
+
+Deadlines here are steady time: how long a peer may take to answer has nothing to do with
+simulated time.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from action_msgs.msg import GoalStatus
+from rclpy.action import ActionClient
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.node import Node
+from rclpy.qos import qos_profile_action_status_default
+from rclpy.task import Future
+
+from surveillance_fsm.clock import Interrupt
+from surveillance_fsm.ros.waiting import ACTION_CLIENT_QOS, CLIENT_QOS, own
+
+DISCOVERY_PERIOD = 0.02
+"""Seconds between two looks for a server; rclpy offers no event for its appearance."""
+
+
+SERVER_PERIOD = 0.1
+"""Seconds between two looks whether the server that owes an answer is still there."""
+
+
+class CallError(Exception):
+    """A call did not bring an answer; the message is one line that names the peer."""
+
+
+class UnavailableError(CallError):
+    """The server is not there, or went away before it answered."""
+
+
+class CallTimeoutError(CallError):
+    """The server is there but did not answer in time."""
+
+
+class CallInterruptedError(CallError):
+    """The caller's interrupt ended the wait."""
+
+
+class ServiceCaller:
+    """Calls one service.
+
+    Args:
+        node: The node that calls; an executor must spin it.
+        srv_type: The service's type.
+        name: The service's name, relative to the node's namespace.
+    """
+
+    def __init__(self, node: Node, srv_type: Any, name: str) -> None:
+        self._node = node
+        self._client = node.create_client(
+            srv_type, name, callback_group=ReentrantCallbackGroup(), qos_profile=CLIENT_QOS
+        )
+        self.name = name
+
+    def is_ready(self) -> bool:
+        """Tell whether the server is there now."""
+        return bool(self._client.service_is_ready())
+
+    def call(
+        self,
+        request: Any,
+        timeout: float,
+        interrupt: Interrupt | None = None,
+        *,
+        discovery: float | None = None,
+    ) -> Any:
+        """Call and block until the answer; from a worker thread only.
+
+        A server that was stopped is noticed at once. One that was killed is known to be gone only
+        when another takes its place, or after the middleware's own deadline (20 s by default).
+
+        Args:
+            request: The request message.
+            timeout: Seconds for finding the server and for its answer together.
+            interrupt: Ends the wait early.
+            discovery: Seconds for finding the server, where an answer may take much longer;
+                default: `timeout`.
+
+        Returns:
+            The response message.
+
+        Raises:
+            UnavailableError: No server within the time, or it went away before it answered.
+            CallTimeoutError: No answer within the time.
+            CallInterruptedError: The interrupt was raised.
+        """
+        deadline = time.monotonic() + timeout
+        found_by = deadline if discovery is None else time.monotonic() + min(discovery, timeout)
+        what = f'service {self.name}'
+        await_ready(self.is_ready, found_by, interrupt, what)
+        future = self._client.call_async(request)
+        try:
+            return block_on(future, deadline, interrupt, what, self._look_for_loss())
+        except CallError:
+            self._client.remove_pending_request(future)
+            raise
+
+    def _look_for_loss(self) -> Callable[[], None]:
+        """Return a look that raises `UnavailableError` once the server owes an answer for ever."""
+        servers, lost = self._count_servers(), ''
+
+        def look() -> None:
+            nonlocal servers, lost
+            if lost:
+                raise UnavailableError(f'service {self.name}: {lost}')
+            before, servers = servers, self._count_servers()
+            # Not before the next look: an answer may be under way.
+            if not self.is_ready():
+                lost = 'the server went away before it answered'
+            elif servers > before:
+                lost = 'another server took the place of the one that was asked'
+
+        return look
+
+    def _count_servers(self) -> int:
+        # One that answers to `is_ready` may not be counted yet.
+        return max(1, int(self._node.count_services(self._client.service_name)))
+
+    async def call_async(self, request: Any, timeout: float) -> Any:
+        """Call from a callback with `await`; otherwise as `call`.
+
+        Raises:
+            UnavailableError: The server is not there when the call is made.
+            CallTimeoutError: No answer within the time.
+        """
+        if not self.is_ready():
+            raise UnavailableError(f'service {self.name}: no server')
+        future = self._client.call_async(request)
+        executor = self._node.executor
+        late = threading.Event()
+
+        def expire() -> None:
+            late.set()
+            future.cancel()
+            executor.wake()
+
+        timer = threading.Timer(timeout, expire)
+        timer.daemon = True
+        timer.start()
+        try:
+            response = await future
+        finally:
+            timer.cancel()
+        if late.is_set() and not future.done():
+            self._client.remove_pending_request(future)
+            raise CallTimeoutError(f'service {self.name}: no answer within {timeout:g} s')
+        return response
+
+
+def await_ready(
+    is_ready: Callable[[], bool], deadline: float, interrupt: Interrupt | None, what: str
+) -> None:
+    """Wait for a server, on a worker thread.
+
+    Args:
+        is_ready: Whether it is there.
+        deadline: Steady time in seconds at which the wait ends.
+        interrupt: Ends the wait early.
+        what: Names the server in errors.
+
+    Raises:
+        UnavailableError: No server by the deadline.
+        CallInterruptedError: The interrupt was raised.
+    """
+    pause = interrupt if interrupt is not None else Interrupt()
+    while not is_ready():
+        if time.monotonic() >= deadline:
+            raise UnavailableError(f'{what}: no server')
+        if pause.wait(DISCOVERY_PERIOD):
+            raise CallInterruptedError(f'{what}: interrupted')
+
+
+def block_on(
+    future: Future,
+    deadline: float,
+    interrupt: Interrupt | None,
+    what: str,
+    look: Callable[[], None] = lambda: None,
+) -> Any:
+    """Wait for a future that the executor completes, on a worker thread; its result.
+
+    Args:
+        future: What is waited for.
+        deadline: Steady time in seconds at which the wait ends.
+        interrupt: Ends the wait early.
+        what: Names the peer in errors.
+        look: Called every `SERVER_PERIOD` meanwhile; what it raises ends the wait.
+
+    Raises:
+        CallTimeoutError: Nothing came by the deadline.
+        CallInterruptedError: The interrupt was raised.
+    """
+    woken = threading.Event()
+    future.add_done_callback(lambda _future: woken.set())
+    remove = interrupt.subscribe(woken.set) if interrupt is not None else None
+    try:
+        while not woken.wait(max(0.0, min(SERVER_PERIOD, deadline - time.monotonic()))):
+            if time.monotonic() >= deadline:
+                break
+            look()
+    finally:
+        if remove is not None:
+            remove()
+    if future.done():
+        return future.result()
+    if interrupt is not None and interrupt.is_set():
+        raise CallInterruptedError(f'{what}: interrupted')
+    raise CallTimeoutError(f'{what}: no answer in time')
+
+
+PROBE_PERIOD = 0.5
+"""Seconds between two questions to a server that came or went while a goal runs."""
+
+DOUBT_SECONDS = 5.0
+"""How long such a server is asked: its services are discovered one by one."""
+
+
+@dataclass(frozen=True)
+class GoalEnd:
+    """How a goal ended.
+
+    Attributes:
+        status: `succeeded`, `aborted`, `canceled` or `rejected`.
+        result: The action's result message; None when rejected.
+    """
+
+    status: str
+    result: Any
+
+
+_STATUS = {
+    GoalStatus.STATUS_SUCCEEDED: 'succeeded',
+    GoalStatus.STATUS_ABORTED: 'aborted',
+    GoalStatus.STATUS_CANCELED: 'canceled',
+}
+
+
+class GoalCaller:
+    """Sends goals to one action server, one at a time.
+
+    A server that dies or restarts in the middle is noticed: its status topic comes or goes, and
+    the server that is there then is asked whether it knows the goal.
+
+    Args:
+        node: The node that calls; an executor must spin it.
+        action_type: The action's type.
+        name: The action's name, relative to the node's namespace.
+        cancel_timeout: Seconds that a server may take to end a cancelled goal.
+    """
+
+    def __init__(
+        self, node: Node, action_type: Any, name: str, cancel_timeout: float = 2.0
+    ) -> None:
+        self._node = node
+        group = ReentrantCallbackGroup()
+        self._client = ActionClient(
+            node, action_type, name, callback_group=group, **ACTION_CLIENT_QOS
+        )
+        own(node, self._client)
+        self._action_type = action_type
+        self._cancel_timeout = cancel_timeout
+        self._watch: _ServerWatch | None = None
+        self._probe = node.create_client(
+            action_type.Impl.GetResultService,
+            f'{name}/_action/get_result',
+            callback_group=group,
+            qos_profile=CLIENT_QOS,
+        )
+        self._status = node.create_subscription(
+            action_type.Impl.GoalStatusMessage,
+            f'{name}/_action/status',
+            lambda _message: None,
+            qos_profile_action_status_default,
+            callback_group=group,
+            event_callbacks=SubscriptionEventCallbacks(matched=self._on_matched),
+        )
+        self.name = name
+
+    def is_ready(self) -> bool:
+        """Tell whether the server is there now."""
+        return bool(self._client.server_is_ready())
+
+    def run(
+        self,
+        goal: Any,
+        *,
+        accept_timeout: float,
+        result_timeout: float | None = None,
+        interrupt: Interrupt | None = None,
+        on_feedback: Callable[[Any], None] | None = None,
+    ) -> GoalEnd:
+        """Send a goal and block until it ends; from a worker thread only.
+
+        Args:
+            goal: The goal message.
+            accept_timeout: Seconds for finding the server and for its yes or no.
+            result_timeout: Seconds for the result after that; None waits as long as the server
+                lives. When it passes, the goal is cancelled.
+            interrupt: Ends the wait early; the goal is cancelled on the server.
+            on_feedback: Called with each feedback message, in the executor's thread.
+
+        Raises:
+            UnavailableError: No server within the time, or it went away in the middle.
+            CallTimeoutError: No yes or no, or no result, within the time.
+            CallInterruptedError: The interrupt was raised; the server was told to cancel and has
+                ended the goal, or had `cancel_timeout` to do so.
+        """
+        what = f'action {self.name}'
+        deadline = time.monotonic() + accept_timeout
+        await_ready(self.is_ready, deadline, interrupt, what)
+        feedback = None
+        if on_feedback is not None:
+            told = on_feedback
+
+            def feedback(message: Any) -> None:
+                told(message.feedback)
+
+        # From before the goal is sent: a server that goes right after its yes is seen going.
+        wake = Interrupt()
+        watch = self._watch = _ServerWatch(wake)
+        sent = self._client.send_goal_async(goal, feedback_callback=feedback)
+        try:
+            handle = block_on(sent, deadline, interrupt, what)
+        except CallError:
+            self._watch = None
+            # The goal may be accepted yet; it must not run on unseen.
+            sent.add_done_callback(_cancel_when_accepted)
+            raise
+        if not handle.accepted:
+            self._watch = None
+            return GoalEnd('rejected', None)
+        ended = handle.get_result_async()
+        ended.add_done_callback(lambda _future: wake.set())
+        remove = interrupt.subscribe(wake.set) if interrupt is not None else None
+        try:
+            lost = self._wait_for_end(handle, ended, watch, result_timeout, interrupt)
+        finally:
+            self._watch = None
+            if remove is not None:
+                remove()
+        if not ended.done():
+            if lost:
+                raise UnavailableError(f'{what}: the server went away before the goal ended')
+            self._cancel(handle, ended)
+            if interrupt is not None and interrupt.is_set():
+                raise CallInterruptedError(f'{what}: interrupted')
+            raise CallTimeoutError(f'{what}: no result within {result_timeout:g} s')
+        response = ended.result()
+        if response.status not in _STATUS:
+            raise UnavailableError(f'{what}: the server does not know the goal any more')
+        return GoalEnd(_STATUS[response.status], response.result)
+
+    def _cancel(self, handle: Any, ended: Future) -> None:
+        done = threading.Event()
+        ended.add_done_callback(lambda _future: done.set())
+        handle.cancel_goal_async()
+        done.wait(self._cancel_timeout)
+
+    def _on_matched(self, info: Any) -> None:
+        watch = self._watch
+        if watch is not None:
+            watch.servers = info.current_count
+            watch.doubt_until = time.monotonic() + DOUBT_SECONDS
+            watch.wake.set()
+
+    def _wait_for_end(
+        self,
+        handle: Any,
+        ended: Future,
+        watch: _ServerWatch,
+        result_timeout: float | None,
+        interrupt: Interrupt | None,
+    ) -> bool:
+        """Wait for the goal's end, its deadline or the interrupt; True when the server is lost."""
+        deadline = math.inf if result_timeout is None else time.monotonic() + result_timeout
+        while not ended.done() and not (interrupt is not None and interrupt.is_set()):
+            now = time.monotonic()
+            if watch.servers == 0 or watch.forgotten:
+                return True
+            if now >= deadline:
+                break
+            in_doubt = now < watch.doubt_until
+            if in_doubt:
+                self._ask_for(handle, watch)
+            limit = min(deadline, now + PROBE_PERIOD if in_doubt else math.inf)
+            watch.wake.wait(None if limit == math.inf else limit - now)
+            watch.wake.clear()
+        return False
+
+    def _ask_for(self, handle: Any, watch: _ServerWatch) -> None:
+        """Ask for the goal's result once more: a server that does not know it says so at once."""
+        request = self._action_type.Impl.GetResultService.Request()
+        request.goal_id = handle.goal_id
+
+        def answered(future: Future) -> None:
+            response = future.result()
+            if response is not None and response.status == GoalStatus.STATUS_UNKNOWN:
+                watch.forgotten = True
+                watch.wake.set()
+
+        self._probe.call_async(request).add_done_callback(answered)
+
+
+class _ServerWatch:
+    """What is known of the server while a goal runs; `wake` is raised on each change."""
+
+    def __init__(self, wake: Interrupt) -> None:
+        self.wake = wake
+        self.servers: int | None = None
+        self.doubt_until = 0.0
+        self.forgotten = False
+
+
+def _cancel_when_accepted(sent: Future) -> None:
+    handle = sent.result()
+    if handle is not None and handle.accepted:
+        handle.cancel_goal_async()

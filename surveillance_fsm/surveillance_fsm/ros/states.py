@@ -1,0 +1,517 @@
+"""States that call ROS 2 services and actions, watch topics and ask questions.
+
+None of them blocks an executor and none can hang: each ends in one of its outcomes within its time
+limits. The node's executor must spin in another thread than the machine's.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
+from action_msgs.msg import GoalStatus
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+
+import surveillance_fsm as fsm
+from surveillance_fsm.clock import Interrupt
+from surveillance_fsm.exceptions import describe
+from surveillance_fsm.ros.calls import (
+    CallError,
+    CallInterruptedError,
+    GoalCaller,
+    ServiceCaller,
+)
+from surveillance_fsm.ros.exchange import (
+    ExchangeError,
+    Incoming,
+    Outgoing,
+    UserCallback,
+    seconds,
+)
+from surveillance_fsm.ros.waiting import ClockWait
+
+_STATUS = {
+    'succeeded': GoalStatus.STATUS_SUCCEEDED,
+    'aborted': GoalStatus.STATUS_ABORTED,
+    'canceled': GoalStatus.STATUS_CANCELED,
+}
+
+
+class RosState(fsm.State):
+    """Base of states that have a node.
+
+    Attributes:
+        node: The node.
+
+    Args:
+        node: The node.
+        outcomes: See `State`.
+        input_keys: See `State`.
+        output_keys: See `State`.
+        io_keys: See `State`.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        outcomes: Iterable[str] = (),
+        input_keys: Iterable[str] = (),
+        output_keys: Iterable[str] = (),
+        io_keys: Iterable[str] = (),
+    ) -> None:
+        super().__init__(outcomes, input_keys, output_keys, io_keys)
+        self.node = node
+
+
+class ServiceState(RosState):
+    """Calls a service and ends with ``succeeded``, ``aborted`` or ``preempted``.
+
+    However the server behaves, the state ends within `timeout`; a preempt ends it at once.
+
+    Args:
+        node: The node that calls; an executor must spin it in another thread.
+        service_name: The service's name.
+        service_spec: The service's type.
+        request: The request; an empty one by default. It is copied, never changed.
+        request_cb: ``(userdata, request, *args, **kwargs)``; returns the request, or None.
+        request_cb_args: See `request_cb`.
+        request_cb_kwargs: See `request_cb`.
+        request_key: Userdata key that holds the request.
+        request_slots: Fields of the request that are userdata keys.
+        response_cb: ``(userdata, response, *args, **kwargs)``; may return an outcome.
+        response_cb_args: See `response_cb`.
+        response_cb_kwargs: See `response_cb`.
+        response_key: Userdata key that takes the response.
+        response_slots: Fields of the response that become userdata keys.
+        input_keys: Userdata that callbacks without a `cb_interface` read.
+        output_keys: Userdata that callbacks without a `cb_interface` write.
+        outcomes: Outcomes that `response_cb` may return.
+        timeout: Seconds (steady time, or an rclpy ``Duration``) for finding the server and for its
+            answer together.
+
+    Raises:
+        InvalidStateError: A field or a callback is wrong.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        service_name: str,
+        service_spec: Any,
+        request: Any = None,
+        request_cb: Callable[..., Any] | None = None,
+        request_cb_args: Iterable[Any] = (),
+        request_cb_kwargs: Mapping[str, Any] | None = None,
+        request_key: str | None = None,
+        request_slots: Iterable[str] = (),
+        response_cb: Callable[..., Any] | None = None,
+        response_cb_args: Iterable[Any] = (),
+        response_cb_kwargs: Mapping[str, Any] | None = None,
+        response_key: str | None = None,
+        response_slots: Iterable[str] = (),
+        input_keys: Iterable[str] = (),
+        output_keys: Iterable[str] = (),
+        outcomes: Iterable[str] = (),
+        *,
+        timeout: Any = 60.0,
+    ) -> None:
+        keys = tuple(input_keys), tuple(output_keys)
+        super().__init__(node, ['succeeded', 'aborted', 'preempted', *outcomes], *keys)
+        self._request = Outgoing(
+            'request',
+            service_spec.Request,
+            request,
+            request_key,
+            tuple(request_slots),
+            UserCallback('request_cb', request_cb, request_cb_args, request_cb_kwargs, *keys),
+        )
+        self._response = Incoming(
+            'response',
+            service_spec.Response,
+            response_key,
+            tuple(response_slots),
+            UserCallback('response_cb', response_cb, response_cb_args, response_cb_kwargs, *keys),
+        )
+        self._request.declare(self)
+        self._response.declare(self)
+        self._timeout = seconds(timeout) or 0.0
+        self._caller = ServiceCaller(node, service_spec, service_name)
+
+    def execute(self, ud: Any) -> str:
+        """Call the service."""
+        if self.preempt_requested():
+            self.service_preempt()
+            return 'preempted'
+        try:
+            request = self._request.make(ud)
+            response = self._caller.call(request, self._timeout, self.interrupt)
+            return self._response.take(ud, self, response) or 'succeeded'
+        except CallInterruptedError:
+            self.service_preempt()
+            return 'preempted'
+        except (CallError, ExchangeError) as error:
+            fsm.logerr(f"Service '{self._caller.name}': {error}")
+            return 'aborted'
+
+
+class SimpleActionState(RosState):
+    """Runs an action and ends with ``succeeded``, ``aborted`` or ``preempted``.
+
+    The state ends whatever happens: a server that is absent, rejects the goal, dies or restarts in
+    the middle, or an executor that does not spin any more make it ``aborted``. A preempt cancels
+    the goal; a server that refuses to cancel is given up after `preempt_timeout`.
+
+    Args:
+        node: The node that sends the goal; an executor must spin it in another thread.
+        action_name: The action's name.
+        action_spec: The action's type.
+        goal: The goal; an empty one by default. It is copied, never changed.
+        goal_key: Userdata key that holds the goal.
+        goal_slots: Fields of the goal that are userdata keys.
+        goal_cb: ``(userdata, goal, *args, **kwargs)``; returns the goal, or None.
+        goal_cb_args: See `goal_cb`.
+        goal_cb_kwargs: See `goal_cb`.
+        result_key: Userdata key that takes the result.
+        result_slots: Fields of the result that become userdata keys.
+        result_cb: ``(userdata, status, result, *args, **kwargs)`` with a status of
+            ``action_msgs/GoalStatus``; may return an outcome.
+        result_cb_args: See `result_cb`.
+        result_cb_kwargs: See `result_cb`.
+        input_keys: Userdata that callbacks without a `cb_interface` read.
+        output_keys: Userdata that callbacks without a `cb_interface` write.
+        outcomes: Outcomes that `result_cb` may return.
+        exec_timeout: Longest execution; then the goal is cancelled and the state ``aborted``.
+        preempt_timeout: How long a server may take to end a cancelled goal.
+        server_wait_timeout: For finding the server and for its yes or no.
+        feedback_cb: ``(userdata, feedback, *args, **kwargs)``, in the executor's thread.
+        feedback_cb_args: See `feedback_cb`.
+        feedback_cb_kwargs: See `feedback_cb`.
+
+    Durations are seconds of steady time, or an rclpy ``Duration``.
+
+    Raises:
+        InvalidStateError: A field or a callback is wrong.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        action_name: str,
+        action_spec: Any,
+        goal: Any = None,
+        goal_key: str | None = None,
+        goal_slots: Iterable[str] = (),
+        goal_cb: Callable[..., Any] | None = None,
+        goal_cb_args: Iterable[Any] = (),
+        goal_cb_kwargs: Mapping[str, Any] | None = None,
+        result_key: str | None = None,
+        result_slots: Iterable[str] = (),
+        result_cb: Callable[..., Any] | None = None,
+        result_cb_args: Iterable[Any] = (),
+        result_cb_kwargs: Mapping[str, Any] | None = None,
+        input_keys: Iterable[str] = (),
+        output_keys: Iterable[str] = (),
+        outcomes: Iterable[str] = (),
+        exec_timeout: Any = None,
+        preempt_timeout: Any = 60.0,
+        server_wait_timeout: Any = 60.0,
+        feedback_cb: Callable[..., Any] | None = None,
+        feedback_cb_args: Iterable[Any] = (),
+        feedback_cb_kwargs: Mapping[str, Any] | None = None,
+    ) -> None:
+        keys = tuple(input_keys), tuple(output_keys)
+        super().__init__(node, ['succeeded', 'aborted', 'preempted', *outcomes], *keys)
+        self._goal = Outgoing(
+            'goal',
+            action_spec.Goal,
+            goal,
+            goal_key,
+            tuple(goal_slots),
+            UserCallback('goal_cb', goal_cb, goal_cb_args, goal_cb_kwargs, *keys),
+        )
+        self._result = Incoming(
+            'result',
+            action_spec.Result,
+            result_key,
+            tuple(result_slots),
+            UserCallback('result_cb', result_cb, result_cb_args, result_cb_kwargs, *keys),
+        )
+        self._feedback = UserCallback(
+            'feedback_cb', feedback_cb, feedback_cb_args, feedback_cb_kwargs, *keys
+        )
+        self._goal.declare(self)
+        self._result.declare(self)
+        self._feedback.declare(self)
+        self._exec_timeout = seconds(exec_timeout)
+        self._server_wait_timeout = seconds(server_wait_timeout) or 0.0
+        self._caller = GoalCaller(
+            node, action_spec, action_name, cancel_timeout=seconds(preempt_timeout) or 0.0
+        )
+        self._watchdog = _ExecutorWatchdog(node, max(1.0, self._server_wait_timeout))
+
+    def execute(self, ud: Any) -> str:
+        """Run the action."""
+        if self.preempt_requested():
+            self.service_preempt()
+            return 'preempted'
+        try:
+            goal = self._goal.make(ud)
+            with self._watchdog.watched(self.interrupt) as interrupt:
+                end = self._caller.run(
+                    goal,
+                    accept_timeout=self._server_wait_timeout,
+                    result_timeout=self._exec_timeout,
+                    interrupt=interrupt,
+                    on_feedback=self._on_feedback(ud),
+                )
+            if end.status == 'rejected':
+                fsm.logerr(f"Action '{self._caller.name}': the server rejected the goal")
+                return 'aborted'
+            outcome = self._result.take(ud, self, _STATUS[end.status], end.result)
+        except CallInterruptedError:
+            if not self.preempt_requested():
+                fsm.logerr(f"Action '{self._caller.name}': the node's executor does not spin")
+                return 'aborted'
+            self.service_preempt()
+            return 'preempted'
+        except (CallError, ExchangeError) as error:
+            fsm.logerr(f"Action '{self._caller.name}': {error}")
+            return 'aborted'
+        if self.preempt_requested():
+            # It ended in the same moment; the preempt is served by that, whatever the status.
+            self.service_preempt()
+            return outcome or ('succeeded' if end.status == 'succeeded' else 'preempted')
+        return outcome or ('succeeded' if end.status == 'succeeded' else 'aborted')
+
+    def _on_feedback(self, ud: Any) -> Callable[[Any], None] | None:
+        if self._feedback.function is None:
+            return None
+
+        def told(message: Any) -> None:
+            try:
+                self._feedback.call(ud, message)
+            except ExchangeError as error:
+                fsm.logerr(f"Action '{self._caller.name}': {error}")
+
+        return told
+
+
+class MonitorState(RosState):
+    """Looks at each message of a topic until one is not as it should be.
+
+    It ends with ``invalid`` when `cond_cb` says no, with ``valid`` after `max_checks` messages for
+    which it said yes, and with ``preempted``. Watching has no end of its own; give `timeout` where
+    silence is a fault.
+
+    Args:
+        node: The node that subscribes; an executor must spin it in another thread.
+        topic: The topic's name.
+        msg_type: The topic's type.
+        cond_cb: ``(userdata, message)``; whether the message is as it should be.
+        max_checks: Messages to look at; -1 for no limit.
+        input_keys: Userdata that `cond_cb` reads.
+        output_keys: Userdata that `cond_cb` writes.
+        io_keys: Both.
+        timeout: Longest silence, seconds of steady time (or an rclpy ``Duration``), after which the
+            state ends with ``invalid``.
+        qos: The subscription's profile. With transient local durability the last message counts
+            also when it came before the state.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        topic: str,
+        msg_type: Any,
+        cond_cb: Callable[[Any, Any], Any],
+        max_checks: int = -1,
+        input_keys: Iterable[str] = (),
+        output_keys: Iterable[str] = (),
+        io_keys: Iterable[str] = (),
+        *,
+        timeout: Any = None,
+        qos: QoSProfile | int = 10,
+    ) -> None:
+        super().__init__(node, ['valid', 'invalid', 'preempted'], input_keys, output_keys, io_keys)
+        if not callable(cond_cb):
+            raise fsm.InvalidStateError(f'cond_cb {cond_cb!r} cannot be called')
+        declared: Any = cond_cb
+        if fsm.has_smach_interface(declared):
+            self.register_input_keys(declared.get_registered_input_keys())
+            self.register_output_keys(declared.get_registered_output_keys())
+        self._topic = topic
+        self._cond_cb = cond_cb
+        self._max_checks = max_checks
+        self._timeout = seconds(timeout)
+        self._changed = threading.Condition()
+        self._ud: Any = None
+        self._checks = 0
+        self._verdict: str | None = None
+        self._heard = 0.0
+        self._latched = (
+            isinstance(qos, QoSProfile) and qos.durability == DurabilityPolicy.TRANSIENT_LOCAL
+        )
+        self._last: Any = None
+        # Made once: an entity must not be destroyed while an executor spins.
+        self._subscription = node.create_subscription(msg_type, topic, self._arrived, qos)
+
+    def execute(self, ud: Any) -> str:
+        """Watch."""
+        remove = self.interrupt.subscribe(self._wake)
+        with self._changed:
+            self._ud, self._checks, self._verdict = ud, 0, None
+            self._heard = time.monotonic()
+            if self._last is not None:
+                self._look_at(self._last)
+        try:
+            with self._changed:
+                while self._verdict is None and not self.preempt_requested():
+                    left = None
+                    if self._timeout is not None:
+                        left = self._heard + self._timeout - time.monotonic()
+                        if left <= 0.0:
+                            fsm.logwarn(f"Topic '{self._topic}': silent for {self._timeout:g} s")
+                            self._verdict = 'invalid'
+                            break
+                    self._changed.wait(left)
+                self._ud = None
+                verdict = self._verdict
+        finally:
+            remove()
+        if verdict is None or self.preempt_requested():
+            self.service_preempt()
+            return 'preempted'
+        return verdict
+
+    def _wake(self) -> None:
+        with self._changed:
+            self._changed.notify_all()
+
+    def _arrived(self, message: Any) -> None:
+        with self._changed:
+            if self._latched:
+                self._last = message
+            if self._ud is not None and self._verdict is None:
+                self._look_at(message)
+                self._changed.notify_all()
+
+    def _look_at(self, message: Any) -> None:
+        self._heard = time.monotonic()
+        try:
+            good = bool(self._cond_cb(self._ud, message))
+        except Exception as error:
+            fsm.logerr(f"Topic '{self._topic}': cond_cb raised {describe(error)}")
+            good = False
+        if not good:
+            self._verdict = 'invalid'
+            return
+        self._checks += 1
+        if 0 < self._max_checks <= self._checks:
+            self._verdict = 'valid'
+
+
+class ConditionState(RosState):
+    """Checks a condition and ends with ``true``, ``false`` or ``preempted``.
+
+    Args:
+        node: The node whose clock counts.
+        cond_cb: ``(userdata)``; the condition.
+        input_keys: Userdata it reads.
+        poll_rate: Checks a second of ROS time, hertz.
+        timeout: After this time the answer is ``false``: seconds of ROS time, or an rclpy
+            ``Duration``.
+        max_checks: After so many checks the answer is ``false``; -1 for no limit.
+
+    Raises:
+        InvalidStateError: `poll_rate` is not above 0, or there is neither `timeout` nor a limit of
+            checks and the callback cannot be called.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        cond_cb: Callable[[Any], Any],
+        input_keys: Iterable[str] = (),
+        poll_rate: float = 20.0,
+        timeout: Any = None,
+        max_checks: int = 1,
+    ) -> None:
+        super().__init__(node, ['true', 'false', 'preempted'], input_keys)
+        declared: Any = cond_cb
+        if not callable(cond_cb):
+            raise fsm.InvalidStateError(f'cond_cb {cond_cb!r} cannot be called')
+        if fsm.has_smach_interface(declared):
+            self.register_input_keys(declared.get_registered_input_keys())
+            self.register_output_keys(declared.get_registered_output_keys())
+        self._cond_cb = cond_cb
+        if not isinstance(poll_rate, int | float) or not 0.0 < poll_rate < math.inf:
+            raise fsm.InvalidStateError(f'poll_rate is {poll_rate!r}, expected hertz above 0')
+        self._period = 1.0 / poll_rate
+        self._timeout = seconds(timeout)
+        self._max_checks = max_checks
+        self._clock = ClockWait(node)
+
+    def execute(self, ud: Any) -> str:
+        """Check until yes, or until it is enough."""
+        start = self._clock.elapsed()
+        checks = 0
+        while not self.preempt_requested():
+            try:
+                if self._cond_cb(ud):
+                    return 'true'
+            except Exception as error:
+                raise fsm.InvalidUserCodeError(f'cond_cb raised {describe(error)}') from error
+            checks += 1
+            if 0 <= self._max_checks <= checks:
+                return 'false'
+            left = self._period
+            if self._timeout is not None:
+                left = min(left, start + self._timeout - self._clock.elapsed())
+                if left <= 0.0:
+                    return 'false'
+            self._clock.sleep(left, self.interrupt)
+        self.service_preempt()
+        return 'preempted'
+
+
+class _ExecutorWatchdog:
+    """Raises an interrupt when the executor has not spun for a while.
+
+    Args:
+        node: The node.
+        patience: Seconds (steady time) without a sign of it after which it counts as dead.
+    """
+
+    def __init__(self, node: Node, patience: float) -> None:
+        self._patience = patience
+        self._spun = threading.Event()
+        self._guard = node.create_guard_condition(self._spun.set)
+
+    @contextmanager
+    def watched(self, interrupt: Interrupt) -> Iterator[Interrupt]:
+        """Give an interrupt that is raised by `interrupt` or when the executor is dead."""
+        either, done = Interrupt(), threading.Event()
+        remove = interrupt.subscribe(either.set)
+
+        def watch() -> None:
+            while not done.wait(self._patience):
+                self._spun.clear()
+                self._guard.trigger()
+                if not self._spun.wait(self._patience):
+                    if not done.is_set():
+                        either.set()
+                    return
+
+        thread = threading.Thread(target=watch, name='executor watchdog', daemon=True)
+        thread.start()
+        try:
+            yield either
+        finally:
+            done.set()
+            self._spun.set()
+            remove()

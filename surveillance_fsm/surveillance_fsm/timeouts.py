@@ -1,0 +1,430 @@
+"""Time limits, retries, and states that hang: stopped in time, executed again, left behind.
+
+Whoever executes a machine watches its threads (`supervise`). When a state neither returns within
+its deadline nor heeds a preempt within its bound, the watcher leaves its thread behind, has another
+one go on where the state would have ended (`take_over`), and names the state in the log.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from surveillance_fsm.clock import Interrupt
+from surveillance_fsm.exceptions import InvalidTransitionError, PreemptIgnoredError
+from surveillance_fsm.execution import SUSPENDED, ExecutionThread, Frame, Node, Run, Work
+from surveillance_fsm.log import logerr, logwarn
+from surveillance_fsm.state import State, this_thread
+
+TIMEOUT = 'timeout'
+"""The outcome of a state that ran out of time, where its transitions bind it."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a container holds a state to.
+
+    Attributes:
+        timeout: Seconds of the machine's clock after which the state is asked to stop.
+        deadline: Seconds after which the machine goes on without the state.
+        retry: How often the state is executed again after a failure.
+        failures: The outcomes that count as one.
+        late_outcome: The outcome that running out of time has.
+    """
+
+    timeout: float | None
+    deadline: float | None
+    retry: int
+    failures: frozenset[str]
+    late_outcome: str
+
+
+def make_limits(
+    path: str,
+    state: State,
+    transitions: Mapping[str, Any],
+    timeout: float | None,
+    deadline: float | None,
+    retry: int,
+    retry_on: Iterable[str],
+) -> Limits | None:
+    """Check limits and settle which outcome running out of time has.
+
+    Args:
+        path: The state's path, for errors.
+        state: The state.
+        transitions: Its transitions; ``timeout`` may be among them without being declared.
+        timeout: See `Limits`.
+        deadline: See `Limits`; None with a timeout leaves it to the preempt's bound.
+        retry: See `Limits`.
+        retry_on: Outcomes that count as failures, beside running out of time.
+
+    Raises:
+        InvalidTransitionError: There is no outcome for running out of time, or a number is wrong.
+    """
+    if timeout is None and deadline is None and not retry:
+        return None
+    for name, value in (('timeout', timeout), ('deadline', deadline)):
+        if value is not None and not value > 0:
+            raise InvalidTransitionError(
+                f"State '{path}' has {name} {value!r}: expected seconds above 0"
+            )
+    if retry < 0:
+        raise InvalidTransitionError(f"State '{path}' has retry {retry}: expected 0 or more")
+    outcomes = state.get_registered_outcomes()
+    late = ''
+    if timeout is not None or deadline is not None:
+        for late in (TIMEOUT, 'aborted', 'preempted'):
+            if late in transitions or late in outcomes:
+                break
+        else:
+            raise InvalidTransitionError(
+                f"State '{path}' has a time limit but no outcome for it: bind '{TIMEOUT}' in its "
+                f'transitions (its outcomes are {sorted(outcomes)})'
+            )
+    failures = {outcome for outcome in retry_on if outcome in outcomes} | ({late} - {''})
+    if retry and not failures:
+        raise InvalidTransitionError(
+            f"State '{path}' has retry {retry} but none of the outcomes {sorted(retry_on)} to "
+            f'retry on (its outcomes are {sorted(outcomes)})'
+        )
+    return Limits(timeout, deadline, retry, frozenset(failures), late)
+
+
+@dataclass
+class Watch:
+    """Limits at work on a state that executes.
+
+    Attributes:
+        node: The state's node.
+        depth: Index in the thread's stack of the frame it runs in; -1 below a concurrence.
+        soft: When the state is asked to stop, on the machine's clock; None when it was, or never.
+        hard: When the machine goes on without it; None for never.
+        asked: The state was asked to stop.
+    """
+
+    node: Node
+    depth: int
+    soft: float | None
+    hard: float | None
+    asked: bool = False
+
+
+def limited(node: Node, limits: Limits) -> Callable[[Any], Any]:
+    """Wrap what executes a state so that its limits are at work meanwhile."""
+    timed = limits.timeout is not None or limits.deadline is not None
+
+    def run(view: Any) -> Any:
+        for attempt in range(limits.retry + 1):
+            thread: ExecutionThread | None = this_thread.thread
+            watch = _begin_watch(thread, node, limits) if thread is not None and timed else None
+            try:
+                outcome = node.enter(view)
+            finally:
+                if watch is not None and thread is not None:
+                    end_watch(thread, watch)
+            frame = thread.stack[-1] if thread is not None and thread.stack else None
+            place = thread if frame is None else frame
+            outcome = settle(node, place, watch, outcome)
+            if outcome not in limits.failures or attempt == limits.retry:
+                return outcome
+            if node.state.preempt_requested() or (place is not None and place.wanted):
+                return outcome
+            logwarn(
+                f"State '{node.path}' ended with '{outcome}': attempt {attempt + 2} of "
+                f'{limits.retry + 1}'
+            )
+        return None
+
+    return run
+
+
+def settle(
+    node: Node, place: Frame | ExecutionThread | None, watch: Watch | None, outcome: Any
+) -> Any:
+    """Turn what a state returned after running out of time into the outcome for that.
+
+    Args:
+        node: The state's node.
+        place: The frame that it ran in; below a concurrence the thread.
+        watch: Its limits at work.
+        outcome: What it returned.
+    """
+    limits = node.limits
+    if watch is None or not watch.asked or limits is None or outcome is SUSPENDED:
+        return outcome
+    if place is not None and place.wanted:
+        return outcome  # Whoever wants it to end too sorts the request out.
+    ignored = node.state.preempt_requested()
+    if ignored:
+        # It ended by itself; the request came too late or for nothing.
+        node.state.recall_preempt()
+        if outcome != 'preempted':
+            return outcome
+    logwarn(f"State '{node.path}' was stopped after its timeout of {limits.timeout:g} s")
+    return limits.late_outcome
+
+
+# Limits at work.
+
+
+def _begin_watch(thread: ExecutionThread, node: Node, limits: Limits) -> Watch:
+    """Put limits to work on the state that the innermost frame is about to execute."""
+    now = thread.run.now()
+    with thread.run.condition:
+        thread.check()
+        watch = Watch(
+            node,
+            len(thread.stack) - 1,
+            None if limits.timeout is None else now + limits.timeout,
+            None if limits.deadline is None else now + limits.deadline,
+        )
+        thread.watches.append(watch)
+    thread.wakeup.set()
+    return watch
+
+
+def end_watch(thread: ExecutionThread, watch: Watch) -> None:
+    """End the limits of a state that has returned."""
+    with thread.run.condition:
+        thread.check()
+        thread.watches.remove(watch)
+
+
+def watch_of(frame: Frame) -> Watch | None:
+    """The limits at work on the state that `frame` executes."""
+    for watch in frame.thread.watches:
+        if watch.depth >= 0 and frame.thread.stack[watch.depth] is frame:
+            return watch
+    return None
+
+
+# Watching.
+
+
+def supervise(run: Run, threads: Sequence[ExecutionThread], wakeup: Interrupt) -> None:
+    """Watch threads until one of them ends or `wakeup` is raised by somebody else.
+
+    A preempt need not wake the watcher: it looks at least once in every bound, so that it always
+    looks before a bound that has just begun is over.
+
+    Args:
+        run: The execution they belong to.
+        threads: The threads; each raises `wakeup` when it ends or its limits change.
+        wakeup: What the wait ends by.
+    """
+    with run.condition:
+        wakeup.clear()
+        if any(thread.done for thread in threads):
+            return
+        dues = [_due(thread) for thread in threads]
+    clocked = min((due for due, _ in dues if due is not None), default=None)
+    steady = min((due for _, due in dues if due is not None), default=None)
+    left = run.preempt_timeout if steady is None else max(0.0, steady - time.monotonic())
+    if clocked is None:
+        wakeup.wait(left)
+    else:
+        alarm = threading.Timer(left, wakeup.set) if left is not None else None
+        if alarm is not None:
+            alarm.daemon = True
+            alarm.start()
+        run.clock.sleep(max(0.0, clocked - run.now()), wakeup)
+        if alarm is not None:
+            alarm.cancel()
+    for thread in threads:
+        if not thread.done:
+            _enforce(thread)
+
+
+def _due(thread: ExecutionThread) -> tuple[float | None, float | None]:
+    """When something is due next: (on the machine's clock, in steady time)."""
+    times = [t for watch in thread.watches for t in (watch.soft, watch.hard) if t is not None]
+    bound = thread.run.preempt_timeout
+    steady = None
+    if thread.asked_at is not None and bound is not None and not _bounds_itself(thread):
+        steady = thread.asked_at + bound
+    return (min(times) if times else None), steady
+
+
+def _bounds_itself(thread: ExecutionThread) -> bool:
+    stack = tuple(thread.stack)
+    return bool(stack) and stack[-1].bounds_itself
+
+
+def _enforce(thread: ExecutionThread) -> None:
+    """Do what is due: ask states to stop, or go on without them."""
+    now = thread.run.now()
+    with thread.run.condition:
+        if thread.done:
+            return
+        for watch in tuple(thread.watches):
+            if watch.hard is not None and now >= watch.hard:
+                _go_on_without(thread, watch)
+                return
+            if watch.soft is not None and now >= watch.soft:
+                watch.soft, watch.asked = None, True
+                watch.node.state.request_preempt()
+        _, steady = _due(thread)
+        if steady is not None and time.monotonic() >= steady:
+            _go_on_past(thread)
+
+
+def _go_on_without(thread: ExecutionThread, watch: Watch) -> None:
+    limits = watch.node.limits
+    assert limits is not None
+    reason = f'did not return within its deadline of {limits.deadline:g} s'
+    take_over(thread, watch.depth, watch.node, limits.late_outcome, reason)
+
+
+# Going on without a state.
+
+STOPPED = ('preempted', 'aborted')
+"""Outcomes that a state may be taken to have ended with that was left behind."""
+
+
+def stopped_outcome(node: Node) -> str | None:
+    """The outcome that a state is taken to have ended with, if it has one for that."""
+    for outcome in STOPPED:
+        if outcome in node.targets:
+            return outcome
+    return None
+
+
+def _go_on_past(thread: ExecutionThread) -> None:
+    """Go on without a state that ignores a preempt: with its preempted outcome, or its container's.
+
+    Under the run's condition.
+    """
+    bound = thread.run.preempt_timeout
+    reason = f'ignored a preempt for {bound:g} s'
+    culprit = thread.path_inside()
+    for depth in range(len(thread.stack) - 1, -1, -1):
+        node = thread.stack[depth].current
+        if not isinstance(node, Node):
+            return  # It is ending by itself.
+        forced = thread.stack[depth].forced
+        outcome = forced[1] if forced is not None else stopped_outcome(node)
+        if outcome is not None:
+            take_over(thread, depth, node, outcome, reason, culprit)
+            return
+    leaf, forced = thread.leaf, thread.forced
+    if leaf is not None:
+        outcome = forced[1] if forced is not None else stopped_outcome(leaf)
+        if outcome is not None:
+            take_over(thread, -1, leaf, outcome, reason, culprit)
+            return
+    root = thread.stack[0].container if thread.stack else None
+    outcomes = root.get_registered_outcomes() if root is not None else ()
+    for ending in STOPPED:
+        if ending in outcomes:
+            take_over(thread, -1, None, ending, reason, culprit)
+            return
+    error = PreemptIgnoredError(
+        f"State '{culprit}' {reason}, and no container around it can "
+        f"end with 'preempted' or 'aborted'"
+    )
+    take_over(thread, -1, None, error, reason, culprit)
+
+
+def take_over(
+    thread: ExecutionThread,
+    depth: int,
+    node: Node | None,
+    outcome: str | BaseException,
+    reason: str,
+    culprit: str | None = None,
+) -> None:
+    """Leave the present thread behind and go on as if the state in frame `depth` had ended.
+
+    Under the run's condition.
+
+    Args:
+        thread: The logical thread.
+        depth: Index of the frame to go on in; -1 to end the logical thread.
+        node: The state to go on without, whose userdata is taken away.
+        outcome: What it is taken to have returned, or the error to end with.
+        reason: What it did wrong, for the log.
+        culprit: Its path.
+    """
+    assert thread.work is not None
+    culprit = culprit or thread.path_inside()
+    leaf = thread.stack[-1].current if thread.stack else thread.leaf
+    ended = f"with '{outcome}'" if isinstance(outcome, str) else 'with an error'
+    logerr(f"State '{culprit}' {reason}: the machine goes on without it, {ended}")
+    thread.run.left_behind.append((culprit, thread.work))
+    old = thread.stack
+    frames = [frame.successor() for frame in old[: depth + 1]]
+    for frame in old:
+        frame.stale = frame.attention = True
+        frame.container.fsm_frame = None
+    for frame in old[depth + 1 :]:
+        frame.container.recall_preempt()
+    for frame in frames:
+        frame.container.fsm_frame = frame
+    if frames:
+        frames[-1].gone = node
+    if isinstance(leaf, Node):
+        # The request stays with the state, so that the thread left behind ends some time.
+        leaf.state.request_preempt()
+        leaf.revoke()
+        keep_out(leaf, thread.work)
+    if node is not None and node is not leaf:
+        node.revoke()
+    thread.stack = list(frames)
+    thread.watches = [watch for watch in thread.watches if watch.depth < depth]
+    thread.asked_at = None
+    thread.run.condition.notify_all()
+    for frame in old:
+        frame.woken()
+    if not frames:
+        thread.without_leaf = leaf is thread.leaf
+        if isinstance(outcome, str):
+            thread.end(outcome, None)
+        else:
+            thread.end(None, outcome)
+        return
+    thread.start(lambda: _go_on(thread, frames, outcome))
+
+
+def _go_on(thread: ExecutionThread, frames: list[Frame], outcome: Any) -> Any:
+    """Finish nested containers from inside out, the innermost one's state having ended."""
+    frame = frames[-1]
+    try:
+        for frame in reversed(frames):
+            outcome = frame.proceed(outcome)
+    finally:
+        with thread.run.condition:
+            for rest in frames[: frames.index(frame) + 1]:
+                if rest.container.fsm_frame is rest:
+                    rest.container.fsm_frame = None
+    return outcome
+
+
+def keep_out(node: Node, left: Work) -> None:
+    """Let nobody into a state before the thread that was left behind in it has ended."""
+    enter = node.state.execute
+    unlimited = node.execute is node.enter
+
+    def wait_and_enter(view: Any) -> Any:
+        thread: ExecutionThread | None = this_thread.thread
+        if not left.await_end(thread.run.preempt_timeout if thread is not None else None):
+            logerr(f"State '{node.label}' is still running from an earlier execution")
+            if thread is not None:
+                thread.still_gone(node)
+            return stopped_outcome(node)
+        node.enter = enter
+        if unlimited:
+            node.execute = enter
+        if thread is None:
+            node.state.recall_preempt()
+        else:
+            thread.renew_request(node)
+        return enter(view)
+
+    node.state.fsm_left = left
+    node.enter = wait_and_enter
+    if unlimited:
+        node.execute = wait_and_enter

@@ -1,0 +1,794 @@
+"""What follows for an individual from the classes it is in, unknown individuals included.
+
+A consequence-based calculus for Horn description logics (Kazakov, "Consequence-driven reasoning
+for Horn SHIQ ontologies", IJCAI 2009; Simancik, Kazakov, Horrocks, IJCAI 2011). A *context* stands
+for every individual that is in all classes of its core; its tokens are what such an individual is
+besides. An existential adds an edge to the context of the individual it requires; what must hold of
+that individual because of its neighbour goes into the edge's core, so two different neighbours
+never share what one of them causes. Contexts are shared by core, so there are finitely many and the
+calculus ends without a bound on depth or number.
+
+A token is a class predicate, ('is', individual), ('has', property, turned, individual),
+('value', property, value) or ('self', property).
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Any, TypeAlias, TypeVar
+
+from surveillance_ontology.owl.axiom_text import axiom_text
+from surveillance_ontology.owl.axioms import Axiom
+from surveillance_ontology.reasoner.clauses import (
+    AtLeast,
+    AtMost,
+    Clause,
+    Constant,
+    HeadAtom,
+    Predicate,
+    PredicateAtom,
+    Program,
+    RangeAtom,
+    SameAtom,
+)
+from surveillance_ontology.reasoner.value_sets import EVERY, ValueSet, point
+
+T = TypeVar('T')
+Token: TypeAlias = 'Predicate | tuple[Any, ...]'
+Tokens: TypeAlias = frozenset[Token]
+Role: TypeAlias = tuple[Predicate, bool]
+_CASES = 'which of the related individuals are the same would need reasoning by cases'
+_DATES = 'whether its values suit another range is not decided'
+_NOMINALS = 'facts about the individual are not used for classes and unnamed individuals'
+
+
+def closure(start: T, following: Callable[[T], Iterable[T]]) -> dict[T, None]:
+    """What is reached from `start` by following again and again, itself included."""
+    found = {start: None}
+    pending = [start]
+    while pending:
+        for other in following(pending.pop()):
+            if other not in found:
+                found[other] = None
+                pending.append(other)
+    return found
+
+
+def turned(role: Role) -> Role:
+    """The role in the other direction."""
+    return role[0], not role[1]
+
+
+@dataclass(frozen=True, slots=True)
+class _EdgeRule:
+    """For x related to y by all roles, with tokens of both: a token of x or y, a role, or a clash.
+
+    `head` is ('x', token), ('y', token), ('role', role) or ('clash',).
+    """
+
+    roles: frozenset[Role]
+    xs: Tokens
+    ys: Tokens
+    head: tuple[Any, ...]
+    origin: Axiom | None
+
+
+@dataclass(frozen=True, slots=True)
+class _ValueRule:
+    """For x with a value in `values` by all properties: a token, a property, or a clash."""
+
+    props: frozenset[Predicate]
+    xs: Tokens
+    values: ValueSet
+    head: tuple[Any, ...]
+    origin: Axiom | None
+
+
+class _Edge:
+    """`count` individuals that the owner is related to by all roles and that are in the core."""
+
+    __slots__ = ('core', 'count', 'roles', 'target')
+
+    def __init__(self, roles: set[Role], core: set[Token], count: int, target: Context) -> None:
+        self.roles, self.core, self.count, self.target = roles, core, count, target
+
+
+class _Values:
+    """`count` values that the owner has by all properties, in a set."""
+
+    __slots__ = ('count', 'props', 'values')
+
+    def __init__(self, props: set[Predicate], values: ValueSet, count: int) -> None:
+        self.props, self.values, self.count = props, values, count
+
+
+class Context:
+    """What an individual with all tokens of the core is.
+
+    Attributes:
+        tokens: All tokens, the core included.
+        clash: Whether there can be no such individual.
+        edges, values: What it must be related to.
+        users: Contexts with an edge to this one, or that wait for its clash.
+    """
+
+    __slots__ = ('bare', 'clash', 'core', 'done', 'edges', 'loops', 'tokens', 'users', 'values')
+
+    def __init__(self, core: Tokens, bare: bool) -> None:
+        self.core, self.bare = core, bare
+        self.tokens: set[Token] = set(core)
+        self.clash = False
+        self.edges: list[_Edge] = []
+        self.values: list[_Values] = []
+        self.loops: set[Role] = set()
+        self.users: dict[Context, None] = {}
+        self.done: set[object] = set()
+
+
+class Contexts:
+    """Completes contexts of one program; rules of SWRL take no part.
+
+    Attributes:
+        gaps: Sentences about axioms whose consequences may be incomplete.
+    """
+
+    def __init__(self, program: Program) -> None:
+        self._program = program
+        self.gaps: dict[str, None] = {}
+        self._known: dict[tuple[Tokens, bool], Context] = {}
+        self._queue: deque[Context] = deque()
+        self._queued: set[Context] = set()
+        self._heads: dict[Tokens, frozenset[HeadAtom] | None] = {}
+        self._always: list[tuple[Token | None, Axiom | None]] = []
+        self._class_rules: dict[Token, list[tuple[Tokens, Token | None]]] = {}
+        self.edge_rules: dict[Role, list[_EdgeRule]] = {}
+        self._value_rules: dict[Predicate, list[_ValueRule]] = {}
+        for clause in program.clauses:
+            if not clause.named_only:
+                self._take(clause)
+        for predicate in program.predicates():
+            for other in predicate.disjoint:
+                self._class_rule(frozenset((predicate, other)), None, None)
+        self._existentials: dict[Token, list[Any]] = {}
+        for existential in program.existentials:
+            self._existentials.setdefault(existential.label, []).append(existential)
+        self._at_most = [c for c in program.at_most if c.prop.kind == 'object']
+        self._at_most_values = [c for c in program.at_most if c.prop.kind == 'data']
+        self._at_least = [c for c in program.at_least if c.prop.kind == 'object']
+        self._at_least_values = [c for c in program.at_least if c.prop.kind == 'data']
+
+    # --- rules ---
+
+    def _take(self, clause: Clause) -> None:
+        """Indexes a clause about one individual, or one and what it is directly related to."""
+        tokens: dict[Any, set[Token]] = {}
+        roles: dict[tuple[Any, Any], set[Role]] = {}
+        datas: dict[Any, tuple[Any, set[Predicate]]] = {}
+        values: dict[Any, ValueSet] = {}
+        for atom in clause.body:
+            if isinstance(atom, PredicateAtom):
+                predicate, terms = atom.predicate, atom.terms
+                if predicate.kind == 'class':
+                    held = tokens.setdefault(_key(terms[0]), set())
+                    if predicate is not self._program.thing:
+                        held.add(predicate)
+                elif predicate.kind == 'data':
+                    x, v = terms
+                    _, props = datas.setdefault(v, (x, set()))
+                    props.add(predicate)
+                    if isinstance(v, Constant):
+                        values[v] = point(v.value)
+                elif predicate.kind == 'object':
+                    one, other = _key(terms[0]), _key(terms[1])
+                    if one == other:
+                        tokens.setdefault(one, set()).add(('self', predicate))
+                    elif (other, one) in roles:
+                        roles[other, one].add((predicate, True))
+                    else:
+                        roles.setdefault((one, other), set()).add((predicate, False))
+                else:
+                    return
+            elif isinstance(atom, SameAtom):
+                one, other = map(_key, atom.terms)
+                if isinstance(one, tuple):
+                    one, other = other, one
+                if not isinstance(other, tuple):
+                    return
+                tokens.setdefault(one, set()).add(other)
+            elif isinstance(atom, RangeAtom):
+                (v,) = atom.terms
+                values[v] = values.get(v, EVERY) & atom.values
+            else:
+                return
+        if datas:
+            self._take_values(clause, tokens, datas, values)
+        elif not roles:
+            self._take_class(clause, tokens)
+        elif len(roles) == 1:
+            ((pair, found),) = roles.items()
+            for x, y, directed in (
+                (*pair, frozenset(found)),
+                (pair[1], pair[0], frozenset(map(turned, found))),
+            ):
+                if isinstance(x, tuple):
+                    continue
+                xs, ys = frozenset(tokens.get(x, ())), set(tokens.get(y, ()))
+                if isinstance(y, tuple):
+                    ys.add(y)
+                head = self._edge_head(clause, x, y)
+                if head is not None:
+                    rule = _EdgeRule(directed, xs, frozenset(ys), head, clause.origin)
+                    for role in directed:
+                        self.edge_rules.setdefault(role, []).append(rule)
+        # Chains of properties are spelt out as steps by `classification`.
+
+    def _edge_head(self, clause: Clause, x: Any, y: Any) -> tuple[Any, ...] | None:
+        head = clause.head
+        if isinstance(head, PredicateAtom) and head.predicate.kind == 'object':
+            one, other = map(_key, head.terms)
+            if (one, other) == (x, y):
+                return 'role', (head.predicate, False)
+            if (one, other) == (y, x):
+                return 'role', (head.predicate, True)
+        place, token = self._token(head)
+        if token is None:
+            return ('clash',) if place is not None else None
+        if place == x:
+            return 'x', token
+        return ('y', token) if place == y else None
+
+    def _token(self, head: HeadAtom) -> tuple[Any, Token | None]:
+        """What a head says of one individual, as (place, token).
+
+        Without a token it is a clash, without a place nothing that a context can use.
+        """
+        if isinstance(head, SameAtom):
+            one, other = map(_key, head.terms)
+            if isinstance(one, tuple):
+                one, other = other, one
+            return (one, other) if isinstance(other, tuple) else (None, None)
+        predicate, terms = head.predicate, head.terms
+        if predicate is self._program.nothing:
+            return _key(terms[0]), None
+        if predicate.kind == 'class':
+            return _key(terms[0]), predicate
+        if predicate.kind == 'data':
+            value = terms[1]
+            if isinstance(value, Constant):
+                return terms[0], ('value', predicate, value.value)
+            return None, None
+        if predicate.kind != 'object':
+            return None, None
+        one, other = map(_key, terms)
+        if one == other:
+            return one, ('self', predicate)
+        if isinstance(other, tuple):
+            return one, ('has', predicate, False, other[1])
+        if isinstance(one, tuple):
+            return other, ('has', predicate, True, one[1])
+        return None, None
+
+    def _take_class(self, clause: Clause, tokens: dict[Any, set[Token]]) -> None:
+        place, token = self._token(clause.head)
+        if len(tokens) > 1 or place is None or isinstance(place, tuple):
+            return
+        body = frozenset(tokens.get(place, ()))
+        if set(tokens) <= {place}:
+            self._class_rule(body, token, clause.origin)
+
+    def _class_rule(self, body: Tokens, token: Token | None, origin: Axiom | None) -> None:
+        if not body:
+            self._always.append((token, origin))
+        for one in body:
+            self._class_rules.setdefault(one, []).append((body, token))
+
+    def _take_values(
+        self,
+        clause: Clause,
+        tokens: dict[Any, set[Token]],
+        datas: dict[Any, tuple[Any, set[Predicate]]],
+        values: dict[Any, ValueSet],
+    ) -> None:
+        if len(datas) != 1:
+            return
+        ((v, (x, props)),) = datas.items()
+        if isinstance(x, Constant) or not set(tokens) <= {x}:
+            return
+        head: tuple[Any, ...] | None = None
+        atom = clause.head
+        if isinstance(atom, PredicateAtom) and atom.predicate.kind == 'data' and atom.terms[1] == v:
+            head = ('prop', atom.predicate)
+        else:
+            place, token = self._token(atom)
+            if place == x:
+                head = ('clash',) if token is None else ('x', token)
+        if head is not None:
+            xs = frozenset(tokens.get(x, ()))
+            rule = _ValueRule(frozenset(props), xs, values.get(v, EVERY), head, clause.origin)
+            for prop in props:
+                self._value_rules.setdefault(prop, []).append(rule)
+
+    # --- questions ---
+
+    def context(self, core: Iterable[Token], bare: bool = False) -> Context:
+        """The completed context of a core; `bare`: without what classes alone imply."""
+        found = self._open(frozenset(core), bare)
+        while self._queue:
+            context = self._queue.popleft()
+            self._queued.discard(context)
+            self._complete(context)
+        return found
+
+    def roles_above(self, role: Role) -> frozenset[Role]:
+        """The role and every role that it implies by itself."""
+        return frozenset(closure(role, self._implied_roles))
+
+    def _implied_roles(self, role: Role) -> list[Role]:
+        return [
+            rule.head[1]
+            for rule in self.edge_rules.get(role, ())
+            if rule.head[0] == 'role' and not (rule.xs or rule.ys) and len(rule.roles) == 1
+        ]
+
+    def possible_roles(self, role: Role) -> list[Role]:
+        """Roles, turned ones too, that an edge with this one may come to have."""
+        heads = [r.head[1] for r in self.edge_rules.get(role, ()) if r.head[0] == 'role']
+        return [*heads, *map(turned, heads)]
+
+    def contradictory(self, roles: frozenset[Role]) -> bool:
+        """Whether one individual cannot be related to another by all roles."""
+        return any(
+            rule.head[0] == 'clash' and not (rule.xs or rule.ys) and rule.roles <= roles
+            for role in roles
+            for rule in self.edge_rules.get(role, ())
+        )
+
+    def heads(self, core: Tokens) -> frozenset[HeadAtom] | None:
+        """What an individual 0 with all tokens is, as heads of clauses; None: there is none."""
+        if core in self._heads:
+            return self._heads[core]
+        context = self.context(core)
+        heads = None if context.clash else frozenset(self.heads_of(context)) - _stated(core)
+        self._heads[core] = heads
+        return heads
+
+    def heads_of(self, context: Context) -> Iterator[HeadAtom]:
+        """The tokens and edges of a context as heads of clauses about individual 0."""
+        for token in context.tokens:
+            if isinstance(token, Predicate):
+                yield PredicateAtom(token, (0,))
+            elif token[0] == 'is':
+                yield SameAtom((0, Constant(token[1])))
+            elif token[0] == 'self':
+                yield PredicateAtom(token[1], (0, 0))
+        for held in context.values:
+            value = held.values.only
+            if value is not None:
+                for prop in held.props:
+                    yield PredicateAtom(prop, (0, Constant(value, True)))
+        for edge in context.edges:
+            for name in _names(edge.target):
+                for predicate, backwards in edge.roles:
+                    terms = (Constant(name), 0) if backwards else (0, Constant(name))
+                    yield PredicateAtom(predicate, terms)
+        yield from self._about_named(context)
+
+    def _about_named(self, context: Context) -> Iterator[HeadAtom]:
+        """What named individuals are because of individuals that must exist."""
+        for one in closure(context, lambda one: [edge.target for edge in one.edges]):
+            for name in _names(one):
+                for token in one.tokens:
+                    if isinstance(token, Predicate):
+                        yield PredicateAtom(token, (Constant(name),))
+                for edge in one.edges:
+                    for other in _names(edge.target):
+                        for predicate, backwards in edge.roles:
+                            pair = Constant(name), Constant(other)
+                            yield PredicateAtom(predicate, pair[::-1] if backwards else pair)
+
+    # --- completion ---
+
+    def _open(self, core: Tokens, bare: bool = False) -> Context:
+        found = self._known.get((core, bare))
+        if found is None:
+            found = self._known[core, bare] = Context(core, bare)
+            found.clash = self._program.nothing in core
+            self._enqueue(found)
+        return found
+
+    def _enqueue(self, context: Context) -> None:
+        if context not in self._queued:
+            self._queued.add(context)
+            self._queue.append(context)
+
+    def _complete(self, context: Context) -> None:
+        known = len(context.tokens)
+        self._changed = True
+        while self._changed and not context.clash:
+            self._changed = False
+            self._close(context)
+            self._relate(context)
+            for edge in tuple(context.edges):
+                if edge in context.edges:
+                    self._along(context, edge)
+            self._loops(context)
+            self._merge(context)
+            self._count(context)
+            self._evaluate(context)
+        if context.clash or len(context.tokens) > known or context.edges:
+            for user in context.users:
+                self._enqueue_if_news(user, context)
+
+    def _enqueue_if_news(self, user: Context, context: Context) -> None:
+        size = sum(len(edge.roles) + len(edge.core) for edge in context.edges)
+        news = (context, len(context.tokens), context.clash, len(context.edges), size)
+        if news not in user.done:
+            user.done.add(news)
+            self._enqueue(user)
+
+    def _clash(self, context: Context) -> None:
+        context.clash = self._changed = True
+
+    def _add(self, context: Context, token: Token) -> None:
+        if token not in context.tokens:
+            context.tokens.add(token)
+            self._changed = True
+
+    def _close(self, context: Context) -> None:
+        """What classes imply without relations."""
+        if context.bare:
+            return
+        tokens = context.tokens
+        for token, _ in self._always:
+            if token is None:
+                self._clash(context)
+            elif token not in tokens:
+                self._add(context, token)
+        pending = [token for token in tokens if ('closed', token) not in context.done]
+        while pending:
+            one = pending.pop()
+            context.done.add(('closed', one))
+            for body, token in self._class_rules.get(one, ()):
+                if (token is None or token not in tokens) and body <= tokens:
+                    if token is None:
+                        self._clash(context)
+                        return
+                    self._add(context, token)
+                    pending.append(token)
+
+    def _relate(self, context: Context) -> None:
+        """Adds the edges and values that the tokens require."""
+        for token in tuple(context.tokens):
+            if ('related', token) in context.done:
+                continue
+            context.done.add(('related', token))
+            if isinstance(token, Predicate):
+                for existential in self._existentials.get(token, ()):
+                    filler = existential.filler
+                    if existential.prop.kind == 'data':
+                        self._value(context, existential.prop, filler, existential.n)
+                    else:
+                        role = (existential.prop, existential.inverse)
+                        core = set() if filler is None else {filler}
+                        self._edge(context, role, core, existential.n)
+            elif token[0] == 'has':
+                self._edge(context, (token[1], token[2]), {('is', token[3])}, 1)
+            elif token[0] == 'self':
+                context.loops |= {(token[1], False), (token[1], True)}
+                self._changed = True
+            elif token[0] == 'value':
+                self._value(context, token[1], point(token[2]), 1)
+
+    def _edge(self, context: Context, role: Role, core: set[Token], count: int) -> None:
+        target = self._open(frozenset(core))
+        target.users[context] = None
+        context.edges.append(_Edge({role}, core, count, target))
+        self._changed = True
+
+    def _value(self, context: Context, prop: Predicate, values: ValueSet, count: int) -> None:
+        context.values.append(_Values({prop}, values, count))
+        self._changed = True
+
+    def _retarget(self, context: Context, edge: _Edge) -> None:
+        edge.target = self._open(frozenset(edge.core))
+        edge.target.users[context] = None
+        self._changed = True
+
+    # --- edges ---
+
+    def _along(self, context: Context, edge: _Edge) -> None:
+        """Applies the rules that speak of both ends of an edge."""
+        if edge.target.clash:
+            self._clash(context)
+            return
+        tokens = context.tokens
+        for role in tuple(edge.roles):
+            for rule in self.edge_rules.get(role, ()):
+                if rule.xs <= tokens and rule.ys <= edge.target.tokens:
+                    if rule.roles <= edge.roles:
+                        self._fire(context, edge, rule)
+                elif rule.xs <= tokens and _names(edge.target):
+                    self._nominal_gap(context, rule)
+        self._join_parent(context, edge)
+
+    def _nominal_gap(self, context: Context, rule: _EdgeRule) -> None:
+        if rule.origin is not None:
+            self.gaps[f'{axiom_text(rule.origin)}: {_NOMINALS}'] = None
+
+    def _fire(self, context: Context, edge: _Edge, rule: _EdgeRule) -> None:
+        head = rule.head
+        if head[0] == 'clash':
+            self._clash(context)
+        elif head[0] == 'x':
+            self._add(context, head[1])
+        elif head[0] == 'role':
+            if head[1] not in edge.roles:
+                edge.roles.add(head[1])
+                self._changed = True
+        elif head[1] not in edge.target.tokens:
+            edge.core.add(head[1])
+            self._retarget(context, edge)
+
+    def _join_parent(self, context: Context, edge: _Edge) -> None:
+        """Where the other end may have one such neighbour only, and this is it."""
+        target = edge.target
+        if not target.edges:
+            return
+        back = {turned(role) for role in edge.roles}
+        for condition in self._at_most:
+            role = (condition.prop, condition.inverse)
+            if role not in back or not _holds(condition.label, target.tokens):
+                continue
+            if not _holds(condition.filler, context.tokens):
+                continue
+            if condition.n != 1:
+                if any(role in other.roles for other in target.edges):
+                    self._case_gap(condition)
+                continue
+            for other in target.edges:
+                if role in other.roles and _holds(condition.filler, other.target.tokens):
+                    if other.count > 1:
+                        self._clash(context)
+                        return
+                    for token in other.core:
+                        self._add(context, token)
+                    fresh = {turned(r) for r in other.roles} - edge.roles
+                    if fresh:
+                        edge.roles |= fresh
+                        self._changed = True
+
+    def _loops(self, context: Context) -> None:
+        """Applies the rules to what relates an individual to itself."""
+        if not context.loops:
+            return
+        for role in tuple(context.loops):
+            for rule in self.edge_rules.get(role, ()):
+                if rule.roles <= context.loops and rule.xs | rule.ys <= context.tokens:
+                    head = rule.head
+                    if head[0] == 'clash':
+                        self._clash(context)
+                    elif head[0] == 'role':
+                        context.loops |= {head[1], turned(head[1])}
+                    else:
+                        self._add(context, head[1])
+        for predicate, _ in tuple(context.loops):
+            self._add(context, ('self', predicate))
+
+    # --- counting ---
+
+    def _merge(self, context: Context) -> None:
+        """Makes one edge of those that must lead to the same individual."""
+        for condition in self._at_most:
+            if condition.n == 1 and _holds(condition.label, context.tokens):
+                role = (condition.prop, condition.inverse)
+                counted = [
+                    edge
+                    for edge in context.edges
+                    if role in edge.roles and _holds(condition.filler, edge.target.tokens)
+                ]
+                if role in context.loops and _holds(condition.filler, context.tokens):
+                    for edge in counted:
+                        self._into_itself(context, edge)
+                    counted = []
+                for other in counted[1:]:
+                    self._unite(context, counted[0], other)
+                if any(edge.count > 1 for edge in counted):
+                    self._clash(context)
+        named = [edge for edge in context.edges if _names(edge.target)]
+        if any(edge.count > 1 for edge in named):
+            self._clash(context)
+        for one, other in combinations(named, 2):
+            shared = set(_names(one.target)) & set(_names(other.target))
+            if shared and one in context.edges and other in context.edges:
+                self._unite(context, one, other)
+
+    def _unite(self, context: Context, kept: _Edge, gone: _Edge) -> None:
+        kept.roles |= gone.roles
+        kept.core |= gone.core
+        kept.count = max(kept.count, gone.count)
+        context.edges.remove(gone)
+        self._retarget(context, kept)
+
+    def _into_itself(self, context: Context, edge: _Edge) -> None:
+        for token in edge.core:
+            self._add(context, token)
+        context.loops |= edge.roles | {turned(role) for role in edge.roles}
+        context.edges.remove(edge)
+        self._changed = True
+
+    def _count(self, context: Context) -> None:
+        conditions: list[AtLeast | AtMost] = [*self._at_least, *self._at_most]
+        for condition in conditions:
+            needed = condition.n if isinstance(condition, AtLeast) else condition.n + 1
+            if isinstance(condition, AtLeast):
+                if condition.head in context.tokens:
+                    continue
+            elif condition.n == 1 or not _holds(condition.label, context.tokens):
+                continue
+            role = (condition.prop, condition.inverse)
+            counted = [
+                edge
+                for edge in context.edges
+                if role in edge.roles and _holds(condition.filler, edge.target.tokens)
+            ]
+            if sum(edge.count for edge in counted) < needed:
+                continue
+            counted = [edge for edge in counted if not _is_redundant(edge, counted)]
+            if sum(edge.count for edge in counted) < needed:
+                continue
+            if self._most_different(context, counted) >= needed:
+                if isinstance(condition, AtLeast):
+                    self._add(context, condition.head)
+                else:
+                    self._clash(context)
+            else:
+                self._case_gap(condition)
+
+    def _most_different(self, context: Context, edges: list[_Edge]) -> int:
+        """How many individuals pairwise known to be different some of the edges lead to."""
+        order = sorted(edges, key=lambda edge: -edge.count)
+        apart = {
+            (one, other): self._different(context, one, other)
+            for one, other in combinations(order, 2)
+        }
+        best = 0
+        chosen: list[_Edge] = []
+
+        def extend(place: int, total: int) -> None:
+            nonlocal best
+            best = max(best, total)
+            for next_place in range(place, len(order)):
+                edge = order[next_place]
+                if all(apart[one, edge] for one in chosen):
+                    chosen.append(edge)
+                    extend(next_place + 1, total + edge.count)
+                    chosen.pop()
+
+        extend(0, 0)
+        return best
+
+    def _different(self, context: Context, one: _Edge, other: _Edge) -> bool:
+        roles = one.roles | other.roles
+        both = self._open(frozenset(one.core | other.core))
+        both.users[context] = None
+        tokens = both.tokens
+        return both.clash or any(
+            rule.head == ('clash',)
+            and rule.roles <= roles
+            and rule.xs <= context.tokens
+            and rule.ys <= tokens
+            for role in roles
+            for rule in self.edge_rules.get(role, ())
+        )
+
+    def _case_gap(self, condition: AtLeast | AtMost) -> None:
+        if condition.origin is not None:
+            self.gaps[f'{axiom_text(condition.origin)}: {_CASES}'] = None
+
+    # --- values ---
+
+    def _evaluate(self, context: Context) -> None:
+        """Applies the rules about values and counts them."""
+        if not context.values:
+            return
+        for held in tuple(context.values):
+            self._along_value(context, held)
+        for condition in self._at_most_values:
+            if _holds(condition.label, context.tokens):
+                self._limit_values(context, condition)
+        for least in self._at_least_values:
+            if least.head not in context.tokens:
+                counted = self._counted_values(context, least)
+                if sum(held.count for held in counted) >= least.n:
+                    if self._most_distinct(counted) >= least.n:
+                        self._add(context, least.head)
+                    else:
+                        self._case_gap(least)
+        for held in context.values:
+            if held.values.size < held.count:
+                self._clash(context)
+
+    def _along_value(self, context: Context, held: _Values) -> None:
+        for prop in tuple(held.props):
+            for rule in self._value_rules.get(prop, ()):
+                if not (rule.props <= held.props and rule.xs <= context.tokens):
+                    continue
+                head = rule.head
+                if head[0] == 'clash':
+                    rest = held.values & ~rule.values
+                    if rest != held.values:
+                        held.values = rest
+                        self._changed = True
+                elif held.values.within(rule.values):
+                    if head[0] == 'x':
+                        self._add(context, head[1])
+                    elif head[1] not in held.props:
+                        held.props.add(head[1])
+                        self._changed = True
+                elif not (held.values & rule.values).decided and rule.origin is not None:
+                    self.gaps[f'{axiom_text(rule.origin)}: {_DATES}'] = None
+
+    def _counted_values(self, context: Context, condition: AtLeast | AtMost) -> list[_Values]:
+        admitted = condition.values
+        return [
+            held
+            for held in context.values
+            if condition.prop in held.props and (admitted is None or held.values.within(admitted))
+        ]
+
+    def _limit_values(self, context: Context, condition: AtMost) -> None:
+        counted = self._counted_values(context, condition)
+        if condition.n == 1:
+            for other in counted[1:]:
+                kept = counted[0]
+                kept.props |= other.props
+                kept.values &= other.values
+                kept.count = max(kept.count, other.count)
+                context.values.remove(other)
+                self._changed = True
+            if counted and counted[0].count > 1:
+                self._clash(context)
+        elif sum(held.count for held in counted) > condition.n:
+            if self._most_distinct(counted) > condition.n:
+                self._clash(context)
+            else:
+                self._case_gap(condition)
+
+    def _most_distinct(self, counted: list[_Values]) -> int:
+        best = 0
+        for size in range(len(counted), 0, -1):
+            for chosen in combinations(counted, size):
+                if all((a.values & b.values).is_empty for a, b in combinations(chosen, 2)):
+                    best = max(best, sum(held.count for held in chosen))
+        return best
+
+
+def _key(term: Any) -> Any:
+    """A term of a clause: a variable's number, or ('is', individual)."""
+    return ('is', term.value) if isinstance(term, Constant) else term
+
+
+def _holds(token: Any, tokens: set[Token]) -> bool:
+    return token is None or token in tokens
+
+
+def _names(context: Context) -> list[str]:
+    return [token[1] for token in context.tokens if isinstance(token, tuple) and token[0] == 'is']
+
+
+def _is_redundant(edge: _Edge, others: list[_Edge]) -> bool:
+    """Whether an individual that another edge leads to serves for this edge as well."""
+    for other in others:
+        if other is not edge and edge.count <= other.count and edge.roles <= other.roles:
+            mine, theirs = edge.target.tokens, other.target.tokens
+            equal = mine == theirs and edge.roles == other.roles and edge.count == other.count
+            if mine <= theirs and not (equal and others.index(edge) < others.index(other)):
+                return True
+    return False
+
+
+def _stated(core: Tokens) -> frozenset[HeadAtom]:
+    return frozenset(PredicateAtom(token, (0,)) for token in core if isinstance(token, Predicate))

@@ -1,0 +1,258 @@
+"""Property chains and transitivity as steps from one individual to the next.
+
+A clause about R(x, y), where R follows from a chain, also holds where the chain runs over
+individuals that must exist but are not known. So each such clause gets an automaton that accepts
+the chains of R (Horrocks and Sattler, "Decidability of SHIQ with complex role inclusion axioms",
+2004): its states are labels, its steps are clauses over single properties.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from itertools import count
+
+from surveillance_ontology.owl.axiom_text import axiom_text
+from surveillance_ontology.reasoner.clauses import (
+    BodyAtom,
+    Clause,
+    Constant,
+    HeadAtom,
+    Predicate,
+    PredicateAtom,
+    Program,
+    SameAtom,
+    Term,
+)
+from surveillance_ontology.reasoner.contexts import Role, closure, turned
+
+_Steps = list[tuple[int, 'Role | None', int]]
+_X, _Y = 0, 1
+
+
+def spell_out_chains(program: Program) -> None:
+    """Adds the steps of every chain to a program's clauses."""
+    _Chains(program).run()
+
+
+class _IrregularError(Exception):
+    """Property chains depend on each other in a circle."""
+
+
+class _Chains:
+    def __init__(self, program: Program) -> None:
+        self._program = program
+        self._chains: dict[Role, list[tuple[Role, ...]]] = {}
+        self._below: dict[Role, set[Role]] = {}
+        self._numbers = count(1)
+        for clause in program.clauses:
+            if not clause.named_only:
+                self._read(clause)
+
+    def _read(self, clause: Clause) -> None:
+        """Takes a clause that implies a property from properties alone."""
+        head = clause.head
+        if not isinstance(head, PredicateAtom) or head.predicate.kind != 'object':
+            return
+        atoms = [atom for atom in clause.body if isinstance(atom, PredicateAtom)]
+        plain = all(atom.predicate.kind == 'object' for atom in atoms)
+        if not atoms or len(atoms) != len(clause.body) or not plain:
+            return
+        start, end = head.terms
+        here, chain, rest = start, [], list(atoms)
+        while rest:
+            step = next((a for a in rest if here in a.terms and a.terms[0] != a.terms[1]), None)
+            if step is None or any(isinstance(term, Constant) for term in step.terms):
+                return
+            rest.remove(step)
+            backwards = step.terms[0] != here
+            chain.append((step.predicate, backwards))
+            here = step.terms[0] if backwards else step.terms[1]
+        if here != end or start == end:
+            return
+        role = (head.predicate, False)
+        back = tuple(turned(one) for one in reversed(chain))
+        if len(chain) == 1:
+            self._below.setdefault(role, set()).add(chain[0])
+            self._below.setdefault(turned(role), set()).add(back[0])
+        else:
+            self._chains.setdefault(role, []).append(tuple(chain))
+            self._chains.setdefault(turned(role), []).append(back)
+
+    def _roles_below(self, role: Role) -> list[Role]:
+        return list(closure(role, lambda one: self._below.get(one, ())))
+
+    def _is_complex(self, role: Role) -> bool:
+        return any(one in self._chains for one in self._roles_below(role))
+
+    # --- clauses ---
+
+    def run(self) -> None:
+        if not self._chains:
+            return
+        for clause in tuple(self._program.clauses):
+            if not clause.named_only:
+                self._extend(clause)
+        self._individuals()
+
+    def _extend(self, clause: Clause) -> None:
+        links = [
+            atom
+            for atom in clause.body
+            if isinstance(atom, PredicateAtom) and atom.predicate.kind == 'object'
+        ]
+        if len(links) != 1:
+            return
+        (link,) = links
+        one, other = link.terms
+        if one == other or (isinstance(one, Constant) and isinstance(other, Constant)):
+            return
+        role = (link.predicate, False)
+        if not self._is_complex(role):
+            return
+        rest = [atom for atom in clause.body if atom is not link]
+        used = {t for atom in (*rest, clause.head) for t in atom.terms}
+        if not {t for t in used if isinstance(t, int)} <= {one, other}:
+            return
+        if set(clause.head.terms) >= {one, other}:
+            return  # One property below another: its chains are followed by `_below`.
+        to = other if other in clause.head.terms else one
+        if to == one:
+            role, one = turned(role), other
+        if isinstance(to, Constant):
+            return
+        source = [atom for atom in rest if one in atom.terms]
+        target = [atom for atom in rest if one not in atom.terms]
+        if isinstance(one, Constant):
+            source.append(SameAtom((_X, one)))
+        self._automaton(source, one, role, target, to, clause.head, clause)
+
+    def _automaton(
+        self,
+        source: Iterable[BodyAtom],
+        start: Term,
+        role: Role,
+        target: Iterable[BodyAtom],
+        end: Term,
+        head: HeadAtom,
+        clause: Clause,
+    ) -> None:
+        steps: _Steps = []
+        try:
+            self._accept(role, 0, 1, steps, (), count(2))
+        except _IrregularError:
+            text = 'the ontology' if clause.origin is None else axiom_text(clause.origin)
+            sentence = f'{text}: its property chains depend on each other in a circle'
+            if sentence not in self._program.unsupported:
+                self._program.unsupported.append(sentence)
+            return
+        name = f'{next(self._numbers)}'
+        labels: dict[int, Predicate] = {}
+
+        def state(number: int) -> Predicate:
+            label = labels.get(number)
+            if label is None:
+                key = ('state', name, number)
+                label = labels[number] = Predicate('class', f'state {name}.{number}', key)
+                self._program.labels[key] = label  # type: ignore[index]
+            return label
+
+        add = self._program.clauses.append
+        moved = tuple(_moved(atom, start, _X) for atom in source)
+        if not moved:
+            self._program.uses_thing = True
+            moved = (PredicateAtom(self._program.thing, (_X,)),)
+        add(Clause(moved, PredicateAtom(state(0), (_X,)), clause.origin))
+        for before, step, after in steps:
+            here = PredicateAtom(state(before), (_X,))
+            if step is None:
+                add(Clause((here,), PredicateAtom(state(after), (_X,)), clause.origin))
+            else:
+                pair = (_Y, _X) if step[1] else (_X, _Y)
+                body = (here, PredicateAtom(step[0], pair))
+                add(Clause(body, PredicateAtom(state(after), (_Y,)), clause.origin))
+        last = (PredicateAtom(state(1), (_X,)), *(_moved(atom, end, _X) for atom in target))
+        add(Clause(last, _moved(head, end, _X), clause.origin))  # type: ignore[arg-type]
+
+    def _accept(
+        self,
+        role: Role,
+        first: int,
+        last: int,
+        steps: _Steps,
+        above: tuple[Role, ...],
+        fresh: count[int],
+    ) -> None:
+        """Adds the steps between two states of a role's own that its chains make.
+
+        Raises:
+            _IrregularError: The role's chains use a role that depends on it.
+        """
+        below = self._roles_below(role)
+        if any(one in above for one in below):
+            raise _IrregularError
+        equal = [one for one in below if role in self._roles_below(one)]
+        stack = (*above, *equal)
+        steps.append((first, role, last))
+        for one in below:
+            if one not in equal and one in self._chains:
+                self._detour(one, first, last, steps, stack, fresh)
+        for chain in [chain for one in equal for chain in self._chains.get(one, ())]:
+            inner, start, end = list(chain), first, last
+            if len(inner) == 2 and inner[0] in equal and inner[1] in equal:
+                steps.append((last, None, first))
+                continue
+            if inner[0] in equal:
+                start, inner = last, inner[1:]
+            elif inner[-1] in equal:
+                end, inner = first, inner[:-1]
+            here = start
+            for place, part in enumerate(inner):
+                there = end if place == len(inner) - 1 else next(fresh)
+                self._detour(part, here, there, steps, stack, fresh)
+                here = there
+
+    def _detour(
+        self,
+        role: Role,
+        here: int,
+        there: int,
+        steps: _Steps,
+        above: tuple[Role, ...],
+        fresh: count[int],
+    ) -> None:
+        """Leads from one state to another along a role, through states of its own."""
+        if not self._is_complex(role):
+            if role in above:
+                raise _IrregularError
+            steps.append((here, role, there))
+            return
+        first, last = next(fresh), next(fresh)
+        steps.append((here, None, first))
+        steps.append((last, None, there))
+        self._accept(role, first, last, steps, above, fresh)
+
+    def _individuals(self) -> None:
+        """Chains that end at an individual the classes name."""
+        names = {
+            term.value: None
+            for clause in self._program.clauses
+            if not clause.named_only
+            for atom in (*clause.body, clause.head)
+            if not isinstance(atom, PredicateAtom) or atom.predicate.kind == 'object'
+            for term in atom.terms
+            if isinstance(term, Constant) and not term.is_value
+        }
+        for name in names:
+            for role in tuple(self._chains):
+                constant = Constant(name)
+                terms = (constant, _X) if role[1] else (_X, constant)
+                head = PredicateAtom(role[0], terms)
+                origin = Clause((), head)
+                self._automaton([SameAtom((_X, constant))], _X, turned(role), [], _X, head, origin)
+
+
+def _moved(atom: BodyAtom, old: Term, new: Term) -> BodyAtom:
+    """The atom with a variable renamed."""
+    terms = tuple(new if term == old else term for term in atom.terms)
+    return replace(atom, terms=terms)  # type: ignore[arg-type]

@@ -1,0 +1,424 @@
+"""Sets of data values: the algebra of data ranges, with emptiness, inclusion and size.
+
+Ordered spaces (numbers, floats) are unions of intervals: numbers lie in four layers that
+share no value (whole, other decimal, other rational, other real), so that every boolean combination
+of XML Schema's numeric ranges is again a union of intervals for each layer. The other spaces hold
+finite sets, sets of all but finitely many, and tests (patterns, lengths, string types,
+moments) that are decided on single values only.
+
+Source of the value spaces: OWL 2 Structural Specification, section 4, and XML Schema 1.1 part 2.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cache
+from typing import Any, TypeAlias
+
+from surveillance_ontology.owl import expressions as ex
+from surveillance_ontology.owl.expressions import DataRange
+from surveillance_ontology.owl.vocabulary import OWL, RDF, TOP_LITERAL, XSD
+from surveillance_ontology.reasoner.datatypes import (
+    BOUNDS,
+    Value,
+    comparable,
+    facet_test,
+    includes,
+    is_decimal,
+    range_test,
+    value_of,
+)
+
+_NUMBERS = ('whole', 'decimal', 'rational', 'real')
+_ORDERED = (*_NUMBERS, 'float', 'double')
+_PLAIN = (
+    *('string', 'langString', 'boolean', 'dateTime'),
+    *('anyURI', 'hexBinary', 'base64Binary', 'other'),
+)
+_BOOLEANS = frozenset([('boolean', True), ('boolean', False)])
+_LIMIT = 64  # More values than any cardinality in an ontology asks for.
+
+
+class _End:
+    """The place of an interval's end: below, at or above a key; a total order with `_LOW`."""
+
+    __slots__ = ('key', 'side')
+
+    def __init__(self, key: Any, side: int) -> None:
+        self.key, self.side = key, side
+
+    def _place(self) -> tuple[int, Any, int]:
+        if self.key is None:
+            return self.side, 0, 0
+        return 0, self.key, self.side
+
+    def __lt__(self, other: _End) -> bool:
+        return self._place() < other._place()
+
+    def __le__(self, other: _End) -> bool:
+        return self._place() <= other._place()
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _End) and self._place() == other._place()
+
+    def __hash__(self) -> int:
+        return hash((self.key, self.side))
+
+
+_LOW, _HIGH = _End(None, -1), _End(None, 1)
+_Intervals: TypeAlias = 'tuple[tuple[_End, _End], ...]'
+_EVERY: _Intervals = ((_LOW, _HIGH),)
+
+
+def _union(parts: Iterable[tuple[_End, _End]]) -> _Intervals:
+    joined: list[tuple[_End, _End]] = []
+    for low, high in sorted((part for part in parts if part[0] < part[1]), key=_by_low):
+        if joined and low <= joined[-1][1]:
+            joined[-1] = (joined[-1][0], max(joined[-1][1], high))
+        else:
+            joined.append((low, high))
+    return tuple(joined)
+
+
+def _by_low(part: tuple[_End, _End]) -> tuple[int, Any, int]:
+    return part[0]._place()
+
+
+def _common(first: _Intervals, second: _Intervals) -> _Intervals:
+    return _union((max(a, c), min(b, d)) for a, b in first for c, d in second)
+
+
+def _outside(parts: _Intervals) -> _Intervals:
+    ends = [_LOW, *(end for part in parts for end in part), _HIGH]
+    return _union(zip(ends[::2], ends[1::2], strict=True))
+
+
+@dataclass(frozen=True, slots=True)
+class _Conjunction:
+    """Values of one plain space: listed (None: any), not excluded, that pass the tests.
+
+    A test is (data range, whether values are in it).
+    """
+
+    listed: frozenset[Value] | None
+    excluded: frozenset[Value]
+    tests: frozenset[tuple[DataRange, bool]]
+
+
+_Part: TypeAlias = 'tuple[_Conjunction, ...]'
+_ANY: _Part = (_Conjunction(None, frozenset(), frozenset()),)
+
+
+def _listed(values: Iterable[Value]) -> _Part:
+    found = frozenset(values)
+    return (_Conjunction(found, frozenset(), frozenset()),) if found else ()
+
+
+def _tested(data_range: DataRange) -> _Part:
+    return (_Conjunction(None, frozenset(), frozenset([(data_range, True)])),)
+
+
+def _both(first: _Part, second: _Part) -> _Part:
+    found: dict[_Conjunction, None] = {}
+    for one in first:
+        for other in second:
+            listed = one.listed
+            if listed is None:
+                listed = other.listed
+            elif other.listed is not None:
+                listed &= other.listed
+            excluded, tests = one.excluded | other.excluded, one.tests | other.tests
+            if listed is not None:
+                listed = frozenset(v for v in listed if v not in excluded and _passes(v, tests))
+                excluded, tests = frozenset(), frozenset()
+            if listed is None or listed:
+                found[_Conjunction(listed, excluded, tests)] = None
+    return tuple(found)
+
+
+def _not(part: _Part) -> _Part:
+    result = _ANY
+    for one in part:
+        choices: list[_Conjunction] = []
+        if one.listed is not None:
+            choices.append(_Conjunction(None, one.listed, frozenset()))
+        choices += _listed(one.excluded)
+        choices += [
+            _Conjunction(None, frozenset(), frozenset([(data_range, not inside)]))
+            for data_range, inside in one.tests
+        ]
+        result = _both(result, tuple(choices))
+    return result
+
+
+def _passes(value: Value, tests: Iterable[tuple[DataRange, bool]]) -> bool:
+    for data_range, inside in tests:
+        test = range_test(data_range)
+        if test is None or test(value) != inside:
+            return False
+    return True
+
+
+def _impossible(tests: frozenset[tuple[DataRange, bool]]) -> bool:
+    inside = [data_range for data_range, wanted in tests if wanted]
+    outside = [data_range for data_range, wanted in tests if not wanted]
+    return any(includes(outer, inner) for outer in outside for inner in inside)
+
+
+class ValueSet:
+    """A set of values; where it has tests, `is_empty`, `within` and `size` err towards more."""
+
+    __slots__ = ('intervals', 'parts')
+
+    def __init__(self, intervals: dict[str, _Intervals], parts: dict[str, _Part]) -> None:
+        self.intervals = {name: found for name, found in intervals.items() if found}
+        self.parts = {name: found for name, found in parts.items() if found}
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, ValueSet):
+            return NotImplemented
+        return self.intervals == other.intervals and self.parts == other.parts
+
+    def __hash__(self) -> int:
+        return hash((frozenset(self.intervals.items()), frozenset(self.parts.items())))
+
+    # --- algebra ---
+
+    def __and__(self, other: ValueSet) -> ValueSet:
+        return ValueSet(
+            {
+                name: _common(found, other.intervals[name])
+                for name, found in self.intervals.items()
+                if name in other.intervals
+            },
+            {
+                name: _both(found, other.parts[name])
+                for name, found in self.parts.items()
+                if name in other.parts
+            },
+        )
+
+    def __or__(self, other: ValueSet) -> ValueSet:
+        return ValueSet(
+            {
+                name: _union((*self.intervals.get(name, ()), *other.intervals.get(name, ())))
+                for name in _ORDERED
+            },
+            {
+                name: tuple(dict.fromkeys((*self.parts.get(name, ()), *other.parts.get(name, ()))))
+                for name in _PLAIN
+            },
+        )
+
+    def __invert__(self) -> ValueSet:
+        parts = {name: _not(self.parts.get(name, ())) for name in _PLAIN}
+        parts['boolean'] = _both(parts['boolean'], _listed(_BOOLEANS))
+        intervals = {name: _outside(self.intervals.get(name, ())) for name in _ORDERED}
+        return ValueSet(intervals, parts)
+
+    # --- questions ---
+
+    def contains(self, value: Value) -> bool:
+        """Whether a value is in the set."""
+        return not (self & point(value)).is_empty
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether no value is in the set."""
+        return not self.size
+
+    @property
+    def decided(self) -> bool:
+        """Whether the answers about the set are exact."""
+        return not any(one.tests for part in self.parts.values() for one in part)
+
+    @property
+    def only(self) -> Value | None:
+        """The value of a set of one value; None of any other set."""
+        if self.size != 1:
+            return None
+        for part in self.parts.values():
+            for one in part:
+                if one.listed:
+                    return next(iter(one.listed))
+        ((layer, ((low, high),)),) = self.intervals.items()
+        if layer in ('float', 'double') and low.key != high.key:
+            return None
+        if layer in ('float', 'double'):
+            return (layer, low.key)
+        if layer == 'whole':
+            return int(math.ceil(low.key) + (low.side > 0 and math.ceil(low.key) == low.key))
+        found: Value = low.key
+        return found
+
+    def within(self, other: ValueSet) -> bool:
+        """Whether every value is in another set."""
+        return (self & ~other).is_empty
+
+    @property
+    def size(self) -> float:
+        """The number of values, counted up to a limit; infinite beyond it."""
+        total: float = 0
+        listed: set[Value] = set()
+        for part in self.parts.values():
+            for one in part:
+                if one.listed is not None:
+                    listed |= one.listed
+                elif not _impossible(one.tests):
+                    return math.inf
+        total += len(listed)
+        for layer, intervals in self.intervals.items():
+            for low, high in intervals:
+                total += _count(layer, low, high)
+                if total > _LIMIT:
+                    return math.inf
+        return total
+
+
+def _count(layer: str, low: _End, high: _End) -> float:
+    """How many values of a layer lie between two ends."""
+    if low.key is None or high.key is None:
+        return math.inf
+    if layer == 'whole':
+        first = math.ceil(low.key) + (low.side > 0 and math.ceil(low.key) == low.key)
+        last = math.floor(high.key) - (high.side < 0 and math.floor(high.key) == high.key)
+        return int(max(0, last - first + 1))
+    if layer in ('float', 'double'):
+        return _count_floats(layer, low, high)
+    if low.key != high.key:
+        return math.inf
+    return int(_layer_of(low.key) == layer)
+
+
+def _count_floats(layer: str, low: _End, high: _End) -> float:
+    code, whole = ('<f', '<i') if layer == 'float' else ('<d', '<q')
+
+    def number(key: float) -> int:
+        bits: int = struct.unpack(whole, struct.pack(code, float(key)))[0]
+        return bits if bits >= 0 else -(bits & (2 ** (8 * struct.calcsize(code) - 1) - 1))
+
+    try:
+        first, last = number(low.key), number(high.key)
+    except OverflowError:
+        return math.inf
+    return max(0, last - first + 1 - (low.side > 0) - (high.side < 0))
+
+
+def _layer_of(number: int | Fraction) -> str:
+    if isinstance(number, int) or number.denominator == 1:
+        return 'whole'
+    return 'decimal' if is_decimal(number) else 'rational'
+
+
+EVERY = ValueSet(
+    dict.fromkeys(_ORDERED, _EVERY),
+    {name: _listed(_BOOLEANS) if name == 'boolean' else _ANY for name in _PLAIN},
+)
+NONE = ValueSet({}, {})
+
+
+def point(value: Value) -> ValueSet:
+    """The set of one value."""
+    _, key = comparable(value)
+    if isinstance(value, (int, Fraction)):
+        return ValueSet({_layer_of(value): ((_End(key, -1), _End(key, 1)),)}, {})
+    if isinstance(value, str):
+        return ValueSet({}, {'string': _listed([value])})
+    space = value[0]
+    if space in ('float', 'double') and len(value) == 2 and value[1] != 'NaN':
+        return ValueSet({space: ((_End(key, -1), _End(key, 1)),)}, {})
+    if space == 'ill-formed':
+        return NONE
+    return ValueSet({}, {space if space in _PLAIN else 'other': _listed([value])})
+
+
+def _datatype(datatype: str) -> ValueSet | None:
+    if datatype in (TOP_LITERAL, OWL + 'topDataProperty'):
+        return EVERY
+    layers = {OWL + 'real': 4, OWL + 'rational': 3, XSD + 'decimal': 2}.get(datatype)
+    if layers:
+        return ValueSet(dict.fromkeys(_NUMBERS[:layers], _EVERY), {})
+    if datatype in (RDF + 'langString', RDF + 'PlainLiteral'):
+        parts = {'langString': _ANY}
+        return ValueSet({}, parts if datatype == RDF + 'langString' else {**parts, 'string': _ANY})
+    if range_test(datatype) is None:
+        return None
+    name = datatype.removeprefix(XSD)
+    if name in BOUNDS:
+        low, high = BOUNDS[name]
+        ends = (_LOW if low is None else _End(low, -1), _HIGH if high is None else _End(high, 1))
+        return ValueSet({'whole': (ends,)}, {})
+    if name in ('float', 'double'):
+        return ValueSet({name: _EVERY}, {'other': _listed([(name, 'NaN'), (name, 0.0, '-')])})
+    if name == 'dateTimeStamp':
+        return ValueSet({}, {'dateTime': _tested(datatype)})
+    if name == 'boolean':
+        return ValueSet({}, {'boolean': _listed(_BOOLEANS)})
+    if name in _PLAIN:
+        return ValueSet({}, {name: _ANY})
+    return ValueSet({}, {'string': _tested(datatype)})
+
+
+_ENDS: dict[str, Callable[[Any], tuple[_End, _End]]] = {
+    'minInclusive': lambda key: (_End(key, -1), _HIGH),
+    'minExclusive': lambda key: (_End(key, 1), _HIGH),
+    'maxInclusive': lambda key: (_LOW, _End(key, 1)),
+    'maxExclusive': lambda key: (_LOW, _End(key, -1)),
+}
+
+
+def _facet(datatype: str, facet: str, bound: ex.Literal) -> ValueSet | None:
+    name = facet.removeprefix(XSD)
+    ends = _ENDS.get(name)
+    if ends is not None:
+        value = value_of(bound)
+        kind, key = comparable(value)
+        if kind == 'number':
+            if key != key:
+                return NONE
+            if isinstance(value, (int, Fraction)):
+                return ValueSet(dict.fromkeys(_NUMBERS, (ends(key),)), {})
+            space = value[0]
+            test = facet_test(facet, bound)
+            zero = (space, 0.0, '-')
+            others = [zero] if test is not None and test(zero) else []
+            return ValueSet({space: (ends(key),)}, {'other': _listed(others)})
+    if facet_test(facet, bound) is None:
+        return None
+    tested = _tested(ex.DatatypeRestriction(datatype, ((facet, bound),)))
+    return ValueSet({}, {space: tested for space in _PLAIN if space != 'boolean'})
+
+
+@cache
+def value_set(data_range: DataRange) -> ValueSet | None:
+    """The values of a data range without defined datatypes; None where it is not supported."""
+    if isinstance(data_range, str):
+        return _datatype(data_range)
+    if isinstance(data_range, ex.DataOneOf):
+        found = NONE
+        for literal in data_range.literals:
+            found |= point(value_of(literal))
+        return found
+    if isinstance(data_range, ex.DataComplementOf):
+        inner = value_set(data_range.operand)
+        return None if inner is None else ~inner
+    if isinstance(data_range, ex.DatatypeRestriction):
+        parts = [_datatype(data_range.datatype)]
+        parts += [_facet(data_range.datatype, facet, bound) for facet, bound in data_range.facets]
+    else:
+        parts = [value_set(operand) for operand in data_range.operands]
+    known = [part for part in parts if part is not None]
+    if len(known) != len(parts):
+        return None
+    return _combined(iter(known), isinstance(data_range, ex.DataUnionOf))
+
+
+def _combined(sets: Iterator[ValueSet], any_of: bool) -> ValueSet:
+    result = next(sets)
+    for other in sets:
+        result = result | other if any_of else result & other
+    return result

@@ -1,0 +1,246 @@
+"""What a person can do to a mission, each with an answer in words: for the console and the page.
+
+All calls block until the answer or a deadline, so they belong on a worker thread.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
+
+from geometry_msgs.msg import Point
+from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+from rcl_interfaces.srv import SetParameters
+from std_srvs.srv import Trigger
+
+from surveillance_interfaces.srv import (
+    AddRoom,
+    ConsoleCommand,
+    DrainBattery,
+    GoTo,
+    PlaceObstacle,
+    ReferenceName,
+    RemoveObstacle,
+    RemoveRoom,
+    SetDoor,
+    WhyNot,
+)
+from surveillance_ontology.armor.facts import parse_fact
+from surveillance_ontology.armor_client import (
+    ArmorClient,
+    ArmorServiceCallError,
+    ArmorServiceInternalError,
+)
+from surveillance_operator.mission_feed import BEHAVIOUR, CONTROLLERS
+from surveillance_runtime.calls import CallError, ServiceCaller
+from surveillance_runtime.node import PatrolNode
+
+PLACE_FACTS = (
+    'URGENT({0})',
+    'ROOM({0})',
+    'CORRIDOR({0})',
+    'LOCATION({0})',
+    'isIn(?, {0})',
+    'canReach(?, {0})',
+    'visitedAt({0}, ?)',
+    'hasDoor({0}, ?)',
+    'connectedTo({0}, ?)',
+)
+"""What the ontology knows of a place, most interesting first."""
+_NAME = re.compile(r'[A-Za-z]\w{0,63}\Z', re.ASCII)
+
+
+def _facts_like(query: str, armor: Any) -> Any:
+    return armor.query.facts_by_origin(query)
+
+
+class ActionError(ValueError):
+    """What was asked for was not done; the message is one line that says why."""
+
+
+class MissionActions:
+    """Calls the services of a mission.
+
+    Args:
+        node: The node that calls; an executor must spin it.
+        timeout: Deadline of each call, seconds.
+    """
+
+    def __init__(self, node: PatrolNode, timeout: float = 5.0) -> None:
+        self._node = node
+        self._timeout = timeout
+        self._callers: dict[str, ServiceCaller] = {}
+        self._armor: ArmorClient | None = None
+        for kind, name in (
+            (SetDoor, 'simulation/set_door'),
+            (SetDoor, 'ontology_map/set_door'),
+            (PlaceObstacle, 'simulation/place_obstacle'),
+            (RemoveObstacle, 'simulation/remove_obstacle'),
+            (DrainBattery, 'simulation/drain_battery'),
+            (AddRoom, 'ontology_map/add_room'),
+            (RemoveRoom, 'ontology_map/remove_room'),
+            (ReferenceName, 'ontology_map/reference_name'),
+            (GoTo, f'{BEHAVIOUR}/go_to'),
+            (WhyNot, f'{BEHAVIOUR}/why_not'),
+            (SetParameters, f'{BEHAVIOUR}/set_parameters'),
+            *((Trigger, f'{BEHAVIOUR}/fsm/{word}') for word in ('pause', 'step', 'resume')),
+            *((ConsoleCommand, f'{name}/command') for name in CONTROLLERS),
+        ):
+            self._callers[name] = ServiceCaller(node, kind, name)
+
+    def set_door(self, door: str, is_open: bool) -> str:
+        """Open or close a door: a simulated one, or else as the map has it."""
+        simulated = self._callers['simulation/set_door'].is_ready()
+        service = 'simulation/set_door' if simulated else 'ontology_map/set_door'
+        return self._told(service, SetDoor.Request(door=_name(door), open=is_open))
+
+    def place_obstacle(self, name: str, x: float, y: float, radius: float) -> str:
+        """Put a cylinder in the simulated robot's way, metres."""
+        at = {'x': _number(x), 'y': _number(y), 'radius': _number(radius)}
+        return self._told(
+            'simulation/place_obstacle', PlaceObstacle.Request(name=_name(name), **at)
+        )
+
+    def remove_obstacle(self, name: str) -> str:
+        """Take an obstacle away."""
+        return self._told('simulation/remove_obstacle', RemoveObstacle.Request(name=_name(name)))
+
+    def drain_battery(self, percent: float) -> str:
+        """Take charge out of the simulated battery."""
+        request = DrainBattery.Request(percent=_number(percent))
+        return self._told('simulation/drain_battery', request)
+
+    def add_room(self, name: str, x: float, y: float, doors: Sequence[str]) -> str:
+        """Add a place to the map and the ontology."""
+        request = AddRoom.Request(
+            room_name=_name(name),
+            position=Point(x=_number(x), y=_number(y)),
+            doors=[_name(door) for door in doors],
+        )
+        return self._told('ontology_map/add_room', request)
+
+    def remove_room(self, name: str) -> str:
+        """Remove a place from the map and the ontology."""
+        return self._told('ontology_map/remove_room', RemoveRoom.Request(room_name=_name(name)))
+
+    def go_to(self, place: str) -> str:
+        """Send the robot to a place next; an empty one calls it home."""
+        return self._told(f'{BEHAVIOUR}/go_to', GoTo.Request(place=place and _name(place)))
+
+    def why_not(self, place: str) -> tuple[str, list[str]]:
+        """Return why the robot would not go to a place now, and the premises of that."""
+        answer = self._call(f'{BEHAVIOUR}/why_not', WhyNot.Request(place=_name(place)))
+        if not answer.success:
+            raise ActionError(answer.message or f'no answer about {place}')
+        return answer.message, list(answer.premises)
+
+    def machine(self, word: str) -> str:
+        """Pause, step or resume the state machine."""
+        if word not in ('pause', 'step', 'resume'):
+            raise ActionError(f'{word!r}: expected pause, step or resume')
+        answer = self._call(f'{BEHAVIOUR}/fsm/{word}', Trigger.Request())
+        if not answer.success:
+            raise ActionError(answer.message or f'{word} was refused')
+        done = {'pause': 'paused', 'step': 'one step made', 'resume': 'going on'}
+        return str(answer.message) or f'state machine: {done[word]}'
+
+    def set_threshold(self, seconds: float) -> str:
+        """Set after how long a place is URGENT, seconds."""
+        number = _number(seconds)
+        if number != int(number):
+            raise ActionError(f'threshold {number:g}: expected whole seconds')
+        value = ParameterValue(type=ParameterType.PARAMETER_INTEGER, integer_value=int(number))
+        return self._set('urgency_threshold', value, f'{number:g} s')
+
+    def set_policy(self, policy: str) -> str:
+        """Set how a place is chosen among those that the rules allow."""
+        value = ParameterValue(type=ParameterType.PARAMETER_STRING, string_value=policy)
+        return self._set('policy', value, policy)
+
+    def command(self, controller: str, line: str) -> str:
+        """Give a controller one of its console's commands: the answers of mode MANUAL."""
+        if controller not in CONTROLLERS:
+            raise ActionError(f'{controller!r}: expected one of {", ".join(CONTROLLERS)}')
+        answer = self._call(f'{controller}/command', ConsoleCommand.Request(line=line[:20_000]))
+        if not answer.accepted:
+            raise ActionError(answer.answer)
+        return str(answer.answer)
+
+    def facts(self, place: str) -> list[tuple[str, bool]]:
+        """Return what the ontology knows of a place: facts, and whether each is asserted."""
+        name = _name(place)
+        found: list[tuple[str, bool]] = []
+        for pattern in PLACE_FACTS:
+            query = pattern.format(name)
+            every, asserted = self._ask(partial(_facts_like, query))
+            found += [(str(fact), fact in asserted) for fact in every]
+        return found
+
+    def explain(self, fact: str) -> list[tuple[int, str]]:
+        """Return the proof of a fact: lines with their depth, each following from those below."""
+        try:
+            parse_fact(fact)
+        except (ValueError, IndexError) as error:
+            raise ActionError(str(error)) from None
+        proof = self._ask(lambda armor: armor.query.explain(fact))
+        if proof is None:
+            raise ActionError(f'{fact} does not hold')
+        lines = proof[1].splitlines()
+        return [((len(line) - len(line.lstrip())) // 2, line.strip()) for line in lines]
+
+    def _ask(self, question: Callable[[Any], Any]) -> Any:
+        try:
+            if self._armor is None:
+                answer = self._call('ontology_map/reference_name', ReferenceName.Request())
+                self._armor = ArmorClient(
+                    self._node,
+                    self._node.get_name(),
+                    answer.name,
+                    timeout=self._timeout,
+                    interrupt=self._node.stopping,
+                )
+            return question(self._armor)
+        except (ArmorServiceCallError, ArmorServiceInternalError) as error:
+            raise ActionError(str(error)) from None
+
+    def _set(self, name: str, value: ParameterValue, shown: str) -> str:
+        request = SetParameters.Request(parameters=[Parameter(name=name, value=value)])
+        (result,) = self._call(f'{BEHAVIOUR}/set_parameters', request).results
+        if not result.successful:
+            raise ActionError(result.reason or f'{name} was refused')
+        return f'{name} is {shown}'
+
+    def _told(self, service: str, request: Any) -> str:
+        answer = self._call(service, request)
+        if not answer.success:
+            raise ActionError(answer.message or f'{service} refused')
+        return str(answer.message) or 'done'
+
+    def _call(self, service: str, request: Any) -> Any:
+        caller = self._callers[service]
+        try:
+            # Nobody waits for a service that this kind of mission does not have.
+            return caller.call(
+                request, self._timeout, self._node.stopping, discovery=min(0.5, self._timeout)
+            )
+        except CallError as error:
+            raise ActionError(str(error)) from None
+
+
+def _name(text: str) -> str:
+    if not isinstance(text, str) or not _NAME.match(text):
+        raise ActionError(f'name {str(text)[:80]!r}: expected letters, digits and _ like R3')
+    return text
+
+
+def _number(value: float) -> float:
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        number = math.nan
+    if not math.isfinite(number):
+        raise ActionError(f'{str(value)[:40]!r}: expected a finite number')
+    return number

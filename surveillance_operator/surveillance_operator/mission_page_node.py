@@ -1,0 +1,108 @@
+"""The node `mission_page`: a live page of the mission for browsers.
+
+It only listens and asks; with `control` it also does what a person at the page wants.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from surveillance_operator.mission_actions import MissionActions
+from surveillance_operator.mission_feed import MissionFeed
+from surveillance_operator.page.camera import Camera
+from surveillance_operator.page.hub import Hub
+from surveillance_operator.page.server import Action, Page, PageError
+from surveillance_operator.snapshot import Change, Snapshot
+from surveillance_runtime.node import PatrolNode, StartError
+from surveillance_runtime.process import run_node
+
+POLL_PERIOD = 0.02
+"""Seconds between two looks at the topics while somebody looks at the page."""
+IDLE_PERIOD = 0.5
+"""And while nobody does."""
+
+
+class MissionPage(PatrolNode):
+    """Serves the page."""
+
+    def __init__(self, **node_options: Any) -> None:
+        super().__init__('mission_page', **node_options)
+        host = self.parameter(
+            'host', '127.0.0.1', 'Address to listen at; all but loopback need the token.'
+        )
+        port = self.parameter(
+            'port', 8080, 'Port to listen at; 0: any.', minimum=0, maximum=65535, read_only=True
+        )
+        control = self.parameter(
+            'control', False, 'Let whoever has the token act, not only look.', read_only=True
+        )
+        token = self.parameter('token', '', 'The token; empty: a new one.', read_only=True)
+        self._hub = Hub()
+        self._camera = Camera(self)
+        self._actions = MissionActions(self)
+        try:
+            self.page = Page(
+                self._hub,
+                questions=self._questions(),
+                actions=self._hands() if control else {},
+                picture=self._camera.jpeg,
+                host=host,
+                port=port,
+                token=token,
+            )
+        except PageError as error:
+            raise StartError(str(error)) from error
+        self._feed = MissionFeed(self, self._period, self._on_news, streams=True)
+        self._hub.show(self._feed.snapshot)
+        self.page.start()
+        self.get_logger().info(f'the mission is shown at {self.page.address}')
+        self.spawn(self._tick, 'page')
+
+    def on_stop(self) -> None:
+        """End the server."""
+        self.page.stop()
+
+    def _period(self) -> float:
+        return POLL_PERIOD if self._hub.viewers else IDLE_PERIOD
+
+    def _on_news(self, new: Snapshot, _told: Sequence[Change]) -> None:
+        self._hub.show(new)
+
+    def _tick(self) -> None:
+        while not self.stopping.wait(1.0):
+            self._hub.show(self._feed.see())
+            self._camera.rest()
+
+    def _questions(self) -> dict[str, Action]:
+        actions = self._actions
+
+        def why_not(given: Mapping[str, Any]) -> Any:
+            text, premises = actions.why_not(given['place'])
+            return {'ok': True, 'text': text, 'premises': premises}
+
+        return {
+            'facts': lambda given: {'ok': True, 'facts': actions.facts(given['place'])},
+            'explain': lambda given: {'ok': True, 'lines': actions.explain(given['fact'])},
+            'why_not': why_not,
+        }
+
+    def _hands(self) -> dict[str, Action]:
+        actions = self._actions
+        return {
+            'door': lambda g: actions.set_door(g['door'], bool(g['open'])),
+            'obstacle': lambda g: actions.place_obstacle(g['name'], g['x'], g['y'], g['radius']),
+            'remove_obstacle': lambda g: actions.remove_obstacle(g['name']),
+            'add_room': lambda g: actions.add_room(g['name'], g['x'], g['y'], list(g['doors'])),
+            'remove_room': lambda g: actions.remove_room(g['name']),
+            'go': lambda g: actions.go_to(str(g['place'])),
+            'machine': lambda g: actions.machine(str(g['word'])),
+            'threshold': lambda g: actions.set_threshold(g['seconds']),
+            'policy': lambda g: actions.set_policy(str(g['policy'])),
+            'command': lambda g: actions.command(str(g['controller']), str(g['line'])),
+        }
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the node until it is stopped."""
+    return run_node(MissionPage, args)

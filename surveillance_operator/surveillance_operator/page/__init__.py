@@ -1,0 +1,1 @@
+"""The live page of a mission: its server, and what it serves."""

@@ -1,0 +1,259 @@
+"""The page's web server: who may see it, who may act, and what each address answers.
+
+On the loopback address everybody on this machine may look. Elsewhere a token is needed: the address
+that is printed holds it once, and it becomes a cookie. Whatever changes something needs the token
+in any case, comes from the page's own origin, and only where control was switched on.
+"""
+
+from __future__ import annotations
+
+import ipaddress
+import json
+import secrets
+import socket
+import threading
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+import uvicorn
+from starlette.applications import Starlette
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import Request
+from starlette.responses import (
+    JSONResponse,
+    PlainTextResponse,
+    RedirectResponse,
+    Response,
+    StreamingResponse,
+)
+from starlette.routing import Mount, Route
+from starlette.staticfiles import StaticFiles
+from starlette.types import ASGIApp, Receive, Scope, Send
+
+from surveillance_operator.page.hub import Hub
+
+STATIC = Path(__file__).with_name('static')
+LONGEST_BODY = 65_536
+HEADERS = {
+    'Content-Security-Policy': "default-src 'none'; script-src 'self'; style-src 'self'; "
+    "img-src 'self' data:; connect-src 'self'; base-uri 'none'; form-action 'none'; "
+    "frame-ancestors 'none'",
+    'X-Content-Type-Options': 'nosniff',
+    'Referrer-Policy': 'no-referrer',
+    'Cache-Control': 'no-store',
+}
+
+Action = Callable[[Mapping[str, Any]], Any]
+"""Takes the fields of a request; returns what came of it; raises `ValueError` with one line."""
+
+
+class PageError(ValueError):
+    """The page cannot be served; the message is one line."""
+
+
+class Page:
+    """What is served.
+
+    Args:
+        hub: What viewers see.
+        questions: Answered to whoever may look, by name.
+        actions: Done for whoever may act, by name; none without control.
+        picture: The camera's image as JPEG, or None when there is none.
+        host, port: Where to listen; port 0 takes any.
+        token: What gives access; one is made unless given.
+        replay: Whether a recording is shown: then anybody who may look may move in time.
+
+    Raises:
+        PageError: The address cannot be used.
+    """
+
+    def __init__(
+        self,
+        hub: Hub,
+        *,
+        questions: Mapping[str, Action],
+        actions: Mapping[str, Action],
+        picture: Callable[[], bytes | None] = lambda: None,
+        host: str = '127.0.0.1',
+        port: int = 8080,
+        token: str = '',
+        replay: bool = False,
+    ) -> None:
+        self._hub = hub
+        self._questions, self._actions = questions, actions
+        self._picture = picture
+        self._replay = replay
+        self.token = token or secrets.token_urlsafe(24)
+        self._socket = _bound(host, port)
+        self.port: int = self._socket.getsockname()[1]
+        self._host = host
+        self._is_local = _is_loopback(host)
+        self._cookie = f'mission_{self.port}'
+        routes = [
+            Route('/', self._index),
+            Route('/events', self._events),
+            Route('/camera.jpg', self._camera),
+            Route('/ask/{name}', self._ask),
+            Route('/act/{name}', self._act, methods=['POST']),
+            Mount('/static', StaticFiles(directory=STATIC)),
+        ]
+        app = _Guard(Starlette(routes=routes), self._refusal)
+        config = uvicorn.Config(
+            app,
+            log_config=None,
+            access_log=False,
+            lifespan='off',
+            timeout_graceful_shutdown=1,
+            server_header=False,
+        )
+        self._server = uvicorn.Server(config)
+        self._thread: threading.Thread | None = None
+
+    @property
+    def address(self) -> str:
+        """Where to look; with the token where one is needed."""
+        shown = f'[{self._host}]' if ':' in self._host else self._host
+        if self._host in ('0.0.0.0', '::'):
+            shown = socket.gethostname()
+        needs = not self._is_local or (self._actions and not self._replay)
+        return f'http://{shown}:{self.port}/' + (f'?token={self.token}' if needs else '')
+
+    def start(self) -> None:
+        """Serve on a thread of its own."""
+        self._thread = threading.Thread(target=self.run, name='page', daemon=True)
+        self._thread.start()
+
+    def run(self) -> None:
+        """Serve until `stop`, or a signal on the main thread."""
+        self._server.run(sockets=[self._socket])
+
+    def stop(self) -> None:
+        """End the streams and the server."""
+        self._hub.close()
+        self._server.should_exit = True
+        if self._thread is not None:
+            self._thread.join(3.0)
+
+    def _refusal(self, request: Request) -> str | None:
+        """Say why a request may not even look; None when it may."""
+        host = urlsplit(f'//{request.headers.get("host", "")}').hostname or ''
+        # Another site's name that leads here would make a browser send that site's requests.
+        if self._is_local and host != 'localhost' and not _is_loopback(host):
+            return f'host {host[:80]!r} is not this page'
+        if not self._is_local and not self._has_token(request):
+            return 'a token is needed: open the address that the mission printed'
+        return None
+
+    def _has_token(self, request: Request) -> bool:
+        given = request.query_params.get('token') or request.cookies.get(self._cookie, '')
+        return secrets.compare_digest(given.encode(), self.token.encode())
+
+    async def _index(self, request: Request) -> Response:
+        if 'token' in request.query_params:
+            if not self._has_token(request):
+                return PlainTextResponse('this token is not valid any more', 403)
+            answer = RedirectResponse('/', 303)
+            answer.set_cookie(
+                self._cookie, self.token, httponly=True, samesite='strict', max_age=30 * 86400
+            )
+            return answer
+        text = (STATIC / 'index.html').read_text(encoding='utf-8')
+        kind = 'replay' if self._replay else 'live'
+        may_act = bool(self._actions) and (self._replay or self._has_token(request))
+        text = text.replace('data-kind=""', f'data-kind="{kind}" data-control="{int(may_act)}"')
+        return Response(text, media_type='text/html')
+
+    async def _events(self, _request: Request) -> Response:
+        return StreamingResponse(self._hub.stream(), media_type='text/event-stream')
+
+    async def _camera(self, _request: Request) -> Response:
+        image = await run_in_threadpool(self._picture)
+        if image is None:
+            return Response(status_code=204)
+        return Response(image, media_type='image/jpeg')
+
+    async def _ask(self, request: Request) -> Response:
+        question = self._questions.get(request.path_params['name'])
+        if question is None:
+            return PlainTextResponse('no such question', 404)
+        return await _answered(question, dict(request.query_params))
+
+    async def _act(self, request: Request) -> Response:
+        action = self._actions.get(request.path_params['name'])
+        if action is None:
+            return JSONResponse(
+                {'ok': False, 'text': 'control is off: start with --web-control'}, 403
+            )
+        origin = request.headers.get('origin', '')
+        if origin != f'http://{request.headers.get("host", "")}':
+            return JSONResponse({'ok': False, 'text': 'refused: not from this page'}, 403)
+        if not self._replay and not self._has_token(request):
+            text = 'refused: open the address with the token that the mission printed'
+            return JSONResponse({'ok': False, 'text': text}, 403)
+        body = b''
+        async for chunk in request.stream():
+            body += chunk
+            if len(body) > LONGEST_BODY:
+                return JSONResponse({'ok': False, 'text': 'the request is too long'}, 413)
+        try:
+            given = json.loads(body or b'{}')
+        except ValueError:
+            given = None
+        if not isinstance(given, dict):
+            return JSONResponse({'ok': False, 'text': 'expected a JSON object'}, 400)
+        return await _answered(action, given)
+
+
+class _Guard:
+    """Refuses who may not look, and gives every answer its headers."""
+
+    def __init__(self, app: ASGIApp, refusal: Callable[[Request], str | None]) -> None:
+        self._app = app
+        self._refusal = refusal
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope['type'] != 'http':
+            return
+
+        async def send_with_headers(message: Any) -> None:
+            if message['type'] == 'http.response.start':
+                extra = [(k.lower().encode(), v.encode()) for k, v in HEADERS.items()]
+                message['headers'] = [*message.get('headers', []), *extra]
+            await send(message)
+
+        refused = self._refusal(Request(scope))
+        app = self._app if refused is None else PlainTextResponse(refused, 403)
+        await app(scope, receive, send_with_headers)
+
+
+async def _answered(call: Action, fields: Mapping[str, Any]) -> Response:
+    try:
+        result = await run_in_threadpool(call, fields)
+    except (ValueError, KeyError, TypeError) as error:
+        text = f'field {error} is missing' if isinstance(error, KeyError) else str(error)
+        return JSONResponse({'ok': False, 'text': text}, 422)
+    return JSONResponse({'ok': True, 'text': result} if isinstance(result, str) else result)
+
+
+def _is_loopback(host: str) -> bool:
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == 'localhost'
+
+
+def _bound(host: str, port: int) -> socket.socket:
+    try:
+        family, kind, protocol, _, address = socket.getaddrinfo(
+            host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
+        )[0]
+        bound = socket.socket(family, kind, protocol)
+        bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        bound.bind(address)
+        bound.listen(64)
+    except (OSError, OverflowError) as error:
+        reason = getattr(error, 'strerror', None) or error
+        raise PageError(f'the page cannot be served at {host}:{port}: {reason}') from None
+    return bound

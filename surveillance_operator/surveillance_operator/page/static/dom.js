@@ -1,0 +1,42 @@
+// Makes elements; text always goes in as text, never as HTML.
+const SVG = 'http://www.w3.org/2000/svg';
+
+export const $ = (id) => document.getElementById(id);
+
+function fill(element, attributes, children) {
+  for (const [name, value] of Object.entries(attributes)) {
+    if (name.startsWith('on')) element.addEventListener(name.slice(2), value);
+    else if (value !== null && value !== undefined && value !== false) element.setAttribute(name, value === true ? '' : value);
+  }
+  element.append(...children.filter((child) => child !== null && child !== undefined));
+  return element;
+}
+
+export const h = (name, attributes = {}, ...children) => fill(document.createElement(name), attributes, children);
+export const s = (name, attributes = {}, ...children) => fill(document.createElementNS(SVG, name), attributes, children);
+
+export function age(seconds) {
+  const whole = Math.max(0, Math.floor(seconds));
+  const minutes = Math.floor(whole / 60);
+  const rest = String(whole % 60).padStart(2, '0');
+  if (minutes < 60) return `${minutes}:${rest}`;
+  return `${Math.floor(minutes / 60)}:${String(minutes % 60).padStart(2, '0')}:${rest}`;
+}
+
+export async function ask(name, fields) {
+  return answerOf(fetch(`/ask/${name}?` + new URLSearchParams(fields)));
+}
+
+export async function act(name, fields) {
+  return answerOf(fetch(`/act/${name}`, {method: 'POST', body: JSON.stringify(fields), headers: {'Content-Type': 'application/json'}}));
+}
+
+async function answerOf(request) {
+  try {
+    const response = await request;
+    const text = await response.text();
+    try { return JSON.parse(text); } catch { return {ok: false, text}; }
+  } catch {
+    return {ok: false, text: 'the mission does not answer'};
+  }
+}

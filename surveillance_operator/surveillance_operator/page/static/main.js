@@ -1,0 +1,121 @@
+// Follows the mission's events and hands each part to those who show it.
+import {$, h, age} from './dom.js';
+import {MapView} from './map.js';
+import {drawMachine, lightMachine} from './machine.js';
+import {drawStrips} from './time.js';
+import {Why} from './why.js';
+import {Hands} from './hands.js';
+import {Replay} from './replay.js';
+
+const root = document.documentElement;
+const state = {};
+const clock = {now: 0, at: 0, rate: 1};
+const may = root.dataset.control === '1';
+const replaying = root.dataset.kind === 'replay';
+
+const why = new Why(state);
+const hands = new Hands(state, may && !replaying);
+const map = new MapView($('map'), (place) => { why.choose(place); hands.choose(place); }, (point) => hands.point(point));
+const replay = replaying ? new Replay() : null;
+window.mission = {state, received: 0};
+
+export function now() {
+  const passed = (performance.now() - clock.at) / 1000;
+  return clock.now + Math.min(passed, 5) * clock.rate;
+}
+
+function set(id, text) {
+  const element = $(id);
+  if (element.textContent !== text) element.textContent = text;
+}
+
+function header() {
+  const {status, mission, battery} = state;
+  set('title', status ? `${status.machine}${mission?.mode ? ' · ' + mission.mode : ''}` : 'no mission yet');
+  document.title = status ? `${status.place || '?'} · ${status.machine}` : 'Mission';
+  const ended = mission && !mission.running && status ? ' · the mission has ended' : '';
+  const where = status ? (status.heading_to && status.heading_to !== status.place ? `in ${status.place || '?'} → ${status.heading_to}` : `in ${status.place || '?'}`) : `waiting on ${mission?.where ?? ''}`;
+  set('state', `${status?.state ? status.state + ' · ' : ''}${where}${status?.text ? ' · ' + status.text : ''}${ended}`);
+  $('state').classList.toggle('warn', Boolean(status?.help));
+  set('battery', battery ? `battery ${Math.round(battery.level)} %${battery.low ? ' (low)' : ''}` : 'battery –');
+  $('battery').classList.toggle('warn', Boolean(battery?.low));
+}
+
+function lists() {
+  const {events, health, markers, transitions} = state;
+  $('events').replaceChildren(...(events ?? []).toReversed().map(([at, text]) => h('li', {}, h('time', {}, at), text)));
+  const silent = Object.entries(health?.silent ?? {}).map(([topic, reason]) => h('li', {}, `${topic}: ${reason}`));
+  $('nodes').replaceChildren(...Object.entries(health?.nodes ?? {}).map(([name, node]) =>
+    h('li', {class: node.up ? 'up' : 'down'}, h('b', {}, node.up ? '● ' : '✗ '), name, node.up ? '' : ' ended', node.restarts ? ` (started again ${node.restarts}×)` : '')));
+  const words = ['ok', 'WARN', 'ERROR', 'STALE'];
+  $('reports').replaceChildren(...Object.entries(health?.reports ?? {}).map(([name, report]) =>
+    h('li', {class: report.level ? 'warn' : null}, `${words[report.level] ?? '?'} ${name}: ${report.message}`)), ...silent);
+  $('markers').replaceChildren(...(markers?.seen ?? []).map(([id, known, confirmed, confidence]) =>
+    h('li', {}, `marker ${id}${confirmed ? ', confirmed' : ''}${known ? '' : ', not on the list'}, confidence ${confidence}`)));
+  set('scan', markers?.progress ? `scan: view ${markers.progress[0]} of ${markers.progress[1]}` : '');
+  $('transitions').replaceChildren(...(transitions ?? []).toReversed().slice(0, 12).map((each) =>
+    h('li', {}, h('time', {}, `${each[6].toFixed(1)} s`), `${each[3]} –${each[4]}→ ${each[5]}`)));
+}
+
+const SHOW = {
+  header: [['status', 'mission', 'battery'], header],
+  why: [['decision', 'places'], () => why.show()],
+  lists: [['events', 'health', 'markers', 'transitions'], lists],
+  machine: [['machine'], () => drawMachine($('machine'), state.machine ?? [])],
+  lit: [['machine', 'active', 'transitions'], () => { lightMachine($('machine'), state.active?.paths ?? [], state.transitions ?? []); $('paused').hidden = !state.active?.paused; }],
+  hands: [['places', 'doors', 'mission', 'requests'], () => hands.show()],
+  strips: [['history', 'places', 'mission'], () => drawStrips($('strips'), state, now())],
+  map: [['status', 'grid', 'places', 'links', 'doors', 'plan', 'scan', 'obstacles', 'pose', 'trail', 'mission', 'decision'], (parts) => map.show(state, parts, now())],
+};
+
+function receive(message) {
+  const parts = message.p;
+  const at = performance.now();
+  if (clock.at && !message.whole) {
+    const passed = (at - clock.at) / 1000;
+    if (passed > 0.5) clock.rate = Math.min(1000, Math.max(0, (message.now - clock.now) / passed));
+  }
+  if (!clock.at || at - clock.at > 500 || message.whole) { clock.now = message.now; clock.at = at; }
+  if (message.whole) for (const name of Object.keys(state)) delete state[name];
+  if (parts.pose && !parts.trail && state.trail) {
+    const last = state.trail.at(-1);
+    if (!last || Math.hypot(last[0] - parts.pose[0], last[1] - parts.pose[1]) > 0.1) { state.trail.push(parts.pose.slice(0, 2)); state.trail.splice(0, state.trail.length - 3000); }
+  }
+  Object.assign(state, parts);
+  if (message.replay) replay?.show(message.replay);
+  if (parts.replay) replay?.show(parts.replay);
+  for (const [needs, draw] of Object.values(SHOW)) if (needs.some((name) => name in parts)) draw(parts);
+  window.mission.received += 1;
+}
+
+function connection(kind, text) {
+  $('connection').dataset.state = kind;
+  set('connection', text);
+}
+
+function connect() {
+  const source = new EventSource('/events');
+  source.onopen = () => connection('on', replaying ? 'replay' : 'live');
+  source.onmessage = (event) => receive(JSON.parse(event.data));
+  source.onerror = () => {
+    connection('off', 'connection lost, trying again');
+    if (source.readyState === EventSource.CLOSED) setTimeout(connect, 2000);
+  };
+}
+
+function camera() {
+  const image = $('camera');
+  const box = $('camera-section').getBoundingClientRect();
+  if (document.hidden || box.top > innerHeight || box.bottom < 0 || replaying) return;
+  const next = new Image();
+  next.onload = () => { image.src = next.src; image.hidden = false; $('no-camera').hidden = true; };
+  next.src = `/camera.jpg?${Date.now()}`;
+}
+
+document.body.classList.toggle('replay', replaying);
+$('replay').hidden = !replaying;
+for (const each of document.querySelectorAll('.hands')) each.hidden = !may || replaying;
+if (replaying) $('camera-section').hidden = true;
+connect();
+setInterval(() => { map.tick(state, now()); drawStrips($('strips'), state, now()); }, 1000);
+setInterval(camera, 700);

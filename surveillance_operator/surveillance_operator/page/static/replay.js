@@ -1,0 +1,30 @@
+// Moves through a recording: slider, speed, jumps.
+import {$, h, act} from './dom.js';
+
+const SPEEDS = [0.1, 0.5, 1, 2, 5, 10, 30, 100];
+
+export class Replay {
+  constructor() {
+    this.playing = true;
+    this.dragging = false;
+    $('speed').replaceChildren(...SPEEDS.map((speed) => h('option', {value: speed, selected: speed === 1}, `${speed}×`)));
+    $('speed').addEventListener('change', () => act('speed', {speed: +$('speed').value}));
+    $('play').addEventListener('click', () => act(this.playing ? 'pause' : 'play', {}));
+    $('slider').addEventListener('input', () => { this.dragging = true; act('seek', {to: +$('slider').value}); });
+    $('slider').addEventListener('change', () => { this.dragging = false; });
+    for (const button of document.querySelectorAll('[data-jump]')) button.addEventListener('click', async () => {
+      const found = await act('jump', {kind: button.dataset.jump});
+      if (!found.ok) $('moment').textContent = found.text;
+    });
+  }
+
+  show({at, length, playing, speed, day}) {
+    this.playing = playing;
+    $('play').textContent = playing ? 'Pause' : 'Play';
+    $('slider').max = length;
+    if (!this.dragging) $('slider').value = at;
+    if (document.activeElement !== $('speed')) $('speed').value = speed;
+    const time = (seconds) => new Date(seconds * 1000).toISOString().slice(11, 19);
+    $('moment').textContent = `${time(at)} of ${time(length)} · ${day}`;
+  }
+}

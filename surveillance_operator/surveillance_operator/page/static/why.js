@@ -1,0 +1,73 @@
+// Why the robot goes where it goes: the decision, what is known of a place, proofs, why not.
+import {$, h, ask} from './dom.js';
+
+export class Why {
+  constructor(state) {
+    this.state = state;
+    this.names = '';
+    $('ask-facts').addEventListener('click', () => this.facts());
+    $('why-not').addEventListener('click', () => this.whyNot());
+  }
+
+  choose(place) {
+    $('place').value = place;
+    this.facts();
+  }
+
+  show() {
+    const {decision, places} = this.state;
+    if (decision) {
+      $('decision-line').textContent = `decision ${decision.number}: ${decision.from} → ${decision.place} [${decision.rule}]`;
+      $('reason').textContent = decision.reason;
+      const rows = decision.scores.toSorted((a, b) => b[1] - a[1]).map(([name, score]) =>
+        h('tr', {class: name === decision.place ? 'chosen' : null}, h('td', {}, name === decision.place ? `→ ${name}` : name), h('td', {class: 'n'}, String(score))));
+      $('scores').replaceChildren(h('caption', {class: 'hidden'}, 'Candidates'), h('thead', {}, h('tr', {}, h('th', {scope: 'col'}, 'Candidate'), h('th', {scope: 'col'}, `Score (${decision.policy})`))), h('tbody', {}, ...rows));
+    }
+    const names = Object.keys(places ?? {});
+    if (names.join() !== this.names) {
+      const chosen = $('place').value;
+      this.names = names.join();
+      $('place').replaceChildren(...names.map((name) => h('option', {value: name}, name)));
+      if (names.includes(chosen)) $('place').value = chosen;
+    }
+  }
+
+  async whyNot() {
+    const place = $('place').value;
+    const found = await ask('why_not', {place});
+    $('answer').replaceChildren(h('p', {class: found.ok ? 'strong' : 'warn'}, found.text), ...(found.premises?.length ? [h('ul', {class: 'proof'}, ...found.premises.map((text) => h('li', {}, text)))] : []));
+  }
+
+  async facts() {
+    const place = $('place').value;
+    const found = await ask('facts', {place});
+    if (!found.ok) { $('facts').replaceChildren(h('p', {class: 'warn'}, found.text)); return; }
+    $('facts').replaceChildren(h('h3', {}, `What is known of ${place}`), ...found.facts.map(([fact, asserted]) => asserted ? h('p', {}, `${fact} `, h('small', {}, 'asserted')) : this.derived(fact)));
+  }
+
+  derived(fact) {
+    const body = h('div');
+    const box = h('details', {'data-fact': fact}, h('summary', {}, `${fact} `, h('small', {}, 'derived: open for its proof')), body);
+    box.addEventListener('toggle', async () => {
+      if (!box.open || body.childElementCount) return;
+      const found = await ask('explain', {fact});
+      body.replaceChildren(found.ok ? tree(found.lines) : h('p', {class: 'warn'}, found.text));
+    });
+    return box;
+  }
+}
+
+function tree(lines) {
+  const root = h('ul', {class: 'proof'});
+  const open = [root];
+  for (const [depth, text] of lines) {
+    const item = h('li', {}, text);
+    open.length = Math.min(open.length, depth + 1);
+    open.at(-1).append(item);
+    const inner = h('ul', {class: 'proof'});
+    item.append(inner);
+    open.push(inner);
+  }
+  for (const list of root.querySelectorAll('ul')) if (!list.childElementCount) list.remove();
+  return root;
+}

@@ -1,0 +1,169 @@
+"""Who may see the page and who may act, over real HTTP."""
+
+from __future__ import annotations
+
+import http.client
+import json
+from collections.abc import Iterator
+
+import pytest
+
+from surveillance_operator.page.hub import Hub
+from surveillance_operator.page.server import Page, PageError
+from surveillance_operator.snapshot import Snapshot
+
+done: list[object] = []
+
+
+def door(given: object) -> str:
+    done.append(given)
+    return 'door D1 is closed'
+
+
+def facts(given: object) -> object:
+    return {'ok': True, 'facts': [given]}
+
+
+def refuse(given: object) -> str:
+    raise ValueError('no such door')
+
+
+@pytest.fixture
+def page() -> Iterator[Page]:
+    done.clear()
+    page = Page(
+        Hub(),
+        questions={'facts': facts},
+        actions={'door': door, 'refused': refuse},
+        port=0,
+        token='secret',
+    )
+    page.start()
+    yield page
+    page.stop()
+
+
+def ask(page: Page, method: str, path: str, body: str = '', **headers: str) -> tuple[int, str]:
+    connection = http.client.HTTPConnection('127.0.0.1', page.port, timeout=10)
+    named = {name.replace('_', '-'): value for name, value in headers.items()}
+    connection.request(method, path, body, named)
+    answer = connection.getresponse()
+    text = answer.read().decode()
+    connection.close()
+    return answer.status, text
+
+
+def own(page: Page) -> dict[str, str]:
+    return {
+        'Origin': f'http://127.0.0.1:{page.port}',
+        'Cookie': f'mission_{page.port}=secret',
+    }
+
+
+def test_whoever_is_on_this_machine_may_look(page: Page) -> None:
+    status, text = ask(page, 'GET', '/')
+    assert status == 200
+    assert 'data-kind="live" data-control="0"' in text
+    assert ask(page, 'GET', '/static/main.js')[0] == 200
+    assert ask(page, 'GET', '/ask/facts?place=R1') == (200, '{"ok":true,"facts":[{"place":"R1"}]}')
+    assert ask(page, 'GET', '/camera.jpg')[0] == 204
+    assert ask(page, 'GET', '/static/../server.py')[0] == 404
+
+
+def test_the_token_becomes_a_cookie(page: Page) -> None:
+    connection = http.client.HTTPConnection('127.0.0.1', page.port, timeout=10)
+    connection.request('GET', '/?token=secret')
+    answer = connection.getresponse()
+    cookie = answer.headers['set-cookie']
+    assert answer.status == 303
+    assert 'HttpOnly' in cookie
+    assert 'samesite=strict' in cookie.lower()
+    connection.close()
+    assert ask(page, 'GET', '/?token=wrong')[0] == 403
+    assert 'data-control="1"' in ask(page, 'GET', '/', **own(page))[1]
+
+
+def test_an_action_needs_token_and_origin(page: Page) -> None:
+    good = own(page)
+    cookie, origin = {'Cookie': good['Cookie']}, {'Origin': good['Origin']}
+    foreign = {**good, 'Origin': 'http://evil.example'}
+    wrong = {**good, 'Cookie': f'mission_{page.port}=wrong'}
+    for headers in ({}, cookie, origin, foreign, wrong):
+        status, text = ask(page, 'POST', '/act/door', '{}', **headers)
+        assert status == 403
+        assert 'refused' in text
+    assert ask(page, 'GET', '/act/door', **good)[0] == 405
+    assert done == []
+    status, text = ask(page, 'POST', '/act/door', '{"door": "D1"}', **good)
+    assert (status, json.loads(text)) == (200, {'ok': True, 'text': 'door D1 is closed'})
+    assert done == [{'door': 'D1'}]
+
+
+@pytest.mark.parametrize(
+    ('path', 'body', 'status'),
+    [
+        ('/act/door', '[', 400),
+        ('/act/door', '[]', 400),
+        ('/act/door', ' ' * 70_000, 413),
+        ('/act/refused', '{}', 422),
+        ('/act/unknown', '{}', 403),
+    ],
+)
+def test_what_cannot_be_done_is_said(page: Page, path: str, body: str, status: int) -> None:
+    found, text = ask(page, 'POST', path, body, **own(page))
+    assert found == status
+    assert json.loads(text)['ok'] is False
+    assert 'Traceback' not in text
+
+
+def test_another_name_for_this_machine_is_refused(page: Page) -> None:
+    assert ask(page, 'GET', '/', Host='evil.example')[0] == 403
+    assert ask(page, 'GET', '/', Host=f'localhost:{page.port}')[0] == 200
+
+
+def test_beyond_this_machine_even_looking_needs_the_token() -> None:
+    page = Page(Hub(), questions={}, actions={}, host='0.0.0.0', port=0, token='secret')
+    page.start()
+    try:
+        assert page.address.endswith('?token=secret')
+        for path in ('/', '/events', '/static/main.js', '/camera.jpg'):
+            assert ask(page, 'GET', path)[0] == 403
+        assert ask(page, 'GET', '/', Cookie=f'mission_{page.port}=secret')[0] == 200
+    finally:
+        page.stop()
+
+
+def test_no_other_site_may_be_loaded_or_embed_the_page(page: Page) -> None:
+    connection = http.client.HTTPConnection('127.0.0.1', page.port, timeout=10)
+    connection.request('GET', '/')
+    policy = connection.getresponse().headers['content-security-policy']
+    connection.close()
+    assert "default-src 'none'" in policy
+    assert "frame-ancestors 'none'" in policy
+    assert 'unsafe' not in policy
+
+
+def test_a_viewer_gets_everything_and_then_what_changed(page: Page) -> None:
+    page._hub.show(Snapshot(battery=50.0, now=1.0))
+    connection = http.client.HTTPConnection('127.0.0.1', page.port, timeout=10)
+    connection.request('GET', '/events')
+    answer = connection.getresponse()
+
+    def event() -> dict[str, object]:
+        while not (line := answer.readline()).startswith(b'data: '):
+            assert line
+        found: dict[str, object] = json.loads(line[6:])
+        return found
+
+    first = event()
+    assert first['whole'] == 1
+    assert first['p']['battery'] == {'level': 50.0, 'low': False}  # type: ignore[index]
+    page._hub.show(Snapshot(battery=49.0, now=2.0))
+    second = event()
+    assert second == {'now': 2.0, 'whole': 0, 'p': {'battery': {'level': 49.0, 'low': False}}}
+    connection.close()
+
+
+def test_an_address_that_is_taken_is_one_line(page: Page) -> None:
+    with pytest.raises(PageError, match=f'127.0.0.1:{page.port}: Address already in use'):
+        Page(Hub(), questions={}, actions={}, port=page.port)
