@@ -215,7 +215,7 @@ def configured(places: Sequence[Map], hours: float) -> None:
     """What the threshold of config/parameters.yaml comes to, with the default policy."""
     text = (ROOT / 'config' / 'parameters.yaml').read_text(encoding='utf-8')
     nodes = yaml.safe_load(text)
-    threshold = nodes['/**/robot_behavior']['ros__parameters']['urgency_threshold']
+    threshold = nodes['/**']['ros__parameters']['urgency_threshold']
     print(f'\nurgency_threshold {threshold} s, {DEFAULT_POLICY}, {hours:g} h, once settled')
     rows = [['place', 'tour s', 'longest s', 'late s', 'mean s', 'moves that are URGENT']]
     for place in places:

@@ -19,7 +19,7 @@ from launcher import node_table
 from launcher.instance_lock import claim
 from launcher.log_merge import ROS_FORMAT, MergedLog
 from launcher.supervisor import Program, Supervisor
-from surveillance_behaviour.mission import record as mission_record
+from surveillance_behaviour.mission import mission_log
 from surveillance_runtime.place import read_place
 from surveillance_runtime.yaml_file import YamlFileError, read_yaml_file
 
@@ -212,6 +212,7 @@ def write_own_parameters(folder: Path, run: Run) -> Path:
     """Writes what the command line says as parameters, for the nodes that it concerns."""
     own: dict[str, dict[str, Any]] = {
         BEHAVIOUR_NODE: {'behaviour': run.behaviour, 'record': str(folder / RECORD)},
+        'reasoner': {'record': str(folder / RECORD)},
         'armor_server': {
             'ontologies_folder': str(folder.resolve() / ONTOLOGIES),
             'store': str(folder.resolve() / STORE),
@@ -313,8 +314,8 @@ def summary(record: Path) -> str:
     if not record.exists():
         return 'Mission: nothing was recorded.'
     try:
-        return str(mission_record.summarize(mission_record.read(record)))
-    except mission_record.RecordError as error:
+        return str(mission_log.summarize(mission_log.read(record)))
+    except mission_log.RecordError as error:
         return f'Mission: {error}'
 
 

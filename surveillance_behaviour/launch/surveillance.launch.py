@@ -71,7 +71,8 @@ def start_nodes(context: LaunchContext) -> list[Node]:
     if behaviour == 'patrol' or mode == 'SIMULATED':
         parts.append(SIMULATION)
     own: dict[str, dict[str, object]] = {
-        'robot_behavior': {'behaviour': behaviour, 'record': argument('record')}
+        'robot_behavior': {'behaviour': behaviour, 'record': argument('record')},
+        'reasoner': {'record': argument('record')},
     }
     for controller in ALWAYS['surveillance_controllers']:
         own[controller] = {'execution_mode': mode, 'console': False}

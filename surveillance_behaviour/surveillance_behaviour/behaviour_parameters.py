@@ -9,21 +9,21 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+from surveillance_behaviour.decision import DEFAULT_RULES, DecisionSettings, Rules
 from surveillance_behaviour.mission.mission import MissionSettings
 from surveillance_behaviour.mission.recovery import RecoveryLimits
 from surveillance_behaviour.peers.ros_ports import Deadlines
-from surveillance_behaviour.policy.battery import BatteryLimits
-from surveillance_behaviour.policy.chooser import ChoiceSettings
+from surveillance_behaviour.policy.battery_reserve import BatteryLimits
 from surveillance_behaviour.policy.policies import POLICIES
-from surveillance_behaviour.policy.rules import DEFAULT_RULES, Rules
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import Described, ParameterError, declare_fields
 
 _DAY = 86400.0
+_EXPLORATION = 'exploration_seconds'
 _CHOICE = {
-    'exploration_seconds': Described('Seconds the robot takes to explore a place.', 0.0, _DAY),
+    _EXPLORATION: Described('Seconds the robot takes to explore a place.', 0.0, _DAY),
     'speed': Described(
-        "Metres per second at which the robot drives, to tell a move's time.",
+        "Metres per second, to tell a move's time before any was driven.",
         *(0.001, 100.0),
         name='robot_speed',
     ),
@@ -69,14 +69,22 @@ _DEADLINES = {
 }
 
 
-def choice_settings(node: PatrolNode) -> ChoiceSettings:
-    """Declares what a choice depends on; the result follows changes at run time.
+def choice_settings(node: PatrolNode, *, explores: bool = True) -> DecisionSettings:
+    """Declares what a decision depends on; the result follows changes at run time.
+
+    Args:
+        node: The node.
+        explores: Whether the robot explores each place for a while.
 
     Raises:
         ParameterError: A value is of the wrong type or out of range.
     """
+    described = {name: how for name, how in _CHOICE.items() if explores or name != _EXPLORATION}
     settings = declare_fields(
-        node, ChoiceSettings(), _CHOICE, on_change=lambda *change: setattr(settings, *change)
+        node,
+        DecisionSettings(exploration_seconds=2.0 if explores else 0.0),
+        described,
+        on_change=lambda *change: setattr(settings, *change),
     )
     settings.urgency_threshold = node.parameter(
         'urgency_threshold',
@@ -102,7 +110,7 @@ def choice_settings(node: PatrolNode) -> ChoiceSettings:
     return settings
 
 
-def _battery_limits(node: PatrolNode, settings: ChoiceSettings) -> BatteryLimits:
+def _battery_limits(node: PatrolNode, settings: DecisionSettings) -> BatteryLimits:
     default = BatteryLimits()
     values: dict[str, float] = {
         'require_recharge': default.require_recharge,
@@ -175,6 +183,18 @@ def random_seed(node: PatrolNode) -> int:
         read_only=True,
     )
     return seed
+
+
+def record_path(node: PatrolNode) -> str:
+    """Declares the file of the mission record; what was learned is kept beside it."""
+    path: str = node.parameter(
+        'record',
+        '',
+        'File that the mission is recorded in, and beside which `FILE.experience.json` keeps what '
+        'was learned (visits, leg times, battery); empty: none.',
+        read_only=True,
+    )
+    return path
 
 
 def _rules_expected(names: Sequence[str]) -> str | None:

@@ -12,8 +12,8 @@ import sys
 from collections.abc import Callable, Sequence
 from typing import NoReturn
 
+from surveillance_behaviour.charging import BatteryMonitor
 from surveillance_behaviour.machines import MACHINES
-from surveillance_behaviour.mission.battery_gauge import BatteryGauge
 from surveillance_behaviour.mission.mission import Mission, MissionSettings
 from surveillance_behaviour.peers.ports import Ports
 from surveillance_fsm import Container
@@ -46,8 +46,8 @@ def build(name: str) -> Container:
     """
     if name in MACHINES:
         nobody = _Nobody()
-        ports = Ports(nobody, nobody, nobody)  # type: ignore[arg-type]
-        mission = Mission(name, MissionSettings(), ports, BatteryGauge(), WALL_CLOCK)
+        ports = Ports(nobody, nobody, nobody, nobody)  # type: ignore[arg-type]
+        mission = Mission(name, MissionSettings(), ports, BatteryMonitor(), WALL_CLOCK)
         machine: object = MACHINES[name](mission)
     else:
         module_name, _, factory_name = name.partition(':')

@@ -10,10 +10,15 @@ from sensor_msgs.msg import BatteryState
 
 from surveillance_behaviour.map_from_markers.survey import PlaceNote
 from surveillance_behaviour.peers.ports import Point
-from surveillance_behaviour.policy.situation import Decision
+from surveillance_behaviour.policy.world import Decision
 from surveillance_interfaces.msg import Decision as DecisionMessage
 from surveillance_interfaces.msg import OntologyMap, OntologyPlace, RoomConnection
 from surveillance_runtime.conversions import seconds_of
+
+
+def nanoseconds_of(stamp: Any) -> int:
+    """Return a stamp as nanoseconds since the clock's start."""
+    return int(stamp.sec) * 10**9 + int(stamp.nanosec)
 
 
 def point_from(message: PointMessage) -> Point:

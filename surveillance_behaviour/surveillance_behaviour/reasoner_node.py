@@ -1,7 +1,8 @@
-"""The node `reasoner`: answers `reason` with the place to visit next.
+"""The node `reasoner`: answers `reason` with the place to go to next, in the behaviour `patrol`.
 
-It asks the ontology where the robot is, what it can reach and what is URGENT, and chooses by the
-same rules and policies as the surveillance machine. The decision is published with its reason.
+It takes one snapshot of the ontology, and decides by the same function as the behaviour
+`surveillance`: charging first, then an operator's request, then the rules and the policy. The
+decision is published with its reason. It also offers `why_not` and `go_to`.
 """
 
 from __future__ import annotations
@@ -13,16 +14,21 @@ from typing import Any
 
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.task import Future
+from std_msgs.msg import Bool, UInt8
 
 from surveillance_behaviour import behaviour_parameters
+from surveillance_behaviour.charging import BatteryMonitor
+from surveillance_behaviour.decider import Decider
+from surveillance_behaviour.decision import NowhereToGoError
 from surveillance_behaviour.peers.announcing import DecisionTopic
+from surveillance_behaviour.peers.decision_services import DecisionServices
 from surveillance_behaviour.peers.ports import InterruptedWaitError, PeerError
-from surveillance_behaviour.peers.ros_ports import RosPlaces, ros_knowledge
-from surveillance_behaviour.policy.chooser import Chooser
-from surveillance_behaviour.policy.rules import NowhereToGoError
+from surveillance_behaviour.peers.ros_ports import RosPlaces, ros_ontology
+from surveillance_behaviour.world_model import Experience
 from surveillance_fsm import Interrupt
 from surveillance_interfaces.msg import MissionStatus
 from surveillance_interfaces.srv import Reason
+from surveillance_runtime.conversions import seconds_of
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
@@ -30,34 +36,55 @@ from surveillance_runtime.waiting import AwaitedWork, ClockWait
 
 
 class Reasoner(PatrolNode):
-    """Chooses the next place on request."""
+    """Decides on request where the robot goes."""
 
     def __init__(self, **node_options: Any) -> None:
         super().__init__('reasoner', **node_options)
-        settings = behaviour_parameters.choice_settings(self)
+        settings = behaviour_parameters.choice_settings(self, explores=False)
         deadlines = behaviour_parameters.deadlines(self, ('answer', 'build'))
         seed = behaviour_parameters.random_seed(self)
-        self._chooser = Chooser(
+        experience = Experience.of_record(behaviour_parameters.record_path(self))
+        if experience.problem:
+            self.get_logger().warn(experience.problem)
+        battery = BatteryMonitor()
+        self._decider = Decider(
             settings,
-            ros_knowledge(self, deadlines),
+            ros_ontology(self, deadlines),
             RosPlaces(self, deadlines),
+            battery,
+            experience,
             random.Random(seed if seed >= 0 else None),
+            lambda warning: self.get_logger().warn(warning),
         )
         self._wait = ClockWait(self)
         self._decisions = DecisionTopic(self)
         self._avoided: frozenset[str] = frozenset()
+        self._place = ''
         self._work = AwaitedWork(self, 1)
         self._next: Future | None = None
         self._sharing = threading.Lock()
         self._interrupt = Interrupt()
         self.stopping.subscribe(self._interrupt.set)
+        battery.watch(lambda: self._decider.learn_draw(self._wait.now()))
+        self.create_subscription(
+            UInt8, 'battery_level', lambda m: battery.set_level(float(m.data)), STATE_QOS
+        )
+        self.create_subscription(
+            Bool, 'state/battery_low', lambda m: battery.set_low(m.data), STATE_QOS
+        )
         self.create_subscription(MissionStatus, 'mission_status', self._on_status, STATE_QOS)
         self.create_service(
             Reason, 'reason', self._on_reason, callback_group=ReentrantCallbackGroup()
         )
+        DecisionServices(self, self._decider, self._wait.now, lambda: self._avoided, self._work)
 
     def _on_status(self, status: MissionStatus) -> None:
         self._avoided = frozenset(status.avoided)
+        if status.waiting_for_help or 'Recover' in status.state:
+            self._decider.disturbed()
+        if status.place and status.place != self._place:
+            self._place = status.place
+            self._decider.arrived(status.place, seconds_of(status.stamp))
 
     async def _on_reason(self, _request: Any, response: Any) -> Any:
         # Who asks before a choice is begun shares it: one client that gave up and asks again must
@@ -70,7 +97,7 @@ class Reasoner(PatrolNode):
         return response
 
     def on_stop(self) -> None:
-        """Ends the worker."""
+        """End the worker."""
         self._work.stop()
 
     def _choose(self) -> str:
@@ -79,8 +106,7 @@ class Reasoner(PatrolNode):
             # The lock is held until the request that began this choice has noted it as the next.
             self._next = None
         try:
-            situation = self._chooser.look(self._wait.now(), self._interrupt, self._avoided)
-            decision = self._chooser.choose(situation)
+            decision = self._decider.decide(self._wait.now(), self._interrupt, self._avoided)
         except (PeerError, NowhereToGoError) as error:
             self.get_logger().warn(f'no place to name: {error}')
             return ''
@@ -91,5 +117,5 @@ class Reasoner(PatrolNode):
 
 
 def main(args: Sequence[str] | None = None) -> int:
-    """Runs the node until it is stopped."""
+    """Run the node until it is stopped."""
     return run_node(Reasoner, args)

@@ -1,8 +1,10 @@
 """The node `robot_behavior`: runs one of the machines until it is told to stop.
 
-Subscribes `battery_level`, `state/battery_low` and `battery_state`, publishes `decision` and
+Subscribes `battery_level`, `state/battery_low`, `battery_state` and `robot_place`, publishes
 `mission_status`, and calls the services and actions of the machine that `behaviour` names. Below
-`robot_behavior/fsm` the machine can be watched, paused and stepped.
+`robot_behavior/fsm` the machine can be watched, paused and stepped. In the behaviour `surveillance`
+this node decides: it publishes `decision` and offers `why_not` and `go_to`; in `patrol` the node
+`reasoner` does.
 """
 
 from __future__ import annotations
@@ -17,21 +19,33 @@ from std_msgs.msg import Bool, UInt8
 
 import surveillance_fsm as fsm
 from surveillance_behaviour import behaviour_parameters, conversions
+from surveillance_behaviour.charging import BatteryMonitor
+from surveillance_behaviour.decider import Decider
 from surveillance_behaviour.machines import MACHINES
-from surveillance_behaviour.mission.battery_gauge import BatteryGauge
-from surveillance_behaviour.mission.mission import Mission
-from surveillance_behaviour.mission.record import MissionRecord, RecordError, read
-from surveillance_behaviour.mission.resumption import CutOff, cut_off
+from surveillance_behaviour.mission.mission import Mission, MissionSettings
+from surveillance_behaviour.mission.mission_log import (
+    CutOff,
+    MissionRecord,
+    RecordError,
+    cut_off,
+    read,
+)
 from surveillance_behaviour.peers.announcing import DecisionTopic, RosAnnouncer
-from surveillance_behaviour.peers.ports import Ports
-from surveillance_behaviour.peers.ros_ports import RosMotion, RosPlaces, RosRoutine, ros_knowledge
-from surveillance_behaviour.policy.rules import RECHARGE
+from surveillance_behaviour.peers.decision_services import DecisionServices
+from surveillance_behaviour.peers.ports import Ontology, Ports
+from surveillance_behaviour.peers.ros_ports import (
+    RosMotion,
+    RosPlaces,
+    RosReasoner,
+    RosRoutine,
+    ros_ontology,
+)
+from surveillance_behaviour.world_model import Experience
 from surveillance_fsm.ros import IntrospectionServer
-from surveillance_interfaces.msg import Decision as DecisionMessage
 from surveillance_runtime.node import JOIN_SECONDS, PatrolNode, StartError
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
-from surveillance_runtime.waiting import ClockWait
+from surveillance_runtime.waiting import AwaitedWork, ClockWait
 
 
 class RobotBehavior(PatrolNode):
@@ -50,55 +64,55 @@ class RobotBehavior(PatrolNode):
         settings = behaviour_parameters.mission_settings(self)
         deadlines = behaviour_parameters.deadlines(self)
         seed = behaviour_parameters.random_seed(self)
-        path: str = self.parameter(
-            'record', '', 'File that the mission is recorded in; empty: none.', read_only=True
-        )
+        path = behaviour_parameters.record_path(self)
         left_at = self._where_it_was_cut_off(path)
         self._record = _open_record(path)
-        patrols = self._behaviour == 'patrol'
-        gauge = BatteryGauge()
         self._wait = ClockWait(self)
-        self._announcer = RosAnnouncer(self, DecisionTopic(self))
+        self._work: AwaitedWork | None = None
+        patrols = self._behaviour == 'patrol'
+        battery = BatteryMonitor()
+        ontology, places = ros_ontology(self, deadlines), RosPlaces(self, deadlines)
+        if patrols:
+            decisions: RosReasoner | Decider = RosReasoner(self, deadlines, ontology, battery)
+        else:
+            generator = random.Random(seed if seed >= 0 else None)
+            decisions = self._decider(settings, ontology, places, battery, path, generator)
+        self._announcer = RosAnnouncer(self, None if patrols else DecisionTopic(self))
         ports = Ports(
-            knowledge=ros_knowledge(self, deadlines),
-            places=RosPlaces(self, deadlines),
+            ontology=ontology,
+            places=places,
             announcer=self._announcer,
+            decisions=decisions,
             motion=None if patrols else RosMotion(self, deadlines),
-            routine=RosRoutine(self, deadlines, gauge) if patrols else None,
+            routine=RosRoutine(self, deadlines, battery) if patrols else None,
         )
+        clock = cast(fsm.Clock, self._wait)
         self.mission = Mission(
-            self._behaviour,
-            settings,
-            ports,
-            gauge,
-            cast(fsm.Clock, self._wait),
-            self._record,
-            random.Random(seed if seed >= 0 else None),
-            left_at,
+            self._behaviour, settings, ports, battery, clock, self._record, left_at
         )
         self.machine = MACHINES[self._behaviour](self.mission)
         self._announcer.attach(self.mission, self.machine)
         self._introspection = IntrospectionServer(self, self.get_name(), self.machine, '/')
         self._introspection.start()
         self.create_subscription(
-            UInt8, 'battery_level', lambda m: gauge.set_level(float(m.data)), STATE_QOS
+            UInt8, 'battery_level', lambda m: battery.set_level(float(m.data)), STATE_QOS
         )
         self.create_subscription(
-            Bool, 'state/battery_low', lambda m: gauge.set_low(m.data), STATE_QOS
+            Bool, 'state/battery_low', lambda m: battery.set_low(m.data), STATE_QOS
         )
         self.create_subscription(
             BatteryState,
             'battery_state',
-            lambda m: gauge.set_charging(conversions.charging_from(m)),
+            lambda m: battery.set_charging(conversions.charging_from(m)),
             SENSOR_QOS,
         )
-        if patrols:
-            self.create_subscription(DecisionMessage, 'decision', self._on_decision, STATE_QOS)
         self._machine_thread = self.spawn(self._run, name='machine')
 
     def on_stop(self) -> None:
         """Preempts the machine, so that what it started is cancelled while messages flow."""
         self.machine.request_preempt()
+        if self._work is not None:
+            self._work.stop()
         # What it does last is reported, too.
         self._machine_thread.join(JOIN_SECONDS)
         self._introspection.stop()
@@ -116,7 +130,7 @@ class RobotBehavior(PatrolNode):
                     self._wait.sleep(self.mission.recovery.pause(), self.stopping)
                     self._announcer.waiting_for_help('')
         finally:
-            self.mission.ended()
+            self.mission.note('end')
             if self._record is not None:
                 self._record.close()
 
@@ -129,11 +143,38 @@ class RobotBehavior(PatrolNode):
             self.get_logger().warn(f'what was begun before is begun anew: {error}')
             return None
 
-    def _on_decision(self, message: DecisionMessage) -> None:
-        decision = conversions.decision_from(message)
-        # Charging is this node's own decision, which the mission knows of.
-        if decision.rule != RECHARGE:
-            self.mission.note_decision(decision)
+    def _decider(
+        self,
+        settings: MissionSettings,
+        ontology: Ontology,
+        places: RosPlaces,
+        battery: BatteryMonitor,
+        record: str,
+        generator: random.Random,
+    ) -> Decider:
+        """Who decides in this process, with the services that go with it."""
+        experience = Experience.of_record(record)
+        if experience.problem:
+            self.get_logger().warn(experience.problem)
+        decider = Decider(
+            settings.choice,
+            ontology,
+            places,
+            battery,
+            experience,
+            generator,
+            lambda warning: self.get_logger().warn(warning),
+        )
+        battery.watch(lambda: decider.learn_draw(self._wait.now()))
+        self._work = AwaitedWork(self, 1)
+        DecisionServices(
+            self,
+            decider,
+            self._wait.now,
+            lambda: self.mission.recovery.avoided(self.mission.now()),
+            self._work,
+        )
+        return decider
 
 
 def _open_record(path: str) -> MissionRecord | None:

@@ -17,7 +17,7 @@ from nav_msgs.msg import Path as PathMessage
 from numpy.typing import NDArray
 from sensor_msgs.msg import LaserScan, PointCloud2
 
-from surveillance_behaviour.policy.situation import Decision
+from surveillance_behaviour.policy.world import Decision
 from surveillance_interfaces.msg import Decision as DecisionMessage
 from surveillance_interfaces.msg import (
     DoorStates,

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
-from surveillance_behaviour.mission import record as mission_record
+from surveillance_behaviour.mission import mission_log
 from surveillance_behaviour.policy.graph import PatrolGraph
 from surveillance_runtime.place import Place, read_place_file
 from surveillance_runtime.place.floor_plan import FloorPlan
@@ -60,13 +60,13 @@ def facts(plan: FloorPlan) -> str:
     return ' · '.join(parts)
 
 
-def run_of(events: Sequence[mission_record.Event], place: Place, source: str) -> Run:
+def run_of(events: Sequence[mission_log.Event], place: Place, source: str) -> Run:
     """Return what a mission's record adds to the picture of its place.
 
     Raises:
         CommandError: The record is of another place, or empty.
     """
-    summary = mission_record.summarize(events)
+    summary = mission_log.summarize(events)
     if not summary.visits:
         raise CommandError(f'{source}: nothing was recorded')
     unknown = sorted(set(summary.visits) - set(place.rooms))
@@ -89,7 +89,7 @@ def run_of(events: Sequence[mission_record.Event], place: Place, source: str) ->
 
 
 def _driven(
-    events: Sequence[mission_record.Event], place: Place
+    events: Sequence[mission_log.Event], place: Place
 ) -> list[list[tuple[float, float]]]:
     """Return the ways driven; where the record does not have one, it is the straight line."""
     ways = []
@@ -135,7 +135,7 @@ def _draw(options: argparse.Namespace) -> list[str]:
     run = None
     lines = [f'{options.place}: {facts(plan)}']
     if options.record:
-        events = mission_record.read(options.record)
+        events = mission_log.read(options.record)
         run = run_of(events, plan.place, str(options.record))
         lines.append(f'{options.record}: {run.summary}')
     title = options.place.stem.replace('_', ' ')
@@ -151,7 +151,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Check a place, draw it, and say what was found; the exit code is 2 for bad input."""
     try:
         lines = _draw(_parse(sys.argv[1:] if argv is None else argv))
-    except (CommandError, YamlFileError, TextureError, mission_record.RecordError) as error:
+    except (CommandError, YamlFileError, TextureError, mission_log.RecordError) as error:
         print(f'map: {error}', file=sys.stderr)
         return EXIT_BAD_INPUT
     print('\n'.join(lines))

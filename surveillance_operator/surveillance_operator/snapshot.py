@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from surveillance_behaviour.policy.situation import Decision
+from surveillance_behaviour.policy.world import Decision
 
 NO_POINTS: NDArray[np.float64] = np.empty((0, 2))
 BATTERY_STEP = 10

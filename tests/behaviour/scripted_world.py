@@ -11,22 +11,22 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from surveillance_behaviour.mission.battery_gauge import BatteryGauge
+from surveillance_behaviour.charging import BatteryMonitor
+from surveillance_behaviour.decider import Decider
+from surveillance_behaviour.decision import NowhereToGoError
 from surveillance_behaviour.mission.mission import Mission, MissionSettings
-from surveillance_behaviour.mission.record import MissionRecord
-from surveillance_behaviour.mission.resumption import CutOff
+from surveillance_behaviour.mission.mission_log import CutOff, MissionRecord
 from surveillance_behaviour.peers.ports import (
-    Beliefs,
     InterruptedWaitError,
     PeerError,
     Point,
     Ports,
     UnknownPlaceError,
 )
-from surveillance_behaviour.policy.chooser import Chooser
-from surveillance_behaviour.policy.rules import NowhereToGoError
-from surveillance_behaviour.policy.situation import Decision
+from surveillance_behaviour.policy.world import Decision
+from surveillance_behaviour.world_model import Experience
 from surveillance_fsm import Interrupt
+from surveillance_ontology.patrol_ontology import Snapshot
 
 SEVEN_ROOMS = {
     'R1': ['D1'],
@@ -108,9 +108,9 @@ class World:
 
     def __post_init__(self) -> None:
         self.clock = ScriptedClock()
-        self.gauge = BatteryGauge()
+        self.battery = BatteryMonitor()
         self.level = 100.0
-        self.gauge.set_level(self.level)
+        self.battery.set_level(self.level)
         self.place = self.start_place
         self.is_in = self.start_place
         self.at: Point = self.positions[self.start_place]
@@ -125,14 +125,13 @@ class World:
         self.arrivals: list[tuple[float, str]] = []
         self.calls: list[str] = []
         self.avoided: Callable[[], frozenset[str]] = frozenset
-        self.hear_of: Callable[[Decision], None] = lambda decision: None
         self._tick()
 
     # The battery.
 
     def _tick(self) -> None:
         self.clock.after(1.0, self._tick)
-        self.gauge.set_charging(self.docked())
+        self.battery.set_charging(self.docked())
         self.set_level(self.level + (self.charge if self.docked() else -self.draw))
 
     def set_level(self, level: float) -> None:
@@ -140,9 +139,9 @@ class World:
         if level < 0.0 <= self.level:
             self.stranded += 1
         self.level = min(100.0, max(-1e-9, level))
-        self.gauge.set_level(float(max(0, round(self.level))))
-        if (self.level < self.low_below) != self.gauge.low:
-            self.gauge.set_low(self.level < self.low_below)
+        self.battery.set_level(float(max(0, round(self.level))))
+        if (self.level < self.low_below) != self.battery.low:
+            self.battery.set_low(self.level < self.low_below)
 
     # The ports.
 
@@ -175,17 +174,17 @@ class World:
         self._call('set_urgency_threshold', interrupt)
         self.threshold = seconds
 
-    def beliefs(
+    def snapshot(
         self,
-        classes: Sequence[str],
         now: float,
+        classes: Sequence[str],
+        visits: Mapping[str, float],
         interrupt: Interrupt,
-        visits: Mapping[str, float] | None = None,
-    ) -> Beliefs:
-        self._call('beliefs', interrupt)
-        for place, seconds in (visits or {}).items():
-            if place in self.visited_at:
-                self.visited_at[place] = max(self.visited_at[place], seconds)
+    ) -> Snapshot:
+        self._call('snapshot', interrupt)
+        for place, at in visits.items():
+            if place in self.rooms and int(at) > int(self.visited_at[place]):
+                self.visited_at[place] = at
         urgent = self.urgent()
         members = {
             place: frozenset(
@@ -195,8 +194,9 @@ class World:
             )
             for place, doors in self.rooms.items()
         }
-        return Beliefs(
+        return Snapshot(
             place=self.is_in,
+            seen_at=0,
             reachable=self.neighbours(self.is_in),
             classes=members,
             visited_at={place: float(int(self.visited_at[place])) for place in self.rooms},
@@ -204,7 +204,6 @@ class World:
         )
 
     def await_place(self, place: str, seconds: float, interrupt: Interrupt) -> str:
-        self._call('await_place', interrupt)
         return self.is_in
 
     def position(self, place: str, interrupt: Interrupt) -> Point:
@@ -222,7 +221,7 @@ class World:
         return any(math.dist(self.at, self.positions[place]) < 1.0 for place in self.stations)
 
     def plan_path(self, start: Point, goal: Point, interrupt: Interrupt) -> list[Point]:
-        """Port of the first seed's planner."""
+        """Port of the planner."""
         self._call('plan', interrupt)
         middle = tuple((a + b) / 2 for a, b in zip(start, goal, strict=True))
         return [start, (middle[0], middle[1], middle[2]), goal]
@@ -237,29 +236,16 @@ class World:
             if not self.clock.sleep(seconds, interrupt):
                 raise InterruptedWaitError
             self.at = point
-        self.gauge.set_charging(self.docked())
+        self.battery.set_charging(self.docked())
         self.place = min(self.rooms, key=lambda room: math.dist(self.positions[room], self.at))
         self.is_in = self.place
         self.arrivals.append((self.clock.time, self.place))
         return self.at
 
-    # The second seed's peers.
+    # The peers of `patrol`.
 
     def start(self, interrupt: Interrupt) -> None:
         self._call('start', interrupt)
-
-    def reason(self, interrupt: Interrupt) -> str:
-        self._call('reason', interrupt)
-        now = self.clock.time
-        situation = self.chooser.look(now, interrupt, self.avoided())
-        try:
-            decision = self.chooser.choose(situation)
-        except NowhereToGoError as error:
-            raise PeerError('reason', str(error)) from None
-        self.chooser.saw(situation.place, now)
-        self.decisions.append(decision)
-        self.hear_of(decision)
-        return decision.place
 
     def control(self, via_points: Sequence[Point], interrupt: Interrupt) -> Point:
         self._call('control', interrupt)
@@ -289,28 +275,53 @@ class World:
         settings: MissionSettings | None = None,
         record: MissionRecord | None = None,
         cut_off: CutOff | None = None,
+        machine: str = 'surveillance',
+        experience: Experience | None = None,
     ) -> Mission:
         """A mission in this world."""
         settings = settings or MissionSettings(settle_seconds=0.0)
-        self.chooser = Chooser(settings.choice, self, self)
+        kind = ScriptedReasoner if machine == 'patrol' else Decider
+        self.decider = kind(
+            settings.choice, self, self, self.battery, experience, warn=self.said.append
+        )
+        self.decider.world_of_test = self  # type: ignore[attr-defined]
         ports = Ports(
-            knowledge=self,
+            ontology=self,
             places=self,
             announcer=self,
+            decisions=self.decider,
             motion=ScriptedMotion(self),
             routine=ScriptedRoutine(self),
         )
-        mission = Mission(
-            'scripted', settings, ports, self.gauge, self.clock, record, cut_off=cut_off
-        )
+        mission = Mission('scripted', settings, ports, self.battery, self.clock, record, cut_off)
         self.avoided = lambda: mission.recovery.avoided(mission.now())
-        self.hear_of = mission.note_decision
+        self.battery.watch(lambda: self.decider.learn_draw(self.clock.time))
         return mission
+
+
+class ScriptedReasoner(Decider):
+    """Decides in another process: what is called there may fail."""
+
+    world_of_test: World
+
+    def decide(
+        self,
+        now: float,
+        interrupt: Interrupt,
+        avoided: frozenset[str] = frozenset(),
+        *,
+        to_charge: bool = False,
+    ) -> Decision:
+        self.world_of_test._call('reason', interrupt)
+        try:
+            return super().decide(now, interrupt, avoided, to_charge=to_charge)
+        except NowhereToGoError as error:
+            raise PeerError('reason', str(error)) from None
 
 
 @dataclass
 class ScriptedMotion:
-    """The first seed's planner and controller; a port of its own, as both seeds have a ``plan``."""
+    """Planner and controller; a port of its own, since `patrol` has another ``plan``."""
 
     world: World
 
@@ -326,15 +337,12 @@ class ScriptedMotion:
 
 @dataclass
 class ScriptedRoutine:
-    """The second seed's peers."""
+    """The peers of `patrol`."""
 
     world: World
 
     def start(self, interrupt: Interrupt) -> None:
         self.world.start(interrupt)
-
-    def reason(self, interrupt: Interrupt) -> str:
-        return self.world.reason(interrupt)
 
     def plan(self, target: str, interrupt: Interrupt) -> list[Point]:
         world = self.world

@@ -5,7 +5,6 @@ from __future__ import annotations
 import tempfile
 import threading
 from pathlib import Path
-from typing import Any
 
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
@@ -17,18 +16,17 @@ from hypothesis.stateful import (
     run_state_machine_as_test,
 )
 
+from surveillance_behaviour.decision import DecisionSettings
 from surveillance_behaviour.machines import MACHINES
 from surveillance_behaviour.mission.mission import MissionSettings
-from surveillance_behaviour.mission.record import MissionRecord, read
+from surveillance_behaviour.mission.mission_log import MissionRecord, read
 from surveillance_behaviour.peers.ports import AwayError, PeerError
-from surveillance_behaviour.policy.chooser import ChoiceSettings
-from surveillance_behaviour.policy.situation import Decision
+from surveillance_behaviour.policy.world import Decision
 
 from .scripted_world import World
 
 CALLS = [
-    'beliefs',
-    'await_place',
+    'snapshot',
     'position',
     'plan',
     'follow',
@@ -60,12 +58,7 @@ class CheckedWorld(World):
             assert decision.place in urgent, decision
         elif corridors := {place for place in allowed if len(self.rooms[place]) > 1}:
             assert decision.place in corridors, decision
-        assert not self.gauge.low, f'skipped a low battery: {decision}'
-
-    def reason(self, interrupt: Any) -> str:
-        place = super().reason(interrupt)
-        self.check(self.decisions[-1])
-        return place
+        assert not self.battery.low, f'skipped a low battery: {decision}'
 
 
 class AnyOrder(RuleBasedStateMachine):
@@ -81,9 +74,9 @@ class AnyOrder(RuleBasedStateMachine):
         self.faults: dict[str, tuple[int, type[PeerError]]] = {}
         self.world.faults = self.fault
         self.record = MissionRecord(self.path)
-        choice = ChoiceSettings(urgency_threshold=THRESHOLD, policy='oldest')
+        choice = DecisionSettings(urgency_threshold=THRESHOLD, policy='oldest')
         mission_settings = MissionSettings(choice=choice, settle_seconds=0.0)
-        self.mission = self.world.mission(mission_settings, self.record)
+        self.mission = self.world.mission(mission_settings, self.record, machine=self.machine)
         self.fsm = MACHINES[self.machine](self.mission)
         self.go, self.halted = threading.Semaphore(0), threading.Semaphore(0)
         self.ended = False

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import threading
 from pathlib import Path
 
 import pytest
 
 from surveillance_behaviour.peers.armor_knowledge import ArmorKnowledge, Whereabouts
-from surveillance_behaviour.peers.ports import AwayError, InterruptedWaitError, PeerError
+from surveillance_behaviour.peers.ports import InterruptedWaitError, PeerError
 from surveillance_fsm import Interrupt
 from surveillance_ontology.armor.access import DATA
 from surveillance_ontology.armor.client import (
@@ -17,7 +16,7 @@ from surveillance_ontology.armor.client import (
     InProcessTransport,
 )
 from surveillance_ontology.armor.service import ArmorService
-from surveillance_ontology.patrol_ontology import PatrolOntology
+from surveillance_ontology.patrol_ontology import PatrolOntology, Snapshot
 from surveillance_runtime.place import read_place
 
 PLACE = read_place(Path(__file__).parents[2] / 'config' / 'seven_rooms.yaml')
@@ -29,83 +28,94 @@ NOBODY = Interrupt()
 def transport() -> InProcessTransport:
     transport = InProcessTransport(ArmorService())
     ontology = PatrolOntology(ArmorClient('builder', 'map', transport))
-    ontology.build(PLACE, str(DATA / 'surveillance.owl'), 'http://bnc/exp-rob-lab/2022-23')
+    ontology.build(PLACE, str(DATA / 'surveillance.owl'), 'http://bnc/exp-rob-lab/2022-23', 100)
     ontology.record_place('E', 1)
     return transport
 
 
 @pytest.fixture
-def ontology(transport: InProcessTransport) -> PatrolOntology:
-    return PatrolOntology(ArmorClient('test', 'map', transport))
+def armor(transport: InProcessTransport) -> ArmorClient:
+    return ArmorClient('test', 'map', transport)
 
 
 @pytest.fixture
-def whereabouts() -> Whereabouts:
-    return Whereabouts()
+def knowledge(transport: InProcessTransport) -> ArmorKnowledge:
+    return ArmorKnowledge('test', transport, Interrupt(), lambda _interrupt: 'map')
 
 
-@pytest.fixture
-def knowledge(transport: InProcessTransport, whereabouts: Whereabouts) -> ArmorKnowledge:
-    return ArmorKnowledge('test', transport, Interrupt(), lambda _interrupt: 'map', whereabouts)
+def ask(knowledge: ArmorKnowledge, now: float, **visits: float) -> Snapshot:
+    return knowledge.snapshot(now, RULES, visits, NOBODY)
 
 
-def test_beliefs_are_what_the_ontology_infers(knowledge: ArmorKnowledge) -> None:
+def test_a_snapshot_is_what_the_ontology_infers(knowledge: ArmorKnowledge) -> None:
     knowledge.set_urgency_threshold(30.0, NOBODY)
-    beliefs = knowledge.beliefs(RULES, 110.7, NOBODY, {'E': 100.0})
-    assert beliefs.place == 'E'
-    assert beliefs.reachable == ('C1', 'C2')
-    assert beliefs.connections['C1'] == ('C2', 'E', 'R1', 'R2')
-    assert beliefs.classes['C1'] == {'URGENT', 'CORRIDOR', 'ROOM'}
-    assert beliefs.classes['E'] == {'CORRIDOR', 'ROOM'}
-    assert beliefs.visited_at == {'E': 100.0}
+    found = ask(knowledge, 110.7)
+    assert found.place == 'E'
+    assert found.reachable == ('C1', 'C2')
+    assert found.connections['C1'] == ('C2', 'E', 'R1', 'R2')
+    assert found.classes['C1'] == {'CORRIDOR', 'ROOM'}
+    assert found.classes['R1'] == {'ROOM'}
+    assert set(found.visited_at.values()) == {100.0}
 
 
-def test_beliefs_wait_for_the_place_that_was_heard_of(
-    transport: InProcessTransport, ontology: PatrolOntology, whereabouts: Whereabouts
+@pytest.mark.parametrize(('now', 'urgent'), [(130.0, False), (131.0, True)])
+def test_places_become_urgent_beyond_the_threshold(
+    knowledge: ArmorKnowledge, now: float, urgent: bool
 ) -> None:
-    knowledge = ArmorKnowledge(
-        'test', transport, Interrupt(), lambda _interrupt: 'map', whereabouts, 10.0
-    )
-    whereabouts.note('C1', 500)
-    late = threading.Timer(0.1, lambda: ontology.record_place('C1', 500))
-    late.start()
-    assert knowledge.beliefs(RULES, 110.0, NOBODY).place == 'C1'
-    late.join()
+    knowledge.set_urgency_threshold(30.0, NOBODY)
+    assert ('URGENT' in ask(knowledge, now).classes['R1']) is urgent
 
 
-def test_beliefs_that_know_nothing_of_the_place_are_refused_in_time(
-    knowledge: ArmorKnowledge, whereabouts: Whereabouts
+def test_visits_that_the_ontology_does_not_know_are_told_with_the_question(
+    knowledge: ArmorKnowledge, armor: ArmorClient
 ) -> None:
-    whereabouts.note('C1', 500)
-    with pytest.raises(PeerError, match='armor: nobody told it where the robot is'):
-        knowledge.beliefs(RULES, 110.0, NOBODY)
-    whereabouts.note('', 600)
-    with pytest.raises(PeerError, match='armor: nobody told it where the robot is'):
-        knowledge.beliefs(RULES, 110.0, NOBODY)
+    ask(knowledge, 110.0)
+    found = ask(knowledge, 128.0, E=120.0, C1=127.9, R1=50.0)
+    assert (found.visited_at['E'], found.visited_at['C1']) == (120.0, 127.0)
+    assert found.visited_at['R1'] == 100.0, 'a later visit of somebody else stays'
+    assert armor.query.dataprop_b2_ind('now', 'Robot1') == ['"128"^^xsd:long']
 
 
-def test_a_place_is_waited_for_as_long_as_somebody_tells_it(
-    knowledge: ArmorKnowledge, whereabouts: Whereabouts
+def test_the_answer_knows_where_the_robot_was_heard_of_last(
+    transport: InProcessTransport, armor: ArmorClient
 ) -> None:
-    assert knowledge.await_place('C1', 60.0, NOBODY) == '', 'nobody ever told: no wait'
-    whereabouts.note('E', 1)
-    assert knowledge.await_place('C1', 0.05, NOBODY) == 'E'
-    late = threading.Timer(0.05, lambda: whereabouts.note('C1', 2))
-    late.start()
-    assert knowledge.await_place('C1', 60.0, NOBODY) == 'C1'
-    late.join()
-    raised = Interrupt()
-    threading.Timer(0.05, raised.set).start()
-    with pytest.raises(InterruptedWaitError):
-        knowledge.await_place('E', 60.0, raised)
+    heard = Whereabouts()
+    heard.note('C1', 5_000_000_000)
+    knowledge = ArmorKnowledge('test', transport, Interrupt(), lambda _interrupt: 'map', heard)
+    with pytest.raises(PeerError, match='nobody told it where the robot is'):
+        ask(knowledge, 110.0)
+    PatrolOntology(armor).record_place('C1', 5_000_000_000)
+    assert ask(knowledge, 110.0).place == 'C1'
+    assert knowledge.await_place('C1', 5.0, NOBODY) == 'C1'
+    assert knowledge.await_place('C2', 0.0, NOBODY) == 'C1'
+
+
+def test_a_lost_robot_is_named(knowledge: ArmorKnowledge, armor: ArmorClient) -> None:
+    armor.manipulation.remove_objectprop_from_ind('isIn', 'Robot1', 'E')
+    with pytest.raises(PeerError, match='Robot1 in no place'):
+        ask(knowledge, 110.0)
+
+
+def test_a_visit_time_that_is_none_is_named(knowledge: ArmorKnowledge, armor: ArmorClient) -> None:
+    armor.manipulation.add_dataprop_to_ind('visitedAt', 'R1', 'STRING', 'yesterday')
+    with pytest.raises(PeerError, match=r'inconsistent|visitedAt of R1'):
+        ask(knowledge, 110.0)
+
+
+def test_a_new_place_is_believed_at_once(knowledge: ArmorKnowledge, armor: ArmorClient) -> None:
+    before = ask(knowledge, 110.0)
+    armor.manipulation.add_objectprop_to_ind('hasDoor', 'R9', 'D1')
+    armor.manipulation.add_dataprop_to_ind('visitedAt', 'R9', 'LONG', '105')
+    after = ask(knowledge, 111.0)
+    assert set(after.connections) == {*before.connections, 'R9'}
 
 
 def test_an_unknown_ontology_is_asked_for_anew(transport: InProcessTransport) -> None:
     names = ['other', 'map']
     knowledge = ArmorKnowledge('test', transport, Interrupt(), lambda _interrupt: names.pop(0))
     with pytest.raises(PeerError, match="unknown reference 'other'"):
-        knowledge.set_urgency_threshold(5.0, NOBODY)
-    knowledge.set_urgency_threshold(5.0, NOBODY)
+        ask(knowledge, 110.0)
+    assert ask(knowledge, 110.0).place == 'E'
 
 
 def test_an_interrupted_call_is_no_fault_of_the_server(transport: InProcessTransport) -> None:
@@ -118,6 +128,6 @@ def test_an_interrupted_call_is_no_fault_of_the_server(transport: InProcessTrans
     transport.call_list = cut_off  # type: ignore[method-assign, assignment]
     knowledge = ArmorKnowledge('test', transport, Interrupt(), lambda _interrupt: 'map')
     with pytest.raises(InterruptedWaitError):
-        knowledge.beliefs(RULES, 1.0, raised)
-    with pytest.raises(AwayError, match='armor: interrupted'):
-        knowledge.beliefs(RULES, 1.0, Interrupt())
+        knowledge.snapshot(110.0, RULES, {}, raised)
+    with pytest.raises(PeerError, match='armor: interrupted'):
+        ask(knowledge, 110.0)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from sensor_msgs.msg import BatteryState
 
 from surveillance_behaviour import conversions
-from surveillance_behaviour.policy.situation import Decision
+from surveillance_behaviour.policy.world import Decision
 
 numbers = st.floats(allow_nan=False, allow_infinity=False)
 names = st.text('ABCR0123456789_', min_size=1, max_size=6)

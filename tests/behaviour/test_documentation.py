@@ -18,4 +18,4 @@ DOCUMENT = Path(__file__).parents[2] / 'docs' / 'behaviour.md'
 @pytest.mark.parametrize('name', list(MACHINES))
 def test_the_drawing_is_the_machine(name: str) -> None:
     drawings = re.findall(r'```mermaid\n(.*?)```', DOCUMENT.read_text(encoding='utf-8'), re.DOTALL)
-    assert to_mermaid(MACHINES[name](World().mission())) in drawings
+    assert to_mermaid(MACHINES[name](World().mission(machine=name))) in drawings

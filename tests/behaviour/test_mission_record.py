@@ -12,8 +12,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from surveillance_behaviour.mission.record import MissionRecord, RecordError, read, summarize
-from surveillance_behaviour.mission.resumption import CutOff, cut_off
+from surveillance_behaviour.mission.mission_log import (
+    CutOff,
+    MissionRecord,
+    RecordError,
+    cut_off,
+    read,
+    summarize,
+)
 
 
 @pytest.fixture
@@ -39,7 +45,7 @@ def test_what_was_written_is_read_back(path: Path) -> None:
 def test_a_killed_writer_loses_nothing(path: Path) -> None:
     program = (
         'import os, signal, sys\n'
-        'from surveillance_behaviour.mission.record import MissionRecord\n'
+        'from surveillance_behaviour.mission.mission_log import MissionRecord\n'
         'record = MissionRecord(sys.argv[1])\n'
         'record.start(0.0, "surveillance", "E", ["E"])\n'
         'for turn in range(50):\n'
@@ -133,14 +139,11 @@ RECHARGE = ('recharge', {'place': 'E', 'seconds': 9.0})
     [
         ([], None),
         ([START], CutOff(0.0, 'E')),
-        ([START, VISIT, EXPLORING], CutOff(2.0, 'C1', 3.5, visits={'C1': 1.0})),
+        ([START, VISIT, EXPLORING], CutOff(2.0, 'C1', 3.5)),
         ([START, DECISION], CutOff(1.0, 'E', math.inf, left=True)),
-        ([START, DECISION, VISIT], CutOff(2.0, 'C1', visits={'C1': 2.0})),
+        ([START, DECISION, VISIT], CutOff(2.0, 'C1')),
         ([START, TO_CHARGE], CutOff(1.0, 'E', math.inf, left=True, charging='it is low')),
-        (
-            [START, TO_CHARGE, VISIT],
-            CutOff(2.0, 'C1', charging='it is low', visits={'C1': 2.0}),
-        ),
+        ([START, TO_CHARGE, VISIT], CutOff(2.0, 'C1', charging='it is low')),
         ([START, TO_CHARGE, RECHARGE], CutOff(2.0, 'E', math.inf)),
         ([START, DECISION, START], CutOff(2.0, 'E', math.inf, left=True)),
         ([START, DECISION, ('end', {})], None),

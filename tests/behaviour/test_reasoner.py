@@ -6,7 +6,7 @@ import threading
 from typing import Any
 
 from surveillance_behaviour.peers.ports import PeerError
-from surveillance_behaviour.policy.situation import Decision
+from surveillance_behaviour.policy.world import Decision
 from surveillance_behaviour.reasoner_node import Reasoner
 from surveillance_interfaces.srv import Reason
 
@@ -23,7 +23,7 @@ def test_requests_that_come_while_a_choice_is_made_share_the_next_one(
         assert done.wait(10.0)
         raise PeerError('armor', 'away')
 
-    monkeypatch.setattr(reasoner._chooser, 'look', look)
+    monkeypatch.setattr(reasoner._decider, 'decide', look)
     client = graph.node.create_client(Reason, 'reason')
     graph.until(client.service_is_ready)
     answers = [client.call_async(Reason.Request())]
@@ -46,7 +46,7 @@ def test_a_choice_that_begins_at_once_is_given_once(graph: Any, monkeypatch: Any
     answers = iter(['C1', 'C2'])
     begun = threading.Event()
 
-    def choose_now(_situation: Any) -> Any:
+    def choose_now(*_: Any) -> Any:
         return Decision(0.0, 'E', next(answers), 'E', 'ROOM', 'tour', '', {})
 
     put = reasoner._work.run
@@ -59,8 +59,7 @@ def test_a_choice_that_begins_at_once_is_given_once(graph: Any, monkeypatch: Any
         return future
 
     graph_pause = threading.Event()
-    monkeypatch.setattr(reasoner._chooser, 'look', lambda *_: None)
-    monkeypatch.setattr(reasoner._chooser, 'choose', choose_now)
+    monkeypatch.setattr(reasoner._decider, 'decide', choose_now)
     monkeypatch.setattr(reasoner._work, 'run', run_and_wait)
     client = graph.node.create_client(Reason, 'reason')
     graph.until(client.service_is_ready)

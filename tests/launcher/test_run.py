@@ -20,7 +20,7 @@ from launcher.run import (
     watch_command,
     write_own_parameters,
 )
-from surveillance_behaviour.mission.record import MissionRecord
+from surveillance_behaviour.mission.mission_log import MissionRecord
 
 
 def error_of(run: Run) -> str:

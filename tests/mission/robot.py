@@ -12,7 +12,7 @@ import yaml
 from rclpy.parameter import Parameter
 
 from surveillance_behaviour.initial_state_node import InitialState
-from surveillance_behaviour.mission.record import Event, Summary, read, summarize
+from surveillance_behaviour.mission.mission_log import Event, Summary, read, summarize
 from surveillance_behaviour.reasoner_node import Reasoner
 from surveillance_behaviour.robot_behavior_node import RobotBehavior
 from surveillance_controllers.battery_controller_node import BatteryController

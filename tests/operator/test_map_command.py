@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from surveillance_behaviour.mission.record import MissionRecord
+from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_operator import map_command
 from surveillance_runtime.place.canvas import Canvas, blend
 from surveillance_runtime.place.picture import draw_place
@@ -69,10 +69,10 @@ def test_a_run_is_drawn_with_its_waits(
 
 
 def test_driven_ways_come_from_the_record_or_are_straight(record: Path) -> None:
-    from surveillance_behaviour.mission import record as mission_record
+    from surveillance_behaviour.mission import mission_log
 
     place = read_world(CONFIG / 'seven_rooms.yaml').plan.place
-    run = map_command.run_of(mission_record.read(record), place, 'run')
+    run = map_command.run_of(mission_log.read(record), place, 'run')
     assert run.driven == [
         [(5.0, 10.0), (10.0, 8.0)],
         [(10.0, 8.0), (10.0, 6.5), (10.0, 5.0)],

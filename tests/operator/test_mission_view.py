@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rich.console import Console
 
-from surveillance_behaviour.policy.situation import Decision
+from surveillance_behaviour.policy.world import Decision
 from surveillance_operator.snapshot import Grid, Snapshot, Status, changes
 from surveillance_operator.watch import raster
 from surveillance_operator.watch.raster import Frame, rasterise

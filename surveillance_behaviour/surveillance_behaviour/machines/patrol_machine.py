@@ -1,7 +1,8 @@
 """The patrol machine: ask the reasoner for a place, point the way, drive there, charge in between.
 
-States and outcomes are those of the second seed; ``failed`` and the recovery states are this
-project's. A low battery ends Reasoning, Pointing and Controlling at once: what runs is cancelled.
+States and outcomes follow the behaviour diagram of the assignment "patrol"; ``failed`` and the
+recovery states are this project's. A low battery ends Reasoning, Pointing and Controlling at once:
+what runs is cancelled.
 On the way to the dock it is known already and ends nothing.
 """
 
@@ -10,7 +11,8 @@ from __future__ import annotations
 from typing import Any
 
 import surveillance_fsm as fsm
-from surveillance_behaviour.machines.path_checks import check_arrival, check_path, path_length
+from surveillance_behaviour.charging import charge
+from surveillance_behaviour.decision import RECHARGE
 from surveillance_behaviour.machines.shared_states import (
     FAILED,
     PREEMPTED,
@@ -18,16 +20,19 @@ from surveillance_behaviour.machines.shared_states import (
     Recover,
     WaitForHelp,
     add,
+    check_arrival,
+    check_path,
+    path_length,
 )
 from surveillance_behaviour.mission.mission import Mission
 from surveillance_behaviour.mission.recovery import Step
-from surveillance_behaviour.peers.ports import InterruptedWaitError, PeerError, Point, Routine
+from surveillance_behaviour.peers.ports import Point, Routine
 
 BATTERY_LOW = 'battery_low'
 
 
 class RoutineState(MissionState):
-    """A state that talks to the second seed's peers."""
+    """A state that talks to the peers of the behaviour `patrol`."""
 
     @property
     def routine(self) -> Routine:
@@ -47,7 +52,7 @@ class Initial(RoutineState):
 
     def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
         self.routine.start(interrupt)
-        self.mission.ports.knowledge.wait_until_built(interrupt)
+        self.mission.ports.ontology.wait_until_built(interrupt)
         self.mission.begin(interrupt)
         return 'start'
 
@@ -62,14 +67,13 @@ class Reasoning(RoutineState):
 
     def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
         mission = self.mission
-        mission.look(interrupt)
-        with mission.gauge.interrupting(interrupt, lambda: bool(mission.why_charge())) as either:
-            target = self.routine.reason(either)
-        mission.heading_to = ud.target = target
-        return 'reasoned'
+        with mission.battery.interrupting(interrupt, lambda: mission.battery.low) as either:
+            decision = mission.decide(either)
+        ud.target = decision.place
+        return BATTERY_LOW if decision.rule == RECHARGE else 'reasoned'
 
     def interrupted(self, ud: Any) -> str:
-        self.mission.say(self.mission.why_charge())
+        self.mission.say(f'the battery is low ({self.mission.battery.level_text()})')
         return BATTERY_LOW
 
 
@@ -96,8 +100,8 @@ class MovingState(RoutineState):
         self._heeds_battery = heeds_battery
 
     def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
-        gauge = self.mission.gauge
-        with gauge.interrupting(interrupt, lambda: self._heeds_battery and gauge.low) as either:
+        battery = self.mission.battery
+        with battery.interrupting(interrupt, lambda: self._heeds_battery and battery.low) as either:
             self.move(ud, either)
         return self._outcome
 
@@ -106,7 +110,8 @@ class MovingState(RoutineState):
         raise NotImplementedError
 
     def interrupted(self, ud: Any) -> str:
-        self.mission.say(f'battery low ({self.mission.level_text()}): {self.task} is cancelled')
+        level = self.mission.battery.level_text()
+        self.mission.say(f'battery low ({level}): {self.task} is cancelled')
         return BATTERY_LOW
 
     def goal(self, ud: Any) -> str | None:
@@ -130,7 +135,7 @@ class Pointing(MovingState):
 
 
 class Controlling(MovingState):
-    """Drives through the via points and notes the visit."""
+    """Drives through the via points; the motion controller notes the visit."""
 
     task = 'controlling'
 
@@ -183,40 +188,29 @@ class Recharge(RoutineState):
         super().__init__(mission, ['battery_full', 'not_at_dock'], output_keys=['target'])
 
     def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
-        mission = self.mission
+        mission, settings = self.mission, self.mission.settings
         self.charging = False
-        mission.look(interrupt)
         if not mission.at_station():
-            why = mission.why_charge() or 'charging was begun'
-            ud.target = mission.choose_station(interrupt, why).place
-            return 'not_at_dock'
+            decision = mission.pending
+            if decision is None or decision.rule != RECHARGE:
+                decision = mission.decide(interrupt, to_charge=True)
+            ud.target = decision.place
+            return 'not_at_dock' if decision.rule == RECHARGE else 'battery_full'
         self.charging = True
         ud.target = mission.place
         began = mission.now()
-        mission.say(f'charging in {mission.place} ({mission.level_text()})')
-        self._charge(interrupt)
-        with mission.gauge.interrupting(interrupt, mission.charged_enough) as told:
-            told.wait(mission.settings.settle_seconds)
-        if not mission.charged_enough():
-            raise PeerError('recharge', f'it ended at {mission.level_text()}')
-        mission.charged(mission.place, mission.now() - began)
+        mission.say(f'charging in {mission.place} ({mission.battery.level_text()})')
+        charge(
+            mission.battery,
+            mission.charged_enough,
+            mission.clock,
+            interrupt,
+            stall_seconds=settings.charge_stall_seconds,
+            settle_seconds=settings.settle_seconds,
+            recharge=self.routine.recharge,
+        )
+        mission.charged(mission.now() - began)
         return 'battery_full'
-
-    def _charge(self, interrupt: fsm.Interrupt) -> None:
-        """Has the battery charged until the peer says it is done.
-
-        Raises:
-            PeerError: It does not charge, or the robot was moved off the station.
-        """
-        gauge = self.mission.gauge
-        while True:
-            self.mission.await_contact(interrupt)
-            with gauge.interrupting(interrupt, lambda: gauge.charging is False) as off:
-                try:
-                    return self.routine.recharge(off)
-                except InterruptedWaitError:
-                    if interrupt.is_set():
-                        raise
 
     def goal(self, ud: Any) -> str | None:
         return self.mission.place if self.charging else None
@@ -262,7 +256,7 @@ def recharge_routine(mission: Mission) -> fsm.StateMachine:
 
 
 def patrol_machine(mission: Mission) -> fsm.StateMachine:
-    """The second seed's machine with its recovery; it ends only when it is preempted."""
+    """Return the machine `patrol` with its recovery; it ends only when it is preempted."""
     machine = fsm.StateMachine([PREEMPTED])
     machine.set_name('patrol')
     machine.set_clock(mission.clock)

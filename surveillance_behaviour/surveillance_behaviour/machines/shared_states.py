@@ -1,15 +1,17 @@
-"""States that both machines have: the base of all, recovery, going back, waiting for help."""
+"""What both machines share: the base of their states, recovery, waiting for help, path checks."""
 
 from __future__ import annotations
 
+import itertools
+import math
 from collections.abc import Iterable, Mapping
 from typing import Any
 
 import surveillance_fsm as fsm
+from surveillance_behaviour.decision import NowhereToGoError
 from surveillance_behaviour.mission.mission import Mission
 from surveillance_behaviour.mission.recovery import Step
-from surveillance_behaviour.peers.ports import AwayError, InterruptedWaitError, PeerError
-from surveillance_behaviour.policy.rules import NowhereToGoError
+from surveillance_behaviour.peers.ports import AwayError, InterruptedWaitError, PeerError, Point
 
 PREEMPTED = 'preempted'
 FAILED = 'failed'
@@ -87,10 +89,14 @@ class Recover(fsm.State):
         if self.preempt_requested():
             self.service_preempt()
             return PREEMPTED
-        step = self.mission.next_step(may_go_back=Step.GO_BACK in self._steps)
+        mission = self.mission
+        assert mission.failure is not None
+        step = mission.recovery.next_step(
+            mission.failure, mission.now(), may_go_back=Step.GO_BACK in self._steps
+        )
         if step not in self._steps:
             step = Step.WAIT_FOR_HELP
-        self.mission.say(f'recovery: {WORDS[step]}')
+        mission.say(f'recovery: {WORDS[step]}')
         return step.value
 
 
@@ -116,7 +122,7 @@ class WaitForHelp(fsm.State):
         reason = 'nothing works' if failure is None else f'{failure.what} failed: {failure.reason}'
         seconds = mission.recovery.pause()
         mission.ports.announcer.waiting_for_help(
-            f'{reason} (in {mission.place or "an unknown place"}, {mission.level_text()}; '
+            f'{reason} (in {mission.place or "an unknown place"}, {mission.battery.level_text()}; '
             f'trying again in {seconds:g} s)'
         )
         if not self.wait(seconds):
@@ -136,3 +142,39 @@ def add(
     bound: dict[str, str | None] = {PREEMPTED: PREEMPTED}
     bound.update(transitions)
     fsm.StateMachine.add(label, state, bound, remapping)
+
+
+def path_length(path: list[Point]) -> float:
+    """Length of a path, metres."""
+    return sum(math.dist(start, end) for start, end in itertools.pairwise(path))
+
+
+def check_path(path: list[Point], goal: Point | None, tolerance: float, peer: str) -> None:
+    """Refuses a path that leads nowhere, or elsewhere.
+
+    Raises:
+        PeerError: It is empty, not finite, or ends too far from ``goal``.
+    """
+    if not path:
+        raise PeerError(peer, 'the path has no points')
+    if not all(math.isfinite(value) for point in path for value in point):
+        raise PeerError(peer, 'the path has a point that is not finite')
+    if goal is not None and math.dist(path[-1][:2], goal[:2]) > tolerance:
+        raise PeerError(
+            peer,
+            f'the path ends {math.dist(path[-1][:2], goal[:2]):.2f} m from the goal, expected '
+            f'at most {tolerance:g} m',
+        )
+
+
+def check_arrival(end: Point, goal: Point, tolerance: float, peer: str) -> None:
+    """Refuses an arrival that is none.
+
+    Raises:
+        PeerError: The robot stopped too far from ``goal``.
+    """
+    away = math.dist(end[:2], goal[:2])
+    if not away <= tolerance:
+        raise PeerError(
+            peer, f'the robot stopped {away:.2f} m short, expected at most {tolerance:g} m'
+        )

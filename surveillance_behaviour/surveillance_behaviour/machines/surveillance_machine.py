@@ -1,16 +1,15 @@
 """The surveillance machine: explore or charge where the robot is, choose the next room, move there.
 
-States and outcomes are those of the first seed; ``failed`` and the recovery states are this
-project's. One round of the machine is one room.
+States and outcomes follow the diagram of the assignment "surveillance"; ``failed`` and the recovery
+states are this project's. One round of the machine is one room.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import surveillance_fsm as fsm
-from surveillance_behaviour.machines.path_checks import check_arrival, check_path, path_length
+from surveillance_behaviour.charging import charge
 from surveillance_behaviour.machines.shared_states import (
     FAILED,
     PREEMPTED,
@@ -18,13 +17,16 @@ from surveillance_behaviour.machines.shared_states import (
     Recover,
     WaitForHelp,
     add,
+    check_arrival,
+    check_path,
+    path_length,
 )
 from surveillance_behaviour.mission.mission import Mission
-from surveillance_behaviour.peers.ports import InterruptedWaitError, PeerError, Point
-from surveillance_behaviour.policy.graph import GraphError
+from surveillance_behaviour.mission.recovery import Step
+from surveillance_behaviour.peers.ports import Point
 
-LONG = 1e6
-"""One wait without a limit, seconds; it is repeated as long as need be."""
+NOTE_SECONDS = 1.0
+"""The shortest time between two notes of how far a place is explored, seconds."""
 
 
 class Initialization(MissionState):
@@ -36,7 +38,7 @@ class Initialization(MissionState):
         super().__init__(mission, ['initialized'])
 
     def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
-        self.mission.ports.knowledge.wait_until_built(interrupt)
+        self.mission.ports.ontology.wait_until_built(interrupt)
         self.mission.begin(interrupt)
         return 'initialized'
 
@@ -52,7 +54,7 @@ class ChooseRoomTask(fsm.State):
         if self.preempt_requested():
             self.service_preempt()
             return PREEMPTED
-        must_charge = self.mission.at_station() and self.mission.why_charge()
+        must_charge = self.mission.at_station() and self.mission.ports.decisions.why_charge()
         return 'recharge' if must_charge else 'explore'
 
 
@@ -65,14 +67,28 @@ class ExploreTask(fsm.State):
 
     def execute(self, ud: Any) -> str:
         mission = self.mission
-        with mission.gauge.interrupting(self.interrupt, lambda: bool(mission.why_charge())) as wake:
-            whole = mission.explore(wake)
+        why = mission.ports.decisions.why_charge
+        with mission.battery.interrupting(self.interrupt, lambda: bool(why())) as wake:
+            whole = self._explore(wake)
         if self.preempt_requested():
             self.service_preempt()
             return PREEMPTED
         if not whole:
-            mission.say(f'exploring {mission.place} ends early: {mission.why_charge()}')
+            mission.say(f'exploring {mission.place} ends early: {why()}')
         return 'explored'
+
+    def _explore(self, interrupt: fsm.Interrupt) -> bool:
+        """Explore the place for its time, or what is left of it after a restart; whether it did."""
+        mission = self.mission
+        seconds = mission.settings.choice.exploration_seconds
+        begin = mission.now() - min(mission.explored, seconds)
+        mission.explored = 0.0
+        while (left := begin + seconds - mission.now()) > 0.0:
+            if not mission.clock.sleep(min(left, max(NOTE_SECONDS, seconds / 20.0)), interrupt):
+                return False
+            explored = round(mission.now() - begin, 3)
+            mission.note('exploring', place=mission.place, seconds=explored)
+        return True
 
 
 class RechargeTask(MissionState):
@@ -85,32 +101,19 @@ class RechargeTask(MissionState):
         super().__init__(mission, ['recharged'])
 
     def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
-        mission = self.mission
-        place, began = mission.place, mission.now()
-        mission.say(f'charging in {place} ({mission.level_text()}, {mission.why_charge()})')
-        while not mission.charged_enough():
-            limit = mission.settings.charge_stall_seconds
-            with mission.gauge.interrupting(interrupt, self._news()) as wake:
-                late = mission.clock.sleep(limit if limit > 0.0 else LONG, wake)
-            if interrupt.is_set():
-                raise InterruptedWaitError
-            if mission.gauge.charging is False:
-                mission.await_contact(interrupt)
-            elif late and limit > 0.0:
-                raise PeerError('battery', f'still at {mission.level_text()} after {limit:g} s')
-        mission.charged(place, mission.now() - began)
+        mission, began = self.mission, self.mission.now()
+        why = mission.ports.decisions.why_charge()
+        mission.say(f'charging in {mission.place} ({mission.battery.level_text()}, {why})')
+        charge(
+            mission.battery,
+            mission.charged_enough,
+            mission.clock,
+            interrupt,
+            stall_seconds=mission.settings.charge_stall_seconds,
+            settle_seconds=mission.settings.settle_seconds,
+        )
+        mission.charged(mission.now() - began)
         return 'recharged'
-
-    def _news(self) -> Callable[[], bool]:
-        """Whether the level has risen, or the battery is not being charged."""
-        mission, before = self.mission, self.mission.gauge.level
-
-        def news() -> bool:
-            level = mission.gauge.level
-            risen = level is not None and (before is None or level > before)
-            return risen or mission.gauge.charging is False or mission.charged_enough()
-
-        return news
 
     def goal(self, ud: Any) -> str | None:
         return self.mission.place
@@ -125,7 +128,7 @@ class ChooseNextRoom(MissionState):
         super().__init__(mission, ['chosen'], output_keys=['next_room'])
 
     def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
-        ud.next_room = self.mission.choose(interrupt).place
+        ud.next_room = self.mission.decide(interrupt).place
         return 'chosen'
 
 
@@ -137,16 +140,13 @@ class Move(MissionState):
         self._outcome = outcome
 
     def move(self, place: str, interrupt: fsm.Interrupt) -> str:
-        """Moves the robot.
+        """Move the robot to a place.
 
         Raises:
             PeerError: It did not get there.
         """
-        mission = self.mission
-        if not mission.astray:
-            mission.leaves()
-        path = self._drive(mission.place, place, interrupt)
-        mission.arrived(place, path_length(path), path)
+        path = self._drive(self.mission.place, place, interrupt)
+        self.mission.arrived(place, path_length(path), path)
         return self._outcome
 
     def _drive(self, before: str, place: str, interrupt: fsm.Interrupt) -> list[Point]:
@@ -171,16 +171,15 @@ class Move(MissionState):
         mission = self.mission
         if mission.recovery.tries(place) < max(1, mission.settings.recovery.path_tries - 1):
             return [goal]
-        try:
-            way = mission.chooser.graph.without_leg(before, place).route(before, place)
-        except (GraphError, KeyError):
+        way = mission.ports.decisions.route_round(before, place)
+        if not way:
             return [goal]
         mission.say(f'trying the way round: {" - ".join((before, *way))}')
         return [*(mission.ports.places.position(room, interrupt) for room in way[:-1]), goal]
 
 
 class MoveToNextRoom(Move):
-    """Notes the visit of the room it leaves, and moves to the next."""
+    """Moves to the next room."""
 
     task = 'moving'
 
@@ -209,7 +208,7 @@ class ReturnToLastPlace(Move):
 
 
 def surveillance_machine(mission: Mission) -> fsm.StateMachine:
-    """The first seed's machine with its recovery; it ends only when it is preempted."""
+    """Return the machine `surveillance` with its recovery; it ends only when it is preempted."""
     tasks = fsm.StateMachine(['explored', 'recharged', FAILED, PREEMPTED])
     with tasks:
         add(
@@ -276,8 +275,10 @@ class ReDock(fsm.State):
         if self.preempt_requested():
             self.service_preempt()
             return PREEMPTED
-        if self.mission.next_step() != 'another_path':
+        mission = self.mission
+        assert mission.failure is not None
+        if mission.recovery.next_step(mission.failure, mission.now()) != Step.ANOTHER_PATH:
             return 'give_up'
-        ud.next_room = self.mission.place
-        self.mission.say(f'driving to the station in {self.mission.place} again')
+        ud.next_room = mission.place
+        mission.say(f'driving to the station in {mission.place} again')
         return 'again'

@@ -1,1 +1,1 @@
-"""The rest of the robot as the machines see it: ports, and their ROS side."""
+"""Whom the machines talk to: the ports, and what stands behind them on the robot."""

@@ -9,7 +9,7 @@ from collections.abc import Callable
 import surveillance_fsm as fsm
 from surveillance_behaviour import conversions
 from surveillance_behaviour.mission.mission import Mission
-from surveillance_behaviour.policy.situation import Decision
+from surveillance_behaviour.policy.world import Decision
 from surveillance_interfaces.msg import Decision as DecisionMessage
 from surveillance_interfaces.msg import MissionStatus
 from surveillance_runtime.node import PatrolNode
@@ -40,10 +40,10 @@ class RosAnnouncer:
 
     Args:
         node: The node that speaks.
-        decisions: Where decisions go.
+        decisions: Where decisions go; None: whoever decides publishes them.
     """
 
-    def __init__(self, node: PatrolNode, decisions: DecisionTopic) -> None:
+    def __init__(self, node: PatrolNode, decisions: DecisionTopic | None) -> None:
         self._node = node
         self._decisions = decisions
         self._lock = threading.Lock()
@@ -56,7 +56,7 @@ class RosAnnouncer:
         """Reports this machine's state from now on, at every transition and every message."""
 
         def status() -> MissionStatus:
-            level = mission.gauge.level
+            level = mission.battery.level
             return MissionStatus(
                 stamp=self._node.get_clock().now().to_msg(),
                 machine=mission.machine,
@@ -76,7 +76,8 @@ class RosAnnouncer:
 
     def decision(self, decision: Decision) -> None:
         """A place was chosen."""
-        self._decisions.publish(decision)
+        if self._decisions is not None:
+            self._decisions.publish(decision)
 
     def say(self, text: str, *, warning: bool = False) -> None:
         """Logs and publishes."""

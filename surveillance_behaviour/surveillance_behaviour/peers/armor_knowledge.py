@@ -11,7 +11,6 @@ from typing import Protocol
 import surveillance_fsm as fsm
 from surveillance_behaviour.peers.ports import (
     AwayError,
-    Beliefs,
     InterruptedWaitError,
     PeerError,
 )
@@ -21,7 +20,7 @@ from surveillance_ontology.armor.client import (
     ArmorServiceInternalError,
     Transport,
 )
-from surveillance_ontology.patrol_ontology import OntologyNotReadyError, PatrolOntology
+from surveillance_ontology.patrol_ontology import OntologyNotReadyError, PatrolOntology, Snapshot
 
 
 class Wake(Protocol):
@@ -131,19 +130,19 @@ class ArmorKnowledge:
             raise InterruptedWaitError
         return found
 
-    def beliefs(
+    def snapshot(
         self,
-        classes: Sequence[str],
         now: float,
+        classes: Sequence[str],
+        visits: Mapping[str, float],
         interrupt: fsm.Interrupt,
-        visits: Mapping[str, float] | None = None,
-    ) -> Beliefs:
+    ) -> Snapshot:
         """Tells the time and what the ontology does not know of ``visits``; asks what follows.
 
         The answer knows where the robot is by the last that was heard of it.
         """
         with self._talking(interrupt):
-            found = self._ontology.snapshot(
+            return self._ontology.snapshot(
                 now,
                 classes,
                 not_before=self._whereabouts.stamp,
@@ -151,13 +150,6 @@ class ArmorKnowledge:
                 patience=self._patience,
                 interrupt=interrupt,
             )
-        return Beliefs(
-            place=found.place,
-            reachable=found.reachable,
-            classes=found.classes,
-            visited_at=found.visited_at,
-            connections=found.connections,
-        )
 
     @contextmanager
     def _talking(self, interrupt: fsm.Interrupt) -> Iterator[None]:

@@ -12,8 +12,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from surveillance_behaviour.policy.situation import Decision
+from surveillance_behaviour.policy.world import Decision
 from surveillance_fsm import Interrupt
+from surveillance_ontology.patrol_ontology import Snapshot
 
 Point = tuple[float, float, float]
 """x, y, z in metres, world frame."""
@@ -45,45 +46,35 @@ class InterruptedWaitError(Exception):
     """The interrupt was raised while a port was at work; what ran on the peer was cancelled."""
 
 
-@dataclass(frozen=True)
-class Beliefs:
-    """What the ontology says, all of one moment.
-
-    Attributes:
-        place: Where the robot is.
-        reachable: Where it can go from there in one move.
-        classes: The classes of every place, as far as the rules ask for them.
-        visited_at: When each place was visited last, seconds; without those that never were.
-        connections: The neighbours of every place.
-    """
-
-    place: str
-    reachable: tuple[str, ...]
-    classes: Mapping[str, frozenset[str]]
-    visited_at: Mapping[str, float]
-    connections: Mapping[str, tuple[str, ...]]
-
-
-class Knowledge(Protocol):
-    """The ontology."""
+class Ontology(Protocol):
+    """What the robot and its ontology say to each other."""
 
     def wait_until_built(self, interrupt: Interrupt) -> None:
-        """Returns once the map is in the ontology."""
+        """Return once the map is in the ontology."""
 
     def set_urgency_threshold(self, seconds: float, interrupt: Interrupt) -> None:
-        """Sets the time after which a place becomes URGENT."""
+        """Set the time after which a place becomes URGENT."""
 
-    def beliefs(
+    def snapshot(
         self,
-        classes: Sequence[str],
         now: float,
+        classes: Sequence[str],
+        visits: Mapping[str, float],
         interrupt: Interrupt,
-        visits: Mapping[str, float] | None = None,
-    ) -> Beliefs:
-        """Tells the ontology the time and the visits that it does not know; asks what follows."""
+    ) -> Snapshot:
+        """Tell the time and the visits that the ontology does not know, and ask what follows.
+
+        The answer knows where the robot is by the last that was heard of it.
+
+        Args:
+            now: The robot's time, seconds.
+            classes: The classes of places that matter.
+            visits: When the robot was in each place last, seconds.
+            interrupt: Ends it.
+        """
 
     def await_place(self, place: str, seconds: float, interrupt: Interrupt) -> str:
-        """Waits until the robot is in ``place``, for a while; where it is then, empty: unknown."""
+        """Wait until the robot is in ``place``, for a while; where it is then, empty: unknown."""
 
 
 class Places(Protocol):
@@ -93,8 +84,57 @@ class Places(Protocol):
         """A point in the place; raises UnknownPlaceError when there is no such place."""
 
 
+class Decisions(Protocol):
+    """Who decides where the robot goes: a `Decider`, here or in another process."""
+
+    @property
+    def places(self) -> frozenset[str]:
+        """All places of the map, as far as is known."""
+
+    def begin(self, now: float, interrupt: Interrupt) -> str:
+        """Look at the map for the first time; where the robot is."""
+
+    def decide(
+        self,
+        now: float,
+        interrupt: Interrupt,
+        avoided: frozenset[str],
+        *,
+        to_charge: bool = False,
+    ) -> Decision:
+        """Choose where to go next; raises NowhereToGoError when nothing can be reached.
+
+        Args:
+            now: Seconds on the mission's clock.
+            interrupt: Ends it.
+            avoided: Places that could not be reached lately.
+            to_charge: Only a charging place will do.
+        """
+
+    def why_charge(self) -> str:
+        """Why the robot must charge now, as a sentence; empty: it need not."""
+
+    def send_to_charge(self, why: str) -> None:
+        """Have the robot charge before anything else."""
+
+    def saw(self, place: str, now: float) -> None:
+        """The robot is in ``place``."""
+
+    def arrived(self, place: str, now: float, metres: float | None = None) -> None:
+        """The robot has come to ``place`` over a path of so many metres."""
+
+    def disturbed(self) -> None:
+        """The present drive is no example of how long a leg takes."""
+
+    def charged(self) -> None:
+        """The battery was charged."""
+
+    def route_round(self, start: str, goal: str) -> tuple[str, ...]:
+        """The places of another way between two neighbours, ``goal`` included; empty: none."""
+
+
 class Motion(Protocol):
-    """The first seed's planner and motion controller."""
+    """The planner and the motion controller of the behaviour `surveillance`."""
 
     def plan(self, start: Point, goal: Point, interrupt: Interrupt) -> list[Point]:
         """A path from ``start`` to ``goal``, both included."""
@@ -107,13 +147,10 @@ class Motion(Protocol):
 
 
 class Routine(Protocol):
-    """The second seed's services and actions."""
+    """The services and actions of the behaviour `patrol`."""
 
     def start(self, interrupt: Interrupt) -> None:
         """Looks around and builds the ontology."""
-
-    def reason(self, interrupt: Interrupt) -> str:
-        """The place to visit next."""
 
     def plan(self, target: str, interrupt: Interrupt) -> list[Point]:
         """Via points from where the robot is to the place."""
@@ -140,10 +177,14 @@ class Announcer(Protocol):
 
 @dataclass
 class Ports:
-    """Whom the machines talk to; ``motion`` serves the first seed's, ``routine`` the second's."""
+    """Whom the machines talk to.
 
-    knowledge: Knowledge
+    ``motion`` serves the machine `surveillance`, ``routine`` the machine `patrol`.
+    """
+
+    ontology: Ontology
     places: Places
     announcer: Announcer
+    decisions: Decisions
     motion: Motion | None = None
     routine: Routine | None = None

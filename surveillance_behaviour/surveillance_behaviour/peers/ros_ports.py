@@ -1,4 +1,4 @@
-"""The machines' peers on the robot: services and actions behind the ports.
+"""The machines' peers on the robot: topics, services and actions behind the ports.
 
 Deadlines are steady time and come from the node's parameters; what takes long on the mission's
 clock (a move, a charge) has none but that its server lives and gets on.
@@ -7,31 +7,49 @@ clock (a move, a charge) has none but that its server lives and gets on.
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from std_srvs.srv import Empty
 
 from surveillance_behaviour import conversions
-from surveillance_behaviour.mission.battery_gauge import BatteryGauge
+from surveillance_behaviour.charging import BatteryMonitor
+from surveillance_behaviour.decision import ANY, RECHARGE
 from surveillance_behaviour.peers.armor_knowledge import ArmorKnowledge, Whereabouts
 from surveillance_behaviour.peers.ports import (
+    AwayError,
     InterruptedWaitError,
+    Ontology,
     PeerError,
     Point,
     UnknownPlaceError,
 )
-from surveillance_behaviour.peers.ros_calls import ask, call, run
+from surveillance_behaviour.policy.world import Decision
 from surveillance_fsm import Interrupt
 from surveillance_interfaces.action import ComputePath, Control, FollowPath, Plan
+from surveillance_interfaces.msg import Decision as DecisionMessage
 from surveillance_interfaces.msg import RobotPlace
 from surveillance_interfaces.srv import Reason, ReferenceName, RoomPosition
 from surveillance_ontology.armor_client import RosTransport
 from surveillance_runtime import waiting
-from surveillance_runtime.calls import GoalCaller, ServiceCaller
-from surveillance_runtime.conversions import nanoseconds_of
+from surveillance_runtime.calls import (
+    CallError,
+    CallInterruptedError,
+    GoalCaller,
+    ServiceCaller,
+    UnavailableError,
+)
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import STATE_QOS
+
+ASK_AGAIN = 10.0
+"""How long one question to a service that takes long waits for its answer, seconds."""
+DECISION_SECONDS = 1.0
+"""How long the message about a decision may come after the answer of `reason`, seconds."""
+LONGEST_CHARGE = 24 * 3600.0
+"""The longest time a charge may take even when it gets on, seconds."""
 
 
 @dataclass(frozen=True)
@@ -53,8 +71,9 @@ class Deadlines:
     charge: float = 60.0
 
 
-def ros_knowledge(node: PatrolNode, deadlines: Deadlines) -> ArmorKnowledge:
-    """The ontology over ``armor_interface_serialized_srv`` and ``ontology_map/reference_name``."""
+def ros_ontology(node: PatrolNode, deadlines: Deadlines) -> ArmorKnowledge:
+    """Return the ontology over ``armor_interface_serialized_srv``, its reference name over
+    ``ontology_map/reference_name``, and the robot's place by the topic ``robot_place``."""
     names = ServiceCaller(node, ReferenceName, 'ontology_map/reference_name')
     wake = waiting.Interrupt()
 
@@ -72,7 +91,7 @@ def ros_knowledge(node: PatrolNode, deadlines: Deadlines) -> ArmorKnowledge:
     node.create_subscription(
         RobotPlace,
         'robot_place',
-        lambda told: whereabouts.note(told.place, nanoseconds_of(told.header.stamp)),
+        lambda told: whereabouts.note(told.place, conversions.nanoseconds_of(told.header.stamp)),
         STATE_QOS,
     )
     return ArmorKnowledge(
@@ -131,14 +150,111 @@ class RosMotion:
         return self._position
 
 
-class RosRoutine:
-    """``start``, ``reason``, ``motion/planner``, ``motion/controller`` and ``recharge``."""
+class RosReasoner:
+    """Decides over the service `reason`; the topic `decision` tells by which rule.
 
-    def __init__(self, node: PatrolNode, deadlines: Deadlines, gauge: BatteryGauge) -> None:
+    Args:
+        node: The node.
+        deadlines: Seconds of steady time.
+        ontology: Asked once, at the start, what places there are.
+        battery: The battery.
+    """
+
+    def __init__(
+        self, node: PatrolNode, deadlines: Deadlines, ontology: Ontology, battery: BatteryMonitor
+    ) -> None:
         self._deadlines = deadlines
-        self._gauge = gauge
-        self._start = ServiceCaller(node, Empty, 'start')
+        self._ontology = ontology
+        self._battery = battery
+        self._places: frozenset[str] = frozenset()
+        self._told = threading.Condition()
+        self._decision: Decision | None = None
         self._reason = ServiceCaller(node, Reason, 'reason')
+        node.create_subscription(DecisionMessage, 'decision', self._on_decision, STATE_QOS)
+
+    def _on_decision(self, message: DecisionMessage) -> None:
+        with self._told:
+            self._decision = conversions.decision_from(message)
+            self._told.notify_all()
+
+    @property
+    def places(self) -> frozenset[str]:
+        """The places that were there at the start, and those that decisions have named since."""
+        return self._places
+
+    def begin(self, now: float, interrupt: Interrupt) -> str:
+        """Look at the map for the first time; where the robot is."""
+        found = self._ontology.snapshot(now, (), {}, interrupt)
+        self._places = frozenset(found.connections)
+        return str(found.place)
+
+    def decide(
+        self,
+        now: float,
+        interrupt: Interrupt,
+        avoided: frozenset[str],
+        *,
+        to_charge: bool = False,
+    ) -> Decision:
+        """Ask the reasoner, which knows from `mission_status` what is avoided."""
+        late = time.monotonic() + self._deadlines.answer
+        while True:
+            decision = self._ask(now, interrupt)
+            self._places |= {decision.place, decision.target, *decision.scores} - {''}
+            # The reasoner may hear of a low battery a moment after this node.
+            if not to_charge or decision.rule in (RECHARGE, ANY) or time.monotonic() > late:
+                return decision
+            interrupt.wait(0.1)
+            if interrupt.is_set():
+                raise InterruptedWaitError
+
+    def _ask(self, now: float, interrupt: Interrupt) -> Decision:
+        self._decision = None
+        answer = call(self._reason, Reason.Request(), self._deadlines.answer, interrupt)
+        if not answer.point:
+            raise PeerError(self._reason.name, 'it names no place; its log says why')
+        place = str(answer.point)
+
+        def told() -> bool:
+            return self._decision is not None and self._decision.place == place
+
+        with self._told:
+            if self._told.wait_for(told, DECISION_SECONDS) and self._decision is not None:
+                return self._decision
+        return Decision(now, '', place, place, ANY, 'reason', 'the service `reason` names it')
+
+    def why_charge(self) -> str:
+        """Return that the battery is low; all else is the reasoner's to say."""
+        battery = self._battery
+        return f'the battery is low ({battery.level_text()})' if battery.low else ''
+
+    def send_to_charge(self, why: str) -> None:
+        """Nothing: the reasoner remembers that itself."""
+
+    def saw(self, place: str, now: float) -> None:
+        """Nothing: the reasoner is told by `mission_status`, like of all that follows."""
+
+    def arrived(self, place: str, now: float, metres: float | None = None) -> None:
+        """Nothing."""
+
+    def disturbed(self) -> None:
+        """Nothing."""
+
+    def charged(self) -> None:
+        """Nothing."""
+
+    def route_round(self, start: str, goal: str) -> tuple[str, ...]:
+        """Nothing: the planner of `motion/planner` goes round by itself."""
+        return ()
+
+
+class RosRoutine:
+    """``start``, ``motion/planner``, ``motion/controller`` and ``recharge``."""
+
+    def __init__(self, node: PatrolNode, deadlines: Deadlines, battery: BatteryMonitor) -> None:
+        self._deadlines = deadlines
+        self._battery = battery
+        self._start = ServiceCaller(node, Empty, 'start')
         self._planner = GoalCaller(node, Plan, 'motion/planner')
         self._controller = GoalCaller(node, Control, 'motion/controller')
         self._recharge = ServiceCaller(node, Empty, 'recharge')
@@ -147,13 +263,6 @@ class RosRoutine:
         """Has the robot look around and build the ontology."""
         limits = self._deadlines
         ask(self._start, Empty.Request(), limits.build, interrupt, limits.answer)
-
-    def reason(self, interrupt: Interrupt) -> str:
-        """The reasoner's choice."""
-        answer = call(self._reason, Reason.Request(), self._deadlines.answer, interrupt)
-        if not answer.point:
-            raise PeerError(self._reason.name, 'it names no place; its log says why')
-        return str(answer.point)
 
     def plan(self, target: str, interrupt: Interrupt) -> list[Point]:
         """Via points to the place."""
@@ -183,7 +292,7 @@ class RosRoutine:
             either.set()
 
         watchdog = _Watchdog(self._deadlines.charge, give_up)
-        forget = (interrupt.subscribe(either.set), self._gauge.watch(watchdog.feed))
+        forget = (interrupt.subscribe(either.set), self._battery.watch(watchdog.feed))
         try:
             watchdog.feed()
             limits = self._deadlines
@@ -198,10 +307,6 @@ class RosRoutine:
             for end in forget:
                 end()
             watchdog.stop()
-
-
-LONGEST_CHARGE = 24 * 3600.0
-"""The longest time a charge may take even when it gets on, seconds."""
 
 
 class _Watchdog:
@@ -224,3 +329,96 @@ class _Watchdog:
         """Never calls back again."""
         if self._timer is not None:
             self._timer.cancel()
+
+
+def call(
+    caller: ServiceCaller,
+    request: Any,
+    deadline: float,
+    interrupt: Interrupt,
+    discovery: float | None = None,
+) -> Any:
+    """Calls a service.
+
+    Args:
+        caller: The service.
+        request: The request message.
+        deadline: Seconds of steady time.
+        interrupt: Ends the wait.
+        discovery: Seconds after which a server that is not there is given up, for services whose
+            answer may take much longer; default: the deadline.
+
+    Raises:
+        PeerError: No server, or no answer in time.
+        InterruptedWaitError: The interrupt was raised.
+    """
+    try:
+        return caller.call(request, deadline, interrupt, discovery=discovery)
+    except CallInterruptedError:
+        raise InterruptedWaitError from None
+    except CallError as error:
+        raise _peer_error(caller.name, error) from None
+
+
+def ask(
+    caller: ServiceCaller, request: Any, deadline: float, interrupt: Interrupt, discovery: float
+) -> Any:
+    """Calls a service whose answer takes long and that may be asked twice; else as `call`.
+
+    It is asked anew now and then: a server that has just taken the place of another one may have
+    been found before its end of the line was there, and does not know that anybody waits.
+    """
+    late = time.monotonic() + deadline
+    while True:
+        patience = min(ASK_AGAIN, max(discovery, late - time.monotonic()))
+        try:
+            return call(caller, request, patience, interrupt, discovery)
+        except AwayError:
+            raise
+        except PeerError:
+            if time.monotonic() >= late:
+                raise
+
+
+def run(
+    caller: GoalCaller,
+    goal: Any,
+    accept_deadline: float,
+    result_deadline: float,
+    interrupt: Interrupt,
+    on_feedback: Callable[[Any], None] | None = None,
+) -> Any:
+    """Runs a goal to its result.
+
+    Args:
+        caller: The action.
+        goal: The goal message.
+        accept_deadline: Seconds of steady time until the goal is accepted.
+        result_deadline: Seconds of steady time for the result; 0: as long as the server lives.
+        interrupt: Ends the wait and cancels the goal.
+        on_feedback: Called with each feedback message.
+
+    Raises:
+        PeerError: No server, or the goal was rejected, aborted, or not done in time.
+        InterruptedWaitError: The interrupt was raised.
+    """
+    try:
+        end = caller.run(
+            goal,
+            accept_timeout=accept_deadline,
+            result_timeout=result_deadline or None,
+            interrupt=interrupt,
+            on_feedback=on_feedback,
+        )
+    except CallInterruptedError:
+        raise InterruptedWaitError from None
+    except CallError as error:
+        raise _peer_error(caller.name, error) from None
+    if end.status != 'succeeded':
+        raise PeerError(caller.name, f'the goal was {end.status}')
+    return end.result
+
+
+def _peer_error(name: str, error: CallError) -> PeerError:
+    kind = AwayError if isinstance(error, UnavailableError) else PeerError
+    return kind(name, str(error).partition(f'{name}: ')[2] or str(error))

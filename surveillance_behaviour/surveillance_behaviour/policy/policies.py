@@ -1,11 +1,11 @@
 """Policies: how good is each of the places that the rules allow?
 
-A policy is a function from a :class:`Situation` and the allowed places to a :class:`Score` for
-each. It keeps nothing between calls, so it can be changed at run time, and whatever it needs to
-remember (the target it was heading for) stands in the situation.
+A policy is a function from a :class:`World` and the allowed places to a :class:`Score` for each. It
+can be changed at run time: what it needs to remember (the target it was heading for, a plan, where
+it draws its chance from) stands in the world.
 
 ========= ========================================================================================
-seed      any allowed place, at random: what both of the project's ancestors do
+seed      any allowed place, at random
 oldest    the allowed place that went unvisited longest
 lookahead the way to wherever on the whole map (time unvisited - time to get there) is highest
 tour      the place from which riding on, within the rules, leaves the least waiting
@@ -23,16 +23,15 @@ an empty list of rules to compare.
 
 from __future__ import annotations
 
-import random
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from surveillance_behaviour.policy.graph import PatrolGraph
-from surveillance_behaviour.policy.rides import Rider
-from surveillance_behaviour.policy.situation import Score, Situation
+from surveillance_behaviour.policy.rollout import Rollout
+from surveillance_behaviour.policy.world import Score, World
 
 Scores = Mapping[str, Score]
 DEFAULT_POLICY = 'tour'
@@ -49,60 +48,55 @@ RULES_BIND = 0.25
 class Policy(Protocol):
     """Scores the allowed places."""
 
-    def __call__(self, situation: Situation, allowed: Sequence[str]) -> Scores:
+    def __call__(self, world: World, allowed: Sequence[str]) -> Scores:
         """A score for each of ``allowed``, which is not empty."""
 
 
-def make_policy(name: str, generator: random.Random | None = None) -> Policy:
-    """The policy of that name.
-
-    Args:
-        name: One of :data:`POLICIES`.
-        generator: Where the random ones take their chance from.
+def make_policy(name: str) -> Policy:
+    """Return the policy of that name, one of :data:`POLICIES`.
 
     Raises:
         ValueError: There is no such policy.
     """
     if name not in POLICIES:
         raise ValueError(f'unknown policy {name!r}, expected one of {", ".join(POLICIES)}')
-    return POLICIES[name](generator or random.Random())
+    return POLICIES[name]
 
 
-def _by_chance(generator: random.Random) -> Policy:
-    def score(situation: Situation, allowed: Sequence[str]) -> Scores:
-        return {place: Score(generator.random(), place, 'drawn at random') for place in allowed}
+def by_chance(world: World, allowed: Sequence[str]) -> Scores:
+    """Return a random score for each place."""
+    generator = world.memory.generator
+    return {place: Score(generator.random(), place, 'drawn at random') for place in allowed}
 
-    return score
 
-
-def oldest(situation: Situation, allowed: Sequence[str]) -> Scores:
+def oldest(world: World, allowed: Sequence[str]) -> Scores:
     """The time each place went unvisited."""
     scores = {}
     for place in allowed:
-        seconds = situation.unvisited(place)
+        seconds = world.unvisited(place)
         scores[place] = Score(seconds, place, f'it went unvisited for {seconds:.1f} s')
     return scores
 
 
-def lookahead(situation: Situation, allowed: Sequence[str]) -> Scores:
+def lookahead(world: World, allowed: Sequence[str]) -> Scores:
     """The best (time unvisited - time to get there) of all places, by way of each candidate."""
-    graph = situation.graph
+    graph = world.graph
     scores = {}
     for place in allowed:
-        worth = situation.idleness - _seconds_by_way_of(situation, place)
-        worth[graph.index[situation.place]] = -np.inf
+        worth = world.idleness - _seconds_by_way_of(world, place)
+        worth[graph.index[world.place]] = -np.inf
         best = int(np.argmax(worth))
         target = graph.places[best]
         scores[place] = Score(
             float(worth[best]),
             target,
-            f'{_leads_to(place, target)} went unvisited for {situation.idleness[best]:.1f} s '
-            f'and is {situation.idleness[best] - worth[best]:.1f} s away',
+            f'{_leads_to(place, target)} went unvisited for {world.idleness[best]:.1f} s '
+            f'and is {world.idleness[best] - worth[best]:.1f} s away',
         )
     return scores
 
 
-def tour(situation: Situation, allowed: Sequence[str]) -> Scores:
+def tour(world: World, allowed: Sequence[str]) -> Scores:
     """The longest wait of any place if the robot rides on from each candidate.
 
     It rides round the tour, joined in whichever sense and at whichever pass through the candidate
@@ -110,27 +104,27 @@ def tour(situation: Situation, allowed: Sequence[str]) -> Scores:
     that, two rides are thought through within the rules instead: round the tour as far as they
     allow, and always to the place that went unvisited longest; the better one counts.
     """
-    graph = situation.graph
+    graph = world.graph
     steps = np.array([graph.index[place] for place in graph.walk], dtype=np.intp)
-    bound_by_rules = situation.rules and situation.threshold >= RULES_BIND * graph.tour.length
+    bound_by_rules = world.rules and world.threshold >= RULES_BIND * graph.tour.length
     small = len(graph.places) <= RIDES_UP_TO
-    rider = Rider(situation) if bound_by_rules and small else None
+    rollout = Rollout(world) if bound_by_rules and small else None
     scores = {}
     for place in allowed:
         first = graph.index[place]
-        start = graph.seconds(situation.place, place)
+        start = graph.seconds(world.place, place)
         longest, mean, waiting, way, begin = min(
             (
-                (*_wait_on_the_way(situation, way, start, int(begin)), sense, int(begin))
+                (*_wait_on_the_way(world, way, start, int(begin)), sense, int(begin))
                 for sense, way in enumerate((steps, steps[::-1]))
                 for begin in np.flatnonzero(way == first)
             ),
         )
-        if rider is None:
+        if rollout is None:
             value = -(longest + MEAN_WEIGHT * mean)
         else:
             course = (steps, steps[::-1])[way].tolist()
-            rides = (rider.ride(first, course, begin), rider.ride(first))
+            rides = (rollout.run(first, course, begin), rollout.run(first))
             best = min(rides, key=lambda ride: (ride.longest, ride.squares))
             longest, waiting = best.longest, best.waiting
             value = -(longest + SQUARES_WEIGHT * best.squares)
@@ -144,12 +138,12 @@ def tour(situation: Situation, allowed: Sequence[str]) -> Scores:
 
 
 def _wait_on_the_way(
-    situation: Situation, way: NDArray[np.intp], start: float, begin: int
+    world: World, way: NDArray[np.intp], start: float, begin: int
 ) -> tuple[float, float, int]:
     """Longest and mean time the places will have waited when the robot meets them on its way.
 
     Args:
-        situation: Where the robot is now.
+        world: Where the robot is now.
         way: A closed walk as indices of places.
         start: Seconds until the robot is at ``way[begin]``.
         begin: Where on the walk it begins.
@@ -158,18 +152,18 @@ def _wait_on_the_way(
         The longest wait, the mean wait, seconds, and which place waits longest.
     """
     order = np.roll(way, -begin)
-    legs = situation.graph.distances[order[:-1], order[1:]]
+    legs = world.graph.distances[order[:-1], order[1:]]
     met = start + np.concatenate(([0.0], np.cumsum(legs)))
     places, first = np.unique(order, return_index=True)
-    waits = situation.idleness[places] + met[first]
+    waits = world.idleness[places] + met[first]
     worst = int(np.argmax(waits))
     return float(waits[worst]), float(waits.mean()), int(places[worst])
 
 
-def heuristic_reactive(situation: Situation, allowed: Sequence[str]) -> Scores:
+def heuristic_reactive(world: World, allowed: Sequence[str]) -> Scores:
     """Half the idleness, half the nearness of each candidate, each over the greatest of them."""
-    idle = np.array([situation.unvisited(place) for place in allowed])
-    far = np.array([situation.graph.seconds(situation.place, place) for place in allowed])
+    idle = np.array([world.unvisited(place) for place in allowed])
+    far = np.array([world.graph.seconds(world.place, place) for place in allowed])
     return {
         place: Score(
             float(value),
@@ -180,13 +174,13 @@ def heuristic_reactive(situation: Situation, allowed: Sequence[str]) -> Scores:
     }
 
 
-def heuristic_cognitive(situation: Situation, allowed: Sequence[str]) -> Scores:
+def heuristic_cognitive(world: World, allowed: Sequence[str]) -> Scores:
     """Towards the goal with the best mix of idleness and nearness, over places that are idle."""
-    graph = situation.graph
-    here = graph.index[situation.place]
-    far, idle = graph.distances[here], situation.idleness
-    kept = situation.target
-    if kept is not None and kept in graph.index and kept != situation.place:
+    graph = world.graph
+    here = graph.index[world.place]
+    far, idle = graph.distances[here], world.idleness
+    kept = world.target
+    if kept is not None and kept in graph.index and kept != world.place:
         goal = graph.index[kept]
     else:
         worth = _worth(idle, far)
@@ -226,16 +220,16 @@ def _idle_ways(
     return first, dijkstra(backwards, indices=goal)
 
 
-def cycle(situation: Situation, allowed: Sequence[str]) -> Scores:
+def cycle(world: World, allowed: Sequence[str]) -> Scores:
     """How soon each candidate comes on the closed tour, from where the robot is on it.
 
     Where the tour passes a place several times, the robot is taken to be at the pass after which
     the next steps have waited longest.
     """
-    graph = situation.graph
+    graph = world.graph
     walk = graph.walk
-    passes = [number for number, place in enumerate(walk) if place == situation.place]
-    here = max(passes, key=lambda number: situation.unvisited(walk[(number + 1) % len(walk)]))
+    passes = [number for number, place in enumerate(walk) if place == world.place]
+    here = max(passes, key=lambda number: world.unvisited(walk[(number + 1) % len(walk)]))
     ahead = walk[here + 1 :] + walk[: here + 1]
     return {
         place: Score(
@@ -247,11 +241,11 @@ def cycle(situation: Situation, allowed: Sequence[str]) -> Scores:
     }
 
 
-def _seconds_by_way_of(situation: Situation, place: str) -> NDArray[np.float64]:
+def _seconds_by_way_of(world: World, place: str) -> NDArray[np.float64]:
     """Seconds to each place when the robot first goes to ``place``, shape (n,)."""
-    graph = situation.graph
+    graph = world.graph
     seconds: NDArray[np.float64] = graph.distances[graph.index[place]]
-    return seconds + graph.seconds(situation.place, place)
+    return seconds + graph.seconds(world.place, place)
 
 
 def _worth(idle: NDArray[np.float64], far: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -264,15 +258,15 @@ def _leads_to(place: str, target: str) -> str:
     return 'it' if place == target else f'it leads to {target}, which'
 
 
-POLICIES: Mapping[str, Callable[[random.Random], Policy]] = {
-    'tour': lambda generator: tour,
-    'lookahead': lambda generator: lookahead,
-    'oldest': lambda generator: oldest,
-    'seed': _by_chance,
-    'random': _by_chance,
-    'CR': lambda generator: oldest,
-    'HCR': lambda generator: heuristic_reactive,
-    'HPCC': lambda generator: heuristic_cognitive,
-    'cycle': lambda generator: cycle,
+POLICIES: Mapping[str, Policy] = {
+    'tour': tour,
+    'lookahead': lookahead,
+    'oldest': oldest,
+    'seed': by_chance,
+    'random': by_chance,
+    'CR': oldest,
+    'HCR': heuristic_reactive,
+    'HPCC': heuristic_cognitive,
+    'cycle': cycle,
 }
-"""What makes each policy, by name."""
+"""The policies by name."""

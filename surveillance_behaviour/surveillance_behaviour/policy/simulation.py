@@ -6,20 +6,27 @@ and what the tests search for mistakes; thousands of moves take a second.
 
 from __future__ import annotations
 
+import random
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from surveillance_behaviour.policy.battery import BatteryLimits, reserve
+from surveillance_behaviour.decision import (
+    RECHARGE,
+    URGENT,
+    DecisionSettings,
+    Rules,
+    decide,
+    why_charge,
+)
+from surveillance_behaviour.policy.battery_reserve import Battery, BatteryLimits
 from surveillance_behaviour.policy.graph import PatrolGraph
-from surveillance_behaviour.policy.policies import Policy
-from surveillance_behaviour.policy.rules import Rules, decide, decide_to_charge
-from surveillance_behaviour.policy.situation import Decision, Situation
+from surveillance_behaviour.policy.world import Decision, PolicyMemory, World
 
-URGENT, CORRIDOR, ROOM = 'URGENT', 'CORRIDOR', 'ROOM'
+CORRIDOR, ROOM = 'CORRIDOR', 'ROOM'
 
 
 @dataclass(frozen=True)
-class Battery:
+class SimulatedBattery:
     """A battery that falls evenly.
 
     Attributes:
@@ -65,8 +72,7 @@ class Patrol:
     Args:
         graph: The map; a place with two ways or more is a CORRIDOR.
         rules: Which places may be chosen.
-        policy: Which of them is.
-        name: The policy's name.
+        policy: Name of the policy.
         threshold: Seconds after which a place is URGENT.
         station: Where the robot starts and charges.
         battery: None: it never gets empty.
@@ -74,11 +80,11 @@ class Patrol:
 
     graph: PatrolGraph
     rules: Rules
-    policy: Policy
-    name: str
+    policy: str
     threshold: float
     station: str
-    battery: Battery | None = None
+    battery: SimulatedBattery | None = None
+    generator: random.Random = field(default_factory=lambda: random.Random(1))
 
     def __post_init__(self) -> None:
         self.place = self.station
@@ -86,6 +92,14 @@ class Patrol:
         self.level = 100.0
         self.target: str | None = None
         self.visited_at = dict.fromkeys(self.graph.places, 0.0)
+        self._memory = PolicyMemory(self.generator)
+        self._settings = DecisionSettings(
+            self.rules,
+            self.policy,
+            self.threshold,
+            (self.station,),
+            self.battery.limits if self.battery else BatteryLimits(),
+        )
         self._seen: set[str] = set()
         self.run = PatrolRun()
         self._classes = {
@@ -94,15 +108,15 @@ class Patrol:
         }
         self._area = 0.0
 
-    def situation(self) -> Situation:
-        """What the robot knows now."""
+    def world(self) -> World:
+        """Return what the robot knows now."""
         reachable = tuple(sorted(self.graph.legs[self.place]))
         urgent = {
             place: self._classes[place] | {URGENT}
             for place in reachable
             if self.now - self.visited_at[place] > self.threshold
         }
-        return Situation(
+        return World(
             place=self.place,
             now=self.now,
             reachable=reachable,
@@ -112,39 +126,35 @@ class Patrol:
             threshold=self.threshold,
             target=self.target,
             rules=self.rules.classes,
+            memory=self._memory,
         )
 
     def step(self) -> Decision:
-        """Charges if need be, or moves to the next place; the decision behind it."""
-        situation = self.situation()
-        if self._must_charge(situation):
-            decision = decide_to_charge(situation, [self.station], 'battery low')
-            self._go(decision.place)
+        """Charge if need be, or move to the next place; return the decision behind it."""
+        world = self.world()
+        decision = decide(world, self._battery(world), self._settings)
+        self._go(decision.place)
+        if decision.rule == RECHARGE:
             self._charge()
-        else:
-            decision = decide(situation, self.rules, self.policy, self.name)
-            self._go(decision.place)
         self.target = decision.target
         self.run.rules[decision.rule] = self.run.rules.get(decision.rule, 0) + 1
         return decision
 
     def until(self, end: float) -> Iterator[Decision]:
-        """Goes on until ``end``, seconds, and then counts what still waits."""
+        """Go on until ``end``, seconds, and then counts what still waits."""
         while self.now < end:
             yield self.step()
         for place in self.graph.places:
             self._count_gap(place)
         self.run.mean = self._area / (self.now * len(self.graph.places))
 
-    def _must_charge(self, situation: Situation) -> bool:
+    def _battery(self, world: World) -> Battery:
         if self.battery is None:
-            return False
-        limits = self.battery.limits
+            return Battery()
         draw = self.battery.draw if self.battery.keeps_reserve else 0.0
-        level, _ = reserve(
-            self.graph, self.place, situation.reachable, [self.station], draw, limits
-        )
-        return self.level <= level and not (self.place == self.station and self.level >= 99.0)
+        battery = Battery(self.level, draw=draw)
+        charged = self.place == self.station and self.level >= 99.0
+        return Battery() if charged and why_charge(world, battery, self._settings) else battery
 
     def _go(self, place: str) -> None:
         seconds = self.graph.seconds(self.place, place)

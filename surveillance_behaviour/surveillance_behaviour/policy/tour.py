@@ -5,8 +5,9 @@ two successive visits enclose a visit to every other place, so that place waits 
 (Chevaleyre 2004, "Theoretical analysis of the multi-agent patrolling problem"). The length of
 the tour is therefore the bound that every patrol is measured by.
 
-All functions take a symmetric matrix of distances, shape (n, n), that obeys the triangle
-inequality (shortest ways between all places do). They are deterministic.
+All functions take a matrix of distances, shape (n, n), that obeys the triangle inequality
+(shortest ways between all places do); it may be asymmetric. Large maps get a tour that is good for
+the mean of both directions, in its shorter sense. All functions are deterministic.
 """
 
 from __future__ import annotations
@@ -53,17 +54,15 @@ class Tour:
 def shortest_tour(distances: Matrix) -> Tour:
     """The exact tour of a small map, a good tour and a lower bound of a large one."""
     count = len(distances)
-    if count <= 3:
-        order = tuple(range(count))
-        length = tour_length(distances, order)
-        return Tour(order, length, length)
     if count <= EXACT_UP_TO:
-        order = _exact_order(distances)
+        order = _exact_order(distances) if count > 2 else tuple(range(count))
         length = tour_length(distances, order)
         return Tour(order, length, length)
-    order = _good_order(distances)
+    order = _good_order((distances + distances.T) / 2.0)
+    order = min(order, order[::-1], key=lambda way: tour_length(distances, way))
     length = tour_length(distances, order)
-    return Tour(order, length, min(length, _one_tree_bound(distances, length)))
+    bound = _one_tree_bound(np.minimum(distances, distances.T), length)
+    return Tour(order, length, min(length, bound))
 
 
 def tour_over_blocks(distances: Matrix, blocks: Iterable[Sequence[int]]) -> Tour:

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from surveillance_behaviour.policy.graph import PatrolGraph
-from surveillance_behaviour.policy.situation import Situation
+from surveillance_behaviour.policy.world import World
 
 URGENT = 'URGENT'
 """The class whose members change by waiting; all others are taken to stay as they are."""
@@ -36,30 +36,30 @@ class Ride:
     waiting: int
 
 
-class Rider:
-    """Rides on one map in one situation.
+class Rollout:
+    """Rides on one map in one world.
 
     Args:
-        situation: Where and when the rides begin; its classes are those of all places.
+        world: Where and when the rides begin; its classes are those of all places.
     """
 
-    def __init__(self, situation: Situation) -> None:
-        graph = situation.graph
+    def __init__(self, world: World) -> None:
+        graph = world.graph
         self._neighbours = _neighbours(graph)
-        self._seen = [situation.visited_at.get(place, situation.since) for place in graph.places]
-        self._here = graph.index[situation.place]
-        self._now = situation.now
-        self._threshold = situation.threshold
-        self._seconds = HORIZON * max(graph.tour.length, situation.threshold)
-        rules = situation.rules
+        self._seen = [world.visited_at.get(place, world.since) for place in graph.places]
+        self._here = graph.index[world.place]
+        self._now = world.now
+        self._threshold = world.threshold
+        self._seconds = HORIZON * max(graph.tour.length, world.threshold)
+        rules = world.rules
         self._urgent = rules.index(URGENT) if URGENT in rules else len(rules)
         self._ranks = []
         for place in graph.places:
-            classes = situation.classes.get(place, frozenset()) - {URGENT}
+            classes = world.classes.get(place, frozenset()) - {URGENT}
             ranks = [rank for rank, name in enumerate(rules) if name in classes]
             self._ranks.append(min(ranks, default=len(rules)))
 
-    def ride(self, first: int, way: Sequence[int] = (), begin: int = 0) -> Ride:
+    def run(self, first: int, way: Sequence[int] = (), begin: int = 0) -> Ride:
         """One ride.
 
         Args:

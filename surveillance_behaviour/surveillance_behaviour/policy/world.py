@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import random
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +14,22 @@ from numpy.typing import NDArray
 from surveillance_behaviour.policy.graph import PatrolGraph
 
 
+@dataclass(eq=False)
+class PolicyMemory:
+    """What policies keep from one choice to the next.
+
+    Attributes:
+        generator: Where the random policies draw from.
+        plan: What a policy that plans ahead has planned; see `surveillance_behaviour.policy.plan`.
+    """
+
+    generator: random.Random = field(default_factory=random.Random)
+    plan: Any = None
+
+
 @dataclass(frozen=True, eq=False)
-class Situation:
-    """What the robot knows when it decides.
+class World:
+    """What the robot knows of its surroundings when it decides.
 
     Attributes:
         place: Where it is.
@@ -23,12 +38,15 @@ class Situation:
         classes: The ontology's classes of the places, e.g. ``{'C1': {'CORRIDOR', 'ROOM'}}``.
         visited_at: When each place was visited last, seconds; a place that is missing was never
             visited and counts as visited at ``since``.
-        graph: The map.
+        graph: The map, with the time that each leg is expected to take.
+        late_graph: The same map with times that 99 of 100 drives keep to; None: as ``graph``.
         since: When the patrol began, seconds.
-        threshold: Seconds after which a place is URGENT.
+        threshold: Seconds after which the ontology counts a place as URGENT.
         target: What the last decision was heading for, if that was not reached yet.
         avoided: Places that could not be reached lately.
-        rules: The classes of places by priority, for policies that think ahead.
+        rules: The classes of places by priority that the ontology was asked for.
+        requested: Where an operator has sent the robot; empty: nowhere.
+        memory: What the policies remember.
     """
 
     place: str
@@ -37,14 +55,17 @@ class Situation:
     classes: Mapping[str, frozenset[str]]
     visited_at: Mapping[str, float]
     graph: PatrolGraph
+    late_graph: PatrolGraph | None = None
     since: float = 0.0
     threshold: float = 0.0
     target: str | None = None
     avoided: frozenset[str] = frozenset()
     rules: tuple[str, ...] = ()
+    requested: str = ''
+    memory: PolicyMemory = field(default_factory=PolicyMemory)
 
     def unvisited(self, place: str) -> float:
-        """Seconds since ``place`` was visited."""
+        """Return the seconds since ``place`` was visited."""
         return self.now - self.visited_at.get(place, self.since)
 
     @cached_property
@@ -77,7 +98,7 @@ class Decision:
         from_place: Where the robot was.
         place: Where it goes.
         target: Where that leads in the end.
-        rule: ``recharge``, or the class of places whose turn it was, or ``any``.
+        rule: ``recharge``, ``request``, the class of places whose turn it was, or ``any``.
         policy: The policy that chose among the rule's candidates.
         reason: One sentence with the numbers that decided.
         scores: The policy's value of each candidate.

@@ -1,8 +1,8 @@
 """When to go charging: early enough for the worst next leg and the way home from there.
 
 A fixed level strands a robot: what is enough beside the station is not enough at the far end of
-the map. The reserve asked for here therefore depends on where the robot is and on how fast the
-battery was seen to fall.
+the map. The reserve therefore depends on where the robot is, on how long the legs may take, and
+on how fast the battery was seen to fall.
 """
 
 from __future__ import annotations
@@ -42,12 +42,40 @@ class BatteryLimits:
             )
 
 
+@dataclass(frozen=True)
+class Battery:
+    """What a decision knows of the battery.
+
+    Attributes:
+        level: Charge in percent; None: not heard yet.
+        low: Whether the battery's own warning is up.
+        draw: Percent per second that it falls at most; 0: not known.
+        sent_to_charge: Why the robot was sent to charge and has not been charged since; empty: it
+            was not.
+    """
+
+    level: float | None = None
+    low: bool = False
+    draw: float = 0.0
+    sent_to_charge: str = ''
+
+    def charged_enough(self, limits: BatteryLimits) -> bool:
+        """Return whether the robot may leave the station."""
+        return (self.level is None or self.level >= limits.stop_recharge) and not self.low
+
+    def level_text(self) -> str:
+        """Return the charge in words."""
+        return 'level unknown' if self.level is None else f'{self.level:g} %'
+
+
 @dataclass
 class DrawEstimate:
-    """How fast the battery falls, learnt from what its level was before and after each leg.
+    """How fast the battery falls, learned from its level before and after each leg.
 
     The highest rate of the last legs counts: a reserve that is right on average strands every
-    second time. A percent is added to each fall, since the level is known in whole percents.
+    second time. A percent is added to each fall, since the level is known in whole percents. One
+    fall that is more than twice the next highest is not counted until it is seen again: it was a
+    jump of the level, not a draw.
 
     Attributes:
         fixed: Percent per second; 0: learn it.
@@ -74,7 +102,20 @@ class DrawEstimate:
     @property
     def percent_per_second(self) -> float:
         """The fastest fall of the last legs; 0 while nothing is known."""
-        return self.fixed if self.fixed > 0.0 else max(self._rates, default=0.0)
+        if self.fixed > 0.0:
+            return self.fixed
+        highest = sorted(self._rates, reverse=True)[:2]
+        if len(self._rates) >= 5 and highest[0] > 2.0 * highest[1]:
+            return highest[1]
+        return highest[0] if highest else 0.0
+
+    def to_json(self) -> list[float]:
+        """Return the rates, to be kept in a file."""
+        return list(self._rates)
+
+    def restore(self, rates: Iterable[float]) -> None:
+        """Take rates that `to_json` gave."""
+        self._rates.extend(float(rate) for rate in rates)
 
 
 def reserve(
@@ -85,10 +126,10 @@ def reserve(
     draw: float,
     limits: BatteryLimits,
 ) -> tuple[float, str]:
-    """The level at which the robot must not go on, and why that one.
+    """Return the level at which the robot must not go on, and why that one.
 
     Args:
-        graph: The map.
+        graph: The map, with the times that legs may take.
         place: Where the robot is.
         next_places: Where it could go instead of charging.
         stations: The places with a charging station.
@@ -121,7 +162,7 @@ def reserve(
 
 
 def way_home(graph: PatrolGraph, place: str, stations: Sequence[str]) -> float:
-    """Seconds from ``place`` to the nearest charging place; inf when there is none."""
+    """Return the seconds from ``place`` to the nearest charging place; inf when there is none."""
     return min(
         (graph.seconds(place, station) for station in stations if station in graph.index),
         default=math.inf,

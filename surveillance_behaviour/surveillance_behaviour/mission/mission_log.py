@@ -18,12 +18,15 @@ from __future__ import annotations
 
 import errno
 import json
+import math
 import os
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import TracebackType
+
+from surveillance_behaviour.decision import RECHARGE
 
 EVENTS: Mapping[str, tuple[str, ...]] = {
     'start': ('machine', 'place', 'places'),
@@ -322,3 +325,67 @@ def _duration(seconds: float) -> str:
     minutes, rest = divmod(round(seconds), 60)
     hours, minutes = divmod(minutes, 60)
     return f'{hours} h {minutes:02} min {rest:02} s' if hours else f'{minutes} min {rest:02} s'
+
+
+@dataclass(frozen=True)
+class CutOff:
+    """The last that is known of a mission that did not end as told.
+
+    Attributes:
+        time: When that was, seconds on the mission's clock.
+        place: Where the robot was last.
+        explored: Seconds for which it had explored that place; inf when it was done there.
+        left: Another place had been chosen since, so that it may be anywhere by now.
+        charging: Why it had been sent to charge and has not been charged since; empty: it was not.
+    """
+
+    time: float
+    place: str
+    explored: float = 0.0
+    left: bool = False
+    charging: str = ''
+
+    def __str__(self) -> str:
+        parts = [f'the robot was in {self.place}']
+        if self.left:
+            parts = [f'the robot was on its way from {self.place}']
+        elif self.explored:
+            done = 'whole' if math.isinf(self.explored) else f'for {self.explored:.1f} s'
+            parts.append(f'had explored it {done}')
+        if self.charging:
+            parts.append('was to charge')
+        return ', '.join(parts)
+
+
+def cut_off(events: Iterable[Event]) -> CutOff | None:
+    """Where the last mission of a record stood; None when it ended as told, or never began."""
+    known: CutOff | None = None
+    for event in events:
+        if known is not None and event.time < known.time:
+            known = None  # Another clock: another simulation.
+        known = _after(known, event)
+        if known is not None:
+            known = replace(known, time=event.time)
+    return known
+
+
+def _after(known: CutOff | None, event: Event) -> CutOff | None:
+    match event.name:
+        case 'end':
+            return None
+        case 'start' | 'visit':
+            place = event.text('place')
+            if event.name == 'start' and known is not None and known.place == place:
+                return known
+            return CutOff(event.time, place, charging=known.charging if known else '')
+    if known is None:
+        return None
+    match event.name:
+        case 'exploring':
+            return replace(known, explored=event.number('seconds'))
+        case 'decision':
+            reason = event.text('reason') if event.text('rule') == RECHARGE else ''
+            return replace(known, explored=math.inf, left=True, charging=reason)
+        case 'recharge':
+            return replace(known, explored=math.inf, left=False, charging='')
+    return known

@@ -1,0 +1,256 @@
+"""Decides for one robot: looks at the world, asks `decide`, and remembers what came of it.
+
+One process of a robot decides: `robot_behavior` in the behaviour `surveillance`, `reasoner` in
+`patrol`. Each has one `Decider`, which holds all that is remembered between two decisions.
+"""
+
+from __future__ import annotations
+
+import random
+import threading
+from collections.abc import Callable
+from dataclasses import replace
+
+from surveillance_behaviour.charging import BatteryMonitor
+from surveillance_behaviour.decision import (
+    RECHARGE,
+    DecisionSettings,
+    NowhereToGoError,
+    UnknownPlaceNameError,
+    WhyNot,
+    decide,
+    known_place,
+    stations_within_reach,
+    tour_warning,
+    why_charge,
+    why_not,
+)
+from surveillance_behaviour.peers.ports import Ontology, Places
+from surveillance_behaviour.policy.battery_reserve import Battery
+from surveillance_behaviour.policy.graph import GraphError
+from surveillance_behaviour.policy.world import Decision, World
+from surveillance_behaviour.world_model import Experience, WorldModel
+from surveillance_fsm import Interrupt
+
+
+class Decider:
+    """Decides where one robot goes.
+
+    Args:
+        settings: Shared with whoever changes them.
+        ontology: The ontology.
+        places: Where the places are.
+        battery: The battery.
+        experience: What the robot has learned; default: nothing yet.
+        generator: Chance, for the policies that need it.
+        warn: Told once when no robot can keep to the threshold on this map.
+    """
+
+    def __init__(
+        self,
+        settings: DecisionSettings,
+        ontology: Ontology,
+        places: Places,
+        battery: BatteryMonitor,
+        experience: Experience | None = None,
+        generator: random.Random | None = None,
+        warn: Callable[[str], None] = lambda sentence: None,
+    ) -> None:
+        self.settings = settings
+        self.model = WorldModel(settings, ontology, places, experience, generator)
+        self._battery = battery
+        self._lock = threading.Lock()
+        self._leg: Decision | None = None
+        self._warn = warn
+        self._warned: object = None
+
+    @property
+    def experience(self) -> Experience:
+        """What the robot has learned."""
+        return self.model.experience
+
+    @property
+    def places(self) -> frozenset[str]:
+        """All places of the map when it was last looked at."""
+        return self.model.places
+
+    def battery(self) -> Battery:
+        """Return what a decision knows of the battery now."""
+        monitor, experience = self._battery, self.experience
+        battery = Battery(
+            monitor.level,
+            monitor.low,
+            experience.draw.percent_per_second,
+            experience.sent_to_charge,
+        )
+        if battery.sent_to_charge and battery.charged_enough(self.settings.battery):
+            experience.sent_to_charge = ''
+            return replace(battery, sent_to_charge='')
+        return battery
+
+    def learn_draw(self, now: float) -> None:
+        """Learn from the battery's level now how fast it falls."""
+        if self._battery.level is not None:
+            self.experience.draw.observe(now, self._battery.level)
+
+    def look(
+        self, now: float, interrupt: Interrupt, avoided: frozenset[str] = frozenset()
+    ) -> World:
+        """Return what is known now: one snapshot of the ontology.
+
+        Args:
+            now: Seconds on the mission's clock.
+            interrupt: Ends it.
+            avoided: Places that could not be reached lately.
+
+        Raises:
+            PeerError: The ontology cannot be asked.
+        """
+        with self._lock:
+            world = self.model.refresh(now, interrupt, avoided)
+        of_what = world.threshold, world.graph.places
+        if of_what != self._warned:
+            warning = tour_warning(world.graph.tour.length, world.threshold)
+            if warning:
+                self._warned = of_what
+                self._warn(warning)
+        return world
+
+    def begin(self, now: float, interrupt: Interrupt) -> str:
+        """Look for the first time; where the robot is.
+
+        Raises:
+            PeerError: The ontology cannot be asked.
+        """
+        return self.look(now, interrupt).place
+
+    def decide(
+        self,
+        now: float,
+        interrupt: Interrupt,
+        avoided: frozenset[str] = frozenset(),
+        *,
+        to_charge: bool = False,
+    ) -> Decision:
+        """Look, and choose where to go next; see `look`.
+
+        Args:
+            now: Seconds on the mission's clock.
+            interrupt: Ends it.
+            avoided: Places that could not be reached lately.
+            to_charge: Only a charging place will do.
+
+        Raises:
+            PeerError: The ontology cannot be asked.
+            NowhereToGoError: Nothing can be reached.
+        """
+        if self.model.requested in avoided:
+            self.model.requested = ''  # It was tried.
+        world = self.look(now, interrupt, avoided)
+        self.model.saw(world.place, now)
+        if to_charge and not self.experience.sent_to_charge:
+            why = why_charge(world, self.battery(), self.settings)
+            self.send_to_charge(why or 'charging was begun')
+        try:
+            decision = decide(world, self.battery(), self.settings)
+        except NowhereToGoError:
+            self.model.requested = ''
+            raise
+        self.model.target = decision.target
+        if decision.rule == RECHARGE and not self.experience.sent_to_charge:
+            self.experience.sent_to_charge = decision.reason.rpartition(': ')[0]
+        self._leg = decision
+        self.experience.save()
+        return decision
+
+    def why_charge(self) -> str:
+        """Return why the robot must charge now, as far as is known without looking; empty: no."""
+        world = self.model.world
+        if world is None:
+            return ''
+        place = self.model.place
+        if place != world.place and place in world.graph.index:
+            world = replace(world, place=place, reachable=tuple(world.graph.legs[place]))
+        return why_charge(world, self.battery(), self.settings)
+
+    def saw(self, place: str, now: float) -> None:
+        """Note that the robot is in ``place``."""
+        self.model.saw(place, now)
+
+    def arrived(self, place: str, now: float, metres: float | None = None) -> None:
+        """Note that the robot has come to ``place``, over a path of so many metres.
+
+        What the drive took is learned if nothing came between the decision and the arrival.
+        """
+        leg, self._leg = self._leg, None
+        if leg is not None and leg.place == place and leg.from_place in self.model.graph.legs:
+            neighbours = self.model.graph.legs[leg.from_place]
+            if place in neighbours:
+                straight = self.model.straight(leg.from_place, place)
+                seconds = now - leg.time
+                self.experience.leg_times.observe(leg.from_place, place, seconds, straight, metres)
+        self.model.saw(place, now)
+
+    def disturbed(self) -> None:
+        """Note that the present drive is no example of how long a leg takes."""
+        self._leg = None
+
+    def charged(self) -> None:
+        """Note that the robot has been charged."""
+        self.experience.sent_to_charge = ''
+        self._leg = None
+
+    def send_to_charge(self, why: str) -> None:
+        """Have the robot charge before anything else."""
+        self.experience.sent_to_charge = why
+
+    def route_round(self, start: str, goal: str) -> tuple[str, ...]:
+        """Return the places of another way between two neighbours; empty when there is none."""
+        try:
+            return self.model.graph.without_leg(start, goal).route(start, goal)
+        except (GraphError, KeyError):
+            return ()
+
+    def expected(self, start: str, goal: str) -> float:
+        """Return the seconds that the leg between two neighbours is expected to take."""
+        return self.model.graph.legs.get(start, {}).get(goal, float('nan'))
+
+    def request(self, place: str) -> str:
+        """Send the robot to a place before the policy decides again; empty: home, to charge.
+
+        Returns:
+            What will be done.
+
+        Raises:
+            UnknownPlaceNameError: There is no such place.
+        """
+        world = self.model.world
+        if world is None:
+            raise UnknownPlaceNameError('the map is not known yet')
+        if not place:
+            here = replace(world, place=self.model.place or world.place)
+            within = stations_within_reach(here, self.settings.recharge_rooms)
+            if not within:
+                raise UnknownPlaceNameError('no charging place can be reached')
+            place = min(within, key=lambda station: within[station])
+        known_place(place, world.graph.places)
+        if place == self.model.place and self._leg is None:
+            return f'the robot is in {place} already'
+        self.model.requested = place
+        return f'the robot goes to {place} when it has ended what it is at'
+
+    def why_not(
+        self,
+        place: str,
+        now: float,
+        interrupt: Interrupt,
+        avoided: frozenset[str] = frozenset(),
+    ) -> WhyNot:
+        """Tell why the robot would not go to ``place`` now.
+
+        Raises:
+            UnknownPlaceNameError: There is no such place.
+            PeerError: The ontology cannot be asked.
+        """
+        world = self.look(now, interrupt, avoided)
+        return why_not(place, world, self.battery(), self.settings)

@@ -1,0 +1,268 @@
+"""What the robot knows of its surroundings: one snapshot of the ontology a choice, and memory.
+
+The ontology says where the robot is, what it can reach, which classes each place has and when it
+was visited; this module adds what the robot itself knows better: where the places are, when it
+was where, and how long each leg takes. What it learned outlives its process in a small file.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import math
+import os
+import random
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from surveillance_behaviour.decision import DecisionSettings
+from surveillance_behaviour.peers.ports import (
+    Ontology,
+    PeerError,
+    Places,
+    Point,
+    UnknownPlaceError,
+)
+from surveillance_behaviour.policy.battery_reserve import DrawEstimate
+from surveillance_behaviour.policy.graph import GraphError, PatrolGraph
+from surveillance_behaviour.policy.leg_times import LegTimes, graphs_of_places
+from surveillance_behaviour.policy.world import PolicyMemory, World
+from surveillance_fsm import Interrupt
+from surveillance_ontology.patrol_ontology import Snapshot
+
+
+@dataclass
+class Experience:
+    """What the robot has learned, kept in a file beside the mission record.
+
+    The file is ``<record>.experience.json``: `of_record` makes it from the parameter ``record``.
+    Whoever decides reads it when it starts and writes it after each decision, so that a mission
+    that goes on (``launch.py --resume``, or a node that was started again) knows the visits, the
+    leg times and the battery's draw of before. To take them to another run, copy the file with
+    the record.
+
+    Attributes:
+        path: The file; None: nothing is kept.
+        visits: When the robot was in each place last, seconds on the mission's clock.
+        leg_times: How long the legs take.
+        draw: How fast the battery falls.
+        sent_to_charge: Why the robot was sent to charge and has not been charged since.
+    """
+
+    path: Path | None = None
+    visits: dict[str, float] = field(default_factory=dict)
+    leg_times: LegTimes = field(default_factory=LegTimes)
+    draw: DrawEstimate = field(default_factory=DrawEstimate)
+    sent_to_charge: str = ''
+
+    @classmethod
+    def of_record(cls, record: str) -> Experience:
+        """Return what was learned on the mission of a record; new for an empty name.
+
+        A file that cannot be read counts as none; `problem` says what is wrong with it.
+        """
+        experience = cls(Path(record + '.experience.json') if record else None)
+        experience.problem = experience._read()
+        return experience
+
+    problem: str = ''
+
+    def _read(self) -> str:
+        if self.path is None or not self.path.exists():
+            return ''
+        try:
+            kept: dict[str, Any] = json.loads(self.path.read_text(encoding='utf-8'))
+            self.visits = {str(place): float(at) for place, at in kept['visits'].items()}
+            self.leg_times.restore(kept['leg_times'])
+            self.draw.restore(kept['draw'])
+            self.sent_to_charge = str(kept['sent_to_charge'])
+        except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+            self.visits, self.leg_times, self.draw = {}, LegTimes(), DrawEstimate()
+            return f'{self.path}: what was learned before is not used: {error}'
+        return ''
+
+    def save(self) -> None:
+        """Write the file in one piece; a disk that takes no more does not stop the mission."""
+        if self.path is None:
+            return
+        kept = {
+            'visits': {place: round(at, 3) for place, at in self.visits.items()},
+            'leg_times': self.leg_times.to_json(),
+            'draw': self.draw.to_json(),
+            'sent_to_charge': self.sent_to_charge,
+        }
+        new = self.path.with_name(self.path.name + '.new')
+        with contextlib.suppress(OSError):
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            new.write_text(json.dumps(kept), encoding='utf-8')
+            os.replace(new, self.path)
+
+    def saw(self, place: str, now: float) -> None:
+        """Note that the robot was in ``place``."""
+        self.visits[place] = now
+
+
+class WorldModel:
+    """Keeps the map and the visits in step with the ontology.
+
+    Args:
+        settings: Shared with whoever changes them.
+        ontology: The ontology.
+        places: Where the places are.
+        experience: What the robot has learned; default: nothing yet.
+        generator: Chance, for the policies that need it.
+    """
+
+    def __init__(
+        self,
+        settings: DecisionSettings,
+        ontology: Ontology,
+        places: Places,
+        experience: Experience | None = None,
+        generator: random.Random | None = None,
+    ) -> None:
+        self.settings = settings
+        self.experience = experience or Experience()
+        self.place = ''
+        self.target: str | None = None
+        self.requested = ''
+        self.world: World | None = None
+        self._ontology = ontology
+        self._places = places
+        self._memory = PolicyMemory(generator or random.Random())
+        self._positions: dict[str, Point] = {}
+        self._graphs = (PatrolGraph({}), PatrolGraph({}))
+        self._all: frozenset[str] = frozenset()
+        self._graph_key: object = None
+        self._since: float | None = None
+        self._told_threshold: float | None = None
+
+    @property
+    def graph(self) -> PatrolGraph:
+        """The part of the map that could be reached when it was last looked at."""
+        return self._graphs[0]
+
+    @property
+    def places(self) -> frozenset[str]:
+        """All places of the map when it was last looked at, within reach or not."""
+        return self._all
+
+    def straight(self, start: str, goal: str) -> float:
+        """Return the metres between two places in a straight line; 0: one is not known."""
+        if start not in self._positions or goal not in self._positions:
+            return 0.0
+        return _distance(self._positions[start], self._positions[goal])
+
+    def refresh(
+        self, now: float, interrupt: Interrupt, avoided: frozenset[str] = frozenset()
+    ) -> World:
+        """Take one snapshot of the ontology and bring the map up to date.
+
+        The ontology is told in the same batch which visits it does not know: one that was built
+        anew has them from here.
+
+        Args:
+            now: Seconds on the mission's clock.
+            interrupt: Ends it.
+            avoided: Places that could not be reached lately.
+
+        Raises:
+            PeerError: The ontology or the positions cannot be had, or do not fit together.
+        """
+        self._begin(now)
+        threshold, classes = self.settings.urgency_threshold, self.settings.rules.classes
+        if threshold != self._told_threshold:
+            self._ontology.set_urgency_threshold(threshold, interrupt)
+            self._told_threshold = threshold
+        visits = self.experience.visits
+        try:
+            found = self._ontology.snapshot(now, classes, visits, interrupt)
+        except PeerError:
+            # The ontology that comes back may be another one.
+            self._told_threshold = None
+            raise
+        graph, late_graph = self._map_of(found, interrupt)
+        visited_at = {}
+        for place, seconds in found.visited_at.items():
+            # The ontology counts whole seconds; another robot's visit may be later.
+            own = visits.get(place, -1.0)
+            visited_at[place] = own if own >= seconds else seconds
+        self.place = found.place
+        self.world = World(
+            place=found.place,
+            now=now,
+            reachable=tuple(place for place in found.reachable if place in graph.index),
+            classes=found.classes,
+            visited_at=visited_at,
+            graph=graph,
+            late_graph=late_graph,
+            since=self._since or 0.0,
+            threshold=threshold,
+            target=self.target,
+            avoided=avoided,
+            rules=classes,
+            requested=self.requested,
+            memory=self._memory,
+        )
+        return self.world
+
+    def _begin(self, now: float) -> None:
+        if self._since is None or now < self._since:
+            # What lies ahead was on another clock.
+            own = self.experience.visits
+            self.experience.visits = {place: at for place, at in own.items() if at <= now}
+            self._since = now
+
+    def _map_of(self, found: Snapshot, interrupt: Interrupt) -> tuple[PatrolGraph, PatrolGraph]:
+        positions = {}
+        # A place that went may come back elsewhere.
+        self._positions = {p: at for p, at in self._positions.items() if p in found.connections}
+        for place in found.connections:
+            try:
+                positions[place] = self._position(place, interrupt)
+            except UnknownPlaceError:
+                continue  # It was removed from the map a moment ago; the ontology will follow.
+        self._all = frozenset(positions)
+        if found.place not in positions:
+            raise PeerError('ontology', f'the robot is in {found.place}, which is not on the map')
+        times, dwell = self.experience.leg_times, self.settings.exploration_seconds
+        times.forget_fit(self.settings.speed)
+        connections = {
+            place: tuple(other for other in others if other in positions)
+            for place, others in found.connections.items()
+            if place in positions
+        }
+        used = {
+            (place, other): times.used(place, other, _distance(positions[place], positions[other]))
+            for place, others in connections.items()
+            for other in others
+        }
+        key = (found.place in self.graph.index, connections, used, dwell, round(times.spread, 1))
+        if key != self._graph_key:
+            try:
+                graphs = graphs_of_places(connections, positions, times, dwell)
+                whole, late = (graph.connected(found.place) for graph in graphs)
+            except GraphError as error:
+                raise PeerError('ontology', str(error)) from None
+            self._graphs = whole, late
+            self._graph_key = (True, *key[1:])
+        return self._graphs
+
+    def _position(self, place: str, interrupt: Interrupt) -> Point:
+        if place not in self._positions:
+            self._positions[place] = self._places.position(place, interrupt)
+        return self._positions[place]
+
+    def saw(self, place: str, now: float) -> None:
+        """Note that the robot was in ``place``; finer than the ontology's whole seconds."""
+        self.place = place
+        self.experience.saw(place, now)
+        if place == self.target:
+            self.target = None
+        if place == self.requested:
+            self.requested = ''
+
+
+def _distance(start: Point, goal: Point) -> float:
+    return math.dist(start[:2], goal[:2])
