@@ -88,9 +88,7 @@ def run_of(events: Sequence[mission_log.Event], place: Place, source: str) -> Ru
     return Run(list(_driven(events, place)), summary.unvisited, summary.visits, line)
 
 
-def _driven(
-    events: Sequence[mission_log.Event], place: Place
-) -> list[list[tuple[float, float]]]:
+def _driven(events: Sequence[mission_log.Event], place: Place) -> list[list[tuple[float, float]]]:
     """Return the ways driven; where the record does not have one, it is the straight line."""
     ways = []
     here: tuple[float, float] | None = None
