@@ -106,7 +106,7 @@ def test_a_mode_on_the_command_line_counts_more_than_one_in_the_users_file(tmp_p
 def test_the_default_mode_stands_in_the_first_file_and_for_all_nodes():
     first = parameter_files(CONFIG, Run())[0]
     every = yaml.safe_load(first.read_text())['/**']['ros__parameters']
-    assert every == {'execution_mode': DEFAULT_MODE}
+    assert every['execution_mode'] == DEFAULT_MODE
 
 
 def test_a_run_folder_on_a_full_disk_is_named(tmp_path):
