@@ -71,7 +71,8 @@ def verify(machine: Container, userdata_keys: Iterable[str] = ()) -> list[Findin
         findings += _wrong_remappings(view.structure)
         findings += _two_writers(view)
         findings += _deaf(view.structure)
-    findings += _unset_reads(root, frozenset(userdata_keys))
+    keys = frozenset(userdata_keys)
+    findings += _unset_reads(root, keys, keys)
     return sorted(findings, key=lambda finding: finding.severity != 'error')
 
 
@@ -88,6 +89,7 @@ class _View:
         edges: The transitions that can be taken, by the label of the state they leave.
         reached: Labels of the states that can be reached.
         endings: What the container can end with.
+        numbers: The number of each userdata key, see `_Keys`.
         before: Keys that are written inside before each state, on all ways to it and on some.
         written: Keys that have been written inside when it ends, likewise.
     """
@@ -97,8 +99,9 @@ class _View:
     edges: dict[str, list[Edge]]
     reached: set[str] = field(default_factory=set)
     endings: set[str] = field(default_factory=set)
+    numbers: dict[str, int] = field(default_factory=dict)
     before: dict[str, _Keys] = field(default_factory=dict)
-    written: _Keys | None = None
+    written: _Keys = field(default_factory=lambda: _Keys())
 
     def walk(self) -> Iterator[_View]:
         """This container and all inside, outermost first."""
@@ -359,82 +362,89 @@ def _is_own(node: ast.Attribute) -> bool:
 
 @dataclass(frozen=True)
 class _Keys:
-    """Keys written on all ways to a place, and on some."""
+    """Keys written on all ways to a place, and on some: a bit each, numbered by the container."""
 
-    always: frozenset[str] = frozenset()
-    sometimes: frozenset[str] = frozenset()
+    always: int = 0
+    sometimes: int = 0
 
     def joined(self, other: _Keys) -> _Keys:
-        if other is self or other == self:
-            return self
         return _Keys(self.always & other.always, self.sometimes | other.sometimes)
 
-    def plus(self, always: frozenset[str], sometimes: frozenset[str] = frozenset()) -> _Keys:
-        if always <= self.always and sometimes <= self.sometimes:
-            return self
-        return _Keys(self.always | always, self.sometimes | always | sometimes)
+    def plus(self, added: _Keys) -> _Keys:
+        """After something that always adds `added.always`, and sometimes `added.sometimes`."""
+        return _Keys(self.always | added.always, self.sometimes | added.always | added.sometimes)
+
+
+def _bits(view: _View, keys: Iterable[str]) -> int:
+    numbers, bits = view.numbers, 0
+    for key in keys:
+        bits |= 1 << numbers.setdefault(key, len(numbers))
+    return bits
 
 
 def _follow_keys(view: _View) -> None:
     """Find which keys are written before each state of a container, and when it ends."""
     structure, container = view.structure, view.structure.container
-    preset = frozenset(container.userdata.keys())
+    preset = _bits(view, container.userdata.keys())
     if isinstance(container, IteratorContainer):
-        preset |= {container.items_label}
+        preset |= _bits(view, [container.items_label])
     entry = _Keys(preset, preset)
     adds = {label: _added(view, label) for label in structure.members}
     if structure.together:
         _follow_together(view, entry, adds)
         return
+    before = _follow_loop(view, entry, adds)
+    everywhere = entry.sometimes
+    for label, keys in before.items():
+        everywhere |= keys.plus(adds[label]).sometimes
+    for label in structure.interrupts:
+        # It may come at any time.
+        before[label] = _Keys(entry.always, everywhere)
+        everywhere |= adds[label].always | adds[label].sometimes
+    end: _Keys | None = None
+    for label, keys in before.items():
+        if any(edge.leaving for edge in view.edges[label]):
+            after = keys.plus(adds[label])
+            end = after if end is None else end.joined(after)
+    end = _Keys(entry.always, everywhere) if end is None else end
+    for label in structure.interrupts:
+        end = end.plus(_Keys(0, adds[label].always | adds[label].sometimes))
+    view.before, view.written = before, end
+
+
+def _follow_loop(view: _View, entry: _Keys, adds: dict[str, _Keys]) -> dict[str, _Keys]:
+    """The keys before each state that can be reached, when one runs at a time."""
     order = _order(view)
-    before: dict[str, _Keys] = {label: entry for label in structure.initial if label in order}
+    before: dict[str, _Keys] = {label: entry for label in view.structure.initial if label in order}
     pending = [(order[label], label) for label in before]
     heapq.heapify(pending)
     waiting = set(before)
     while pending:
         _, label = heapq.heappop(pending)
         waiting.discard(label)
-        after = before[label].plus(*adds[label])
+        after = before[label].plus(adds[label])
         for edge in view.edges[label]:
             target = edge.target
             if edge.leaving or target not in order:
                 continue
             known = before.get(target)
             joined = after if known is None else known.joined(after)
-            if joined is not known and joined != known:
+            if joined != known:
                 before[target] = joined
                 if target not in waiting:
                     waiting.add(target)
                     heapq.heappush(pending, (order[target], target))
-    everywhere = entry.sometimes.union(
-        *(keys.sometimes | adds[label][0] | adds[label][1] for label, keys in before.items())
-    )
-    for label in structure.interrupts:
-        # It may come at any time.
-        before[label] = _Keys(entry.always, everywhere)
-    exits = [
-        keys.plus(*adds[label])
-        for label, keys in before.items()
-        if any(edge.leaving for edge in view.edges[label])
-    ]
-    by_interrupts = frozenset[str]().union(
-        *(adds[label][0] | adds[label][1] for label in structure.interrupts)
-    )
-    end = exits[0] if exits else _Keys(entry.always, everywhere)
-    for keys in exits[1:]:
-        end = end.joined(keys)
-    view.before, view.written = before, end.plus(frozenset(), by_interrupts)
+    return before
 
 
-def _follow_together(
-    view: _View, entry: _Keys, adds: dict[str, tuple[frozenset[str], frozenset[str]]]
-) -> None:
+def _follow_together(view: _View, entry: _Keys, adds: dict[str, _Keys]) -> None:
     """All states start with the same keys; what one writes, another may find."""
-    states = view.structure.states
-    always = frozenset[str]().union(*(adds[label][0] for label in states))
-    some = frozenset[str]().union(*(adds[label][0] | adds[label][1] for label in states))
-    view.before = {label: entry.plus(frozenset(), some) for label in view.structure.members}
-    view.written = entry.plus(always, some)
+    end = entry
+    for label in view.structure.states:
+        end = end.plus(adds[label])
+    start = _Keys(entry.always, end.sometimes)
+    view.before = dict.fromkeys(view.structure.members, start)
+    view.written = end
 
 
 def _order(view: _View) -> dict[str, int]:
@@ -460,48 +470,49 @@ def _order(view: _View) -> dict[str, int]:
     return {label: place for place, label in enumerate(reversed(finished))}
 
 
-def _added(view: _View, label: str) -> tuple[frozenset[str], frozenset[str]]:
-    """What a state adds in the container's names: always, sometimes."""
+def _added(view: _View, label: str) -> _Keys:
+    """What a state adds, in the container's names."""
     state = view.structure.members[label]
     renamed = _remapping(view.structure.container, label)
     outputs = state.get_registered_output_keys()
     inner = view.inner.get(label)
-    if inner is None or inner.written is None:
-        return frozenset(renamed.get(key, key) for key in outputs), frozenset()
-    return (
-        frozenset(renamed.get(key, key) for key in outputs if key in inner.written.always),
-        frozenset(renamed.get(key, key) for key in outputs if key in inner.written.sometimes),
+    if inner is None:
+        return _Keys(_bits(view, (renamed.get(key, key) for key in outputs)))
+    always = [key for key in outputs if inner.written.always & _bits(inner, [key])]
+    sometimes = [key for key in outputs if inner.written.sometimes & _bits(inner, [key])]
+    return _Keys(
+        _bits(view, (renamed.get(key, key) for key in always)),
+        _bits(view, (renamed.get(key, key) for key in sometimes)),
     )
 
 
-def _unset_reads(view: _View, given: frozenset[str]) -> list[Finding]:
+def _unset_reads(view: _View, always: Iterable[str], sometimes: Iterable[str]) -> list[Finding]:
     """Reads that find nothing, or may find nothing.
 
     Args:
         view: A container.
-        given: Keys that it is entered with, in its own names.
+        always: Keys that it is always entered with, in its own names.
+        sometimes: Keys that it is sometimes entered with.
     """
-    return _reads(view, _Keys(given, given))
-
-
-def _reads(view: _View, given: _Keys) -> list[Finding]:
     container, findings = view.structure.container, []
-    for label, before in view.before.items():
+    given = _Keys(_bits(view, always), _bits(view, sometimes))
+    for label, local in view.before.items():
+        before = local.plus(given)
         state = view.structure.members[label]
         renamed = _remapping(container, label)
         constants = container.fsm_constants.get(label, {})
-        always: set[str] = set()
-        sometimes: set[str] = set()
+        there: list[str] = []
+        at_times: list[str] = []
         for key in sorted(state.get_registered_input_keys()):
-            outer = renamed.get(key, key)
-            if key in constants or outer in given.always or outer in before.always:
-                always.add(key)
-            if key in always or outer in given.sometimes or outer in before.sometimes:
-                sometimes.add(key)
-            if label not in view.inner and key not in always:
-                findings.append(_unset(view, label, key, key in sometimes))
+            bit = _bits(view, [renamed.get(key, key)])
+            if key in constants or before.always & bit:
+                there.append(key)
+            elif before.sometimes & bit:
+                at_times.append(key)
+            if label not in view.inner and key not in there:
+                findings.append(_unset(view, label, key, key in at_times))
         if label in view.inner:
-            findings += _reads(view.inner[label], _Keys(frozenset(always), frozenset(sometimes)))
+            findings += _unset_reads(view.inner[label], there, [*there, *at_times])
     return findings
 
 

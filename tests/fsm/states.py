@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import threading
 from collections.abc import Callable, Iterable
 from typing import Any
@@ -95,3 +96,18 @@ class Background:
 def began(state: Any, timeout: float = 5.0) -> None:
     """Wait until a `Waiter` or `Deaf` has begun to execute."""
     assert state.begun.acquire(timeout=timeout), 'it did not begin'
+
+
+def chain(
+    *states: fsm.State, outcomes: Iterable[str] = ('done', 'preempted')
+) -> tuple[fsm.StateMachine, list[fsm.StateMachine]]:
+    """Machines in one another, the states in the innermost."""
+    machines = [fsm.StateMachine(outcomes) for _ in range(3)]
+    for outer, inner in itertools.pairwise(machines):
+        with outer:
+            fsm.StateMachine.add('INNER', inner)
+    with machines[-1]:
+        for number, state in enumerate(states):
+            target = {'done': f'S{number + 1}'} if number + 1 < len(states) else {}
+            fsm.StateMachine.add(f'S{number}', state, target)
+    return machines[0], machines

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import signal
 import subprocess
@@ -255,3 +256,170 @@ def test_a_reader_never_finds_half_a_checkpoint_whoever_saves(tmp_path):
             saver.join(10.0)
     assert not faults
     assert [each.name for each in tmp_path.iterdir()] == ['checkpoint']
+
+
+# What is kept, and how.
+
+
+def machine_with(**values):
+    machine = fsm.StateMachine(['done'])
+    with machine:
+        fsm.StateMachine.add('A', Answer('done'))
+    for key, value in values.items():
+        machine.userdata[key] = value
+    return machine
+
+
+@pytest.mark.parametrize(
+    'value',
+    [
+        {1, 2},
+        frozenset({'a'}),
+        b'\x00\xff',
+        bytearray(b'ab'),
+        (1, ('two', [3])),
+        {1: 'one', (2, 3): 'pair', None: 0},
+        {'!': 'tuple', 'is': []},
+        {'a': {'b': {1.5}}},
+        float('inf'),
+        -0.0,
+        1 + 2j,
+        10**40,
+        '\ud800',
+        True,
+        None,
+    ],
+)
+def test_plain_values_come_back_exactly(value, tmp_path):
+    checkpoint.save(machine_with(key=value), tmp_path / 'at')
+    again = machine_with()
+    checkpoint.load(again, tmp_path / 'at')
+    assert again.userdata.key == value
+    assert type(again.userdata.key) is type(value)
+    assert repr(again.userdata.key) == repr(value)
+
+
+def test_what_is_no_number_comes_back_as_such(tmp_path):
+    checkpoint.save(machine_with(key=[float('nan')]), tmp_path / 'at')
+    again = machine_with()
+    checkpoint.load(again, tmp_path / 'at')
+    assert math.isnan(again.userdata.key[0])
+
+
+def circle():
+    value = []
+    value.append(value)
+    return value
+
+
+class Number(int):
+    """Not exactly an integer."""
+
+
+@pytest.mark.parametrize('value', [object(), [object()], Number(3), circle(), {'a': print}])
+def test_what_cannot_be_kept_is_refused_with_its_key_when_it_is_written(value, tmp_path, caplog):
+    machine = machine_with(fine=1, robot=value)
+    with pytest.raises(checkpoint.CheckpointError, match="userdata key 'robot' of 'StateMachine'"):
+        checkpoint.save(machine, tmp_path / 'at')
+    assert list(tmp_path.iterdir()) == []
+    checkpoint.save(machine, tmp_path / 'at', leave_out=['robot'])
+    again = machine_with()
+    checkpoint.load(again, tmp_path / 'at')
+    assert again.userdata.keys() == ['fine']
+    checkpoint.Checkpointer(machine, tmp_path / 'at')
+    assert machine.execute() == 'done'
+    assert "'robot'" in caplog.text
+
+
+def test_a_checkpoint_is_on_the_disk_before_it_is_there(tmp_path, monkeypatch):
+    deeds = []
+    monkeypatch.setattr(os, 'fsync', lambda handle: deeds.append('sync'))
+    replace = os.replace
+    monkeypatch.setattr(os, 'replace', lambda *a: (deeds.append('replace'), replace(*a)))
+    checkpoint.save(machine_with(), tmp_path / 'at')
+    assert deeds == ['sync', 'replace', 'sync']
+
+
+DEEP = '[' * 5000 + ']' * 5000
+
+
+@pytest.mark.parametrize(
+    ('old', 'new'),
+    [
+        ('"userdata": {"key": 1}', '"userdata": 7'),
+        ('"userdata": {"key": 1}', '"userdata": {"key": {"!": "nix", "is": 1}}'),
+        ('"userdata": {"key": 1}', '"userdata": {"key": {"!": "bytes", "is": 1}}'),
+        ('"userdata": {"key": 1}', '"userdata": {"key": {"!": []}}'),
+        ('"userdata": {"key": 1}', f'"userdata": {{"key": {DEEP}}}'),
+        ('"userdata": {"key": 1}', '"states": []'),
+        ('"userdata": {"key": 1}', '"at": []'),
+        ('"userdata": {"key": 1}', '"at": {"current": 3}'),
+        ('"userdata": {"key": 1}', '"at": {"current": "A", "saved": [1]}'),
+        ('"userdata": {"key": 1}', '"at": {"current": "A", "index": -1}'),
+        ('"userdata": {"key": 1}', '"raised": [[]]'),
+        ('"userdata": {"key": 1}', '"progress": [1]'),
+        ('"userdata": {"key": 1}', '"states": {"A": {"userdata": {}}}'),
+    ],
+)
+def test_a_damaged_checkpoint_is_an_error_of_one_line_that_changes_nothing(old, new, tmp_path):
+    path = tmp_path / 'at'
+    checkpoint.save(machine_with(key=1), path)
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new))
+    machine = machine_with()
+    with pytest.raises(checkpoint.CheckpointError) as caught:
+        checkpoint.load(machine, path)
+    assert '\n' not in str(caught.value)
+    assert str(path) in str(caught.value)
+    assert machine.userdata.keys() == []
+
+
+def test_an_item_that_was_done_is_not_repeated_by_a_checkpoint_taken_after_it():
+    def build(seen):
+        each = fsm.Iterator(['done'], [], [], it='ABCD', it_label='x', exhausted_outcome='done')
+        with each:
+            fsm.Iterator.set_contained_state(
+                'S',
+                fsm.CBState(
+                    lambda ud: seen.append(ud.x) or 'more', outcomes=['more'], input_keys=['x']
+                ),
+                ['more'],
+            )
+        return each
+
+    first, saved = [], []
+    each = build(first)
+    each.register_transition_cb(lambda ud, active: saved.append(through_json(each)))
+    assert each.execute() == 'done'
+    assert len(saved) == 4
+    for done, at in enumerate(saved, start=1):
+        second = []
+        again = build(second)
+        checkpoint.restore(again, at)
+        assert again.execute() == 'done'
+        assert second == list('ABCD'[done:])
+
+
+def test_items_that_cannot_be_kept_are_drawn_again():
+    def build(seen, die):
+        items = [object(), object(), object()]
+        each = fsm.Iterator(['done'], [], [], it=items, it_label='x', exhausted_outcome='done')
+
+        def visit(ud):
+            seen.append(items.index(ud.x))
+            if die is not None and len(seen) == 2:
+                die.append(json.loads(json.dumps(checkpoint.capture(each, leave_out=['x']))))
+            return 'more'
+
+        with each:
+            state = fsm.CBState(visit, outcomes=['more'], input_keys=['x'])
+            fsm.Iterator.set_contained_state('S', state, ['more'])
+        return each
+
+    saved, second = [], []
+    build([], saved).execute()
+    again = build(second, None)
+    checkpoint.restore(again, saved[0])
+    assert again.execute() == 'done'
+    assert second == [1, 2]

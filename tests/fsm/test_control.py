@@ -7,7 +7,8 @@ import threading
 import pytest
 
 import surveillance_fsm as fsm
-from surveillance_fsm.testing import watching
+from surveillance_fsm.history import TransitionFeed
+from surveillance_fsm.testing import FakeClock, watching
 
 from .states import Answer, Background, Waiter, began
 
@@ -199,3 +200,80 @@ def test_a_transition_is_told_although_the_machine_is_put_aside_in_that_instant(
         assert run.result() == 'done'
     watched.assert_path('GATE', 'LAST', container='ROOT/INNER')
     assert watched.path() == ['INNER', 'ALARM', 'INNER']
+
+
+# Pausing.
+
+
+def test_a_paused_machine_tells_its_transition_at_once_and_counts_no_pause():
+    clock = FakeClock()
+    first, second = Waiter(3.0), Waiter(5.0)
+    machine = fsm.StateMachine(['done', 'preempted'])
+    machine.set_clock(clock)
+    with machine:
+        fsm.StateMachine.add('FIRST', first, {'done': 'SECOND'})
+        fsm.StateMachine.add('SECOND', second)
+    seen, told = [], threading.Semaphore(0)
+    feed = TransitionFeed(machine, lambda t: (seen.append(t), told.release()))
+    run = Background(machine)
+    began(first)
+    machine.control.pause()
+    clock.until_sleeping()
+    clock.advance(3.0)
+    assert told.acquire(timeout=5.0)
+    clock.advance(1000.0)
+    machine.control.resume()
+    began(second)
+    clock.until_sleeping()
+    clock.advance(5.0)
+    assert run.result() == 'done'
+    assert told.acquire(timeout=5.0)
+    feed.close()
+    assert [(t.from_state, t.to_state, t.duration) for t in seen] == [
+        ('FIRST', 'SECOND', 3.0),
+        ('SECOND', 'done', 5.0),
+    ]
+    assert seen[0].visits == seen[1].visits == 1
+
+
+def test_an_interrupt_cuts_into_a_pause_and_leads_back():
+    charge, waiter = Answer('done'), Waiter(0.0)
+    machine = fsm.StateMachine(['done', 'preempted'])
+    with machine:
+        fsm.StateMachine.add('FIRST', Answer('done'), {'done': 'SECOND'})
+        fsm.StateMachine.add('SECOND', waiter)
+    machine.add_interrupt('CHARGE', charge, priority=1)
+    told = threading.Semaphore(0)
+    machine.register_transition_cb(lambda ud, active: told.release())
+    machine.control.pause()
+    run = Background(machine)
+    machine.control.step()
+    with watching(machine) as watched:
+        assert told.acquire(timeout=5.0)
+        machine.raise_interrupt('CHARGE')
+        machine.control.resume()
+        assert run.result() == 'done'
+    assert charge.runs == 1
+    assert watched.transitions[-1] == ('StateMachine', 'SECOND', 'done', 'done')
+
+
+# Traces.
+
+
+@pytest.mark.parametrize('others', [0, 1])
+def test_a_trace_that_raises_does_not_end_the_machine(others, caplog):
+    machine = fsm.StateMachine(['done'])
+    with machine:
+        fsm.StateMachine.add('FIRST', Answer('done'), {'done': 'SECOND'})
+        fsm.StateMachine.add('SECOND', Answer('done'))
+
+    def broken(raw):
+        raise OSError('disk full')
+
+    machine.control.add_trace(broken)
+    seen = []
+    for _ in range(others):
+        machine.control.add_trace(seen.append)
+    assert machine.execute() == 'done'
+    assert 'disk full' in caplog.text
+    assert len(seen) == 3 * others

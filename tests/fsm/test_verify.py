@@ -113,6 +113,93 @@ def test_keys_are_followed_through_remappings_and_nested_containers():
     }
 
 
+# What nothing produces, mistyped remappings, two writers, loops.
+
+
+def test_an_outcome_that_nothing_inside_produces():
+    machine = machine_of({'A': (Answer('done'),)}, ['done', 'aborted'])
+    (finding,) = verify(machine)
+    assert (finding.severity, finding.check, finding.path) == ('warning', 'unproduced', 'ROOT')
+    assert "'aborted'" in finding.message
+    both = fsm.Concurrence(['all', 'some', 'never', 'preempted'], 'some', outcome_map={'all': {}})
+    with both:
+        fsm.Concurrence.add('A', Answer('done'))
+    assert [f.message for f in verify(both)] == ["nothing inside produces its outcome 'never'"]
+
+
+def test_a_loop_whose_only_way_out_nothing_produces():
+    inner = machine_of({'A': (Answer('done'),)}, ['done', 'stop'])
+    machine = machine_of({'INNER': (inner, {'done': 'INNER', 'stop': 'done'})})
+    assert ('error', 'no-exit', 'ROOT') in found(machine)
+    behind = machine_of(
+        {'INNER': (inner, {'done': 'done', 'stop': 'AFTER'}), 'AFTER': (Answer('done'),)}
+    )
+    assert ('error', 'unreachable', 'ROOT/AFTER') in found(behind)
+
+
+def test_a_remapping_of_a_key_that_the_state_does_not_declare():
+    machine = machine_of({'A': (keyed(['goal']), None, {'gaol': 'room'})})
+    machine.userdata.goal = 1
+    (finding,) = verify(machine)
+    assert (finding.severity, finding.check, finding.path) == ('error', 'remapping', 'ROOT/A')
+    assert "'gaol'" in finding.message
+    wrong = machine_of({'A': (keyed(), None, None, {'speed': 1.0})})
+    assert found(wrong) == {('error', 'remapping', 'ROOT/A')}
+
+
+def test_two_states_of_a_concurrence_that_write_one_key():
+    both = fsm.Concurrence(['done'], 'done')
+    with both:
+        fsm.Concurrence.add('A', keyed((), ['x']))
+        fsm.Concurrence.add('B', keyed((), ['y']), {'y': 'x'})
+        fsm.Concurrence.add('C', keyed((), ['z']))
+    (finding,) = verify(both)
+    assert (finding.severity, finding.check) == ('warning', 'two-writers')
+    assert "'x' is written by ['A', 'B']" in finding.message
+
+
+class Writes(fsm.State):
+    def __init__(self, reads=(), writes=()):
+        super().__init__(['done', 'more'], reads, writes)
+
+
+def chained(width):
+    machine = fsm.StateMachine(['done'])
+    with machine:
+        for number in range(width):
+            following = {'more': f'S{number + 1}'} if number + 1 < width else {'more': 'S0'}
+            reads = [f'k{number - 1}'] if number else []
+            fsm.StateMachine.add(f'S{number}', Writes(reads, [f'k{number}']), following)
+    return machine
+
+
+def nested(depth):
+    machine = fsm.StateMachine(['done'], ['k'], ['k'])
+    with machine:
+        if depth:
+            fsm.StateMachine.add('IN', nested(depth - 1), {'done': 'A'})
+        fsm.StateMachine.add('A', Writes(['k'], ['k']), {'more': 'B'})
+        fsm.StateMachine.add('B', Writes(['k'], ['k']), {'more': 'A'})
+    return machine
+
+
+def test_the_time_grows_with_the_size_alone():
+    def seconds(machine):
+        begin = time.process_time()
+        findings = verify(machine, ['k'])
+        return time.process_time() - begin, findings
+
+    small, findings = seconds(chained(200))
+    assert findings == []
+    large, findings = seconds(chained(2000))
+    assert findings == []
+    # A keyset of each state is as large as the way to it: a little more than linear is left.
+    assert large < 60 * max(small, 0.005)
+    deep, findings = seconds(nested(60))
+    assert findings == []
+    assert deep < 2.0
+
+
 def test_constants_count_as_written():
     machine = machine_of({'A': (keyed(['speed']), None, None, {'speed': 1.0})})
     assert not found(machine)

@@ -1,0 +1,289 @@
+"""Concurrences: how they end, and that they hear a preempt at any moment."""
+
+from __future__ import annotations
+
+import random
+import threading
+
+import pytest
+
+import surveillance_fsm as fsm
+
+from .states import Answer, Background, Deaf, Waiter, began, chain
+
+
+def together(*states, **arguments):
+    concurrence = fsm.Concurrence(['done', 'preempted'], 'preempted', **arguments)
+    with concurrence:
+        for number, state in enumerate(states):
+            fsm.Concurrence.add(f'S{number}', state)
+    return concurrence
+
+
+ALL_DONE = {'outcome_map': {'done': {'S0': 'done', 'S1': 'done'}}}
+
+
+@pytest.mark.parametrize('nested', [False, True])
+def test_a_preempt_reaches_all_children_of_a_concurrence(nested):
+    states = [Waiter(), Waiter()]
+    root = concurrence = together(*states, **ALL_DONE)
+    if nested:
+        root = fsm.StateMachine(['done', 'preempted'])
+        with root:
+            fsm.StateMachine.add('TOGETHER', concurrence)
+    run = Background(root)
+    for state in states:
+        began(state)
+    root.request_preempt()
+    assert run.result() == 'preempted'
+    assert not any(state.preempt_requested() for state in (root, concurrence, *states))
+
+
+def test_a_preempt_of_a_concurrence_before_its_start_is_not_lost():
+    states = [Waiter(), Waiter()]
+    root = together(*states, **ALL_DONE)
+    root.request_preempt()
+    assert root.execute() == 'preempted'
+    assert not root.preempt_requested()
+
+
+def test_a_preempt_while_the_children_finish_is_not_lost():
+    # One child has ended, and the others were told to stop; one of them takes its time.
+    quick, deaf = Answer('done'), Deaf()
+    concurrence = together(quick, deaf, child_termination_cb=lambda ends: True)
+    after = Waiter()
+    root = fsm.StateMachine(['done', 'preempted'])
+    with root:
+        fsm.StateMachine.add('TOGETHER', concurrence, {'preempted': 'AFTER', 'done': 'AFTER'})
+        fsm.StateMachine.add('AFTER', after)
+    run = Background(root)
+    began(deaf)
+    root.request_preempt()
+    deaf.release.set()
+    assert run.result() == 'preempted'
+    assert not root.preempt_requested()
+
+
+def test_a_child_of_a_concurrence_that_ignores_a_preempt_is_left_behind(caplog):
+    deaf, waiter = Deaf(), Waiter()
+    concurrence = together(deaf, waiter)
+    root = fsm.StateMachine(['done', 'preempted'])
+    root.set_name('ROOT')
+    root.preempt_timeout = 0.05
+    with root:
+        fsm.StateMachine.add('TOGETHER', concurrence)
+    run = Background(root)
+    began(deaf)
+    began(waiter)
+    root.request_preempt()
+    assert run.result() == 'preempted'
+    assert "'ROOT/TOGETHER/S0' ignored a preempt" in caplog.text
+    assert not root.preempt_requested()
+    assert not concurrence.preempt_requested()
+    deaf.release.set()
+
+
+def test_a_request_to_a_state_that_an_earlier_run_left_behind_is_kept():
+    deaf = Deaf()
+    root = fsm.StateMachine(['done', 'preempted'])
+    root.preempt_timeout = 0.05
+    with root:
+        fsm.StateMachine.add('DEAF', deaf)
+    run = Background(root)
+    began(deaf)
+    root.request_preempt()
+    assert run.result() == 'preempted'
+    # It is still running: nobody may enter it, and the machine is told so in time.
+    assert root.execute() == 'preempted'
+    assert not root.preempt_requested()
+    deaf.release.set()
+    assert deaf.ended.wait(5.0)
+    assert root.execute() == 'done'
+
+
+def test_an_interrupt_that_meets_a_state_as_it_begins_leaves_no_request_on_it():
+    first, stop = Answer('done'), Answer('done')
+    second = Waiter(0.0)
+    root = fsm.StateMachine(['done', 'preempted'])
+    with root:
+        fsm.StateMachine.add('FIRST', first, {'done': 'SECOND'})
+        fsm.StateMachine.add('SECOND', second)
+    root.add_interrupt('STOP', stop)
+    # Raised when SECOND is current but has not begun.
+    root.register_transition_cb(
+        lambda ud, active: active == ['SECOND'] and not stop.runs and root.raise_interrupt('STOP')
+    )
+    assert root.execute() == 'done'
+    assert stop.runs == 1
+    assert not second.preempt_requested()
+
+
+def test_a_deaf_state_deep_inside_a_child_of_a_concurrence_is_left_behind():
+    deaf, waiter = Deaf(), Waiter()
+    machine, _ = chain(deaf)
+    root = together(machine, waiter)
+    root.preempt_timeout = 0.05
+    run = Background(root)
+    began(deaf)
+    began(waiter)
+    root.request_preempt()
+    assert run.result() == 'preempted'
+    deaf.release.set()
+
+
+def test_an_error_in_one_child_stops_the_others_and_keeps_its_cause():
+    waiter = Waiter()
+    cause = RuntimeError('arm stuck')
+    root = together(waiter, Answer(cause, outcomes=['done']))
+    with pytest.raises(fsm.InvalidUserCodeError, match=r'Concurrence/S1.*arm stuck') as caught:
+        root.execute()
+    assert caught.value.__cause__ is cause
+    assert not root.is_running()
+
+
+def test_the_first_end_may_stop_all_others_or_some():
+    states = [Answer('done'), Waiter(), Waiter(seconds=0.0)]
+    root = together(*states, child_termination_cb=lambda ends: ends['S0'] == 'done')
+    assert root.execute() == 'preempted'
+    waiter = Waiter()
+    ends = []
+    root = together(
+        Answer('done'),
+        waiter,
+        child_termination_cb=lambda now: ends.append(dict(now)) or (['S1'] if now['S0'] else False),
+    )
+    assert root.execute() == 'preempted'
+    assert ends[-1] == {'S0': 'done', 'S1': 'preempted'}
+
+
+def test_the_outcome_callback_decides_and_is_held_to_the_outcomes():
+    root = together(Answer('done'), Answer('done'), outcome_cb=lambda ends: 'done')
+    assert root.execute() == 'done'
+    root = together(Answer('done'), outcome_cb=lambda ends: None)
+    assert root.execute() == 'preempted'
+    root = together(Answer('done'), outcome_cb=lambda ends: 'nix')
+    with pytest.raises(fsm.InvalidTransitionError, match="'nix'"):
+        root.execute()
+
+
+def test_of_several_outcomes_that_hold_the_most_specific_wins():
+    concurrence = fsm.Concurrence(
+        ['both', 'first', 'none'],
+        'none',
+        outcome_map={'both': {'S0': 'done', 'S1': 'done'}, 'first': {'S0': 'done'}},
+    )
+    with concurrence:
+        fsm.Concurrence.add('S0', Answer('done'))
+        fsm.Concurrence.add('S1', Answer('done'))
+    assert concurrence.execute() == 'both'
+
+
+# A preempt has its own outcome, whatever the default.
+
+
+def guarded(*states, default='succeeded', outcomes=('succeeded', 'preempted'), **arguments):
+    """A mission whose next state runs unless the concurrence before it ends preempted."""
+    concurrence = fsm.Concurrence(outcomes, default, **arguments)
+    following = Answer('done')
+    root = fsm.StateMachine(['done', 'preempted'])
+    with root:
+        fsm.StateMachine.add('TOGETHER', concurrence, {default: 'NEXT'})
+        fsm.StateMachine.add('NEXT', following)
+    with concurrence:
+        for number, state in enumerate(states):
+            fsm.Concurrence.add(f'S{number}', state)
+    return root, following
+
+
+@pytest.mark.parametrize('others', [[], [Waiter], [lambda: Answer('done')]])
+@pytest.mark.parametrize('before', [False, True])
+def test_a_preempted_concurrence_ends_preempted_whatever_its_default(others, before):
+    waiter = Waiter()
+    root, following = guarded(waiter, *(make() for make in others))
+    if before:
+        root.request_preempt()
+        assert root.execute() == 'preempted'
+    else:
+        run = Background(root)
+        began(waiter)
+        root.request_preempt()
+        assert run.result() == 'preempted'
+    assert following.runs == 0
+    assert not root.preempt_requested()
+
+
+def test_a_preempt_counts_more_than_an_outcome_map_that_holds():
+    quick, waiter = Answer('done'), Waiter()
+    root, following = guarded(waiter, quick, outcome_map={'succeeded': {'S1': 'done'}})
+    run = Background(root)
+    began(waiter)
+    root.request_preempt()
+    assert run.result() == 'preempted'
+    assert following.runs == 0
+
+
+def test_without_an_outcome_for_it_a_preempt_goes_to_what_runs_next():
+    waiter, after = Waiter(), Waiter()
+    concurrence = fsm.Concurrence(['succeeded'], 'succeeded')
+    with concurrence:
+        fsm.Concurrence.add('S0', waiter)
+    root = fsm.StateMachine(['done', 'preempted'])
+    with root:
+        fsm.StateMachine.add('TOGETHER', concurrence, {'succeeded': 'AFTER'})
+        fsm.StateMachine.add('AFTER', after)
+    run = Background(root)
+    began(waiter)
+    root.request_preempt()
+    assert run.result() == 'preempted'
+    assert after.runs == 1
+
+
+def test_preempts_at_random_moments_in_nested_containers_are_not_lost():
+    generator = random.Random(5)
+    for _ in range(150):
+        waiters = [Waiter(generator.choice([0.0, 0.0002, 20.0])) for _ in range(3)]
+        each = fsm.Iterator(['preempted'], [], [], it=[1, 2], exhausted_outcome='done')
+        with each:
+            fsm.Iterator.set_contained_state('EACH', waiters[0], loop_outcomes=['done'])
+        inner = fsm.Sequence(['done', 'preempted'], 'done')
+        with inner:
+            fsm.Sequence.add('ONE', waiters[1])
+            fsm.Sequence.add('TWO', each)
+        both = fsm.Concurrence(['done', 'preempted'], 'done')
+        with both:
+            fsm.Concurrence.add('INNER', inner)
+            fsm.Concurrence.add('OTHER', waiters[2])
+        root = fsm.StateMachine(['preempted'])
+        with root:
+            fsm.StateMachine.add('BOTH', both, {'done': 'BOTH'})
+        timer = threading.Timer(generator.uniform(0.0, 0.003), root.request_preempt)
+        timer.start()
+        assert Background(root).result() == 'preempted'
+        timer.join()
+        assert not root.preempt_requested()
+
+
+# What callbacks return.
+
+
+@pytest.mark.parametrize('nonsense', [['NIX'], [3], [['S0']], 'NIX'])
+def test_a_termination_callback_that_returns_nonsense_is_named(nonsense):
+    root = together(Answer('done'), Waiter(), child_termination_cb=lambda ends: nonsense)
+    with pytest.raises(fsm.InvalidUserCodeError, match="child_termination_cb of 'Concurrence'"):
+        root.execute()
+
+
+def test_what_is_no_list_is_taken_for_its_truth_as_in_smach():
+    root = together(Answer('done'), Waiter(), child_termination_cb=lambda ends: 7)
+    assert root.execute() == 'preempted'
+
+
+def test_an_outcome_callback_that_returns_what_cannot_be_hashed_is_named():
+    root = together(Answer('done'), outcome_cb=lambda ends: ['done'])
+    with pytest.raises(fsm.InvalidTransitionError, match='outcome_cb'):
+        root.execute()
+
+
+def test_an_empty_concurrence_is_an_invalid_state():
+    with pytest.raises(fsm.InvalidStateError, match='no states'):
+        fsm.Concurrence(['done'], 'done').execute()

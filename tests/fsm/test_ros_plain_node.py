@@ -1,0 +1,234 @@
+"""The engine's ROS part works with any rclpy node, and with SMACH's introspection."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import threading
+
+import pytest
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from std_msgs.msg import Int32
+from std_srvs.srv import Trigger
+
+import surveillance_fsm as fsm
+from surveillance_fsm.ros import (
+    ActionServerWrapper,
+    ClockWait,
+    ConditionState,
+    IntrospectionClient,
+    IntrospectionServer,
+    MonitorState,
+    RosState,
+    ServiceState,
+    SimpleActionState,
+    set_preempt_handler,
+)
+from surveillance_interfaces.action import FollowPath
+from surveillance_interfaces.msg import SmachContainerStatus, SmachContainerStructure
+
+from .states import Answer, Background, Waiter, began
+
+LATCHED = QoSProfile(depth=200, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+class Plain(Node):
+    """Nothing but rclpy's node; `stop` is what the test's graph calls before it destroys it."""
+
+    def stop(self):
+        pass
+
+
+@pytest.fixture
+def node(graph):
+    return graph.add(Plain, node_name='plain')
+
+
+def machine_of(**states):
+    machine = fsm.StateMachine(['succeeded', 'preempted', 'aborted', 'valid', 'true'])
+    labels = list(states)
+    with machine:
+        for label, following in zip(labels, [*labels[1:], None], strict=True):
+            outcome = next(
+                o
+                for o in ('succeeded', 'valid', 'true')
+                if o in states[label].get_registered_outcomes()
+            )
+            rest = dict.fromkeys(states[label].get_registered_outcomes(), 'aborted')
+            bound = {**rest, outcome: following or 'succeeded', 'preempted': 'preempted'}
+            fsm.StateMachine.add(label, states[label], bound)
+    return machine
+
+
+def test_every_state_and_server_works_on_a_plain_node(graph, node):
+    def serve(request, response):
+        response.success = True
+        return response
+
+    node.create_service(Trigger, 'trigger', serve)
+    node.create_publisher(Int32, 'level', LATCHED).publish(Int32(data=5))
+    inner = fsm.StateMachine(['succeeded', 'preempted'])
+    with inner:
+        fsm.StateMachine.add('WORK', Answer('succeeded'))
+    wrapper = ActionServerWrapper(
+        node, 'follow_path', FollowPath, inner, ['succeeded'], [], ['preempted']
+    )
+    wrapper.run_server()
+
+    class Named(RosState):
+        def __init__(self, node):
+            super().__init__(node, outcomes=['succeeded', 'preempted'])
+
+        def execute(self, ud):
+            return 'succeeded' if self.node.get_name() == 'plain' else 'preempted'
+
+    machine = machine_of(
+        NAMED=Named(node),
+        CALL=ServiceState(node, 'trigger', Trigger, timeout=20.0),
+        LISTEN=MonitorState(node, 'level', Int32, lambda ud, m: m.data == 5, 1, qos=LATCHED),
+        ASK=ConditionState(node, lambda ud: True, poll_rate=50),
+        ACT=SimpleActionState(node, 'follow_path', FollowPath, server_wait_timeout=20.0),
+    )
+    machine.set_clock(ClockWait(node))
+    set_preempt_handler(node, machine)
+    assert machine.execute() == 'succeeded'
+
+
+def test_a_cancelled_goal_of_a_plain_node_preempts_its_machine(graph, node):
+    waiter = Waiter(100.0)
+    inner = fsm.StateMachine(['done', 'preempted'])
+    with inner:
+        fsm.StateMachine.add('WAIT', waiter)
+    wrapper = ActionServerWrapper(
+        node, 'follow_path', FollowPath, inner, ['done'], [], ['preempted']
+    )
+    wrapper.run_server()
+    client = machine_of(
+        ACT=SimpleActionState(graph.node, 'follow_path', FollowPath, server_wait_timeout=20.0)
+    )
+    run = Background(client)
+    began(waiter, timeout=20.0)
+    client.request_preempt()
+    assert run.result() == 'preempted'
+
+
+@pytest.mark.parametrize('rate', [0, -1, float('inf'), float('nan'), '20'])
+def test_a_poll_rate_is_in_hertz(node, rate):
+    with pytest.raises(fsm.InvalidStateError, match='hertz'):
+        ConditionState(node, lambda ud: True, poll_rate=rate)
+
+
+def test_ros_time_that_jumps_back_does_not_delay_a_sleep(graph):
+    from rosgraph_msgs.msg import Clock as ClockMessage
+
+    node = graph.add(Plain, node_name='timed', parameters={'use_sim_time': True})
+    assert node.get_parameter('use_sim_time').value is True
+    wait, publisher = ClockWait(node), graph.node.create_publisher(ClockMessage, '/clock', 10)
+
+    def at(seconds):
+        message = ClockMessage()
+        message.clock.sec = seconds
+        graph.until(lambda: publisher.get_subscription_count() > 0)
+        publisher.publish(message)
+        graph.until(lambda: int(wait.now()) == seconds)
+
+    at(1000)
+    before = wait.elapsed()
+    ended = threading.Event()
+    interrupt = fsm.Interrupt()
+    sleeper = threading.Thread(target=lambda: wait.sleep(5.0, interrupt) and ended.set())
+    sleeper.start()
+    try:
+        at(1002)
+        at(900)
+        assert not ended.is_set()
+        at(904)
+        assert ended.wait(10.0)
+    finally:
+        interrupt.set()
+        sleeper.join(10.0)
+    assert wait.elapsed() - before == pytest.approx(6.0, abs=0.01)
+
+
+# SMACH's introspection.
+
+
+@pytest.fixture
+def watched(graph, node):
+    waiter = Waiter(100.0)
+    inner = fsm.StateMachine(['done', 'preempted'])
+    root = fsm.StateMachine(['done', 'preempted'])
+    with root:
+        fsm.StateMachine.add('FIRST', Answer('done'), {'done': 'INNER'})
+        fsm.StateMachine.add('INNER', inner)
+        with inner:
+            fsm.StateMachine.add('WAIT', waiter, {'done': 'LAST'})
+            fsm.StateMachine.add('LAST', Answer('done'))
+    root.userdata.level = 7
+    root.userdata.secret = object()
+    server = IntrospectionServer(node, 'robot', root, '/PATROL')
+    server.start()
+    yield root, waiter
+    root.request_preempt()
+    server.stop()
+
+
+def test_smachs_topics_tell_structure_and_status_of_each_container(graph, watched):
+    root, waiter = watched
+    structures = graph.listen(SmachContainerStructure, 'robot/smach/container_structure', LATCHED)
+    states = graph.listen(SmachContainerStatus, 'robot/smach/container_status', LATCHED)
+    graph.until(lambda: len(structures) == 2)
+    by_path = {each.path: each for each in structures}
+    assert list(by_path['/PATROL'].children) == ['FIRST', 'INNER']
+    edges = zip(
+        by_path['/PATROL/INNER'].outcomes_from,
+        by_path['/PATROL/INNER'].internal_outcomes,
+        by_path['/PATROL/INNER'].outcomes_to,
+        strict=True,
+    )
+    assert ('WAIT', 'done', 'LAST') in set(edges)
+    assert sorted(by_path['/PATROL/INNER'].container_outcomes) == ['done', 'preempted']
+    run = Background(root)
+    began(waiter)
+    graph.until(
+        lambda: (
+            {(each.path, *each.active_states) for each in states}
+            >= {('/PATROL', 'INNER'), ('/PATROL/INNER', 'WAIT')}
+        )
+    )
+    told = next(each for each in states if each.path == '/PATROL')
+    assert told.local_data == '{"level": 7}'
+    assert list(told.initial_states) == ['FIRST']
+    root.request_preempt()
+    assert run.result() == 'preempted'
+
+
+def test_a_client_finds_servers_and_sets_where_a_container_begins(graph, watched):
+    root, waiter = watched
+    client = IntrospectionClient(graph.node)
+    (server,) = graph.until(client.get_servers)
+    assert server == '/robot'
+    userdata = fsm.UserData()
+    userdata.level = 8
+    assert client.set_initial_state(server, '/PATROL/INNER', ['LAST'], userdata)
+    assert root.execute() == 'done'
+    assert waiter.runs == 0
+    assert root['INNER'].userdata.level == 8
+    assert not client.set_initial_state(server, '/PATROL/INNER', ['NIX'], timeout=0.3)
+    assert not client.set_initial_state(server, '/NIX', ['LAST'], timeout=0.3)
+
+
+def test_the_states_need_nothing_of_this_project_but_the_engine():
+    code = (
+        'import sys\n'
+        'class Refuse:\n'
+        '    def find_spec(self, name, path=None, target=None):\n'
+        "        if name.split('.')[0].startswith('surveillance_') and 'fsm' not in name:\n"
+        '            raise ImportError(name)\n'
+        'sys.meta_path.insert(0, Refuse())\n'
+        'import surveillance_fsm.ros as ros\n'
+        'print(ros.ServiceState, ros.ActionServerWrapper)\n'
+    )
+    done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
