@@ -43,6 +43,7 @@ commands (each has its own --help):
   run                       patrol: the same as without a command
   node NAME [ROS args]      run one node by itself in this terminal
   list                      name the nodes
+  params [NODE]             print every parameter's value and where it comes from
   setup                     set up and do no more
   test [pytest args]        run the test suite
   lint                      check format, lint and types
@@ -64,7 +65,10 @@ class Parser(argparse.ArgumentParser):
 
 
 def _names(text: str) -> list[str]:
-    return [name for name in text.replace(' ', '').split(',') if name]
+    names = [name for name in text.replace(' ', '').split(',') if name]
+    if not names:
+        raise argparse.ArgumentTypeError(f'{text!r} names no node')
+    return names
 
 
 def _seconds(text: str) -> float:
@@ -106,6 +110,14 @@ def _shared_options() -> argparse.ArgumentParser:
         type=Path,
         metavar='FILE',
         help='a ROS parameter file; what it says goes before config/parameters.yaml and the place',
+    )
+    parser.add_argument(
+        '-p',
+        dest='assignments',
+        action='append',
+        default=[],
+        metavar='[NODE:]NAME:=VALUE',
+        help='set a parameter; goes before every file',
     )
     parser.add_argument(
         '--log-level',
@@ -209,6 +221,7 @@ def _dispatch(argv: list[str]) -> int:
         'run': _run,
         'node': _node,
         'list': _list,
+        'params': _params,
         'setup': _setup,
         'test': _test,
         'lint': _lint,
@@ -239,7 +252,9 @@ def wanted_run(options: argparse.Namespace) -> Run:
     given = vars(options)
     renamed = {'map': 'place', 'params': 'parameters'}
     values = {
-        renamed.get(name, name): given[name] for name in given if name not in ('name', 'rest')
+        renamed.get(name, name): given[name]
+        for name in given
+        if name not in ('name', 'rest', 'write')
     }
     return Run(**values)
 
@@ -263,20 +278,24 @@ def _node(argv: list[str]) -> int:
     options = parser.parse_args(own)
     node = node_table.find(options.name)
     _enter(['node', *argv])
-    from launcher.run import command, node_environ, parameter_files, ros_arguments, ros_domain
+    from launcher import run as runs
+    from surveillance_runtime.configuration import split_arguments
 
     run = wanted_run(options)
     run.check()
-    arguments = ros_arguments(parameter_files(CONFIG, run), run)
-    if node.console and run.mode:
-        arguments += ['-p', f'execution_mode:={run.mode}']
-    arguments += ['--', *rest]
+    given = split_arguments(rest)
+    merged = runs.configuration(CONFIG, run, more=given)
+    runs.check_assignments(merged, [node])
     renamed = any('__ns:=' in word or '__node:=' in word for word in rest)
+    name = given.full_name(node.name) if renamed else runs.full_name(run, node.name)
+    file = runs.parameters_in_memory(name, merged.resolve(node.name, name))
+    arguments = runs.ros_arguments([file], run)
+    arguments += [word for word in given.rest if word not in ('--ros-args', '--')]
     if not renamed:
-        for descriptor in claim([node], ros_domain(run), run.namespace):
+        for descriptor in claim([node], runs.ros_domain(run), run.namespace):
             os.set_inheritable(descriptor, True)
-    words = command([node], arguments, 0)
-    os.execve(words[0], words, node_environ(run))
+    words = runs.command([node], arguments, 0)
+    os.execve(words[0], words, runs.node_environ(run))
 
 
 def _split(argv: list[str], word: str) -> tuple[list[str], list[str]]:
@@ -292,6 +311,36 @@ def _list(argv: list[str]) -> int:
         for node in node_table.NODES:
             if node.package == package:
                 print(f'  {node.name:<{width}}  {node.purpose}')
+    return 0
+
+
+def _params(argv: list[str]) -> int:
+    parser = Parser(
+        prog='launch.py params',
+        usage='%(prog)s [options] [NODE]',
+        description='Prints the parameters that the nodes get, and where each value comes from.',
+        parents=[_shared_options()],
+    )
+    parser.add_argument('name', nargs='?', metavar='NODE', help='of this node alone')
+    parser.add_argument(
+        '--write', action='store_true', help='write the schema and docs/parameters.md anew'
+    )
+    options = parser.parse_args(argv)
+    chosen = [node_table.find(options.name)] if options.name else list(node_table.NODES)
+    _enter(['params', *argv])
+    from launcher import parameter_tables
+    from launcher import run as runs
+
+    if options.write:
+        for path in parameter_tables.write(CHECKOUT):
+            print(f'written: {path}')
+        return 0
+    run = wanted_run(options)
+    run.check()
+    merged = runs.configuration(CONFIG, run)
+    runs.check_assignments(merged, chosen)
+    namespace = (run.namespace or '').strip('/')
+    parameter_tables.show(merged, chosen, f'/{namespace}' if namespace else '', print)
     return 0
 
 

@@ -5,23 +5,32 @@ Imported in the project's environment only: the packages read their own places a
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import sys
 import time
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from launcher import node_table
 from launcher.instance_lock import claim
 from launcher.log_merge import ROS_FORMAT, MergedLog
 from launcher.supervisor import Program, Supervisor
 from surveillance_behaviour.mission import mission_log
-from surveillance_runtime.place import read_place
-from surveillance_runtime.yaml_file import YamlFileError, read_yaml_file
+from surveillance_runtime.configuration import (
+    Configuration,
+    ConfigurationError,
+    Entry,
+    Layer,
+    RosArguments,
+    Setting,
+    argument_layer,
+    file_layer,
+    resolved_text,
+)
+from surveillance_runtime.place import read_place_file
+from surveillance_runtime.yaml_file import YamlFileError
 
 CHILD = Path(__file__).with_name('child.py')
 DISCOVERY = Path(__file__).with_name('discovery.xml')
@@ -49,6 +58,7 @@ class Run:
         behaviour: one of `node_table.BEHAVIOURS`.
         place: file that describes the place, None for the behaviour's own.
         parameters: further parameter file, None for none.
+        assignments: `[NODE:]NAME:=VALUE` of `-p`, which win over every file.
         composed: all nodes in one process.
         only, without: names of nodes, see `node_table.select`.
         log_level: one of `node_table.LOG_LEVELS`, None for ROS's own choice.
@@ -61,6 +71,7 @@ class Run:
     behaviour: str = 'surveillance'
     place: Path | None = None
     parameters: Path | None = None
+    assignments: Sequence[str] = ()
     composed: bool = False
     only: Sequence[str] = ()
     without: Sequence[str] = ()
@@ -83,11 +94,14 @@ class Run:
             raise RunError(f'--domain {self.domain}: expected a number from 0 to {MAX_DOMAIN}')
         if self.place is not None:
             try:
-                read_place(self.place)
+                read_place_file(self.place)
             except YamlFileError as error:
                 raise RunError(f'--map {error}') from None
         if self.parameters is not None:
-            check_parameter_file(self.parameters)
+            try:
+                Configuration((file_layer(self.parameters),)).check()
+            except (YamlFileError, ConfigurationError) as error:
+                raise RunError(f'--params {error}') from None
 
     def nodes(self) -> tuple[node_table.Node, ...]:
         chosen = node_table.select(
@@ -104,28 +118,6 @@ class Run:
         return self.composed and self.mode == 'MANUAL'
 
 
-def check_parameter_file(path: Path) -> None:
-    """Makes sure that a file has the form of ROS parameters and names nodes that exist.
-
-    Raises:
-        RunError: one line with the file and what is wrong in it.
-    """
-    try:
-        file = read_yaml_file(path)
-    except YamlFileError as error:
-        raise RunError(f'--params {error}') from None
-    for key, section in file.values.items():
-        name = key.rsplit('/', 1)[-1]
-        problem = ''
-        if name not in node_table.BY_NAME and name not in ('*', '**'):
-            known = ', '.join(node_table.BY_NAME)
-            problem = f'no node is called {key!r}, expected /** or one of {known}'
-        elif not isinstance(section, dict) or not isinstance(section.get('ros__parameters'), dict):
-            problem = f"expected 'ros__parameters:' with a mapping in {key!r}"
-        if problem:
-            raise RunError(f'--params {file.error_at((key,), problem)}')
-
-
 def parameter_files(config: Path, run: Run) -> list[Path]:
     """The files that every node gets, in ROS's order: a later one wins."""
     place = run.place or config / PLACES[run.behaviour]
@@ -135,14 +127,153 @@ def parameter_files(config: Path, run: Run) -> list[Path]:
     return [path.resolve() for path in files]
 
 
+def configuration(
+    config: Path, run: Run, folder: Path | None = None, more: RosArguments | None = None
+) -> Configuration:
+    """Merge all that gives parameters to the nodes of a run; each entry and the place are checked.
+
+    Args:
+        config: The folder with the parameter files.
+        run: What the command line asks for.
+        folder: Where the run leaves its record, its ontologies and their store.
+        more: Further arguments in ROS's own form.
+
+    Raises:
+        RunError: One line about the first entry that is wrong.
+    """
+    try:
+        merged = _merged(config, run, folder, more)
+        merged.check()
+        merged.place('simulator', full_name(run, 'simulator'))
+        _check_behaviour(merged, run)
+    except YamlFileError as error:
+        raise RunError(f'parameter file {error}') from None
+    except ConfigurationError as error:
+        raise RunError(str(error)) from None
+    return merged
+
+
+def _merged(
+    config: Path, run: Run, folder: Path | None, more: RosArguments | None
+) -> Configuration:
+    files = parameter_files(config, run)
+    layers = [file_layer(path) for path in files[:2]]
+    if run.behaviour == 'patrol':
+        # the place's file is for the simulator: the robot learns its map from the markers
+        origin = '--behaviour patrol'
+        layers.append(Layer(origin, (Entry('/**', 'map_source', 'markers', origin),)))
+    if folder is not None:
+        layers.append(Layer('this run', tuple(_folders_of(folder.resolve()))))
+    layers += [file_layer(path) for path in files[2:]]
+    layers += [file_layer(path) for path in (more.files if more else ())]
+    layers.append(Layer('the command line', tuple(_option_entries(run, folder))))
+    layers.append(argument_layer((*run.assignments, *(more.assignments if more else ()))))
+    return Configuration(tuple(layers))
+
+
+def _folders_of(folder: Path) -> Iterator[Entry]:
+    """Where the nodes of a run write, if the user's file names no other place."""
+    for name, part in (('ontologies_folder', ONTOLOGIES), ('store', STORE)):
+        yield Entry('/**/armor_server', name, str(folder / part), 'this run')
+
+
+def _option_entries(run: Run, folder: Path | None) -> Iterator[Entry]:
+    """What the options say as parameters, for the nodes that they concern."""
+    node = f'/**/{BEHAVIOUR_NODE}'
+    if run.behaviour != 'surveillance':
+        yield Entry(node, 'behaviour', run.behaviour, f'--behaviour {run.behaviour}')
+    if folder is not None:
+        yield Entry(node, 'record', str(folder / RECORD), 'this run')
+        yield Entry('/**/reasoner', 'record', str(folder / RECORD), 'this run')
+    # Without one that was asked for, the mode is what the parameter files say.
+    if run.mode:
+        for each in node_table.NODES:
+            if each.console:
+                yield Entry(f'/**/{each.name}', 'execution_mode', run.mode, f'--mode {run.mode}')
+                yield Entry(
+                    f'/**/{each.name}', 'console', not run.one_console, f'--mode {run.mode}'
+                )
+
+
+def _check_behaviour(merged: Configuration, run: Run) -> None:
+    given = merged.resolve(BEHAVIOUR_NODE, full_name(run, BEHAVIOUR_NODE)).get('behaviour')
+    if given is not None and given.value != run.behaviour:
+        raise RunError(
+            f'{given.origin}: behaviour {given.value}, but the run is one of {run.behaviour}: '
+            f'expected --behaviour {given.value}, which starts its nodes too'
+        )
+
+
+def check_assignments(merged: Configuration, nodes: Sequence[node_table.Node]) -> None:
+    """Make sure that each `-p` is for a node that is started.
+
+    Raises:
+        RunError: One would be ignored.
+    """
+    for entry in merged.layers[-1].entries:
+        takers = [
+            node.name
+            for node in nodes
+            if merged.schema[node.name].takes(entry.name)
+            and (entry.rank == 0 or entry.pattern.rsplit('/', 1)[-1] in (node.name, '*', '**'))
+        ]
+        if not takers:
+            names = ', '.join(node.name for node in nodes)
+            raise RunError(f'{entry.origin}: no node that is started takes it: {names}')
+
+
+def with_mode_of(run: Run, merged: Configuration) -> Run:
+    """Return the run, where none was asked for with the mode that all controllers are given."""
+    if run.mode:
+        return run
+    modes = set()
+    for node in node_table.NODES:
+        if node.name in node_table.RUN_NODES and node.console:
+            setting = merged.resolve(node.name, full_name(run, node.name)).get('execution_mode')
+            modes.add(setting.value if setting is not None else node_table.DEFAULT_MODE)
+    mode = modes.pop()
+    return run if modes or mode == node_table.DEFAULT_MODE else replace(run, mode=mode)
+
+
+def full_name(run: Run, node: str) -> str:
+    """Return a node's name in the graph of a run."""
+    namespace = (run.namespace or '').strip('/')
+    return f'/{namespace}/{node}' if namespace else f'/{node}'
+
+
+def write_parameters(
+    folder: Path, run: Run, merged: Configuration, nodes: Sequence[node_table.Node]
+) -> dict[str, Path]:
+    """Write one file for each node with all its parameters and where each came from.
+
+    Raises:
+        RunError: A file cannot be written.
+    """
+    files = {}
+    for node in nodes:
+        path = folder / f'{node.name}.yaml'
+        try:
+            folder.mkdir(exist_ok=True)
+            name = full_name(run, node.name)
+            path.write_text(resolved_text(name, merged.resolve(node.name, name)), 'utf-8')
+        except OSError as error:
+            raise RunError(f'{path}: cannot be written: {error.strerror}') from None
+        files[node.name] = path
+    return files
+
+
+def parameters_in_memory(name: str, settings: Mapping[str, Setting]) -> Path:
+    """Return a file with a node's parameters that lives as long as this process."""
+    descriptor = os.memfd_create('parameters', 0)
+    os.write(descriptor, resolved_text(name, settings).encode())
+    return Path(f'/proc/self/fd/{descriptor}')
+
+
 def ros_arguments(files: Sequence[Path], run: Run) -> list[str]:
-    """The ROS arguments that all nodes of a run share."""
+    """The ROS arguments of a node of a run."""
     arguments = ['--ros-args']
     for path in files:
         arguments += ['--params-file', str(path)]
-    if run.behaviour == 'patrol':
-        # the place's file is for the simulator: the robot learns its map from the markers
-        arguments += ['-p', 'map_source:=markers']
     if run.namespace is not None:
         arguments += ['-r', f'__ns:=/{run.namespace.strip("/")}']
     if run.log_level is not None:
@@ -208,34 +339,6 @@ def make_folder(runs: Path) -> Path:
     raise RunError(f'{folder}: a hundred runs began in this second')
 
 
-def write_own_parameters(folder: Path, run: Run) -> Path:
-    """Writes what the command line says as parameters, for the nodes that it concerns."""
-    own: dict[str, dict[str, Any]] = {
-        BEHAVIOUR_NODE: {'behaviour': run.behaviour, 'record': str(folder / RECORD)},
-        'reasoner': {'record': str(folder / RECORD)},
-        'armor_server': {
-            'ontologies_folder': str(folder.resolve() / ONTOLOGIES),
-            'store': str(folder.resolve() / STORE),
-        },
-    }
-    # Without one that was asked for, the mode is what the parameter files say.
-    if run.mode:
-        for node in node_table.NODES:
-            if node.console:
-                own[node.name] = {'execution_mode': run.mode, 'console': not run.one_console}
-    return _write_parameters(folder / 'launch.yaml', own)
-
-
-def _write_parameters(path: Path, of_nodes: Mapping[str, Mapping[str, Any]]) -> Path:
-    # `/**/name` is the node in any namespace. JSON is YAML too, and quotes safely.
-    content = {f'/**/{name}': {'ros__parameters': of_nodes[name]} for name in of_nodes}
-    try:
-        path.write_text(json.dumps(content, indent=1) + '\n', encoding='utf-8')
-    except OSError as error:
-        raise RunError(f'{path}: cannot be written: {error.strerror}') from None
-    return path
-
-
 def run_mission(run: Run, config: Path, runs: Path) -> int:
     """Starts the nodes, supervises them until the end, prints the summary; returns the exit code.
 
@@ -248,21 +351,24 @@ def run_mission(run: Run, config: Path, runs: Path) -> int:
         RunError, node_table.SelectionError, InstanceLockError: what was asked for cannot be run.
     """
     run.check()
+    merged = configuration(config, run)  # before anything is written
+    run = with_mode_of(run, merged)
     nodes = run.nodes()
+    check_assignments(merged, nodes)
     claims = claim(nodes, ros_domain(run), run.namespace)
     folder = make_folder(runs)
-    files = [*parameter_files(config, run), write_own_parameters(folder, run)]
-    arguments = ros_arguments(files, run)
+    merged = configuration(config, run, folder)
+    files = write_parameters(folder / 'parameters', run, merged, nodes)
     environ = node_environ(run, folder / 'ros')
     manual = run.mode == 'MANUAL'
     if run.composed:
-        words = command(nodes, arguments, os.getpid())
+        words = command(nodes, ros_arguments(list(files.values()), run), os.getpid())
         programs = [Program(COMPOSED, words, environ, takes_input=manual)]
     else:
         programs = [
             Program(
                 node.name,
-                command([node], arguments, os.getpid()),
+                command([node], ros_arguments([files[node.name]], run), os.getpid()),
                 environ,
                 takes_input=manual and bool(node.console),
                 leads=node.name == BEHAVIOUR_NODE,
@@ -274,7 +380,7 @@ def run_mission(run: Run, config: Path, runs: Path) -> int:
     log = MergedLog(None, names, path=folder / 'launch.log')
     log.say(
         f'{run.behaviour} in mode {run.mode or node_table.DEFAULT_MODE}, '
-        f'place {files[1].name}, '
+        f'place {parameter_files(config, run)[1].name}, '
         f'ROS domain {ros_domain(run)}, files in {_short(folder)}'
     )
     log.say(f'watch it in a second terminal: {watch_command(run)}')

@@ -12,11 +12,14 @@ from __future__ import annotations
 from pathlib import Path
 
 from ament_index_python.packages import get_package_share_directory
-from launch.actions import DeclareLaunchArgument, OpaqueFunction
+from launch.actions import DeclareLaunchArgument, OpaqueFunction, Shutdown
+from launch.events.process import ProcessExited
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
 from launch import LaunchContext, LaunchDescription
+from surveillance_runtime.configuration import Configuration, file_layer
+from surveillance_runtime.place import read_place_file
 
 # Executables of each package, by what brings them in.
 ALWAYS = {
@@ -29,6 +32,7 @@ PATROL = {
     'surveillance_perception': ['aruco_detector', 'marker_server', 'arm_controller'],
 }
 SIMULATION = {'surveillance_simulation': ['simulator']}
+EXIT_CANNOT_START = 2
 PLACES = {'surveillance': 'seven_rooms.yaml', 'patrol': 'patrol_world.yaml'}
 
 ARGUMENTS = [
@@ -65,6 +69,7 @@ def start_nodes(context: LaunchContext) -> list[Node]:
     config = Path(get_package_share_directory('surveillance_behaviour'), 'config')
     files = [str(config / 'parameters.yaml'), argument('map') or str(config / PLACES[behaviour])]
     files += [argument('params')] if argument('params') else []
+    check(files)
     parts = [ALWAYS]
     if behaviour == 'patrol':
         parts.append(PATROL)
@@ -88,11 +93,31 @@ def start_nodes(context: LaunchContext) -> list[Node]:
             emulate_tty=True,
             respawn=True,
             respawn_delay=1.0,
+            on_exit=stop_if_unusable,
         )
         for part in parts
         for package, names in part.items()
         for name in names
     ]
+
+
+def check(files: list[str]) -> None:
+    """Look at all parameters and the place before a node starts, as `launch.py` does.
+
+    Raises:
+        ConfigurationError, YamlFileError: One line about the first thing that is wrong.
+    """
+    read_place_file(files[1])
+    merged = Configuration(tuple(file_layer(path) for path in files))
+    merged.check()
+    merged.place()
+
+
+def stop_if_unusable(event: ProcessExited, _context: LaunchContext) -> list[Shutdown] | None:
+    """End the launch when a node says that its configuration does not let it start."""
+    if event.returncode != EXIT_CANNOT_START:
+        return None
+    return [Shutdown(reason=f'{event.process_name} cannot start as it is configured')]
 
 
 def generate_launch_description() -> LaunchDescription:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from rclpy.callback_groups import ReentrantCallbackGroup
@@ -57,7 +58,7 @@ class OntologyMapBuilder(PatrolNode):
             place,
             lambda: int(self.get_clock().now().nanoseconds // 1_000_000_000),
             self.stopping.is_set,
-            Reports(log.info, log.warn, log.error, self.fail),
+            Reports(log.info, log.warn, log.error, partial(self.fail, unusable=True)),
             self._built.happen,
         )
         self._work = AwaitedWork(self, 1)

@@ -31,12 +31,29 @@ from rclpy.qos import qos_policy_name_from_kind
 from rclpy.service import Service
 from rclpy.subscription import Subscription
 
+from surveillance_runtime.configuration import RosArguments, Setting, read_schema
 from surveillance_runtime.parameters import Check, ParameterError, ParameterSpec, element_type
 from surveillance_runtime.qos import CLIENT_QOS, SERVICE_QOS
 from surveillance_runtime.waiting import Interrupt
 
+_EMPTY = {
+    bool: Parameter.Type.BOOL_ARRAY,
+    int: Parameter.Type.INTEGER_ARRAY,
+    float: Parameter.Type.DOUBLE_ARRAY,
+    str: Parameter.Type.STRING_ARRAY,
+}
+
 JOIN_SECONDS = 2.0
 """How long a stopping node waits for each of its threads, seconds."""
+
+
+_given: RosArguments | None = None
+
+
+def give_arguments(arguments: RosArguments | None) -> None:
+    """Let the nodes that this process makes from now on take their parameters from arguments."""
+    global _given
+    _given = arguments
 
 
 class StartError(Exception):
@@ -57,16 +74,29 @@ class PatrolNode(Node):  # type: ignore[misc]
         stopping: Raised when the node stops; give it to every wait.
         ended: Raised when the node's process shall end, wanted (`finish`) or not (`fail`).
         failure: Why the node cannot go on, once `fail` was called.
+        unusable: Whether that is its configuration.
     """
 
     def __init__(self, name: str, **node_options: Any) -> None:
         self.stopping = Interrupt()
         self.ended = Interrupt()
         self.failure: str | None = None
+        self.unusable = False
         self._specs: dict[str, ParameterSpec] = {}
         self._on_change: dict[str, Callable[[Any], None]] = {}
         self._threads: list[threading.Thread] = []
         self._owned: list[Destroyable] = []
+        self._overrides_given: dict[str, Setting] = {}
+        if _given is not None and 'parameter_overrides' not in node_options:
+            given = _given.configuration()
+            if name in given.schema:
+                given.check()
+            self._overrides_given = given.resolve(name, _given.full_name(name))
+            given.place(name, _given.full_name(name))
+            node_options['parameter_overrides'] = [
+                _override(name, key, setting.value)
+                for key, setting in self._overrides_given.items()
+            ]
         super().__init__(name, **node_options)
         self.add_on_set_parameters_callback(self._check_parameters)
         self.add_post_set_parameters_callback(self._tell_parameters)
@@ -122,6 +152,18 @@ class PatrolNode(Node):  # type: ignore[misc]
                 ]
         self._specs[name] = spec
         try:
+            accepted = self._declare_checked(spec, descriptor)
+        except ParameterError as error:
+            if name in self._overrides_given:
+                raise ParameterError(f'{self._overrides_given[name].origin}: {error}') from error
+            raise
+        if on_change is not None:
+            self._on_change[name] = on_change
+        return accepted
+
+    def _declare_checked(self, spec: ParameterSpec, descriptor: ParameterDescriptor) -> Any:
+        name, default = spec.name, spec.default
+        try:
             value = self.declare_parameter(name, default, descriptor).value
         except (InvalidParameterValueException, InvalidParameterTypeException) as error:
             override = self._parameter_overrides.get(name)
@@ -130,8 +172,6 @@ class PatrolNode(Node):  # type: ignore[misc]
             raise spec.error(given) from error
         if isinstance(default, list | tuple) and value is None:
             value = default
-        if on_change is not None:
-            self._on_change[name] = on_change
         return spec.accept(value)
 
     def parameters_under(self, prefix: str) -> dict[str, Any]:
@@ -225,10 +265,15 @@ class PatrolNode(Node):  # type: ignore[misc]
             self._owned.pop().destroy()
         super().destroy_node()
 
-    def fail(self, reason: str) -> None:
-        """End the node's process with an error: the node cannot go on, and says why."""
+    def fail(self, reason: str, *, unusable: bool = False) -> None:
+        """End the node's process with an error: the node cannot go on, and says why.
+
+        Args:
+            reason: One line.
+            unusable: Whether its configuration is to blame, so that a new start would not help.
+        """
         if self.failure is None:
-            self.failure = reason
+            self.failure, self.unusable = reason, unusable
             self.get_logger().fatal(reason)
             self.ended.set()
 
@@ -267,6 +312,16 @@ class PatrolNode(Node):  # type: ignore[misc]
             told = self._on_change.get(parameter.name)
             if told is not None:
                 told(self._specs[parameter.name].accept(_plain(parameter.value)))
+
+
+def _override(node: str, name: str, value: Any) -> Parameter:
+    if value == []:  # rclpy cannot tell of what
+        schema = read_schema().get(node)
+        spec = schema.spec(name) if schema is not None else None
+        return Parameter(name, _EMPTY[str if spec is None else spec.element or str], [])
+    if isinstance(value, list) and {type(each) for each in value} == {int, float}:
+        value = [float(each) for each in value]
+    return Parameter(name, value=value)
 
 
 def _plain(value: Any) -> Any:

@@ -14,6 +14,7 @@ drive = declare_fields(node, DriveParameters(), FIELDS, prefix='drive.')
 
 from __future__ import annotations
 
+import math
 from array import array
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -103,7 +104,9 @@ class ParameterSpec:
             fits = type(element) is kind
         if not fits:
             raise self.error(whole)
-        if self.choices and element not in self.choices:
+        if self.choices:
+            element = self._choice(element, whole)
+        if kind is float and math.isfinite(self._usual()) and not math.isfinite(element):
             raise self.error(whole)
         if kind in (int, float) and (
             (self.minimum is not None and not element >= self.minimum)
@@ -111,6 +114,21 @@ class ParameterSpec:
         ):
             raise self.error(whole)
         return element
+
+    def _choice(self, element: Any, whole: Any) -> Any:
+        """The choice that is meant: of texts also one in other letters, as `manual`."""
+        if element in self.choices:
+            return element
+        if isinstance(element, str):
+            for choice in self.choices:
+                if isinstance(choice, str) and choice.casefold() == element.casefold():
+                    return choice
+        raise self.error(whole)
+
+    def _usual(self) -> float:
+        """A default that is not finite says that such values make sense."""
+        defaults = self.default if isinstance(self.default, list | tuple) else [self.default]
+        return next((d for d in defaults if isinstance(d, float) and not math.isfinite(d)), 0.0)
 
     def _checked(self, accepted: Any, value: Any) -> Any:
         if self.check is not None:

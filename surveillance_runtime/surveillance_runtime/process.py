@@ -8,7 +8,6 @@ running goal can be cancelled), and only then takes ROS down.
 from __future__ import annotations
 
 import contextlib
-import itertools
 import os
 import signal
 import sys
@@ -26,9 +25,10 @@ from rclpy.executors import (
 from rclpy.signals import SignalHandlerOptions
 from threadpoolctl import threadpool_limits
 
-from surveillance_runtime.node import JOIN_SECONDS, PatrolNode, StartError
+from surveillance_runtime.configuration import RosArguments, argument_layer, split_arguments
+from surveillance_runtime.middleware import check_middleware
+from surveillance_runtime.node import JOIN_SECONDS, PatrolNode, StartError, give_arguments
 from surveillance_runtime.parameters import ParameterError
-from surveillance_runtime.yaml_file import YamlFileError, read_yaml_file
 
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM)
 EXIT_CANNOT_START = 2
@@ -57,11 +57,15 @@ def run_nodes(
     ending = _Ending()
     argv = [sys.argv[0], *(sys.argv[1:] if args is None else args)]
     try:
-        _check_parameter_files(argv)
-        rclpy.init(args=argv, signal_handler_options=SignalHandlerOptions.NO)
+        arguments = split_arguments(argv[1:])
+        arguments.configuration()  # the files are there, and of the right form
+        check_middleware()
+        words = [argv[0], *arguments.rest]
+        rclpy.init(args=words, signal_handler_options=SignalHandlerOptions.NO)
     except Exception as error:
         print(f'cannot start: {_one_line(error)}', file=sys.stderr)
         return EXIT_CANNOT_START
+    give_arguments(arguments)
     nodes: list[PatrolNode] = []
     spinner = ExecutorThread()
     code = 0
@@ -70,6 +74,9 @@ def run_nodes(
             nodes.append(factory())
             spinner.executor.add_node(nodes[-1])
             nodes[-1].ended.subscribe(ending.come)
+        check_taken(arguments, nodes)
+        for node in nodes:
+            node.get_logger().info('ready')
         spinner.start(on_end=ending.come)
         ending.wait()
     except (ParameterError, StartError) as error:
@@ -78,6 +85,7 @@ def run_nodes(
         code = EXIT_CANNOT_START
     finally:
         ending.ignore_signals()
+        give_arguments(None)
         for node in reversed(nodes):
             node.stop()
         spinner.stop()
@@ -88,7 +96,7 @@ def run_nodes(
         traceback.print_exception(spinner.error)
         code = 1
     if any(node.failure is not None for node in nodes):
-        code = 1
+        code = EXIT_CANNOT_START if all(n.unusable for n in nodes if n.failure) else 1
     return code
 
 
@@ -103,6 +111,23 @@ def use_one_thread_for_matrices() -> None:
         os.environ.setdefault(variable, '1')
     # for those that are there already
     threadpool_limits(1)
+
+
+def check_taken(arguments: RosArguments, nodes: Sequence[PatrolNode]) -> None:
+    """Make sure that each `-p` is a parameter of one of the nodes.
+
+    Raises:
+        ParameterError: One would be ignored.
+    """
+    for entry in argument_layer(arguments.assignments).entries:
+        takes = any(
+            node.has_parameter(entry.name)
+            for node in nodes
+            if entry.addresses(node.get_name(), node.get_fully_qualified_name())
+        )
+        if not takes and not entry.name.startswith('qos_overrides.'):
+            names = ' or '.join(node.get_name() for node in nodes)
+            raise ParameterError(f'{entry.origin}: not a parameter of {names} as configured')
 
 
 class _Ending:
@@ -181,20 +206,6 @@ class ExecutorThread:
         if self._thread is not None:
             self._thread.join(JOIN_SECONDS)
         self.executor.shutdown(timeout_sec=JOIN_SECONDS)
-
-
-def _check_parameter_files(argv: Sequence[str]) -> None:
-    """Look at the parameter files first: rcl names neither line nor reason.
-
-    Raises:
-        StartError: A file is missing, is not YAML, or gives a parameter twice.
-    """
-    for option, path in itertools.pairwise(argv):
-        if option == '--params-file':
-            try:
-                read_yaml_file(path)
-            except YamlFileError as error:
-                raise StartError(f'parameter file {error}') from error
 
 
 def _one_line(error: BaseException) -> str:

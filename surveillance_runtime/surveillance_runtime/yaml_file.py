@@ -7,6 +7,8 @@ line. `read_yaml_file` reads any mapping, `read_parameter_file` the form of ROS 
 
 from __future__ import annotations
 
+import re
+import stat
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +17,20 @@ from typing import Any
 import yaml
 
 MAX_BYTES = 4_000_000
+MAX_DEPTH = 30
+MAX_VALUES = 200_000
+_SMALL = 30_000
+# libyaml's parser is ten times as fast; PyYAML may have been built without it.
+_Loader = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
+_KINDS = {
+    stat.S_IFDIR: 'a folder',
+    stat.S_IFIFO: 'a pipe',
+    stat.S_IFCHR: 'a device',
+    stat.S_IFBLK: 'a device',
+    stat.S_IFSOCK: 'a socket',
+}
 _INT64 = 2**63
+_EXPONENT = re.compile(r'[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+\Z', re.ASCII)
 KeyPath = tuple[str, ...]
 
 
@@ -70,16 +85,24 @@ def read_yaml_file(path: str | Path) -> YamlFile:
 
 def _compose(path: Path) -> yaml.Node | None:
     try:
-        size = path.stat().st_size
-        if size > MAX_BYTES:
-            raise YamlFileError(f'{path}: {size} bytes, at most {MAX_BYTES} are read')
-        text = path.read_text(encoding='utf-8')
+        found = path.stat()
+        if not stat.S_ISREG(found.st_mode):
+            raise YamlFileError(
+                f'{path}: expected a file, got {_KINDS[stat.S_IFMT(found.st_mode)]}'
+            )
+        if found.st_size > MAX_BYTES:
+            raise YamlFileError(f'{path}: {found.st_size} bytes, at most {MAX_BYTES} are read')
+        with path.open('rb') as stream:  # files of /proc say that they are empty
+            text = stream.read(MAX_BYTES).decode('utf-8')
     except OSError as error:
         raise YamlFileError(f'{path}: {error.strerror or error}') from None
     except UnicodeDecodeError as error:
         raise YamlFileError(f'{path}: not UTF-8 text (byte {error.start})') from None
     try:
-        loader = _NoAliasLoader(text)
+        # PyYAML says better than libyaml where a mistake is.
+        loader_kind: Any = yaml.SafeLoader if len(text) < _SMALL else _Loader
+        _look_over(text, loader_kind)
+        loader = loader_kind(text)
         try:
             node: yaml.Node | None = loader.get_single_node()
         finally:
@@ -94,15 +117,30 @@ def _compose(path: Path) -> yaml.Node | None:
     return node
 
 
-class _NoAliasLoader(yaml.SafeLoader):
-    """Refuses aliases: they make small files expand without bound, and ROS does not know them."""
+def _look_over(text: str, kind: Any) -> None:
+    """Refuse what would take the reader without bound, or what ROS does not know.
 
-    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
-        if self.check_event(yaml.AliasEvent):
-            mark = self.peek_event().start_mark  # type: ignore[no-untyped-call]
-            raise yaml.MarkedYAMLError(None, None, 'an alias (*name) cannot be used here', mark)
-        node: yaml.Node | None = super().compose_node(parent, index)
-        return node
+    Raises:
+        yaml.MarkedYAMLError: An alias, deep nesting, or very many values.
+    """
+    depth = values = 0
+    for event in yaml.parse(text, Loader=kind):
+        if isinstance(event, yaml.AliasEvent):
+            raise yaml.MarkedYAMLError(
+                None,
+                None,
+                'an alias (*name) cannot be used here',
+                event.start_mark,  # type: ignore[arg-type]
+            )
+        if isinstance(event, yaml.CollectionStartEvent):
+            depth += 1
+        elif isinstance(event, yaml.CollectionEndEvent):
+            depth -= 1
+        elif isinstance(event, yaml.ScalarEvent):
+            values += 1
+        if depth > MAX_DEPTH or values > MAX_VALUES:
+            problem = f'expected at most {MAX_DEPTH} levels and {MAX_VALUES} keys and values'
+            raise yaml.MarkedYAMLError(None, None, problem, event.start_mark)  # type: ignore[arg-type]
 
 
 class _Reader:
@@ -140,9 +178,16 @@ class _Reader:
             raise YamlFileError(
                 f"{self.path}:{line}: '{node.value}' cannot be read as a value; quote it"
             ) from None
+        if isinstance(node, yaml.ScalarNode) and node.style is None:
+            value = with_exponent(value)
         if isinstance(value, int) and not -_INT64 <= value < _INT64:
             raise YamlFileError(f'{self.path}:{line}: {node.value:.40}: expected a 64-bit number')
         return value
+
+
+def with_exponent(value: Any) -> Any:
+    """Return a plain text like `1e-3` as the number that ROS reads, other values as they are."""
+    return float(value) if isinstance(value, str) and _EXPONENT.match(value) else value
 
 
 def twice(path: Path, where: KeyPath, line: int, first: int) -> YamlFileError:

@@ -76,7 +76,7 @@ def test_ctrl_c_ends_a_mission_with_its_summary_and_leaves_nothing_behind(launch
     assert 'Traceback' not in output
     assert 'killed' not in output
     (folder,) = (tmp_path / 'runs').iterdir()
-    assert {'mission.jsonl', 'launch.log', 'launch.yaml'} <= {p.name for p in folder.iterdir()}
+    assert {'mission.jsonl', 'launch.log', 'parameters'} <= {p.name for p in folder.iterdir()}
 
 
 @pytest.mark.parametrize('moment', ['surveillance in mode', 'started armor_server'])

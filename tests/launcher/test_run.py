@@ -11,14 +11,17 @@ from launcher.node_table import DEFAULT_MODE
 from launcher.run import (
     Run,
     RunError,
+    check_assignments,
     command,
+    configuration,
     make_folder,
     node_environ,
     parameter_files,
     ros_arguments,
     summary,
     watch_command,
-    write_own_parameters,
+    with_mode_of,
+    write_parameters,
 )
 from surveillance_behaviour.mission.mission_log import MissionRecord
 
@@ -90,17 +93,39 @@ def test_the_users_file_comes_after_the_projects_and_the_launchers_own_last(tmp_
     assert names == ['parameters.yaml', 'place.yaml', 'own.yaml']
 
 
-def own_parameters(folder: Path, run: Run) -> dict[str, dict[str, object]]:
-    content = yaml.safe_load(write_own_parameters(folder, run).read_text())
-    return {key: section['ros__parameters'] for key, section in content.items()}
+def settings_of(node: str, run: Run) -> dict[str, object]:
+    settings = configuration(CONFIG, run).resolve(node, f'/{node}')
+    return {name: setting.value for name, setting in settings.items()}
 
 
 def test_a_mode_on_the_command_line_counts_more_than_one_in_the_users_file(tmp_path):
     file = tmp_path / 'own.yaml'
     file.write_text('battery_controller: {ros__parameters: {execution_mode: MANUAL}}')
-    asked = own_parameters(tmp_path, Run(mode='RANDOM', parameters=file))
-    assert asked['/**/battery_controller']['execution_mode'] == 'RANDOM'
-    assert '/**/battery_controller' not in own_parameters(tmp_path, Run(parameters=file))
+    asked = settings_of('battery_controller', Run(mode='RANDOM', parameters=file))
+    assert asked['execution_mode'] == 'RANDOM'
+    unasked = settings_of('battery_controller', Run(parameters=file))
+    assert unasked['execution_mode'] == 'MANUAL'
+
+
+def test_a_mode_that_the_file_gives_to_all_controllers_is_the_modes_of_the_run(tmp_path):
+    file = tmp_path / 'own.yaml'
+    file.write_text('/**: {ros__parameters: {execution_mode: random}}')
+    run = Run(parameters=file)
+    assert with_mode_of(run, configuration(CONFIG, run)).mode == 'RANDOM'
+    assert with_mode_of(Run(), configuration(CONFIG, Run())) == Run()
+
+
+def test_another_behaviour_in_a_file_is_refused_as_its_nodes_would_be_missing(tmp_path):
+    file = tmp_path / 'own.yaml'
+    file.write_text('robot_behavior: {ros__parameters: {behaviour: patrol}}')
+    with pytest.raises(RunError, match=r'own.yaml:1: behaviour patrol.*--behaviour patrol'):
+        configuration(CONFIG, Run(parameters=file))
+
+
+def test_an_assignment_that_no_started_node_takes_is_refused():
+    run = Run(mode='RANDOM', assignments=('lidar.rays:=90',))
+    with pytest.raises(RunError, match=r'-p lidar.rays:=90: no node that is started takes it'):
+        check_assignments(configuration(CONFIG, run), run.nodes())
 
 
 def test_the_default_mode_stands_in_the_first_file_and_for_all_nodes():
@@ -110,15 +135,16 @@ def test_the_default_mode_stands_in_the_first_file_and_for_all_nodes():
 
 
 def test_a_run_folder_on_a_full_disk_is_named(tmp_path):
-    (tmp_path / 'launch.yaml').symlink_to('/dev/full')
-    with pytest.raises(RunError, match=r'launch.yaml: cannot be written: No space left'):
-        write_own_parameters(tmp_path, Run())
+    (tmp_path / 'armor_server.yaml').symlink_to('/dev/full')
+    run = Run()
+    with pytest.raises(RunError, match=r'armor_server.yaml: cannot be written: No space left'):
+        write_parameters(tmp_path, run, configuration(CONFIG, run), run.nodes())
 
 
-def test_in_one_process_a_console_node_reads_for_all_controllers(tmp_path):
+def test_in_one_process_a_console_node_reads_for_all_controllers():
     run = Run(mode='MANUAL', composed=True)
     assert [node.name for node in run.nodes()][-1] == 'console'
-    assert own_parameters(tmp_path, run)['/**/planner_controller']['console'] is False
+    assert settings_of('planner_controller', run)['console'] is False
     assert 'console' not in [node.name for node in Run(mode='MANUAL').nodes()]
 
 
@@ -173,6 +199,7 @@ def test_the_options_of_the_command_line_become_a_run():
         parameters=Path('p.yaml'),
         only=['a', 'b'],
         without=[],
+        assignments=[],
         seconds=3.0,
     )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -103,6 +104,7 @@ def test_exception_in_a_thread_fails_the_node(graph, capsys):
     assert node.failure == 'LookupError: no such place'
 
 
+READY = r'\[INFO\] \[[\d.]+\] \[program\]: ready\n'
 PROGRAM = """
 import sys
 from surveillance_runtime.node import PatrolNode
@@ -129,7 +131,7 @@ def test_process_stops_cleanly_on_a_signal(number):
     out, err = process.communicate(timeout=10)
     assert process.returncode == 0
     assert 'stopping' in out
-    assert err == ''
+    assert re.fullmatch(READY, err)
 
 
 SIGNALS_IN_EVERY_STEP = """
@@ -156,7 +158,7 @@ def test_signals_in_the_middle_of_any_step_of_a_wait_stop_the_process():
     )
     assert run.returncode == 0
     assert 'stopping' in run.stdout
-    assert run.stderr == ''
+    assert re.fullmatch(READY, run.stderr)
 
 
 SIGNAL_ELSEWHERE = """

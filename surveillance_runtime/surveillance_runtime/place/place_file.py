@@ -18,7 +18,7 @@ from surveillance_runtime.suggestions import nearest
 from surveillance_runtime.yaml_file import YamlFile, read_parameter_file
 
 ROBOT_RADIUS = 0.22
-"""Of the simulated robot, metres: the default of the simulator's `base.robot_radius`."""
+"""Of the simulated robot, metres: the default of the simulator's `robot_radius`."""
 
 
 @dataclass(frozen=True)

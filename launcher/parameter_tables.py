@@ -1,0 +1,225 @@
+"""The tables of all nodes' parameters: written from the nodes' declarations, printed, documented.
+
+`write` makes every node once, in each mode and behaviour, and notes what it declares. The result is
+the schema that `surveillance_runtime.configuration` checks with, and docs/parameters.md.
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import math
+import os
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from launcher import node_table
+from launcher.environment import CHECKOUT
+from surveillance_runtime.configuration import (
+    SCHEMA,
+    Configuration,
+    NodeSchema,
+    read_schema,
+)
+from surveillance_runtime.place.rooms import GEOMETRY_KEYS, PLACE_KEYS
+
+_HEAD = """\
+# Parameters
+
+Every parameter of every node, written by `python3 launch.py params --write` from the nodes' own
+declarations; a test compares. `ros2 param describe NODE NAME` says the same of a running node.
+
+A value is looked for in this order, and the first that is found counts: `-p NAME:=VALUE` on the
+command line; a file given with `--params` (or `--params-file`), of several the last; the file of
+the place (`--map`); `config/parameters.yaml`; the default below. Within one file the section
+`/**/node` counts before `/**`. A file with a `map` replaces the place before it as a whole. An
+unknown name, a wrong type and a value out of range end the start with one line and status 2.
+`python3 launch.py params [NODE]` prints the values and where each comes from.
+
+Parameters marked *live* can be changed while the node runs (`ros2 param set`).
+"""
+
+
+def collect() -> dict[str, Any]:
+    """Return what each node declares, in the form of the schema file; needs a ROS environment."""
+    import rclpy
+    from rclpy.parameter import Parameter
+
+    from surveillance_runtime.node import PatrolNode
+
+    tables: dict[str, Any] = {}
+    context = rclpy.Context()
+    rclpy.init(context=context, domain_id=101)
+    here = os.getcwd()
+    try:
+        with tempfile.TemporaryDirectory() as folder, _recording(PatrolNode) as record:
+            os.chdir(folder)
+            for node in node_table.NODES:
+                declared: dict[str, Any] = {}
+                prefixes: set[str] = set()
+                for given in _variants(node):
+                    record.begin(declared, prefixes)
+                    overrides = [Parameter(name, value=value) for name, value in given.items()]
+                    _make_once(node, context, overrides)
+                tables[node.name] = {
+                    'prefixes': sorted(prefixes),
+                    'parameters': {name: declared[name] for name in sorted(declared)},
+                }
+    finally:
+        os.chdir(here)
+        rclpy.shutdown(context=context)
+    return tables
+
+
+def _variants(node: node_table.Node) -> Iterator[dict[str, Any]]:
+    config = CHECKOUT / 'config'
+    from surveillance_runtime.configuration import file_layer
+
+    schema = {node.name: NodeSchema(prefixes=(*PLACE_KEYS, *GEOMETRY_KEYS))}
+    for behaviour, place in (('surveillance', 'seven_rooms.yaml'), ('patrol', 'patrol_world.yaml')):
+        layers = (file_layer(config / place),)
+        settings = Configuration(layers, schema).resolve(node.name)
+        described = {name: setting.value for name, setting in settings.items()}
+        for mode in node_table.MODES:
+            yield {**described, 'execution_mode': mode, 'behaviour': behaviour, 'console': False}
+
+
+def _make_once(node: node_table.Node, context: Any, overrides: Sequence[Any]) -> None:
+    from surveillance_runtime.node import StartError
+    from surveillance_runtime.parameters import ParameterError
+
+    kind = getattr(importlib.import_module(node.module), node.class_name)
+    try:
+        made = kind(context=context, parameter_overrides=overrides, use_global_arguments=False)
+    except (StartError, ParameterError):
+        return  # what it declared until then is noted
+    made.stop()
+    made.destroy_node()
+
+
+def _portable(value: Any) -> Any:
+    """A default without the folder that this checkout lies in."""
+    return value.removeprefix(f'{CHECKOUT}/') if isinstance(value, str) else value
+
+
+class _Record:
+    def __init__(self) -> None:
+        self._declared: dict[str, Any] = {}
+        self._prefixes: set[str] = set()
+
+    def begin(self, declared: dict[str, Any], prefixes: set[str]) -> None:
+        self._declared, self._prefixes = declared, prefixes
+
+    def note(self, spec: Any, description: str, changeable: bool) -> None:
+        kind = spec.element or type(spec.default)
+        row: dict[str, Any] = {
+            'type': kind.__name__ + ('[]' if spec.element else ''),
+            'default': _portable(list(spec.default) if spec.element else spec.default),
+            'description': description,
+        }
+        for name in ('minimum', 'maximum'):
+            value = getattr(spec, name)
+            if value is not None:
+                row[name] = value
+        if spec.choices:
+            row['choices'] = list(spec.choices)
+        if changeable:
+            row['changeable'] = True
+        self._declared.setdefault(spec.name, row)
+
+    def note_prefix(self, prefix: str) -> None:
+        self._prefixes.add(prefix)
+
+
+@contextmanager
+def _recording(node_class: Any) -> Iterator[_Record]:
+    """Notes every declaration of a parameter."""
+    record = _Record()
+    declare, under = node_class._declare_checked, node_class.parameters_under
+
+    def noting(self: Any, spec: Any, descriptor: Any) -> Any:
+        record.note(spec, descriptor.description, not descriptor.read_only)
+        return declare(self, spec, descriptor)
+
+    def noting_prefix(self: Any, prefix: str) -> Any:
+        record.note_prefix(prefix)
+        return under(self, prefix)
+
+    node_class._declare_checked, node_class.parameters_under = noting, noting_prefix
+    try:
+        yield record
+    finally:
+        node_class._declare_checked, node_class.parameters_under = declare, under
+
+
+def as_json(tables: Mapping[str, Any]) -> str:
+    """Return the schema file's content."""
+    return json.dumps(tables, indent=1, ensure_ascii=False) + '\n'
+
+
+def as_markdown(schema: Mapping[str, NodeSchema]) -> str:
+    """Return the page docs/parameters.md."""
+    parts = [_HEAD]
+    for node in node_table.NODES:
+        table = schema[node.name]
+        parts.append(f'\n## {node.name}\n\n')
+        if table.prefixes:
+            tables = ', '.join(f'`{prefix}`' for prefix in table.prefixes)
+            parts.append(f'Reads the place: {tables}.\n\n')
+        if not table.parameters:
+            parts.append('No parameters of its own.\n')
+            continue
+        parts.append('| parameter | default | allowed | |\n|---|---|---|---|\n')
+        for name, spec in table.parameters.items():
+            live = ' *live*' if name in table.changeable else ''
+            text = table.descriptions[name].replace('|', '\\|')
+            default = _shown(spec.default)
+            parts.append(f'| `{name}` | {default} | {spec.expected()} | {text}{live} |\n')
+    return ''.join(parts)
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, float) and not math.isfinite(value):
+        return 'infinite'
+    if value == '':
+        return 'empty'
+    return f'`{json.dumps(value, ensure_ascii=False)}`'
+
+
+def write(checkout: Path) -> list[Path]:
+    """Write schema and page anew; returns the files."""
+    SCHEMA.write_text(as_json(collect()), encoding='utf-8')
+    read_schema.cache_clear()
+    page = checkout / 'docs' / 'parameters.md'
+    page.write_text(as_markdown(read_schema()), encoding='utf-8')
+    return [SCHEMA, page]
+
+
+Printer = Callable[[str], None]
+
+
+def show(
+    configuration: Configuration, nodes: Sequence[node_table.Node], namespace: str, say: Printer
+) -> None:
+    """Print what each node will get, and where each value comes from."""
+    schema = read_schema()
+    for node in nodes:
+        full_name = f'{namespace}/{node.name}'
+        settings = configuration.resolve(node.name, full_name)
+        table = schema[node.name]
+        rows = [
+            (name, json.dumps(setting.value, ensure_ascii=False), setting.origin)
+            for name, setting in settings.items()
+        ]
+        rows += [
+            (name, json.dumps(spec.default, ensure_ascii=False), 'default')
+            for name, spec in table.parameters.items()
+            if name not in settings
+        ]
+        width = max((len(name) for name, _, _ in rows), default=0)
+        say(f'{full_name}')
+        for name, value, origin in sorted(rows):
+            say(f'  {name:<{width}}  {value}  ({origin})')
