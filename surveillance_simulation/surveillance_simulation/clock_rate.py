@@ -5,6 +5,7 @@ a ceiling bounds the rate, and time stands still while a program is at work on i
 
 - a controller on the next command, while the base is under command;
 - a localisation on the next estimate of the pose;
+- whoever writes the robot's place into the ontology, while a place was told and not written;
 - a planner on a path, while one of its goals is executed;
 - the mission on its next step: it says until which simulated time it waits, and time does not
   pass that moment until it says so again. While a drive is executed, it waits for the drive.
@@ -104,11 +105,33 @@ class ClockRate:
         self._mission_waits_until: float | None = None
         self._mission_late_since: float | None = None
         self._executed: dict[str, bool] = {}
+        self._place_told = -1.0
+        self._place_written: float | None = None
+        self._place_late_since: float | None = None
         self.is_waiting = False
 
     def mission_waits(self, until: float) -> None:
         """Note that the mission waits until this simulated time, seconds; inf: for an event."""
         self._mission_waits_until, self._mission_late_since = until, None
+
+    def place_told(self, seen: float) -> None:
+        """Note that the robot was seen in another place at this simulated time, seconds."""
+        self._place_told = seen
+
+    def place_written(self, seen: float) -> None:
+        """Note that the ontology has the place in which the robot was seen at this time."""
+        self._place_written, self._place_late_since = seen, None
+
+    def _place_is_late(self, steady: float) -> bool:
+        """Return whether time must wait until the ontology knows the robot's place."""
+        if self._place_written is None or self._place_told <= self._place_written:
+            return False
+        if self._place_late_since is None:
+            self._place_late_since = steady
+        if steady - self._place_late_since < self._model.patience:
+            return True
+        self._place_written = self._place_late_since = None
+        return False
 
     def goals(self, action: str, *, executed: bool) -> None:
         """Note whether an action's goal is executed, for `PLANNING` and `DRIVING` actions."""
@@ -156,6 +179,7 @@ class ClockRate:
             answers.are_late(simulated, steady) for answers in (self._commands, self._estimates)
         ]
         late.append(self._mission_is_late(simulated, steady))
+        late.append(self._place_is_late(steady))
         self.is_waiting = model.speed == 0.0 and any(late)
         if self.is_waiting:
             # Ready to go on at once when the answer comes.

@@ -17,6 +17,7 @@ from rclpy.clock import Clock as RclpyClock
 from rclpy.clock import ClockType
 from trajectory_msgs.msg import JointTrajectory
 
+from surveillance_interfaces.msg import RobotPlace
 from surveillance_runtime.conversions import seconds_of
 from surveillance_runtime.node import PatrolNode, StartError
 from surveillance_runtime.place import PlaceError
@@ -75,6 +76,8 @@ class Simulator(PatrolNode):
             PoseWithCovarianceStamped, 'amcl_pose', self._on_estimate, STATE_QOS
         )
         self.create_subscription(Time, 'mission_waits_until', self._on_mission_waits, STATE_QOS)
+        self.create_subscription(RobotPlace, 'robot_place', self._on_place, STATE_QOS)
+        self.create_subscription(Time, 'robot_place_written', self._on_place_written, STATE_QOS)
         for action in (*PLANNING, *DRIVING):
             self.create_subscription(
                 GoalStatusArray,
@@ -138,6 +141,14 @@ class Simulator(PatrolNode):
     def _on_mission_waits(self, message: Time) -> None:
         until = message.sec + 1e-9 * message.nanosec
         self._rate.mission_waits(until or math.inf)
+        self._go_on()
+
+    def _on_place(self, message: RobotPlace) -> None:
+        if message.place:
+            self._rate.place_told(seconds_of(message.header.stamp))
+
+    def _on_place_written(self, stamp: Time) -> None:
+        self._rate.place_written(seconds_of(stamp))
         self._go_on()
 
     def _on_goals(self, action: str, message: GoalStatusArray) -> None:

@@ -119,3 +119,17 @@ def test_a_mission_that_waits_for_an_event_holds_nothing_back() -> None:
     rate = ClockRate(ClockRateModel(speed=0.0), 0.0)
     rate.mission_waits(math.inf)
     assert rate.due(100.0, 0.01, moving=False) > 0.0
+
+
+def test_time_waits_until_the_ontology_has_the_place_as_long_as_somebody_writes_it() -> None:
+    rate = ClockRate(ClockRateModel(speed=0.0), 0.0)
+    rate.place_told(1.0)
+    assert rate.due(1.0, 1.0, moving=True) > 0.0, 'nobody writes places'
+    rate.place_written(1.0)
+    rate.place_told(2.0)
+    assert rate.due(2.0, 2.0, moving=True) == 0.0
+    rate.place_written(2.0)
+    assert rate.due(2.0, 2.1, moving=True) > 0.0
+    rate.place_told(3.0)
+    assert rate.due(3.0, 3.0, moving=True) == 0.0
+    assert rate.due(3.0, 4.1, moving=True) > 0.0, 'given up after its patience'

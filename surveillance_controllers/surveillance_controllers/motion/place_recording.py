@@ -28,6 +28,8 @@ CHANGES_DELAY = 0.5
 class PlaceRecorder:
     """Publishes `robot_place`, and is the only writer of the robot's place in the ontology.
 
+    `robot_place_written` says up to which stamp the ontology has it.
+
     `tell` waits for nobody. A worker writes; what cannot be written yet is tried again, and an
     ontology that has another place (it came back, was built anew, or somebody else wrote) is told
     again.
@@ -55,6 +57,7 @@ class PlaceRecorder:
         self._facts: FactSubscription | None = None
         self._news = Interrupt()
         self._topic = node.create_publisher(RobotPlace, 'robot_place', STATE_QOS)
+        self._done = node.create_publisher(Time, 'robot_place_written', STATE_QOS)
         node.stopping.subscribe(self._news.set)
         if start == '':
             node.create_subscription(
@@ -122,7 +125,8 @@ class PlaceRecorder:
         told, written = self._told, self._written
         if told is None or not told.place:
             return None
-        place, stamp = str(told.place), nanoseconds_of(told.header.stamp)
+        told_stamp = told.header.stamp
+        place, stamp = str(told.place), nanoseconds_of(told_stamp)
         if written is told:
             if {fact.arguments[1] for fact in self._facts.facts} == {place}:
                 return None
@@ -132,6 +136,7 @@ class PlaceRecorder:
         with answered():
             ontology = self._knowledge.connect(stopping)
             ontology.record_place(place, stamp)
+        self._done.publish(told_stamp)
         if written is None or written.place != place:
             self._node.get_logger().info(f'the robot is in {place}')
         self._written, self._written_at = told, time.monotonic()
