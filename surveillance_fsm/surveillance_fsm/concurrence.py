@@ -103,6 +103,11 @@ class OutcomePolicy:
                     )
         return faults
 
+    @property
+    def has_callbacks(self) -> bool:
+        """Whether a callback has a say."""
+        return self._outcome_cb is not None or self._child_termination_cb is not None
+
     def possible_outcomes(self) -> set[str]:
         """The outcomes that may come of it; all of them, if a callback decides."""
         if self._outcome_cb is not None:

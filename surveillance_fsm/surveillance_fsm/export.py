@@ -1,13 +1,20 @@
-"""Drawings of a machine: Mermaid, Graphviz, and text for a log."""
+"""A machine written down: as Mermaid, Graphviz, text for a log, and YAML that can be loaded."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from typing import Any
 
+from surveillance_fsm.concurrence import Concurrence
 from surveillance_fsm.container import Container
+from surveillance_fsm.exceptions import SmachError
 from surveillance_fsm.execution import RESUME
+from surveillance_fsm.state import CBState, State
+from surveillance_fsm.state_machine import Iterator as IteratorContainer
+from surveillance_fsm.state_machine import Sequence, StateMachine
 from surveillance_fsm.structure import Edge, Structure, structure_of
+from surveillance_fsm.userdata import raw
 
 
 def to_mermaid(container: Container) -> str:
@@ -172,3 +179,170 @@ def _quoted(text: str) -> str:
 def _spelled(text: str) -> str:
     """Text between double quotes in Mermaid, which has no escapes but entities."""
     return text.replace('"', '#quot;')
+
+
+# As data.
+
+
+class ExportError(SmachError):
+    """A machine cannot be written as data; the message names the state."""
+
+
+def to_yaml(container: Container) -> str:
+    """Write a machine as YAML that `machine_file.load_machine` reads; needs PyYAML.
+
+    Raises:
+        ExportError: A part of it has no form as data: a callback, a function without a name, a
+            class with arguments that did not come from a file.
+    """
+    import yaml
+
+    data = to_data(container)
+    text: str = yaml.safe_dump(data, sort_keys=False, allow_unicode=True, default_flow_style=None)
+    return text
+
+
+def to_data(container: Container) -> dict[str, Any]:
+    """Describe a machine by plain data, as `machine_file.machine_from` takes it.
+
+    Raises:
+        ExportError: See `to_yaml`.
+    """
+    return {
+        'machine': _kind_of(container),
+        'name': container.get_name(),
+        **_container_data(container, container.get_name()),
+    }
+
+
+def _kind_of(container: Container) -> str:
+    for kind in (Sequence, StateMachine, Concurrence, IteratorContainer):
+        if type(container) is kind:
+            return kind.__name__
+    raise ExportError(
+        f"'{container.get_name()}' is a {type(container).__name__}: only the engine's own "
+        'containers have a form as data'
+    )
+
+
+def _container_data(container: Container, path: str) -> dict[str, Any]:
+    data: dict[str, Any] = {'outcomes': sorted(container.get_registered_outcomes())}
+    for name, keys in (
+        ('input_keys', container.get_registered_input_keys()),
+        ('output_keys', container.get_registered_output_keys()),
+    ):
+        if keys:
+            data[name] = sorted(keys)
+    if raw(container.userdata):
+        data['userdata'] = {
+            key: _plain(f'userdata key {key!r} of {path!r}', value)
+            for key, value in raw(container.userdata).items()
+        }
+    data |= _kind_data(container, path)
+    data['states'] = {
+        label: _state_data(container, label, state, f'{path}/{label}')
+        for label, state in container.fsm_states.items()
+    }
+    if container.fsm_branches:
+        data['interrupts'] = {
+            branch.label: {
+                **_what(branch.state, f'{path}/{branch.label}'),
+                'priority': branch.priority,
+                'transitions': dict(branch.transitions),
+                **({'remapping': dict(branch.remapping)} if branch.remapping else {}),
+            }
+            for branch in container.fsm_branches.values()
+        }
+    return data
+
+
+def _kind_data(container: Container, path: str) -> dict[str, Any]:
+    if isinstance(container, Concurrence):
+        policy = container.policy
+        if policy.has_callbacks:
+            raise ExportError(f"'{path}' has callbacks, which have no form as data")
+        data: dict[str, Any] = {'default_outcome': policy.default}
+        if policy.outcome_map:
+            data['outcome_map'] = policy.outcome_map
+        return data
+    if isinstance(container, IteratorContainer):
+        items = container.items
+        if callable(items) or not isinstance(items, list | tuple | range | str):
+            raise ExportError(f"'{path}' has items that are no list")
+        return {
+            'items': [_plain(f'an item of {path!r}', item) for item in items],
+            'item_key': container.items_label,
+            'exhausted_outcome': container.exhausted_outcome,
+        }
+    data = {'initial': container.get_initial_states()[0]} if container.fsm_states else {}
+    if isinstance(container, Sequence):
+        data['connector_outcome'] = container.connector_outcome
+    return data
+
+
+def _state_data(container: Container, label: str, state: State, path: str) -> dict[str, Any]:
+    data = _what(state, path)
+    if isinstance(container, StateMachine):
+        bound = {
+            outcome: target
+            for outcome, source, target in container.get_internal_edges()
+            if source == label and target
+        }
+        if bound:
+            data['transitions'] = bound
+    elif isinstance(container, IteratorContainer):
+        data |= container.loop_data()
+    if container.fsm_remappings.get(label):
+        data['remapping'] = dict(container.fsm_remappings[label])
+    if container.fsm_constants.get(label):
+        data['constants'] = {
+            key: _plain(f'constant {key!r} of {path!r}', value)
+            for key, value in container.fsm_constants[label].items()
+        }
+    limits = container.fsm_limits.get(label)
+    if limits is not None:
+        for name in ('timeout', 'deadline', 'retry'):
+            if getattr(limits, name):
+                data[name] = getattr(limits, name)
+        if limits.retry:
+            data['retry_on'] = sorted(limits.failures - {limits.late_outcome}) or ['aborted']
+    return data
+
+
+def _what(state: State, path: str) -> dict[str, Any]:
+    """What a state is, as data."""
+    if isinstance(state, Container):
+        return {'machine': _kind_of(state), **_container_data(state, path)}
+    if state.fsm_source is not None:
+        source = {'state': state.fsm_source['state']}
+        if state.fsm_source['arguments']:
+            source['arguments'] = dict(state.fsm_source['arguments'])
+        return source
+    if type(state) is CBState:
+        data: dict[str, Any] = {'function': _name_of(state.function, path)}
+        for name, given in (
+            ('outcomes', state.get_registered_outcomes()),
+            ('input_keys', state.get_registered_input_keys()),
+            ('output_keys', state.get_registered_output_keys()),
+        ):
+            if given:
+                data[name] = sorted(given)
+        return data
+    return {'state': _name_of(type(state), path)}
+
+
+def _name_of(thing: Any, path: str) -> str:
+    name = f'{thing.__module__}:{thing.__qualname__}'
+    if '<' in name or thing.__module__ == '__main__':
+        raise ExportError(f"'{path}': {name} cannot be imported by that name")
+    return name
+
+
+def _plain(what: str, value: Any) -> Any:
+    if isinstance(value, list | tuple):
+        return [_plain(what, item) for item in value]
+    if isinstance(value, dict):
+        return {str(key): _plain(what, item) for key, item in value.items()}
+    if value is None or isinstance(value, bool | int | float | str):
+        return value
+    raise ExportError(f'{what} is a {type(value).__name__}, which has no form as data')

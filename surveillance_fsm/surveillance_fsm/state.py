@@ -160,6 +160,7 @@ class State:
     fsm_progress: dict[str, Any] | None = None
     fsm_waiting: tuple[str, float] | None = None
     fsm_left: Any = None
+    fsm_source: Mapping[str, Any] | None = None
     fsm_of_execution: ClassVar[frozenset[str]] = frozenset(
         {
             '_preempt_requested',

@@ -321,6 +321,11 @@ class Sequence(StateMachine):
         self._connector_outcome = connector_outcome
         self._last_added_seq_label: str | None = None
 
+    @property
+    def connector_outcome(self) -> str:
+        """The outcome that leads on to the next state."""
+        return self._connector_outcome
+
     @staticmethod
     def add(
         label: str,
@@ -549,6 +554,13 @@ class Iterator(Container):
     def exhausted_outcome(self) -> str:
         """What the iterator ends with when no item is left, before the final outcome map."""
         return self._exhausted_outcome
+
+    def loop_data(self) -> dict[str, Any]:
+        """Which outcomes of the state go on and which end, as `set_contained_state` takes it."""
+        data: dict[str, Any] = {'loop_outcomes': sorted(self._loop_outcomes)}
+        if self._final_outcome_map:
+            data['final_outcome_map'] = dict(self._final_outcome_map)
+        return data
 
     def ending(self, outcome: str) -> str:
         """The iterator's outcome when its state's `outcome` ends the loop."""

@@ -1,0 +1,355 @@
+"""A machine as data: YAML that names states, outcomes, transitions and remappings.
+
+A file is loaded with the same checks as code, and `export.to_yaml` writes a machine back. Classes
+and functions are named as ``package.module:Name`` and imported, so a machine's file is trusted as
+code is; names without a colon are looked up in what the caller offers.
+
+    machine: StateMachine          # or Sequence, Concurrence, Iterator; this is the default
+    name: PATROL
+    outcomes: [finished, preempted]
+    userdata: {rooms: [R1, R2]}
+    initial: CHOOSE                # default: the first state
+    states:
+      CHOOSE:
+        state: my_package.states:Choose
+        transitions: {chosen: EXPLORE}
+      EXPLORE:
+        state: my_package.states:Explore
+        arguments: {seconds: 10.0} # of the class; $name stands for an object the caller offers
+        transitions: {explored: CHOOSE}
+        remapping: {place: room}
+        timeout: 30.0              # also deadline, retry, retry_on, constants
+    interrupts:
+      CHARGE: {function: my_package.states:charge, outcomes: [charged], priority: 5}
+
+A `function` is a `CBState`, with ``outcomes``, ``input_keys`` and ``output_keys``. A state that is
+a container has ``machine`` and ``states`` of its own. Further keys are ``connector_outcome`` of a
+Sequence, ``default_outcome`` and ``outcome_map`` of a Concurrence, and ``items``, ``item_key`` and
+``exhausted_outcome`` of an Iterator, whose one state has ``loop_outcomes``, ``break_outcomes`` and
+``final_outcome_map``.
+
+Reading needs PyYAML.
+"""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+from surveillance_fsm.concurrence import Concurrence
+from surveillance_fsm.container import Container
+from surveillance_fsm.exceptions import SmachError, describe, shown
+from surveillance_fsm.state import CBState, State
+from surveillance_fsm.state_machine import Iterator, Sequence, StateMachine
+
+Made = TypeVar('Made')
+
+KINDS = ('StateMachine', 'Sequence', 'Concurrence', 'Iterator')
+
+_LIMITS = {'timeout', 'deadline', 'retry', 'retry_on'}
+_KEYS = {'input_keys', 'output_keys'}
+_CONTAINER = {'machine', 'name', 'outcomes', 'userdata', 'states', 'interrupts', *_KEYS}
+_OF_KIND = {
+    'StateMachine': {'initial'},
+    'Sequence': {'initial', 'connector_outcome'},
+    'Concurrence': {'default_outcome', 'outcome_map'},
+    'Iterator': {'items', 'item_key', 'exhausted_outcome'},
+}
+_IN_KIND = {
+    'StateMachine': {'transitions', 'remapping', 'constants', *_LIMITS},
+    'Sequence': {'transitions', 'remapping', 'constants', *_LIMITS},
+    'Concurrence': {'remapping', *_LIMITS},
+    'Iterator': {'loop_outcomes', 'break_outcomes', 'final_outcome_map', *_LIMITS},
+}
+_INTERRUPT = {'priority', 'transitions', 'remapping'}
+
+
+class MachineFileError(SmachError):
+    """A machine's file is wrong; the message is one line that names the place in it."""
+
+
+def load_machine(path: str | Path, offered: Mapping[str, Any] | None = None) -> Container:
+    """Build the machine that a YAML file describes.
+
+    Args:
+        path: The file.
+        offered: Classes, functions and objects by the names that the file uses for them.
+
+    Raises:
+        MachineFileError: The file cannot be read, or describes no machine that can run.
+    """
+    try:
+        return machine_from(parse(Path(path).read_text(encoding='utf-8')), offered)
+    except (OSError, UnicodeDecodeError, MachineFileError) as error:
+        raise MachineFileError(f'{path}: {describe(error)}') from error
+
+
+def parse(text: str) -> Any:
+    """The values of a YAML text; a key that comes twice is an error.
+
+    Raises:
+        MachineFileError: It is no YAML.
+    """
+    import yaml
+
+    class Loader(yaml.SafeLoader):
+        """Refuses a key that comes twice, of which YAML would take the last."""
+
+    def mapping(loader: Any, node: Any) -> dict[Any, Any]:
+        found: dict[Any, Any] = {}
+        for key_node, value_node in node.value:
+            key = loader.construct_object(key_node, deep=True)
+            line = key_node.start_mark.line + 1
+            if not isinstance(key, str):
+                raise MachineFileError(
+                    f'line {line}: the key {shown(key)} is no string; put it in quotes'
+                )
+            if key in found:
+                raise MachineFileError(f"line {line}: the key '{key}' comes twice")
+            found[key] = loader.construct_object(value_node, deep=True)
+        return found
+
+    Loader.add_constructor('tag:yaml.org,2002:map', mapping)
+    try:
+        return yaml.load(text, Loader)
+    except yaml.YAMLError as error:
+        mark = getattr(error, 'problem_mark', None)
+        line = f'line {mark.line + 1}: ' if mark is not None else ''
+        raise MachineFileError(f'{line}{getattr(error, "problem", None) or "no YAML"}') from error
+    except RecursionError:
+        raise MachineFileError('nested too deep') from None
+
+
+def machine_from(data: Any, offered: Mapping[str, Any] | None = None) -> Container:
+    """Build the machine that plain data describes; see `load_machine`.
+
+    Raises:
+        MachineFileError: It describes no machine that can run.
+    """
+    try:
+        machine = _Builder(offered or {}).container(data, 'machine')
+        _check(machine, 'machine')
+    except RecursionError:
+        raise MachineFileError('nested too deep') from None
+    return machine
+
+
+def _check(machine: Container, place: str) -> None:
+    _guarded(place, machine.check_consistency)
+    for label, state in machine.get_children().items():
+        if isinstance(state, Container):
+            _check(state, f'{place}.states.{label}')
+
+
+def _guarded(place: str, build: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
+    """Call what builds, and name the place in the file when that is wrong."""
+    try:
+        return build(*args, **kwargs)
+    except MachineFileError:
+        raise
+    except Exception as error:
+        raise MachineFileError(f'{place}: {describe(error)}') from error
+
+
+class _Builder:
+    """Builds containers and states from data.
+
+    Args:
+        offered: See `load_machine`.
+    """
+
+    def __init__(self, offered: Mapping[str, Any]) -> None:
+        self._offered = offered
+
+    def container(self, data: Any, place: str, further: Iterable[str] = ()) -> Container:
+        """Build a container.
+
+        Args:
+            data: What describes it.
+            place: Where that stands, for errors.
+            further: Keys that say how it stands in its parent.
+        """
+        entry = _mapping(place, data)
+        kind = entry.get('machine', 'StateMachine')
+        if kind not in KINDS:
+            raise MachineFileError(f'{place}.machine: {_unknown(kind, KINDS)}')
+        _known_keys(place, entry, _CONTAINER | _OF_KIND[kind] | set(further))
+        outcomes = _names(f'{place}.outcomes', entry.get('outcomes', []))
+        keys = {key: _names(f'{place}.{key}', entry.get(key, [])) for key in sorted(_KEYS)}
+        machine = self._make(kind, entry, place, outcomes, keys)
+        if 'name' in entry:
+            _guarded(f'{place}.name', machine.set_name, entry['name'])
+        for key, value in _mapping(f'{place}.userdata', entry.get('userdata', {})).items():
+            machine.userdata[key] = value
+        states = _mapping(f'{place}.states', entry.get('states', {}))
+        for label, inside in states.items():
+            self._add(machine, kind, label, inside, f'{place}.states.{label}')
+        interrupts = _mapping(f'{place}.interrupts', entry.get('interrupts', {}))
+        for label, inside in interrupts.items():
+            where = f'{place}.interrupts.{label}'
+            state, options = self._state(inside, where, _INTERRUPT)
+            _guarded(where, machine.add_interrupt, label, state, **options)
+        if 'initial' in entry:
+            _guarded(f'{place}.initial', machine.set_initial_state, [entry['initial']])
+        return machine
+
+    def _make(
+        self,
+        kind: str,
+        entry: Mapping[str, Any],
+        place: str,
+        outcomes: list[str],
+        keys: Mapping[str, list[str]],
+    ) -> Container:
+        if kind == 'StateMachine':
+            return _made(place, StateMachine, outcomes, **keys)
+        if kind == 'Sequence':
+            connector = _needed(place, entry, 'connector_outcome')
+            return _made(place, Sequence, outcomes, connector, **keys)
+        if kind == 'Concurrence':
+            default = _needed(place, entry, 'default_outcome')
+            outcome_map = _mapping(f'{place}.outcome_map', entry.get('outcome_map', {}))
+            for outcome, wanted in outcome_map.items():
+                _mapping(f'{place}.outcome_map.{outcome}', wanted)
+            return _made(place, Concurrence, outcomes, default, **keys, outcome_map=outcome_map)
+        items = self._value(_needed(place, entry, 'items'), f'{place}.items')
+        if not callable(items) and not isinstance(items, Iterable):
+            raise MachineFileError(f'{place}.items: expected a list, not {shown(items)}')
+        options = {
+            name: entry[key]
+            for key, name in (
+                ('item_key', 'it_label'),
+                ('exhausted_outcome', 'exhausted_outcome'),
+            )
+            if key in entry
+        }
+        return _made(place, Iterator, outcomes, **keys, it=items, **options)
+
+    def _add(self, machine: Container, kind: str, label: str, data: Any, place: str) -> None:
+        state, options = self._state(data, place, _IN_KIND[kind])
+        add: Callable[..., Any]
+        if isinstance(machine, Sequence):
+            add = machine.append_state
+        elif isinstance(machine, StateMachine | Concurrence):
+            add = machine.add_state
+        else:
+            assert isinstance(machine, Iterator)
+            add = machine.set_state
+        _guarded(place, add, label, state, **options)
+
+    def _state(self, data: Any, place: str, further: set[str]) -> tuple[State, dict[str, Any]]:
+        """Build a state; it, and what says how it stands in its container."""
+        entry = _mapping(place, data)
+        options = {key: entry[key] for key in further if key in entry}
+        for key in options:
+            if key == 'constants':
+                options[key] = dict(_mapping(f'{place}.{key}', options[key]))
+            elif key in ('transitions', 'remapping', 'final_outcome_map'):
+                options[key] = _renaming(f'{place}.{key}', options[key])
+            elif key in ('retry_on', 'loop_outcomes', 'break_outcomes'):
+                options[key] = _names(f'{place}.{key}', options[key])
+            else:
+                _number(f'{place}.{key}', options[key])
+        if 'states' in entry or 'machine' in entry:
+            return self.container(entry, place, further), options
+        if 'function' in entry:
+            declared = {'outcomes', *_KEYS}
+            _known_keys(place, entry, {'function', *declared, *further})
+            function = self._value(entry['function'], f'{place}.function', import_names=True)
+            given = {key: _names(f'{place}.{key}', entry[key]) for key in declared if key in entry}
+            if not callable(function):
+                raise MachineFileError(f'{place}.function: {entry["function"]} cannot be called')
+            return _made(place, CBState, function, **given), options
+        _known_keys(place, entry, {'state', 'arguments', *further})
+        kind = self._value(_needed(place, entry, 'state'), f'{place}.state', import_names=True)
+        if not callable(kind):
+            raise MachineFileError(f'{place}.state: {entry["state"]} is no class of states')
+        arguments = _mapping(f'{place}.arguments', entry.get('arguments', {}))
+        values = {key: self._value(v, f'{place}.arguments.{key}') for key, v in arguments.items()}
+        state = _guarded(place, kind, **values)
+        if not isinstance(state, State):
+            raise MachineFileError(f'{place}.state: {entry["state"]} makes no State')
+        # What it was made of, for whoever writes the machine back.
+        state.fsm_source = {'state': entry['state'], 'arguments': dict(arguments)}
+        return state, options
+
+    def _value(self, value: Any, place: str, *, import_names: bool = False) -> Any:
+        """What a value of the file stands for."""
+        if isinstance(value, str) and value.startswith('$'):
+            if value[1:] not in self._offered:
+                raise MachineFileError(f'{place}: {_unknown(value[1:], self._offered)}')
+            return self._offered[value[1:]]
+        if not import_names:
+            return value
+        if not isinstance(value, str):
+            raise MachineFileError(f'{place}: expected package.module:Name, not {shown(value)}')
+        if value in self._offered:
+            return self._offered[value]
+        module, colon, name = value.partition(':')
+        if not colon:
+            raise MachineFileError(
+                f'{place}: {_unknown(value, self._offered)}, or package.module:Name'
+            )
+        found = _guarded(place, importlib.import_module, module)
+        for part in name.split('.'):
+            if not hasattr(found, part):
+                raise MachineFileError(f"{place}: '{module}' has no {_unknown(part, dir(found))}")
+            found = getattr(found, part)
+        return found
+
+
+def _made(place: str, kind: Callable[..., Made], *args: Any, **kwargs: Any) -> Made:
+    made: Made = _guarded(place, kind, *args, **kwargs)
+    return made
+
+
+def _mapping(place: str, data: Any) -> Mapping[str, Any]:
+    if not isinstance(data, Mapping):
+        raise MachineFileError(f'{place}: expected keys with values, not {shown(data)[:80]}')
+    for key in data:
+        if not isinstance(key, str):
+            raise MachineFileError(f'{place}: the key {shown(key)} is no string')
+    return data
+
+
+def _names(place: str, data: Any) -> list[str]:
+    if not isinstance(data, list) or not all(isinstance(name, str) for name in data):
+        raise MachineFileError(f'{place}: expected a list of strings, not {shown(data)[:80]}')
+    return data
+
+
+def _renaming(place: str, data: Any) -> dict[str, str]:
+    renaming = dict(_mapping(place, data))
+    for key, value in renaming.items():
+        if not isinstance(value, str):
+            raise MachineFileError(f'{place}.{key}: expected a name, not {shown(value)[:80]}')
+    return renaming
+
+
+def _number(place: str, value: Any) -> None:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise MachineFileError(f'{place}: expected a number, not {shown(value)[:80]}')
+
+
+def _needed(place: str, entry: Mapping[str, Any], key: str) -> Any:
+    if key not in entry:
+        raise MachineFileError(f"{place}: the key '{key}' is missing")
+    return entry[key]
+
+
+def _known_keys(place: str, entry: Mapping[str, Any], known: Iterable[str]) -> None:
+    known = set(known)
+    for key in entry:
+        if key not in known:
+            raise MachineFileError(f'{place}: {_unknown(key, known)}')
+
+
+def _unknown(name: object, known: Iterable[str]) -> str:
+    """Say that a name is not known, and which is nearest to it."""
+    known = sorted(each for each in known if not each.startswith('_'))
+    near = difflib.get_close_matches(str(name), known, 1)
+    hint = f"; did you mean '{near[0]}'?" if near else f'; known are {known[:20]}'
+    return f'{shown(name)} is not known{hint}'
