@@ -11,6 +11,9 @@ setup(
         ('share/ament_index/resource_index/packages', ['resource/' + package_name]),
         ('share/' + package_name, ['package.xml']),
     ],
+    python_requires='>=3.11',
+    # Machines as data; the ROS part needs rclpy, which comes with ROS.
+    extras_require={'yaml': ['PyYAML>=6.0,<7']},
     zip_safe=True,
     maintainer='Surveillance robot maintainers',
     maintainer_email='surveillance@example.com',
