@@ -21,12 +21,19 @@ if TYPE_CHECKING:
 CONFIG = CHECKOUT / 'config'
 RUNS = CHECKOUT / 'runs'
 EXIT_BAD_INPUT = 2
+DEFAULT_KEEP = 20.0
 EXIT_INTERRUPTED = 130
 
 # Commands that belong to a package: module and function, which takes the arguments and returns
 # the exit code.
 PACKAGE_COMMANDS = {
     'watch': ('surveillance_operator.watch_command', 'show a running mission in this terminal'),
+    'console': (
+        'surveillance_operator.console_node',
+        'one prompt for a running mission: answers, doors, rooms, why, go',
+    ),
+    'replay': ('surveillance_operator.replay', 'show a recorded mission in a browser'),
+    'report': ('surveillance_operator.report', 'write what a mission did into one HTML file'),
     'map': ('surveillance_operator.map_command', 'check a place and draw it as a picture'),
     'detect': ('surveillance_perception.detect_command', 'find ArUco markers in pictures'),
     'check-behaviour': (
@@ -78,6 +85,16 @@ def _seconds(text: str) -> float:
         value = 0.0
     if not 0.0 < value < 1e9:
         raise argparse.ArgumentTypeError(f'{text!r} is not a positive number of seconds')
+    return value
+
+
+def _gigabytes(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1.0
+    if not 0.0 <= value < 1e6:
+        raise argparse.ArgumentTypeError(f'{text!r} is not a number of gigabytes')
     return value
 
 
@@ -177,6 +194,29 @@ def make_parser() -> argparse.ArgumentParser:
         default=[],
         metavar='NODE,...',
         help='start all but these nodes, which run elsewhere',
+    )
+    parser.add_argument(
+        '--record',
+        metavar='off|DIR',
+        help='where the run keeps its recording, log and record; off: no recording (default: runs)',
+    )
+    parser.add_argument(
+        '--keep',
+        type=_gigabytes,
+        default=DEFAULT_KEEP,
+        metavar='GB',
+        help='delete the oldest recordings beyond this size (default: %(default)g)',
+    )
+    parser.add_argument(
+        '--web', action='store_true', help='show the mission in browsers, see the printed address'
+    )
+    parser.add_argument(
+        '--web-control', action='store_true', help='as --web, and let whoever has the token act'
+    )
+    parser.add_argument(
+        '--web-address',
+        metavar='HOST:PORT',
+        help='where the page is: beyond 127.0.0.1 it needs the token (default: 127.0.0.1:8080)',
     )
     return parser
 

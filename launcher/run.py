@@ -5,8 +5,11 @@ Imported in the project's environment only: the packages read their own places a
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
+import secrets
+import shutil
 import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
@@ -39,6 +42,9 @@ RECORD = 'mission.jsonl'
 ONTOLOGIES = 'ontologies'
 STORE = 'armor_store'
 COMPOSED = 'composed'
+NOT_RECORDED = 'off'
+RECORDER, PAGE = 'mission_recorder', 'mission_page'
+RECORDING, PLACE = 'recording', 'place.yaml'
 BEHAVIOUR_NODE = 'robot_behavior'
 _NAMESPACE = re.compile(r'/?[A-Za-z]\w*(/[A-Za-z]\w*)*\Z', re.ASCII)
 MAX_DOMAIN = 101
@@ -65,6 +71,10 @@ class Run:
         namespace: of all nodes, None for none.
         domain: ROS domain, None for the environment's.
         seconds: how long to run, None until stopped.
+        record: `off`, or the folder for the run's own, None for the usual one.
+        keep: most of the recordings to keep, gigabytes.
+        web, web_control: show the mission in browsers; let them act.
+        web_address: where, as HOST:PORT, None for the page's own choice.
     """
 
     mode: str | None = None
@@ -79,6 +89,11 @@ class Run:
     namespace: str | None = None
     domain: int | None = None
     seconds: float | None = None
+    record: str | None = NOT_RECORDED
+    keep: float = 20.0
+    web: bool = False
+    web_control: bool = False
+    web_address: str | None = None
 
     def check(self) -> None:
         """Looks at everything that can be wrong before a process is started.
@@ -102,12 +117,27 @@ class Run:
                 Configuration((file_layer(self.parameters),)).check()
             except (YamlFileError, ConfigurationError) as error:
                 raise RunError(f'--params {error}') from None
+        if self.web_address is not None:
+            _, _, port = self.web_address.rpartition(':')
+            if not port.isdecimal() or int(port) > 65535:
+                raise RunError(
+                    f'--web-address {self.web_address!r}: expected HOST:PORT like 0.0.0.0:8080'
+                )
 
     def nodes(self) -> tuple[node_table.Node, ...]:
         chosen = node_table.select(
             self.mode or node_table.DEFAULT_MODE, self.behaviour, self.only, self.without
         )
         return (*chosen, node_table.find(node_table.CONSOLE)) if self.one_console else chosen
+
+    def observers(self) -> tuple[node_table.Node, ...]:
+        """The nodes that only look on, in processes of their own; they start last."""
+        names = []
+        if self.record != NOT_RECORDED:
+            names.append(RECORDER)
+        if self.web or self.web_control:
+            names.append(PAGE)
+        return tuple(node_table.find(name) for name in names)
 
     @property
     def one_console(self) -> bool:
@@ -185,6 +215,7 @@ def _option_entries(run: Run, folder: Path | None) -> Iterator[Entry]:
     if folder is not None:
         yield Entry(node, 'record', str(folder / RECORD), 'this run')
         yield Entry('/**/reasoner', 'record', str(folder / RECORD), 'this run')
+        yield from _observer_entries(run, folder)
     # Without one that was asked for, the mode is what the parameter files say.
     if run.mode:
         for each in node_table.NODES:
@@ -241,6 +272,21 @@ def full_name(run: Run, node: str) -> str:
     return f'/{namespace}/{node}' if namespace else f'/{node}'
 
 
+def _observer_entries(run: Run, folder: Path) -> Iterator[Entry]:
+    """Yield what the recorder and the page are told."""
+    recorder, page, origin = f'/**/{RECORDER}', f'/**/{PAGE}', 'this run'
+    yield Entry(recorder, 'folder', str(folder / RECORDING), origin)
+    yield Entry(recorder, 'keep', float(run.keep), '--keep')
+    if run.web or run.web_control:
+        yield Entry(page, 'control', run.web_control, '--web-control')
+        # Made here, so that a page that is started again keeps it.
+        yield Entry(page, 'token', secrets.token_urlsafe(24), origin)
+    if run.web_address is not None:
+        host, _, port = run.web_address.rpartition(':')
+        yield Entry(page, 'host', host.strip('[]') or '127.0.0.1', '--web-address')
+        yield Entry(page, 'port', int(port), '--web-address')
+
+
 def write_parameters(
     folder: Path, run: Run, merged: Configuration, nodes: Sequence[node_table.Node]
 ) -> dict[str, Path]:
@@ -254,6 +300,7 @@ def write_parameters(
         path = folder / f'{node.name}.yaml'
         try:
             folder.mkdir(exist_ok=True)
+            path.touch(mode=0o600)  # the page's token may be in it
             name = full_name(run, node.name)
             path.write_text(resolved_text(name, merged.resolve(node.name, name)), 'utf-8')
         except OSError as error:
@@ -354,15 +401,17 @@ def run_mission(run: Run, config: Path, runs: Path) -> int:
     merged = configuration(config, run)  # before anything is written
     run = with_mode_of(run, merged)
     nodes = run.nodes()
-    check_assignments(merged, nodes)
+    observers = run.observers()
+    check_assignments(merged, (*nodes, *observers))
     claims = claim(nodes, ros_domain(run), run.namespace)
-    folder = make_folder(runs)
+    folder = make_folder(Path(run.record) if run.record not in (None, NOT_RECORDED) else runs)
     merged = configuration(config, run, folder)
-    files = write_parameters(folder / 'parameters', run, merged, nodes)
+    files = write_parameters(folder / 'parameters', run, merged, (*nodes, *observers))
     environ = node_environ(run, folder / 'ros')
     manual = run.mode == 'MANUAL'
     if run.composed:
-        words = command(nodes, ros_arguments(list(files.values()), run), os.getpid())
+        own = [files[node.name] for node in nodes]
+        words = command(nodes, ros_arguments(own, run), os.getpid())
         programs = [Program(COMPOSED, words, environ, takes_input=manual)]
     else:
         programs = [
@@ -376,11 +425,19 @@ def run_mission(run: Run, config: Path, runs: Path) -> int:
             )
             for node in nodes
         ]
-    names = [*(node.name for node in nodes), *([COMPOSED] if run.composed else [])]
+    place = parameter_files(config, run)[1]
+    shutil.copyfile(place, folder / PLACE)
+    for node in observers:
+        words = command([node], ros_arguments([files[node.name]], run), os.getpid())
+        programs.append(Program(node.name, words, environ, says_up=True))
+    names = [
+        *(node.name for node in (*nodes, *observers)),
+        *([COMPOSED] if run.composed else []),
+    ]
     log = MergedLog(None, names, path=folder / 'launch.log')
     log.say(
         f'{run.behaviour} in mode {run.mode or node_table.DEFAULT_MODE}, '
-        f'place {parameter_files(config, run)[1].name}, '
+        f'place {place.name}, '
         f'ROS domain {ros_domain(run)}, files in {_short(folder)}'
     )
     log.say(f'watch it in a second terminal: {watch_command(run)}')
@@ -399,10 +456,25 @@ def run_mission(run: Run, config: Path, runs: Path) -> int:
             console.stop()
     if any(node.name == BEHAVIOUR_NODE for node in nodes):
         log.plain(summary(folder / RECORD))
+    for line in what_to_look_at(folder):
+        log.plain(line)
     log.close()
     for descriptor in claims:
         os.close(descriptor)
     return code
+
+
+def what_to_look_at(folder: Path) -> list[str]:
+    """Write the report of a run; return where it is, and how to replay the run."""
+    from surveillance_operator.recording import timeline
+    from surveillance_operator.report import ReportError, write_report
+
+    lines = []
+    with contextlib.suppress(ReportError):  # nothing was visited: the summary says so
+        lines.append(f'report: {_short(write_report(folder))}')
+    if (folder / timeline.NAME).exists():
+        lines.append(f'replay: python3 launch.py replay {_short(folder)}')
+    return lines
 
 
 def watch_command(run: Run) -> str:

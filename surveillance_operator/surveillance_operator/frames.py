@@ -86,7 +86,7 @@ def _places(snapshot: Snapshot) -> Any:
     return {
         name: {
             'at': snapshot.positions.get(name),
-            'visited': snapshot.visited_at.get(name),
+            'visited': snapshot.visited_at.get(name) or None,
             'urgent': name in snapshot.urgent,
         }
         for name in names

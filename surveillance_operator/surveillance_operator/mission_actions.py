@@ -83,8 +83,8 @@ class MissionActions:
             (AddRoom, 'ontology_map/add_room'),
             (RemoveRoom, 'ontology_map/remove_room'),
             (ReferenceName, 'ontology_map/reference_name'),
-            (GoTo, f'{BEHAVIOUR}/go_to'),
-            (WhyNot, f'{BEHAVIOUR}/why_not'),
+            (GoTo, 'go_to'),
+            (WhyNot, 'why_not'),
             (SetParameters, f'{BEHAVIOUR}/set_parameters'),
             *((Trigger, f'{BEHAVIOUR}/fsm/{word}') for word in ('pause', 'step', 'resume')),
             *((ConsoleCommand, f'{name}/command') for name in CONTROLLERS),
@@ -128,11 +128,11 @@ class MissionActions:
 
     def go_to(self, place: str) -> str:
         """Send the robot to a place next; an empty one calls it home."""
-        return self._told(f'{BEHAVIOUR}/go_to', GoTo.Request(place=place and _name(place)))
+        return self._told('go_to', GoTo.Request(place=place and _name(place)))
 
     def why_not(self, place: str) -> tuple[str, list[str]]:
         """Return why the robot would not go to a place now, and the premises of that."""
-        answer = self._call(f'{BEHAVIOUR}/why_not', WhyNot.Request(place=_name(place)))
+        answer = self._call('why_not', WhyNot.Request(place=_name(place)))
         if not answer.success:
             raise ActionError(answer.message or f'no answer about {place}')
         return answer.message, list(answer.premises)

@@ -16,7 +16,14 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from surveillance_operator.mission_feed import MissionFeed
 from surveillance_operator.polled_subscription import PolledSubscription
 from surveillance_operator.recording import timeline
-from surveillance_operator.recording.bag import NAME, BagWriter, RecordingError, TopicType, prune
+from surveillance_operator.recording.bag import (
+    NAME,
+    BagWriter,
+    RecordingError,
+    TopicType,
+    prune,
+    repair,
+)
 from surveillance_operator.recording.schemas import UnknownTypeError, definition, message_class
 from surveillance_operator.recording.timeline import TimelineWriter
 from surveillance_runtime.node import PatrolNode, StartError
@@ -58,6 +65,19 @@ class MissionRecorder(PatrolNode):
         self._unknown: set[str] = set()
         self._feed = MissionFeed(self, FEED_PERIOD)
         self.spawn(self._record, 'recording')
+        if path.name == NAME:
+            self.spawn(self._repair, 'repair')
+
+    def _repair(self) -> None:
+        """Mend what earlier runs left torn."""
+        for folder in sorted(self._bag.folder.resolve().parents[1].glob(f'*/{NAME}')):
+            if self.stopping.is_set():
+                return
+            try:
+                for line in repair(folder):
+                    self.get_logger().info(f'repaired {line}')
+            except OSError as error:
+                self.get_logger().warn(f'{folder}: cannot be repaired: {error.strerror}')
 
     def _record(self) -> None:
         next_seal = next_line = next_prune = 0.0

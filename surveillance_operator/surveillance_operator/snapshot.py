@@ -193,7 +193,7 @@ class Snapshot:
         links: Pairs of places that are joined by an open door.
         doors: Whether each door is open.
         door_lines: The doors' openings: x1, y1, x2, y2, metres.
-        visited_at: When each place was visited last, seconds of the mission's time.
+        visited_at: When each place was visited last, seconds of the mission's time; 0: never yet.
         urgent: The places that the ontology has as URGENT.
         pose: Where the robot is.
         localised: Whether somebody estimates that from sensors.
@@ -358,7 +358,7 @@ def _history(old: Snapshot, new: Snapshot) -> History:
     visits = [
         (at, place)
         for place, at in new.visited_at.items()
-        if at > old.visited_at.get(place, -math.inf)
+        if at > max(0.0, old.visited_at.get(place, 0.0))
     ]
     battery = []
     if new.battery is not None and (

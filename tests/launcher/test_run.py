@@ -201,6 +201,7 @@ def test_the_options_of_the_command_line_become_a_run():
         without=[],
         assignments=[],
         seconds=3.0,
+        record=None,
     )
 
 

@@ -11,7 +11,7 @@ import json
 import threading
 from collections.abc import AsyncIterator
 
-from surveillance_operator.frames import Framer, Parts
+from surveillance_operator.frames import PARTS, Framer, Parts
 from surveillance_operator.snapshot import Snapshot
 
 LEAST_PERIOD = 0.03
@@ -49,10 +49,18 @@ class Hub:
             self._accept(self._framer.patch(snapshot))
         self._rouse()
 
-    def show_parts(self, parts: Parts, now: float, *, whole: bool) -> None:
-        """Take parts that are known already, as a replay does; from any thread."""
+    def show_parts(self, parts: Parts, now: float | None, *, whole: bool) -> None:
+        """Take parts that are known already, as a replay does; from any thread.
+
+        Args:
+            parts: What changed, or everything.
+            now: The mission's time; None for no other than before.
+            whole: Whether it is everything: what is not in it is not known.
+        """
         with self._lock:
-            self._now = now
+            self._now = self._now if now is None else now
+            if whole:
+                parts = {**dict.fromkeys(PARTS), **parts}
             parts = dict(parts)
             trail = parts.pop('trail', None)
             if whole:

@@ -264,7 +264,7 @@ def place_lines(snapshot: Snapshot, width: int) -> list[Text]:
     names = sorted({*known, *snapshot.positions}, key=lambda name: (known.get(name, 0.0), name))
     if not names:
         return [_dim('nothing from the ontology yet: its map is not built')]
-    ages = [_age(snapshot.now - known[name]) if name in known else 'never' for name in names]
+    ages = [_age(snapshot.now - known[name]) if known.get(name) else 'never' for name in names]
     status, longest, widest = snapshot.status, max(map(len, names)), max(map(len, ages))
     column = longest + widest + len('  avoided ←')
     lines = [Text()]

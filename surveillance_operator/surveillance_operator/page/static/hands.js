@@ -18,7 +18,7 @@ export class Hands {
     this.place = h('select', {name: 'place'});
     this.door = h('select', {name: 'door'});
     this.gone = h('select', {name: 'name'});
-    this.policy = h('select', {name: 'policy'}, ...['tour', 'lookahead', 'nearest', 'longest_unvisited', 'random'].map((name) => h('option', {value: name}, name)));
+    this.policy = h('select', {name: 'policy'}, ...['tour', 'lookahead', 'oldest', 'random', 'CR', 'HCR', 'HPCC', 'cycle'].map((name) => h('option', {value: name}, name)));
     this.controller = h('select', {name: 'controller'}, ...WAYS.map(([name]) => h('option', {value: name}, name)));
     this.requests = h('pre', {id: 'requests'}, '');
     this.x = number('x [m]', '', 'x');

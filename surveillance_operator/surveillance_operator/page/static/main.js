@@ -115,7 +115,7 @@ function camera() {
 document.body.classList.toggle('replay', replaying);
 $('replay').hidden = !replaying;
 for (const each of document.querySelectorAll('.hands')) each.hidden = !may || replaying;
-if (replaying) $('camera-section').hidden = true;
+if (replaying) for (const id of ['camera-section', 'asking']) $(id).hidden = true;
 connect();
 setInterval(() => { map.tick(state, now()); drawStrips($('strips'), state, now()); }, 1000);
 setInterval(camera, 700);

@@ -11,7 +11,7 @@ export class Why {
 
   choose(place) {
     $('place').value = place;
-    this.facts();
+    if (!$('asking').hidden) this.facts();
   }
 
   show() {

@@ -1,0 +1,165 @@
+"""Plays the time line of a recording on the page, at any speed, from any moment."""
+
+from __future__ import annotations
+
+import sys
+import threading
+import time
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from surveillance_operator.page.hub import Hub
+from surveillance_operator.page.server import Action, Page, PageError
+from surveillance_operator.recording import timeline
+from surveillance_operator.recording.runs import RunError, find_run, run_parser
+from surveillance_operator.recording.timeline import MARKS, Timeline, TimelineError
+
+EXIT_BAD_INPUT = 2
+
+SPEEDS = 0.1, 100.0
+PERIOD = 0.05
+"""Seconds between two steps."""
+MOST_LINES = 400
+"""Lines that one step applies; where more have passed, it jumps."""
+
+
+class Player:
+    """Where a replay is, and how fast it goes.
+
+    Args:
+        line: What is played.
+        hub: Where it is shown.
+    """
+
+    def __init__(self, line: Timeline, hub: Hub) -> None:
+        self._line = line
+        self._hub = hub
+        self._lock = threading.Lock()
+        self._time = line.times[0]
+        self._number = -1
+        self._speed = 1.0
+        self._playing = True
+        self._ended = threading.Event()
+        self.seek(0.0)
+
+    def run(self) -> None:
+        """Play until `stop`."""
+        before = time.monotonic()
+        while not self._ended.wait(PERIOD):
+            now = time.monotonic()
+            with self._lock:
+                if self._playing:
+                    self._forward((now - before) * self._speed)
+            before = now
+
+    def stop(self) -> None:
+        """End `run`."""
+        self._ended.set()
+
+    def seek(self, seconds: float) -> str:
+        """Go to a moment, seconds from the recording's start."""
+        with self._lock:
+            self._jump(self._line.times[0] + max(0.0, float(seconds)))
+        return 'moved'
+
+    def actions(self) -> dict[str, Action]:
+        """Return what a viewer may do."""
+        return {
+            'seek': lambda given: self.seek(given['to']),
+            'speed': self._set_speed,
+            'play': lambda _: self._set_playing(True),
+            'pause': lambda _: self._set_playing(False),
+            'jump': self._jump_to_mark,
+        }
+
+    def _set_speed(self, given: Mapping[str, Any]) -> str:
+        speed = float(given['speed'])
+        if not SPEEDS[0] <= speed <= SPEEDS[1]:
+            raise ValueError(f'speed {speed:g}: expected {SPEEDS[0]} to {SPEEDS[1]:g}')
+        with self._lock:
+            self._speed = speed
+            self._tell({}, None)
+        return f'speed {speed:g}'
+
+    def _set_playing(self, playing: bool) -> str:
+        with self._lock:
+            self._playing = playing
+            self._tell({}, None)
+        return 'playing' if playing else 'paused'
+
+    def _jump_to_mark(self, given: Mapping[str, Any]) -> str:
+        kind = given['kind']
+        if kind not in MARKS:
+            raise ValueError(f'{kind!r}: expected one of {", ".join(MARKS)}')
+        with self._lock:
+            at = self._line.next_mark(kind, self._time)
+            if at is None:
+                raise ValueError(f'no {kind} after this moment')
+            self._jump(at)
+        return f'at the {kind}'
+
+    def _jump(self, at: float) -> None:
+        last = self._line.times[-1]
+        self._time = min(at, last)
+        self._number, now, parts = self._line.at(self._time)
+        self._tell(parts, now, whole=True)
+
+    def _forward(self, seconds: float) -> None:
+        self._time = min(self._time + seconds, self._line.times[-1])
+        times, number = self._line.times, self._number
+        changed: dict[str, Any] = {}
+        now = None
+        while number + 1 < len(times) and times[number + 1] <= self._time:
+            number += 1
+            if number - self._number > MOST_LINES:
+                self._jump(self._time)
+                return
+            now, parts = self._line.line(number)
+            changed.update(parts)
+        whole = 'trail' in changed
+        self._number = number
+        self._tell(changed, now, whole=whole)
+
+    def _tell(self, parts: dict[str, Any], now: float | None, *, whole: bool = False) -> None:
+        replay = {
+            'at': round(self._time - self._line.times[0], 1),
+            'length': round(self._line.times[-1] - self._line.times[0], 1),
+            'playing': self._playing,
+            'speed': self._speed,
+            'day': time.strftime('%Y-%m-%d %H:%M:%S', time.localtime(self._time)),
+        }
+        self._hub.show_parts({**parts, 'replay': replay}, now, whole=whole)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Show a recorded mission on a page until Ctrl-C; the exit code is 2 for bad input."""
+    parser = run_parser('replay', 'Shows a recorded mission in a browser, with a slider.')
+    parser.add_argument('--port', type=int, default=8080, metavar='N', help='default: %(default)d')
+    options = parser.parse_args(argv)
+    if not 0 <= options.port <= 65535:
+        parser.error(f'--port {options.port}: expected a number from 0 to 65535')
+    hub = Hub()
+    try:
+        folder = find_run(options.run, options.runs)
+        line = Timeline(folder / timeline.NAME)
+        player = Player(line, hub)
+        page = Page(hub, questions={}, actions=player.actions(), port=options.port, replay=True)
+    except (RunError, TimelineError, PageError) as error:
+        print(f'replay: {error}', file=sys.stderr)
+        return EXIT_BAD_INPUT
+    thread = threading.Thread(target=player.run, name='replay', daemon=True)
+    thread.start()
+    print(f'{folder} is shown at {page.address} until Ctrl-C', flush=True)
+    try:
+        page.run()
+    except KeyboardInterrupt:
+        pass
+    finally:
+        player.stop()
+        hub.close()
+        thread.join()
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,262 @@
+"""The report of a mission: one HTML file that needs nothing else, and a picture beside it."""
+
+from __future__ import annotations
+
+import math
+import sys
+import time
+from collections.abc import Iterable, Sequence
+from html import escape
+from itertools import pairwise
+from pathlib import Path
+
+from surveillance_behaviour.mission import mission_log
+from surveillance_behaviour.mission.mission_log import Event
+from surveillance_operator.map_command import CommandError, facts, graph_over_doors, run_of
+from surveillance_operator.recording import bag, timeline
+from surveillance_operator.recording.runs import PLACE, RECORD, RunError, find_run, run_parser
+from surveillance_operator.recording.timeline import Timeline, TimelineError
+from surveillance_runtime.place import read_place_file
+from surveillance_runtime.place.floor_plan import FloorPlan
+from surveillance_runtime.place.picture import Run, draw_place
+from surveillance_runtime.yaml_file import YamlFileError
+
+EXIT_BAD_INPUT = 2
+NAME, PICTURE = 'report.html', 'report.png'
+MOST_LINES = 2000
+_STYLE = """
+:root{color-scheme:light dark}body{font:15px/1.5 system-ui,sans-serif;max-width:70rem;margin:auto;
+padding:1rem}table{border-collapse:collapse}td,th{padding:.2rem .7rem;text-align:left;
+border-bottom:1px solid #8886}td.n{text-align:right;font-variant-numeric:tabular-nums}
+svg.map{height:auto;max-height:32rem}.wall{stroke:currentColor;stroke-width:.12}
+.door{stroke:Canvas;stroke-width:.16}.way{fill:none;stroke:#5b9bd5;stroke-width:.1;stroke-opacity:.7}
+.map text{font-size:.7px;text-anchor:middle;fill:currentColor;paint-order:stroke;stroke:Canvas;
+stroke-width:.15px}.late{font-weight:700}svg{width:100%;height:2rem;display:block}
+.strip{fill:#5b9bd5}.limit{stroke:#b3132b;stroke-dasharray:4 3}th.w{width:50%}
+@media(max-width:40rem){th.w,td.w{display:none}}"""
+
+
+class ReportError(ValueError):
+    """No report can be made; the message is one line."""
+
+
+def write_report(folder: Path) -> Path:
+    """Write the report of a run into its folder; return its path.
+
+    Raises:
+        ReportError: The run has no record, or it cannot be read.
+    """
+    try:
+        events = mission_log.read(folder / RECORD)
+        if not any(event.name == 'visit' for event in events):
+            raise ReportError(f'{folder / RECORD}: no visit was recorded')
+        plan = _plan(folder)
+        run = run_of(events, plan.place, str(folder / RECORD)) if plan is not None else None
+        drawn = _map(plan, run) if plan is not None and run is not None else ''
+        speed = _fastest(events)
+        bound = graph_over_doors(plan).tour.bound / speed if plan is not None and speed else None
+        path = folder / NAME
+        path.write_text(_page(folder, events, drawn, bound), encoding='utf-8')
+    except (mission_log.RecordError, YamlFileError, CommandError) as error:
+        raise ReportError(str(error)) from None
+    except OSError as error:
+        raise ReportError(f'{folder}: {error.strerror or error}') from None
+    return path
+
+
+def draw_picture(folder: Path) -> Path | None:
+    """Draw the way driven as a picture beside the report; None without a place.
+
+    Raises:
+        ReportError: As for `write_report`.
+    """
+    try:
+        plan = _plan(folder)
+        if plan is None:
+            return None
+        run = run_of(mission_log.read(folder / RECORD), plan.place, str(folder / RECORD))
+        path = folder / PICTURE
+        draw_place(plan, 'The way driven', facts(plan), run).save(path)
+    except (mission_log.RecordError, YamlFileError, CommandError) as error:
+        raise ReportError(str(error)) from None
+    except OSError as error:
+        raise ReportError(f'{folder}: {error.strerror or error}') from None
+    return path
+
+
+def _plan(folder: Path) -> FloorPlan | None:
+    file = folder / PLACE
+    return read_place_file(file, walls=True).plan if file.exists() else None
+
+
+def _map(plan: FloorPlan, run: Run) -> str:
+    """Return the place with the ways driven, as SVG; y points up in it."""
+    walls = ''.join(
+        f'M{wall.start[0]:.2f} {-wall.start[1]:.2f}L{wall.end[0]:.2f} {-wall.end[1]:.2f}'
+        for wall in plan.walls.values()
+    )
+    doors = ''
+    for door in plan.doors.values():
+        dx, dy = door.width / 2 * math.cos(door.yaw), door.width / 2 * math.sin(door.yaw)
+        doors += f'M{door.x - dx:.2f} {dy - door.y:.2f}L{door.x + dx:.2f} {-dy - door.y:.2f}'
+    ways = ''.join(
+        'M' + 'L'.join(f'{x:.2f} {-y:.2f}' for x, y, *_ in way) for way in run.driven if way
+    )
+    names = ''.join(
+        f'<text x="{point[0]:.2f}" y="{-point[1]:.2f}">{escape(name)}</text>'
+        for name, point in plan.place.positions.items()
+    )
+    ends = [end for wall in plan.walls.values() for end in (wall.start, wall.end)]
+    xs, ys = [end[0] for end in ends], [-end[1] for end in ends]
+    box = (min(xs) - 0.5, min(ys) - 0.5, max(xs) - min(xs) + 1.0, max(ys) - min(ys) + 1.0)
+    return (
+        f'<svg class="map" role="img" aria-label="The place with the way driven" '
+        f'viewBox="{" ".join(f"{each:.2f}" for each in box)}"><path class="wall" d="{walls}"/>'
+        f'<path class="door" d="{doors}"/><path class="way" d="{ways}"/>{names}</svg>'
+    )
+
+
+def _fastest(events: Sequence[Event]) -> float:
+    """Return the highest mean speed of a leg, from decision to arrival, m/s."""
+    fastest, began = 0.0, math.inf
+    for event in events:
+        if event.name == 'decision':
+            began = event.time
+        elif event.name == 'visit':
+            if event.time - began > 1.0:
+                fastest = max(fastest, event.number('distance') / (event.time - began))
+            began = math.inf
+    return fastest
+
+
+def _threshold(folder: Path) -> float | None:
+    try:
+        line = Timeline(folder / timeline.NAME)
+    except TimelineError:
+        return None
+    _, _, parts = line.at(math.inf)
+    line.close()
+    value = (parts.get('mission') or {}).get('threshold')
+    return float(value) if value else None
+
+
+def _page(folder: Path, events: Sequence[Event], drawn: str, bound: float | None) -> str:
+    summary = mission_log.summarize(events)
+    threshold = _threshold(folder)
+    start, end = events[0].time, max(event.time for event in events)
+    limits = [
+        f'threshold {threshold:g} s' if threshold else 'threshold not recorded',
+        f'no patrol at this pace keeps every place below {bound:.0f} s' if bound else '',
+    ]
+    body = [
+        f'<h1>Mission {escape(folder.name)}</h1>',
+        f'<pre>{escape(str(summary))}</pre>',
+        f'<p>{escape("; ".join(each for each in limits if each))}.</p>',
+    ]
+    body.append(drawn)
+    body.append('<h2>Idleness</h2>')
+    body.append(_idleness(events, summary, threshold, start, end))
+    for title, name, columns in (
+        ('Recharges', 'recharge', ('place', 'seconds')),
+        ('Failures', 'failure', ('what', 'reason')),
+        ('Decisions', 'decision', ('place', 'rule', 'reason')),
+        ('Visits', 'visit', ('place', 'distance')),
+    ):
+        found = [event for event in events if event.name == name]
+        body.append(f'<h2>{title} ({len(found)})</h2>')
+        if found:
+            rows = [
+                [_clock(event.time - start), *(_cell(event.fields[key]) for key in columns)]
+                for event in found[:MOST_LINES]
+            ]
+            body.append(_table(['at', *columns], rows))
+        if len(found) > MOST_LINES:
+            body.append(f'<p>and {len(found) - MOST_LINES} more: see {RECORD}.</p>')
+    made = time.strftime('%Y-%m-%d %H:%M')
+    return (
+        '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f'<title>Mission {escape(folder.name)}</title><style>{_STYLE}</style></head>'
+        f'<body><main>{"".join(body)}<p>Made {made}.</p></main></body></html>\n'
+    )
+
+
+def _idleness(
+    events: Sequence[Event],
+    summary: mission_log.Summary,
+    threshold: float | None,
+    start: float,
+    end: float,
+) -> str:
+    rows = []
+    for place in sorted(summary.visits):
+        times = [e.time for e in events if e.name == 'visit' and e.text('place') == place]
+        longest = summary.unvisited.get(place, 0.0)
+        late = threshold is not None and longest > threshold
+        mark = ' !' if late else ''
+        rows.append(
+            f'<tr><td>{escape(place)}</td><td class="n">{summary.visits[place]}</td>'
+            f'<td class="n{" late" if late else ""}">{longest:.0f} s{mark}</td>'
+            f'<td class="w">{_strip(times, threshold, start, end)}</td></tr>'
+        )
+    return (
+        '<table><thead><tr><th>place</th><th>visits</th><th>longest unvisited</th>'
+        f'<th class="w">over the mission</th></tr></thead><tbody>{"".join(rows)}</tbody></table>'
+    )
+
+
+def _strip(times: Iterable[float], threshold: float | None, start: float, end: float) -> str:
+    """Return how long a place had not been visited, over the mission, as a small SVG."""
+    span = max(end - start, 1.0)
+    gaps = [start, *sorted(times), end]
+    top = max(threshold or 0.0, *(b - a for a, b in pairwise(gaps))) or 1.0
+    points = []
+    for before, at in pairwise(gaps):
+        x1, x2 = (600 * (each - start) / span for each in (before, at))
+        points.append(f'{x1:.1f},30 {x2:.1f},{30 - 30 * (at - before) / top:.1f} {x2:.1f},30')
+    limit = ''
+    if threshold:
+        y = 30 - 30 * threshold / top
+        limit = f'<line class="limit" x1="0" x2="600" y1="{y:.1f}" y2="{y:.1f}"/>'
+    return (
+        '<svg viewBox="0 0 600 30" preserveAspectRatio="none" aria-hidden="true">'
+        f'<polygon class="strip" points="{" ".join(points)}"/>{limit}</svg>'
+    )
+
+
+def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    cells = ''.join(f'<th>{escape(each)}</th>' for each in head)
+    lines = ''.join(
+        '<tr>' + ''.join(f'<td>{escape(cell)}</td>' for cell in row) + '</tr>' for row in rows
+    )
+    return f'<table><thead><tr>{cells}</tr></thead><tbody>{lines}</tbody></table>'
+
+
+def _cell(value: object) -> str:
+    return f'{value:.1f}' if isinstance(value, float) else str(value)
+
+
+def _clock(seconds: float) -> str:
+    minutes, rest = divmod(max(0, int(seconds)), 60)
+    return f'{minutes // 60}:{minutes % 60:02d}:{rest:02d}'
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Write the report of a run and say where; the exit code is 2 for bad input."""
+    parser = run_parser('report', 'Writes what a mission did into one HTML file.')
+    options = parser.parse_args(argv)
+    try:
+        folder = find_run(options.run, options.runs)
+        for line in bag.repair(folder / bag.NAME):
+            print(line)
+        print(write_report(folder))
+        if (picture := draw_picture(folder)) is not None:
+            print(picture)
+    except (RunError, ReportError) as error:
+        print(f'report: {error}', file=sys.stderr)
+        return EXIT_BAD_INPUT
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,286 @@
+"""The page in a real Chromium, beside a real mission: everything on it is seen to change."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import socket
+import subprocess
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.launcher.conftest import ROOT, Started
+
+CHROMIUM = shutil.which('chromium') or shutil.which('chromium-browser')
+DRIVER = shutil.which('chromedriver')
+pytestmark = [
+    pytest.mark.skipif(
+        not (CHROMIUM and DRIVER),
+        reason='no Chromium: apt-get install chromium chromium-driver',
+    ),
+    pytest.mark.timeout(180),
+]
+AXE = 'axe-core@4.10.3'
+PHONE, DESK = (390, 844), (1400, 1000)
+PICTURES = os.environ.get('PAGE_PICTURES')
+"""A folder for screenshots: set it to draw those of the documentation anew."""
+
+
+class Viewer:
+    """A browser on the page."""
+
+    def __init__(self, address: str) -> None:
+        from selenium import webdriver
+        from selenium.webdriver.chrome.service import Service
+
+        options = webdriver.ChromeOptions()
+        options.binary_location = str(CHROMIUM)
+        for argument in ('headless=new', 'no-sandbox', 'disable-gpu', 'disable-dev-shm-usage'):
+            options.add_argument(f'--{argument}')
+        options.set_capability('goog:loggingPrefs', {'browser': 'ALL'})
+        self.driver: Any = webdriver.Chrome(options=options, service=Service(DRIVER))
+        self.size(*DESK)
+        self.address = address
+        self.driver.get(address)
+
+    def size(self, width: int, height: int, *, dark: bool = False) -> None:
+        self.driver.execute_cdp_cmd(
+            'Emulation.setDeviceMetricsOverride',
+            {'width': width, 'height': height, 'deviceScaleFactor': 1, 'mobile': width < 500},
+        )
+        scheme = {'name': 'prefers-color-scheme', 'value': 'dark' if dark else 'light'}
+        self.driver.execute_cdp_cmd('Emulation.setEmulatedMedia', {'features': [scheme]})
+
+    def js(self, script: str, *values: Any) -> Any:
+        return self.driver.execute_script(script, *values)
+
+    def text(self, selector: str) -> str:
+        return str(self.js('return document.querySelector(arguments[0])?.textContent', selector))
+
+    def count(self, selector: str) -> int:
+        return int(self.js('return document.querySelectorAll(arguments[0]).length', selector))
+
+    def attribute(self, selector: str, name: str) -> str:
+        query = 'return document.querySelector(arguments[0])?.getAttribute(arguments[1])'
+        return str(self.js(query, selector, name) or '')
+
+    def until(self, what: Callable[[], Any], seconds: float = 30.0) -> Any:
+        from selenium.webdriver.support.wait import WebDriverWait
+
+        return WebDriverWait(self.driver, seconds, 0.1).until(lambda _: what())
+
+    def click(self, selector: str) -> None:
+        self.js('document.querySelector(arguments[0]).click()', selector)
+
+    def changes(self, look: Callable[[], Any], seconds: float = 30.0) -> None:
+        before = look()
+        self.until(lambda: look() != before, seconds)
+
+    def picture(self, name: str) -> None:
+        if PICTURES:
+            self.driver.save_screenshot(str(Path(PICTURES) / name))
+
+
+@pytest.fixture(scope='module')
+def mission(tmp_path_factory: pytest.TempPathFactory, ros_domain: int) -> Iterator[Started]:
+    folder = tmp_path_factory.mktemp('runs')
+    command = [str(ROOT / '.venv/bin/python'), str(ROOT / 'launch.py'), '--web-control']
+    with socket.socket() as free:
+        free.bind(('127.0.0.1', 0))
+        port = free.getsockname()[1]
+    command += ['--web-address', f'127.0.0.1:{port}', '--record', str(folder)]
+    command += ['--domain', str(ros_domain), '--params', str(ROOT / 'config/fast.yaml')]
+    started = Started(command)
+    yield started
+    started.end(signal.SIGINT)
+
+
+@pytest.fixture(scope='module')
+def viewer(mission: Started) -> Iterator[Viewer]:
+    address = mission.until(r'the mission is shown at (\S+)', timeout=60)[1]
+    viewer = Viewer(address)
+    viewer.until(lambda: viewer.count('[data-place]') == 7, 60)
+    yield viewer
+    viewer.driver.quit()
+
+
+def done(viewer: Viewer, words: str) -> None:
+    viewer.until(lambda: words in viewer.text('#done'))
+    assert viewer.text('#done').startswith('✓')
+
+
+def test_the_map_shows_the_robot_moving(viewer: Viewer) -> None:
+    assert viewer.attribute('#map image', 'href').startswith('data:image/png')
+    viewer.changes(lambda: viewer.attribute('.robot', 'style'))
+    viewer.until(lambda: 'M' in viewer.attribute('.lidar', 'd'))
+    viewer.until(lambda: 'L' in viewer.attribute('path.plan', 'd'))
+    viewer.changes(lambda: viewer.attribute('path.driven', 'd'))
+    assert viewer.count('.door') == 7
+    assert viewer.text('#connection') == 'live'
+
+
+def test_the_decision_and_the_proof_of_a_fact_can_be_read(viewer: Viewer) -> None:
+    viewer.until(lambda: viewer.text('#decision-line').startswith('decision'))
+    assert viewer.count('#scores tbody tr') >= 1
+    assert len(viewer.text('#reason')) > 20
+    viewer.changes(lambda: viewer.text('#decision-line'))
+    viewer.js("document.querySelector('[data-place=R3]').dispatchEvent(new Event('click'))")
+    viewer.until(lambda: viewer.count('[data-fact]'))
+    viewer.click('[data-fact] summary')
+    viewer.until(lambda: 'hasDoor' in viewer.text('.proof'))
+
+
+def test_why_not_is_answered(viewer: Viewer) -> None:
+    viewer.js("document.querySelector('#place').value = 'R4'")
+    viewer.click('#why-not')
+    viewer.until(lambda: 'R4' in viewer.text('#answer'))
+    assert 'warn' not in viewer.attribute('#answer p', 'class')
+
+
+def test_the_machine_is_drawn_and_lit(viewer: Viewer) -> None:
+    viewer.until(lambda: viewer.count('#machine .leaf.on'))
+    assert viewer.count('#machine .leaf') > 8
+    assert viewer.count('#machine path.last') == 1
+    viewer.changes(lambda: viewer.text('#transitions li'))
+
+
+def test_the_strips_of_time_run(viewer: Viewer) -> None:
+    assert viewer.count('[data-strip]') == 9
+    viewer.changes(lambda: viewer.text('[data-value=R1]'))
+    viewer.until(lambda: '%' in viewer.text('[data-value=battery]'))
+    viewer.until(lambda: 'L' in viewer.attribute('[data-strip=R1] .fill', 'd'))
+
+
+def test_every_node_is_seen_to_be_up(viewer: Viewer) -> None:
+    viewer.until(lambda: viewer.count('#nodes .up') >= 6)
+    assert 'armor_server' in viewer.text('#nodes')
+    viewer.until(lambda: viewer.count('#events li'))
+
+
+def test_the_camera_shows_images(viewer: Viewer) -> None:
+    viewer.js("document.querySelector('#camera-section').scrollIntoView()")
+    viewer.until(lambda: viewer.js("return document.querySelector('#camera').naturalWidth"))
+    viewer.changes(lambda: viewer.attribute('#camera', 'src'))
+    viewer.js('scrollTo(0, 0)')
+
+
+def test_hands_change_the_mission_and_say_what_came_of_it(viewer: Viewer) -> None:
+    viewer.js("document.querySelector('select[name=door]').value = 'D4'")
+    viewer.js("[...document.querySelectorAll('[data-act=door]')].at(1).click()")
+    done(viewer, 'D4')
+    viewer.until(lambda: 'shut' in viewer.attribute('[data-door=D4]', 'class'))
+    viewer.js("document.querySelector('[data-act=door]').click()")
+    viewer.until(lambda: 'shut' not in viewer.attribute('[data-door=D4]', 'class'))
+
+    viewer.click('[data-act=obstacle]')  # x and y are missing: the browser says so
+    for name, value in (('x', '16'), ('y', '16')):
+        viewer.js(f"document.querySelector('input[name={name}]').value = '{value}'")
+    viewer.click('[data-act=obstacle]')
+    done(viewer, 'obstacle box')
+    viewer.click('[data-act=remove_obstacle]')
+    done(viewer, 'gone')
+
+    viewer.js("document.querySelector('input[name=seconds]').value = '90'")
+    viewer.click('[data-act=threshold]')
+    done(viewer, 'urgency_threshold is 90 s')
+    viewer.until(lambda: viewer.js('return mission.state.mission.threshold') == 90)
+    viewer.js("document.querySelector('select[name=place]').value = 'R2'")
+    viewer.click('[data-act=go]')
+    done(viewer, 'R2')
+    viewer.js("document.querySelector('input[name=seconds]').value = '-5'")
+    viewer.click('[data-act=threshold]')
+    viewer.until(lambda: viewer.text('#done').startswith('✗'))
+
+
+def test_the_machine_pauses_and_goes_on(viewer: Viewer) -> None:
+    viewer.click('[data-machine=pause]')
+    viewer.until(lambda: not viewer.js("return document.querySelector('#paused').hidden"))
+    viewer.click('[data-machine=resume]')
+    viewer.until(lambda: viewer.js("return document.querySelector('#paused').hidden"))
+
+
+def test_a_room_is_chosen_by_keyboard(viewer: Viewer) -> None:
+    from selenium.webdriver.common.by import By
+    from selenium.webdriver.common.keys import Keys
+
+    viewer.driver.find_element(By.TAG_NAME, 'body').send_keys(Keys.TAB)
+    for _ in range(10):
+        focused = viewer.driver.switch_to.active_element
+        if focused.get_attribute('data-place') == 'E':
+            break
+        focused.send_keys(Keys.TAB)
+    assert focused.get_attribute('data-place') == 'E'
+    viewer.driver.switch_to.active_element.send_keys(Keys.ENTER)
+    viewer.until(lambda: 'What is known of E' in viewer.text('#facts'))
+
+
+def test_without_the_token_nobody_can_act(viewer: Viewer) -> None:
+    address = viewer.address.partition('?')[0]
+    other = Viewer(address)
+    try:
+        other.until(lambda: other.count('[data-place]') == 7)
+        assert other.js("return document.querySelector('#hands').hidden")
+        script = """
+            const [done] = arguments;
+            fetch('/act/door', {method: 'POST', body: '{"door": "D1", "open": false}'})
+              .then((answer) => done(answer.status));
+        """
+        assert other.driver.execute_async_script(script) == 403
+    finally:
+        other.driver.quit()
+
+
+@pytest.mark.parametrize('size', [PHONE, DESK], ids=['phone', 'desk'])
+@pytest.mark.parametrize('dark', [False, True], ids=['light', 'dark'])
+def test_axe_finds_nothing(
+    viewer: Viewer, size: tuple[int, int], dark: bool, axe_script: str
+) -> None:
+    viewer.size(*size, dark=dark)
+    viewer.picture(f'page_{"phone" if size == PHONE else "desk"}{"_dark" if dark else ""}.png')
+    assert viewer.js('return document.documentElement.scrollWidth') <= size[0]
+    viewer.js(axe_script)
+    found = viewer.driver.execute_async_script(
+        'const done = arguments[0]; axe.run().then((r) => done(r.violations.map((v) => '
+        'v.id + ": " + v.nodes.slice(0, 3).map((n) => n.target + " " + n.failureSummary))))'
+    )
+    viewer.size(*DESK)
+    assert found == []
+
+
+def test_a_lost_connection_is_shown_and_mended(viewer: Viewer, mission: Started) -> None:
+    process = int(mission.until(r'started mission_page \(process (\d+)\)')[1])
+    os.kill(process, signal.SIGKILL)
+    viewer.until(lambda: 'lost' in viewer.text('#connection'))
+    viewer.until(lambda: viewer.text('#connection') == 'live', 60)
+    viewer.changes(lambda: viewer.attribute('.robot', 'style'))
+
+
+def test_the_browser_has_nothing_to_complain_about(viewer: Viewer) -> None:
+    severe = [each for each in viewer.driver.get_log('browser') if each['level'] == 'SEVERE']
+    # Refused actions are answered with 4xx, which browsers log, as the lost connection before.
+    expected = ('status of 4', 'ERR_CONNECTION_REFUSED', 'ERR_INCOMPLETE_CHUNKED_ENCODING')
+    assert [s for s in severe if not any(each in s['message'] for each in expected)] == []
+
+
+@pytest.fixture(scope='module')
+def axe_script(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """The accessibility checker, fetched by npm: it is larger than this project's page."""
+    npm = shutil.which('npm')
+    if npm is None:
+        pytest.skip('no npm to fetch axe-core: apt-get install npm')
+    folder = tmp_path_factory.mktemp('axe')
+    try:
+        done = subprocess.run(
+            [npm, 'pack', AXE], cwd=folder, capture_output=True, timeout=60, check=False
+        )
+    except subprocess.TimeoutExpired:
+        pytest.skip(f'npm could not fetch {AXE} within 60 s')
+    archives = list(folder.glob('*.tgz'))
+    if done.returncode or not archives:
+        pytest.skip(f'npm could not fetch {AXE}')
+    shutil.unpack_archive(archives[0], folder, 'gztar')
+    return (folder / 'package/axe.min.js').read_text(encoding='utf-8')
