@@ -67,6 +67,8 @@ BUILDER = 'ontology_map_builder'
 PLANNER = 'planner_controller'
 """The node that knows the doors' lines and the execution mode, as its parameters."""
 BEHAVIOUR = 'robot_behavior'
+OBSERVERS = ('mission_', 'console')
+"""How the names of nodes begin that only look on."""
 CONTROLLERS = ('battery_controller', 'planner_controller', 'motion_controller', 'arm_controller')
 
 _QUEUE = QoSProfile(
@@ -215,6 +217,8 @@ class MissionFeed:
                 fits, reason = qos_check_compatible(info.qos_profile, subscription.qos)
                 if fits == QoSCompatibility.ERROR:
                     silent[topic.name] = _mismatch(reason)
+        if names:  # there is a mission: all its nodes count, also those that tell nothing of it
+            names |= {name for name in processes if not name.startswith(('_', *OBSERVERS))}
         nodes = {name: frozenset(processes.get(name, ())) for name in names}
         if nodes != old.nodes or silent != old.silent:
             ended = old.ended.union(old.nodes).difference(nodes)

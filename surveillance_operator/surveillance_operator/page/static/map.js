@@ -69,6 +69,9 @@ export class MapView {
   }
 
   drawPlaces(state, now) {
+    const key = JSON.stringify(Object.entries(state.places ?? {}).map(([name, place]) => [name, place.at]));
+    if (key === this.key) { this.tick(state, now); return; }
+    this.key = key;
     const focused = document.activeElement?.dataset?.place;
     this.rooms.clear();
     const spots = Object.values(state.places ?? {}).map((place) => place.at).filter(Boolean);
