@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import random
 import socket
 import threading
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -16,7 +18,9 @@ from surveillance_ontology.armor.client import (
     InProcessTransport,
 )
 from surveillance_ontology.armor.service import ArmorService
-from surveillance_ontology.armor.sparql_engine import Graph, SparqlEngine, SparqlTimeoutError
+from surveillance_ontology.armor.sparql_engine import SparqlEngine, SparqlTimeoutError
+from surveillance_ontology.armor.sparql_graph import GraphChanges, GraphUpdate, Version
+from surveillance_ontology.owl.axioms import ObjectPropertyAssertion
 
 from .seven_rooms import IRI, asker, build_seven_rooms
 
@@ -101,23 +105,27 @@ def test_values_come_back_as_they_were_written(service: ArmorService, built: Arm
     assert shown('SELECT (?v + 0 AS ?n) { :R1 :seats ?v }') == '{n=7^^integer}', 'computed'
 
 
+QUERY = 'SELECT ?c { <urn:a> <urn:b> ?c }'
+
+
 def test_the_time_asked_for_is_the_querys_own(monkeypatch: pytest.MonkeyPatch) -> None:
     """Starting the process and handing over the graph do not count, however long they take."""
     passed = 0.0
     clock = time.monotonic
 
-    def graph() -> Graph:
+    def update(_known: Version | None) -> GraphUpdate:
         nonlocal passed
         passed += 100.0
-        return (0, 0, True), b'<urn:a> <urn:b> <urn:c> .\n'
+        fact = ObjectPropertyAssertion('urn:b', 'urn:a', 'urn:c')
+        return GraphUpdate(Version(0, True, 0), True, 'urn:x', [fact])
 
     monkeypatch.setattr(time, 'monotonic', lambda: clock() + passed)
     engine = SparqlEngine()
     try:
-        rows = engine.select((0, 0, True), graph, 'SELECT ?c { ?a ?b ?c }', 20.0, 1000.0, 10)
+        rows = engine.select(Version(0, True, 0), update, QUERY, 20.0, 1000.0, 10)
         assert [[bound.value for bound in row] for row in rows] == [['urn:c']]
         with pytest.raises(SparqlTimeoutError):
-            engine.select((0, 1, True), graph, 'SELECT ?c { ?a ?b ?c }', 20.0, 50.0, 10)
+            engine.select(Version(0, True, 1), update, QUERY, 20.0, 50.0, 10)
     finally:
         engine.close()
 
@@ -196,3 +204,50 @@ def test_a_service_that_closes_stops_its_queries(service: ArmorService, built: A
     thread.join(10)
     assert answers == ['QUERY SPARQL: the server stops']
     assert not asker(service)('QUERY SPARQL', 'SELECT * { ?a ?b ?c }').success
+
+
+def graph_of(client: ArmorClient) -> list[dict[str, str]]:
+    rows = client.query.sparql('SELECT ?s ?p ?o { ?s ?p ?o FILTER(!isBlank(?s) && !isBlank(?o)) }')
+    return sorted(rows, key=lambda row: (row['s'], row['p'], row['o']))
+
+
+@pytest.mark.parametrize('derived', [True, False])
+def test_a_graph_that_is_kept_up_to_date_is_the_one_that_a_new_process_gets(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, derived: bool
+) -> None:
+    service = ArmorService(Settings(tmp_path, sparql_derived=derived))
+    client = ArmorClient('c', 'map', InProcessTransport(service))
+    build_seven_rooms(client, False, True)
+    graph_of(client)
+    wholes: list[bool] = []
+    update = GraphChanges.update
+
+    def counted(*args: Any) -> GraphUpdate:
+        found = update(*args)
+        wholes.append(found.whole)
+        return found
+
+    monkeypatch.setattr(GraphChanges, 'update', counted)
+    change, seed = client.manipulation, random.Random(5)
+    rooms = ['R1', 'R2', 'R3', 'C1', 'NEW']
+    for step in range(60):
+        here, there, value = seed.choice(rooms), seed.choice(rooms), str(seed.randrange(3))
+        seed.choice(
+            [
+                lambda h=here, v=value: change.replace_one_dataprop_b2_ind('size', h, 'INT', v),
+                lambda h=here, v=value: change.add_dataprop_to_ind('size', h, 'LONG', v),
+                lambda h=here, v=value: change.remove_dataprop_from_ind('size', h, 'LONG', v),
+                lambda h=here, t=there: change.add_objectprop_to_ind('near', h, t),
+                lambda h=here, t=there: change.remove_objectprop_from_ind('near', h, t),
+                lambda h=here: change.add_ind_to_class(h, 'ODD'),
+                lambda h=here: change.remove_ind_from_class(h, 'ODD'),
+                lambda h=here, t=there: change.add_objectprop_to_ind('isIn', h, t),
+                lambda h=here, s=step: change.remove_ind(h) if s % 10 == 9 else None,
+                lambda: client.utils.sync_buffered_reasoner(),
+            ]
+        )()
+        kept = graph_of(client)
+        service.session.graphs.note('map', None)
+        assert kept == graph_of(client), step
+    assert wholes.count(False) > 20, 'most changes were told as a difference'
+    service.close()

@@ -14,6 +14,7 @@ from surveillance_ontology.armor.protocol import DirectiveError, ExitCode
 from surveillance_ontology.armor.reference import Reference, Registry
 from surveillance_ontology.armor.rendering import one_line
 from surveillance_ontology.armor.sparql_engine import SparqlEngine
+from surveillance_ontology.armor.sparql_graph import GraphChanges
 from surveillance_ontology.armor.store import Store
 from surveillance_ontology.knowledge_base import Changes
 
@@ -35,6 +36,7 @@ class Session:
         paths: Which files may be read and written.
         log: The log of directives.
         sparql: Runs SPARQL queries.
+        graphs: What changed in the graphs that they see.
         references: What is loaded.
         loading: Held while an ontology is loaded.
         store: Makes references durable; None: they end with the process.
@@ -53,6 +55,7 @@ class Session:
         )
         self.log = DirectiveLog(screen, settings.max_file_bytes)
         self.sparql = SparqlEngine()
+        self.graphs = GraphChanges()
         self.references = Registry()
         self.loading = threading.Lock()
         self._warn = warn
@@ -80,6 +83,7 @@ class Session:
 
     def tell(self, name: str, changes: Changes | None) -> None:
         """Tell the watchers of a change."""
+        self.graphs.note(name, changes)
         for watcher in tuple(self._watchers):
             watcher(name, changes)
 

@@ -1,8 +1,8 @@
 """SPARQL SELECT with a time limit that holds: queries run in processes that can be killed.
 
 The engine is Oxigraph (https://pyoxigraph.readthedocs.io), the fastest of those that were tried; a
-query in it cannot be interrupted, hence the processes. A process keeps its graph, so that further
-queries on an unchanged ontology cost no transfer.
+query in it cannot be interrupted, hence the processes. A process keeps its graph: further queries
+cost no transfer, or that of the difference.
 """
 
 from __future__ import annotations
@@ -19,6 +19,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from surveillance_ontology.armor.sparql_graph import GraphUpdate, Version
+
 MEMORY = 2 * 1024**3
 """Bytes that a query's process may use."""
 GRACE = 1.0
@@ -28,8 +30,8 @@ OUT_OF_MEMORY = 3
 IDLE = 2
 """Processes that are kept for the next query."""
 
-Version = tuple[int, int, bool]
-Graph = tuple[Version, bytes]
+Update = Callable[[Version | None], GraphUpdate | None]
+"""Gives what brings a process with a graph of a version, or none, up to date; None: it is."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +71,7 @@ class SparqlEngine:
     def select(
         self,
         version: Version,
-        graph: Callable[[], Graph],
+        update: Update,
         query: str,
         seconds: float,
         limit: float,
@@ -79,8 +81,7 @@ class SparqlEngine:
 
         Args:
             version: Which graph; equal versions are the same graph.
-            graph: Makes the graph as N-Triples, of this version or a newer one, which it names;
-                called only when no process has this version.
+            update: Makes what a process lacks of this version or a newer one.
             query: A SELECT query.
             seconds: Time limit of the query itself.
             limit: Time limit of all, starting a process and the transfer of the graph included.
@@ -93,7 +94,7 @@ class SparqlEngine:
         deadline = time.monotonic() + limit
         worker = self._take(version)
         try:
-            worker.prepare(version, graph, deadline)
+            worker.prepare(update, deadline)
             answer = worker.ask(query, min(deadline, time.monotonic() + seconds), rows)
         except BaseException:
             with self._lock:
@@ -133,14 +134,22 @@ class SparqlEngine:
         with self._lock:
             if self._closed:
                 raise SparqlError('the server stops')
-            matching = (worker for worker in self._idle if worker.version == version)
-            worker = next(matching, None) or (self._idle[0] if self._idle else None)
+            # The one that has most of it.
+            self._idle.sort(key=lambda worker: _distance(worker.version, version))
+            worker = self._idle[0] if self._idle else None
             if worker is None:
                 worker = _Worker()
             else:
                 self._idle.remove(worker)
             self._busy.add(worker)
             return worker
+
+
+def _distance(known: Version | None, wanted: Version) -> tuple[bool, int]:
+    if known is None:
+        return True, 0
+    same = (known.epoch, known.derived) == (wanted.epoch, wanted.derived)
+    return not same, abs(wanted.sequence - known.sequence)
 
 
 class _Worker:
@@ -159,14 +168,16 @@ class _Worker:
         self._out = self._process.stdout.fileno()
         os.set_blocking(self._in, False)
 
-    def prepare(self, version: Version, graph: Callable[[], Graph], deadline: float) -> None:
-        """Have the process hold a graph of this version or a newer one."""
-        if version == self.version:
+    def prepare(self, update: Update, deadline: float) -> None:
+        """Have the process hold the graph as it is now."""
+        wanted = update(self.version)
+        if wanted is None:
             return
         self.version = None
-        version, payload = graph()
-        self._exchange({'graph': len(payload)}, deadline, payload)
-        self.version = version
+        removed, added = wanted.triples()
+        sizes = {'whole': wanted.whole, 'removed': len(removed), 'added': len(added)}
+        self._exchange(sizes, deadline, removed + added)
+        self.version = wanted.version
 
     def ask(self, query: str, deadline: float, rows: int) -> Any:
         """The process's answer to a query on the graph that it holds."""

@@ -1,8 +1,8 @@
 """The process that runs SPARQL queries, so that one that takes too long can be killed.
 
 It reads requests from standard input and writes answers to standard output, each a line of JSON. A
-request has a graph, which follows it as N-Triples and is kept for the queries that come next, or a
-query.
+request is a query, or has a graph, or triples that go and come in the graph that is there: they
+follow it as N-Triples.
 
 Oxigraph keeps numbers and times by value and forgets how they were written: ``"7"^^xsd:long`` comes
 back as ``"7"^^xsd:integer``. Answers have to show what was asserted. Where a value is written in
@@ -32,11 +32,18 @@ NO_FURTHER_FILES = 3
 
 def serve(requests: BinaryIO, answers: BinaryIO) -> None:
     """Answer requests until the end of input."""
-    store, forms = _load(b'')
+    store, forms = pyoxigraph.Store(), WrittenForms()
     for line in requests:
         request = json.loads(line)
-        if 'graph' in request:
-            store, forms = _load(requests.read(request['graph']))
+        if 'whole' in request:
+            if request['whole']:
+                store, forms = pyoxigraph.Store(), WrittenForms()
+            removed = _quads(requests.read(request['removed']))
+            added = _quads(requests.read(request['added']))
+            for quad in removed:
+                store.remove(quad)
+            store.bulk_extend(added)
+            forms.change(added, removed)
             answer: dict[str, Any] = {}
         else:
             # The kernel ends this process if the one that asked is not there to do it.
@@ -47,11 +54,8 @@ def serve(requests: BinaryIO, answers: BinaryIO) -> None:
         answers.flush()
 
 
-def _load(graph: bytes) -> tuple[pyoxigraph.Store, WrittenForms]:
-    store = pyoxigraph.Store()
-    quads = list(pyoxigraph.parse(graph, format=pyoxigraph.RdfFormat.N_TRIPLES))
-    store.bulk_extend(quads)
-    return store, WrittenForms(quads)
+def _quads(triples: bytes) -> list[Any]:
+    return list(pyoxigraph.parse(triples, format=pyoxigraph.RdfFormat.N_TRIPLES))
 
 
 def _answer(store: pyoxigraph.Store, forms: WrittenForms, query: str, most: int) -> dict[str, Any]:
@@ -92,40 +96,39 @@ _NAME = re.compile(r'<([^<>\s]*)>|([\w.-]*):([\w.-]*\w)')
 _BEFORE = r'(\S+)\s+[?$]{}\b'
 _VARIABLE = re.compile(r'[?$](\w+)')
 
-_Places = list[tuple[str, str]]
+_Places = dict[tuple[str, str], None]
 """Subjects and predicates of the triples in which a form stands."""
+_Forms = dict[Any, dict[Any, _Places]]
+"""For each form in which the store keeps a literal, the ways in which it was written."""
 
 
 class WrittenForms:
-    """The written forms of the literals of one graph.
+    """The written forms of the literals of one graph."""
 
-    Args:
-        quads: The graph as it was parsed.
-    """
+    def __init__(self) -> None:
+        self._forms: _Forms = {}
 
-    def __init__(self, quads: Iterable[Any]) -> None:
-        literals = [quad for quad in quads if _may_be_rewritten(quad.object)]
-        kept = _kept_forms({quad.object for quad in literals})
-        forms: dict[Any, set[Any]] = {}
-        for written, form in kept.items():
-            forms.setdefault(form, set()).add(written)
-        self._only = {
-            form: next(iter(written)) for form, written in forms.items() if len(written) == 1
-        }
-        self._several: dict[Any, dict[Any, _Places]] = {
-            form: {literal: [] for literal in sorted(written, key=str)}
-            for form, written in forms.items()
-            if len(written) > 1
-        }
-        if self._several:
-            for quad in literals:
-                places = self._several.get(kept[quad.object])
-                if places is not None:
-                    places[quad.object].append((_iri(quad.subject), quad.predicate.value))
+    def change(self, added: Iterable[Any], removed: Iterable[Any] = ()) -> None:
+        """Take in quads that came and went, as they were parsed."""
+        gone = [quad for quad in removed if _may_be_rewritten(quad.object)]
+        come = [quad for quad in added if _may_be_rewritten(quad.object)]
+        kept = _kept_forms({quad.object for quad in (*gone, *come)})
+        for quad in gone:
+            written = self._forms.get(kept[quad.object], {})
+            places = written.get(quad.object, {})
+            places.pop((_iri(quad.subject), quad.predicate.value), None)
+            if not places:
+                written.pop(quad.object, None)
+            if not written:
+                self._forms.pop(kept[quad.object], None)
+        for quad in come:
+            written = self._forms.setdefault(kept[quad.object], {})
+            places = written.setdefault(quad.object, {})
+            places[_iri(quad.subject), quad.predicate.value] = None
 
     def reader(self, query: str) -> Reader:
         """What reads the rows of one query."""
-        return Reader(self._only, self._several, query)
+        return Reader(self._forms, query)
 
 
 class Reader:
@@ -134,15 +137,12 @@ class Reader:
     Values that the query computes (``AS ?n``) are left as they are.
     """
 
-    def __init__(
-        self, only: Mapping[Any, Any], several: Mapping[Any, dict[Any, _Places]], query: str
-    ) -> None:
-        self._only = only
-        self._several = several
+    def __init__(self, forms: _Forms, query: str) -> None:
+        self._forms = forms
         self._query = query
         self._computed = set(_COMPUTED.findall(query))
         self._prefixes = dict(_PREFIX.findall(query))
-        self._mentioned = set(self._names(query)) if several else set()
+        self._mentioned = set(self._names(query))
         self._before: dict[str, list[str]] = {}
 
     def written(self, variable: str, row: Mapping[str, Any]) -> Any:
@@ -150,9 +150,12 @@ class Reader:
         term = row[variable]
         if variable in self._computed or not isinstance(term, pyoxigraph.Literal):
             return term
-        several = self._several.get(term)
+        several = self._forms.get(term)
         if several is None:
-            return self._only.get(term, term)
+            return term
+        if len(several) == 1:
+            return next(iter(several))
+        several = dict(sorted(several.items(), key=lambda form: str(form[0])))
         predicates = self._predicates(variable, row)
         near = self._mentioned | {_iri(value) for value in row.values()}
         found = _narrowed(several, lambda place: place[1] in predicates)
@@ -177,7 +180,9 @@ class Reader:
 def _narrowed(forms: dict[Any, _Places], fits: Any) -> dict[Any, _Places]:
     """The forms that stand in a place that fits, with these places; all where none does."""
     found = {
-        form: kept for form, places in forms.items() if (kept := [p for p in places if fits(p)])
+        form: kept
+        for form, places in forms.items()
+        if (kept := {place: None for place in places if fits(place)})
     }
     return found or forms
 

@@ -11,18 +11,10 @@ from surveillance_ontology.armor.rendering import shown
 from surveillance_ontology.armor.session import Session
 from surveillance_ontology.armor.sparql_engine import (
     Binding,
-    Graph,
     SparqlError,
     SparqlTimeoutError,
 )
-from surveillance_ontology.documents.writing import ontology_bytes
-from surveillance_ontology.owl.axioms import (
-    Axiom,
-    Declaration,
-    EquivalentClasses,
-    SubClassOf,
-)
-from surveillance_ontology.owl.entities import entities_of
+from surveillance_ontology.armor.sparql_graph import GraphUpdate, Version
 from surveillance_ontology.owl.vocabulary import XSD
 
 _SUMMARY = (
@@ -96,10 +88,19 @@ def _select(session: Session, ref: Reference, parts: tuple[str, ...]) -> list[li
     asked = _milliseconds(last) / 1000
     seconds = min(asked, limit) if asked > 0 else limit
     derived = session.settings.sparql_derived
+
+    def update(known: Version | None) -> GraphUpdate | None:
+        with ref.lock:
+            if known == session.graphs.version(ref, derived):
+                return None
+            return session.graphs.update(ref, derived, known)
+
+    with ref.lock:
+        version = session.graphs.version(ref, derived)
     try:
         return session.sparql.select(
-            (ref.serial, ref.revision, derived),
-            lambda: _graph(ref, derived),
+            version,
+            update,
             ''.join(texts),
             seconds,
             limit,
@@ -111,27 +112,6 @@ def _select(session: Session, ref: Reference, parts: tuple[str, ...]) -> list[li
         ) from None
     except SparqlError as error:
         raise DirectiveError(f'QUERY SPARQL: {error}') from None
-
-
-def _graph(ref: Reference, derived: bool) -> Graph:
-    with ref.lock:
-        version = (ref.serial, ref.revision, derived)
-        axioms: list[Axiom] = list(ref.kb.axioms())
-        if derived:
-            axioms += ref.kb.facts()
-            axioms += _hierarchy(axioms, ref)
-    return version, ontology_bytes(axioms, ref.kb.iri, 'ntriples')
-
-
-def _hierarchy(axioms: list[Axiom], ref: Reference) -> list[Axiom]:
-    classes = {
-        iri
-        for axiom in axioms
-        if isinstance(axiom, SubClassOf | EquivalentClasses | Declaration)
-        for kind, iri in entities_of(axiom)
-        if kind == 'class'
-    }
-    return [SubClassOf(sub, cls) for cls in sorted(classes) for sub in ref.kb.subclasses(cls)]
 
 
 def _milliseconds(text: str) -> int:
