@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import resource
 import threading
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
@@ -12,6 +13,7 @@ import pytest
 from surveillance_ontology.armor.access import DATA, Settings
 from surveillance_ontology.armor.protocol import DirectiveRequest
 from surveillance_ontology.armor.service import ArmorService
+from surveillance_ontology.owl.vocabulary import OWL, RDF, XSD
 
 from .seven_rooms import FIXTURES, IRI, ONTOLOGY, Ask, asker, names
 
@@ -402,3 +404,24 @@ def test_the_web_when_it_is_allowed(tmp_path: Path) -> None:
             assert words in bad.error_description
         server.shutdown()
         service.close()
+
+
+def test_the_memory_of_a_large_ontology_is_given_back(
+    service: ArmorService, tmp_path: Path
+) -> None:
+    def resident() -> int:
+        pages = Path('/proc/self/statm').read_text().split()[1]
+        return int(pages) * resource.getpagesize()
+
+    ask = asker(service)
+    facts = ''.join(f'<{IRI}#i{n}> <{IRI}#p> "{n}"^^<{XSD}long> .\n' for n in range(40_000))
+    declared = f'<{IRI}#p> <{RDF}type> <{OWL}DatatypeProperty> .\n'
+    (tmp_path / 'large.nt').write_text(declared + facts)
+    before = resident()
+    assert ask('LOAD FILE', 'large.nt', IRI, 'false', '', 'false').success
+    loaded = resident() - before
+    assert ask('DROP').success
+    for thread in threading.enumerate():
+        if thread.daemon and thread.name.startswith('Thread-'):
+            thread.join(10)
+    assert resident() - before < loaded / 2

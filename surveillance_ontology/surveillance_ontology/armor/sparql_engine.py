@@ -119,6 +119,13 @@ class SparqlEngine:
         """Tell whether a query runs."""
         return bool(self._busy)
 
+    def forget(self) -> None:
+        """End the processes that run no query, and with them the graphs that they keep."""
+        with self._lock:
+            idle, self._idle = self._idle, []
+        for worker in idle:
+            worker.kill()
+
     def close(self) -> None:
         """End the processes, also those that run a query."""
         with self._lock:
