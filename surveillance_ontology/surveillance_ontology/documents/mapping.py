@@ -76,6 +76,8 @@ class Mapping(NodeReader):
             return
         for name in types:
             self._type(subject, name)
+        if OWL + 'onProperty' in properties and not subject.startswith('_:'):
+            self._add(ax.EquivalentClasses((subject, self._restriction(subject, properties))))
         for predicate, values in properties.items():
             if predicate == _TYPE or predicate in _STRUCTURE:
                 continue

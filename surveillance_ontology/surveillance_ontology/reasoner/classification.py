@@ -63,6 +63,7 @@ class Classification:
                 program.cls(name)
         if any(existential.prop.kind == 'object' for existential in program.existentials):
             spell_out_chains(program)
+        self._report_partial()
         labels = [program.labels[expression] for expression in asserted]
         fillers = [e.filler for e in program.existentials if isinstance(e.filler, Predicate)]
         simplify(program, [*labels, *fillers])
@@ -74,8 +75,38 @@ class Classification:
         self._exclusions()
         self._requirements()
         drop_implied_atoms(program)
+        program.clauses = list(dict.fromkeys(program.clauses))
         gaps = (gap for gap in self._contexts.gaps if gap not in program.unsupported)
         program.unsupported += gaps
+
+    def _report_partial(self) -> None:
+        """Reports what is defined by expressions whose members are not all recognised.
+
+        Nothing is lost where what membership implies follows from less than membership anyway.
+        """
+        program = self.program
+        if not program.partial:
+            return
+        contexts = Contexts(program)
+        parts = {existential.label for existential in program.existentials}
+        parts |= {condition.label for condition in program.at_most if condition.label is not None}
+        for label, weaker, sentence in program.partial:
+            for clause in program.clauses:
+                atoms = [atom for atom in clause.body if isinstance(atom, PredicateAtom)]
+                if not any(atom.predicate is label for atom in atoms):
+                    continue
+                head = clause.head
+                if not isinstance(head, PredicateAtom) or head.predicate in parts:
+                    continue
+                if len(atoms) == len(clause.body) and all(
+                    atom.predicate.kind == 'class' and atom.terms == (_X,) for atom in atoms
+                ):
+                    tokens = {atom.predicate for atom in atoms} - {label, program.thing} | {weaker}
+                    context = contexts.context(tokens - {program.thing})
+                    if context.clash or head.predicate in context.tokens:
+                        continue
+                if sentence not in program.unsupported:
+                    program.unsupported.append(sentence)
 
     # --- class hierarchy ---
 
@@ -108,6 +139,7 @@ class Classification:
             context = contexts.context((predicate,))
             if context.clash:
                 self._impossible.add(name)
+                self._add_clause((predicate,), PredicateAtom(self.program.nothing, (_X,)))
                 self._above[name] = frozenset()
             else:
                 self._above[name] = frozenset(
@@ -135,16 +167,14 @@ class Classification:
         if not labels or not relevant:
             return
         everything = contexts.context(relevant, bare=True)
-        found = set(contexts.heads_of(everything))
-        stated = {PredicateAtom(token, (_X,)) for token in relevant}
-        if everything.clash or found - alone - stated:
+        stated = {PredicateAtom(token, (_X,)) for token in relevant - everything.derived}
+        if everything.clash or set(contexts.heads_of(everything)) - alone - stated:
             program.contexts, program.relevant = contexts, relevant
 
     def _add_clause(self, body: tuple[Predicate, ...], head: HeadAtom) -> None:
         atoms = tuple(PredicateAtom(predicate, (_X,)) for predicate in body)
-        clause = Clause(atoms, head)
-        if head not in atoms and clause not in self.program.clauses:
-            self.program.clauses.append(clause)
+        if head not in atoms:
+            self.program.clauses.append(Clause(atoms, head))
 
     def _relevant(self, labels: list[Predicate]) -> frozenset[Predicate]:
         """The classes that can make a difference to what an individual must be related to."""

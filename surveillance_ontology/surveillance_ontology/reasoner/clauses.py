@@ -259,6 +259,8 @@ class Program:
             to.
         thing, nothing, different, same: The predicates with fixed meaning; `same` only ever names a
             premise.
+        partial: Labels whose members are not all recognised, each with a label that all its members
+            have, and the sentence that reports it.
         uses_thing: Whether the extension of owl:Thing must be kept.
         contexts: Completes what an individual is by all its classes together; None where each
             class alone says all.
@@ -279,6 +281,7 @@ class Program:
     disjoint_properties: list[tuple[Predicate, bool, Predicate, bool]] = field(default_factory=list)
     negatives: dict[Predicate, Predicate] = field(default_factory=dict)
     unsupported: list[str] = field(default_factory=list)
+    partial: list[tuple[Predicate, Predicate, str]] = field(default_factory=list)
     uses_thing: bool = False
     contexts: Contexts | None = None
     relevant: frozenset[Predicate] = frozenset()

@@ -112,15 +112,20 @@ class Context:
         tokens: All tokens, the core included.
         clash: Whether there can be no such individual.
         edges, values: What it must be related to.
+        derived: Tokens found by rules, whether the core had them already or not.
         users: Contexts with an edge to this one, or that wait for its clash.
     """
 
-    __slots__ = ('bare', 'clash', 'core', 'done', 'edges', 'loops', 'tokens', 'users', 'values')
+    __slots__ = (
+        *('bare', 'clash', 'core', 'derived', 'done'),
+        *('edges', 'loops', 'tokens', 'users', 'values'),
+    )
 
     def __init__(self, core: Tokens, bare: bool) -> None:
         self.core, self.bare = core, bare
         self.tokens: set[Token] = set(core)
         self.clash = False
+        self.derived: set[Token] = set()
         self.edges: list[_Edge] = []
         self.values: list[_Values] = []
         self.loops: set[Role] = set()
@@ -433,6 +438,7 @@ class Contexts:
         context.clash = self._changed = True
 
     def _add(self, context: Context, token: Token) -> None:
+        context.derived.add(token)
         if token not in context.tokens:
             context.tokens.add(token)
             self._changed = True
@@ -535,12 +541,17 @@ class Contexts:
     def _join_parent(self, context: Context, edge: _Edge) -> None:
         """Where the other end may have one such neighbour only, and this is it."""
         target = edge.target
-        if not target.edges:
+        if not target.edges and not _names(target):
             return
         back = {turned(role) for role in edge.roles}
+        named = bool(_names(target))
         for condition in self._at_most:
             role = (condition.prop, condition.inverse)
-            if role not in back or not _holds(condition.label, target.tokens):
+            if role not in back:
+                continue
+            if named and condition.origin is not None:
+                self.gaps[f'{axiom_text(condition.origin)}: {_NOMINALS}'] = None
+            if not _holds(condition.label, target.tokens):
                 continue
             if not _holds(condition.filler, context.tokens):
                 continue
@@ -624,7 +635,7 @@ class Contexts:
         for condition in conditions:
             needed = condition.n if isinstance(condition, AtLeast) else condition.n + 1
             if isinstance(condition, AtLeast):
-                if condition.head in context.tokens:
+                if condition.head in context.derived:
                     continue
             elif condition.n == 1 or not _holds(condition.label, context.tokens):
                 continue
@@ -700,7 +711,7 @@ class Contexts:
             if _holds(condition.label, context.tokens):
                 self._limit_values(context, condition)
         for least in self._at_least_values:
-            if least.head not in context.tokens:
+            if least.head not in context.derived:
                 counted = self._counted_values(context, least)
                 if sum(held.count for held in counted) >= least.n:
                     if self._most_distinct(counted) >= least.n:

@@ -145,6 +145,9 @@ class Engine:
         if isinstance(axiom, NegativeDataPropertyAssertion):
             negative = self.program.negatives[self.program.data(axiom.prop)]
             return negative, names.get(axiom.subject, axiom.subject), self.value(axiom.literal)
+        if isinstance(axiom, DifferentIndividuals) and len(axiom.individuals) == 1:
+            (individual,) = axiom.individuals
+            return self.program.nothing, names.get(individual, individual)
         return None
 
     def current(self, fact: Fact) -> Fact:

@@ -189,6 +189,15 @@ class PropertyHierarchy:
 
 Body = tuple[BodyAtom, ...]
 _X, _Y, _Z = 0, 1, 2
+_NEGATIVE = (
+    ex.ObjectComplementOf,
+    ex.ObjectAllValuesFrom,
+    ex.ObjectMaxCardinality,
+    ex.ObjectExactCardinality,
+    ex.DataAllValuesFrom,
+    ex.DataMaxCardinality,
+    ex.DataExactCardinality,
+)
 _RELATING = (
     ex.ObjectSomeValuesFrom,
     ex.ObjectMinCardinality,
@@ -304,15 +313,19 @@ class Translation:
         ):
             self.contradict((self._differs(_X, _X),), _X)
 
+    def report(self, reason: str) -> None:
+        """Notes a part of the axiom at hand that is not used."""
+        subject = self._context if self._origin is None else axiom_text(self._origin)
+        text = f'{subject}: {reason}'
+        if text not in self.program.unsupported:
+            self.program.unsupported.append(text)
+
     def _attempt(self, add: Callable[..., object], *parts: Any) -> None:
         """Adds what can be added of an axiom; the rest is reported."""
         try:
             add(*parts)
         except UnsupportedError as reason:
-            subject = self._context if self._origin is None else axiom_text(self._origin)
-            text = f'{subject}: {reason}'
-            if text not in self.program.unsupported:
-                self.program.unsupported.append(text)
+            self.report(str(reason))
 
     # --- clauses ---
 
@@ -507,7 +520,25 @@ class Translation:
                 return [*bodies, self._valued(expression.prop, expression.range, x)]
         elif isinstance(expression, ex.ObjectComplementOf) and isinstance(expression.operand, str):
             self._complements[expression.operand] = label
+        if isinstance(expression, _NEGATIVE):
+            self._note_partial(label, expression)
         return bodies
+
+    def _note_partial(self, label: Predicate, expression: ClassExpression) -> None:
+        """Notes an expression whose members cannot all be recognised.
+
+        An exact number has members that are in more than what is asked for: enough related ones.
+        """
+        weaker: ClassExpression = THING
+        if isinstance(expression, ex.ObjectExactCardinality) and expression.n:
+            parts = (expression.n, expression.prop, expression.filler)
+            weaker = ex.ObjectMinCardinality(*parts)
+        elif isinstance(expression, ex.DataExactCardinality) and expression.n:
+            counted = (expression.n, expression.prop, expression.range)
+            weaker = ex.DataMinCardinality(*counted)
+        subject = self._context if self._origin is None else axiom_text(self._origin)
+        text = f'{subject}: not all members of {expression_text(expression)} are recognised'
+        self.program.partial.append((label, self.required(weaker), text))
 
     def _count(
         self, label: Predicate, expression: ex.ObjectMinCardinality | ex.DataMinCardinality

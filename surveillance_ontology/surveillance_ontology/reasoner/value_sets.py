@@ -40,7 +40,6 @@ _PLAIN = (
     *('anyURI', 'hexBinary', 'base64Binary', 'other'),
 )
 _BOOLEANS = frozenset([('boolean', True), ('boolean', False)])
-_LIMIT = 64  # More values than any cardinality in an ontology asks for.
 
 
 class _End:
@@ -261,7 +260,7 @@ class ValueSet:
 
     @property
     def size(self) -> float:
-        """The number of values, counted up to a limit; infinite beyond it."""
+        """The number of values."""
         total: float = 0
         listed: set[Value] = set()
         for part in self.parts.values():
@@ -274,8 +273,6 @@ class ValueSet:
         for layer, intervals in self.intervals.items():
             for low, high in intervals:
                 total += _count(layer, low, high)
-                if total > _LIMIT:
-                    return math.inf
         return total
 
 
