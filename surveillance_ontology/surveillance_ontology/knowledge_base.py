@@ -230,12 +230,17 @@ class KnowledgeBase:
 
     @property
     def unsupported(self) -> tuple[str, ...]:
-        """One sentence for each asserted axiom (or part) that the reasoner does not use, as of
-        `reason`.
+        """One sentence for each asserted axiom (or part) that the reasoner does not fully use.
+
+        As of the last `reason`: what is outside its fragment, and what depends on whether
+        individuals are the same that are neither known to be the same nor to be different.
         """
-        return (
-            () if self._classification is None else tuple(self._classification.program.unsupported)
-        )
+        if self._classification is None or self._engine is None:
+            return ()
+        found = dict.fromkeys(self._classification.program.unsupported)
+        if self._consistent:
+            found.update(dict.fromkeys(self._engine.open_cases()))
+        return tuple(found)
 
     # --- queries ---
 
@@ -312,15 +317,32 @@ class KnowledgeBase:
 
     def subclasses(self, cls: str) -> set[str]:
         """Named classes strictly below, direct and indirect, as of the last `reason`."""
-        if self._classification is None:
+        known = self._classification
+        if known is None:
             return set()
         if cls == THING:
-            return self._classification.classes()
-        return self._classification.subclasses(cls)
+            return known.classes()
+        found = known.subclasses(cls)
+        if known.within:
+            found.update(name for name in known.within if cls in self.superclasses(name))
+        return found - {cls}
 
     def superclasses(self, cls: str) -> set[str]:
         """Named classes strictly above, direct and indirect, as of the last `reason`."""
-        return set() if self._classification is None else self._classification.superclasses(cls)
+        known, engine = self._classification, self._usable
+        if known is None:
+            return set()
+        found = known.superclasses(cls)
+        if engine is not None:
+            # What is one individual at most is below all that the individual belongs to.
+            for name in known.within.get(cls, ()):
+                representative = engine.equality.find(name)
+                found.update(
+                    iri
+                    for iri, predicate in engine.program.classes.items()
+                    if representative in predicate.members
+                )
+        return found - {cls}
 
     def object_values(self, prop: str, individual: str) -> set[str]:
         """What an individual is related to by an object property."""

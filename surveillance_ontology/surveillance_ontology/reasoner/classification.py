@@ -45,6 +45,7 @@ class Classification:
 
     Attributes:
         program: To be run by one `Engine`.
+        within: For classes of one individual at most, the individual's names.
     """
 
     def __init__(
@@ -70,6 +71,7 @@ class Classification:
         self._contexts = Contexts(program)
         self._above: dict[str, frozenset[str]] = {}
         self._impossible: set[str] = set()
+        self.within: dict[str, frozenset[str]] = {}
         self._hierarchy()
         self._named_neighbours(translation)
         self._exclusions()
@@ -147,6 +149,13 @@ class Classification:
                     for token in context.tokens
                     if isinstance(token, Predicate) and isinstance(token.expression, str)
                 )
+                names = frozenset(
+                    token[1]
+                    for token in context.tokens
+                    if not isinstance(token, Predicate) and token[0] == 'is'
+                )
+                if names:
+                    self.within[name] = names
 
     # --- what existentials mean for named individuals ---
 
@@ -211,6 +220,10 @@ class Classification:
         for existential in program.existentials:
             role = (existential.prop, existential.inverse)
             above = translation.hierarchy.above_role(role[0].name, role[1])
+            for least in program.at_least:
+                counts = (least.prop.name, least.inverse) in above
+                if counts and least.prop.kind == role[0].kind:
+                    program.meetings.append((existential, least))
             for condition in program.at_most:
                 if condition.prop.kind != role[0].kind:
                     continue

@@ -261,6 +261,7 @@ class Program:
             premise.
         partial: Labels whose members are not all recognised, each with a label that all its members
             have, and the sentence that reports it.
+        meetings: Existentials whose individuals or values a lower bound counts.
         uses_thing: Whether the extension of owl:Thing must be kept.
         contexts: Completes what an individual is by all its classes together; None where each
             class alone says all.
@@ -282,6 +283,7 @@ class Program:
     negatives: dict[Predicate, Predicate] = field(default_factory=dict)
     unsupported: list[str] = field(default_factory=list)
     partial: list[tuple[Predicate, Predicate, str]] = field(default_factory=list)
+    meetings: list[tuple[Existential, AtLeast]] = field(default_factory=list)
     uses_thing: bool = False
     contexts: Contexts | None = None
     relevant: frozenset[Predicate] = frozenset()

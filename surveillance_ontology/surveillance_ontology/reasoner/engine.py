@@ -32,6 +32,7 @@ from surveillance_ontology.reasoner.datatypes import Value, literal_of, value_of
 from surveillance_ontology.reasoner.difference import Difference
 from surveillance_ontology.reasoner.equality import Equality, Merge
 from surveillance_ontology.reasoner.network import Network
+from surveillance_ontology.reasoner.open_cases import OpenCases
 from surveillance_ontology.reasoner.proofs import ProofSearch
 
 Conflict = tuple[str, str]
@@ -203,6 +204,12 @@ class Engine:
     def consistent(self) -> bool:
         """Whether no contradiction is derived."""
         return not self._nothing.members
+
+    def open_cases(self) -> Iterator[str]:
+        """Sentences about what is not derived because it would need reasoning by cases."""
+        network = self._network
+        cases = OpenCases(self.program, network.context, network.lower, network.counters)
+        return cases.sentences()
 
     # --- touching ---
 

@@ -51,7 +51,8 @@ class Network:
         touch_related: Like these, for individuals that differ because their values do.
         thresholds: The rules run by a sorted index.
         contexts: What follows from individuals that must exist, where that takes an index.
-        counters: The watchers of upper bounds.
+        lower, counters: The watchers of lower and of upper bounds.
+        context: The engine's tables, for compiled joins.
     """
 
     def __init__(
@@ -66,7 +67,9 @@ class Network:
         self._program = program
         self._difference = difference
         self._enqueue, self._overdelete, self._merge = enqueue, overdelete, merge
-        self._context = JoinContext(representative, difference.different, program.different)
+        self.context = self._context = JoinContext(
+            representative, difference.different, program.different
+        )
         self.initial: list[Callable[[], None]] = []
         self.naming: list[Callable[[], None]] = []
         self.touch_insert: list[Callable[[str], None]] = []
@@ -75,8 +78,10 @@ class Network:
         self.thresholds: list[ThresholdIndex] = []
         self.counters: list[AtMostCounter] = []
         program.different.supports.append((difference.premises, None))
+        self.lower: list[AtLeastCounter] = []
         for at_least in program.at_least:
             counter = AtLeastCounter(at_least, difference, enqueue, overdelete)
+            self.lower.append(counter)
             if not counter.is_data:
                 self.touch_insert.append(counter.touch_insert)
                 self.touch_delete.append(counter.touch_delete)

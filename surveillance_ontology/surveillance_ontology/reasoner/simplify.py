@@ -146,6 +146,9 @@ def _prune(program: Program, kept: set[Predicate]) -> None:
             for condition in program.at_most
             if condition.label is None or lives(condition.label, reached)
         ]
+        program.existentials = [
+            existential for existential in program.existentials if lives(existential.label, reached)
+        ]
         if len(program.clauses) + len(program.at_least) == before:
             return
 

@@ -59,58 +59,69 @@ class RandomOntology:
     def named(self) -> str:
         return self.random.choice(CLASSES)
 
-    def filler(self) -> ClassExpression:
-        return THING if self.random.random() < 0.3 else self.named()
+    def filler(self, depth: int, right: bool) -> ClassExpression:
+        """What a restriction speaks of: nested to the given depth."""
+        choice = self.random.random()
+        if choice < 0.2:
+            return THING
+        if choice < 0.7 or not depth:
+            return self.named()
+        return self.right(depth) if right else self.left(depth)
 
-    def left(self, depth: int = 2) -> ClassExpression:
-        """An expression whose members can be recognised."""
-        choice = self.random.randrange(11) if depth else 0
+    def left(self, depth: int = 4) -> ClassExpression:
+        """An expression whose members can be recognised, nested to the given depth."""
+        choice = self.random.randrange(12) if depth else 0
         if choice <= 3:
             return self.named()
         if choice == 4:
             return ex.ObjectIntersectionOf((self.left(depth - 1), self.left(depth - 1)))
         if choice == 5:
             return ex.ObjectUnionOf((self.left(depth - 1), self.left(depth - 1)))
-        if choice == 6:
-            return ex.ObjectSomeValuesFrom(self.prop(), self.filler())
-        if choice == 7:
-            return ex.ObjectMinCardinality(
-                self.random.choice([1, 2, 2, 3]), self.prop(), self.filler()
-            )
+        if choice in (6, 7):
+            return ex.ObjectSomeValuesFrom(self.prop(), self.filler(depth - 1, False))
         if choice == 8:
+            return ex.ObjectMinCardinality(
+                self.random.choice([1, 2, 2, 3]), self.prop(), self.filler(depth - 1, False)
+            )
+        if choice == 9:
             if self.random.random() < 0.5:
                 return ex.ObjectHasValue(self.prop(), self.random.choice(INDIVIDUALS))
             return ex.ObjectOneOf((self.random.choice(INDIVIDUALS),))
-        if choice == 9:
+        if choice == 10:
             data = self.random.choice(DATAS)
-            if self.random.random() < 0.5:
+            if self.random.random() < 0.4:
                 return ex.DataHasValue(data, self.literal())
             return ex.DataSomeValuesFrom(data, self.data_range())
         return ex.DataMinCardinality(2, self.random.choice(DATAS), self.data_range())
 
-    def right(self) -> ClassExpression:
-        """An expression whose membership has Horn consequences."""
-        choice = self.random.randrange(14)
+    def right(self, depth: int = 4) -> ClassExpression:
+        """An expression whose membership has Horn consequences, nested to the given depth."""
+        choice = self.random.randrange(18) if depth else 0
         if choice <= 4:
             return self.named()
         if choice == 5:
-            return ex.ObjectIntersectionOf((self.named(), self.right()))
-        if choice == 6:
-            return ex.ObjectAllValuesFrom(self.prop(), self.named())
-        if choice == 7:
-            return ex.ObjectMaxCardinality(
-                self.random.choice([0, 1, 1, 2]), self.prop(), self.filler()
-            )
+            return ex.ObjectIntersectionOf((self.named(), self.right(depth - 1)))
+        if choice in (6, 7):
+            return ex.ObjectAllValuesFrom(self.prop(), self.filler(depth - 1, True))
         if choice == 8:
-            return ex.ObjectHasValue(self.prop(), self.random.choice(INDIVIDUALS))
+            return ex.ObjectMaxCardinality(
+                self.random.choice([0, 1, 1, 2]), self.prop(), self.filler(depth - 1, False)
+            )
         if choice == 9:
-            return ex.ObjectComplementOf(self.named())
+            return ex.ObjectHasValue(self.prop(), self.random.choice(INDIVIDUALS))
         if choice == 10:
-            return ex.DataMaxCardinality(1, self.random.choice(DATAS), self.data_range())
+            return ex.ObjectComplementOf(self.named())
         if choice == 11:
-            return ex.ObjectExactCardinality(1, self.prop(), self.filler())
+            return ex.DataMaxCardinality(1, self.random.choice(DATAS), self.data_range())
         if choice == 12:
-            return ex.ObjectSomeValuesFrom(self.prop(), self.filler())
+            return ex.ObjectExactCardinality(1, self.prop(), self.filler(0, True))
+        if choice in (13, 14):
+            return ex.ObjectSomeValuesFrom(self.prop(), self.filler(depth - 1, True))
+        if choice == 15:
+            return ex.DataSomeValuesFrom(self.random.choice(DATAS), self.data_range())
+        if choice == 16:
+            number = self.random.choice([1, 2, 3])
+            return ex.DataMinCardinality(number, self.random.choice(DATAS), self.data_range())
         return ex.DataHasValue(self.random.choice(DATAS), self.literal())
 
     def rule(self) -> ax.Rule:
