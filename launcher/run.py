@@ -205,6 +205,8 @@ def _folders_of(folder: Path) -> Iterator[Entry]:
     """Where the nodes of a run write, if the user's file names no other place."""
     for name, part in (('ontologies_folder', ONTOLOGIES), ('store', STORE)):
         yield Entry('/**/armor_server', name, str(folder / part), 'this run')
+    for node in ('battery_controller', 'motion_controller'):
+        yield Entry(f'/**/{node}', 'state_file', str(folder / f'{node}.json'), 'this run')
 
 
 def _option_entries(run: Run, folder: Path | None) -> Iterator[Entry]:

@@ -22,6 +22,7 @@ from surveillance_controllers.controller_parameters import battery_settings, exe
 from surveillance_controllers.manual import stimuli
 from surveillance_controllers.manual.console_commands import BATTERY, BATTERY_SET, ParsedCommand
 from surveillance_controllers.manual.operator_console import OperatorConsole
+from surveillance_controllers.state_file import StateFile
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
@@ -43,7 +44,10 @@ class BatteryController(PatrolNode):
         self._mode = execution_mode(self)
         self._settings = battery_settings(self, self._set_low_below)
         self._low_below = self._settings.require_recharge
-        self._battery = Battery(self._settings.model, self._settings.initial_value)
+        self._kept = StateFile(self, self._settings.state_file)
+        kept = self._kept.number('level')
+        level = self._settings.initial_value if kept is None else min(100.0, max(0.0, kept))
+        self._battery = Battery(self._settings.model, level)
         self._wait = ClockWait(self)
         self._lock = threading.RLock()
         self._said: tuple[int, bool] | None = None
@@ -61,7 +65,8 @@ class BatteryController(PatrolNode):
         elif self._mode == 'RANDOM':
             self.spawn(self._switch_at_random)
         elif self._mode == 'SIMULATED':
-            self._robot = RobotBattery(self, self._settings, self._battery, self._change)
+            since = self._kept.number('time')
+            self._robot = RobotBattery(self, self._settings, self._battery, self._change, since)
 
     def _change(self, change: Callable[[], None]) -> None:
         """Changes the charge and publishes what became different."""
@@ -69,6 +74,7 @@ class BatteryController(PatrolNode):
             change()
             said = self._battery.percent, self._battery.level < self._low_below
             before, self._said = self._said, said
+            self._kept.save({'level': self._battery.level, 'time': self._wait.now()})
             if before is None or said[0] != before[0]:
                 self._level_topic.publish(UInt8(data=said[0]))
             if before is None or said[1] != before[1]:

@@ -49,6 +49,9 @@ _CONSOLE = Described(
 _STATION = Described(
     'Where the charging station is: x, y in metres, yaw in radians, world frame.', check=_pose
 )
+_STATE_FILE = Described(
+    'File that keeps what the node models over a restart of its process; empty: nothing is kept.'
+)
 _DOCK_REACH = Described(
     'SIMULATED: the robot is at the station within this distance of it, m.', 0.0, 100.0
 )
@@ -89,6 +92,7 @@ _BATTERY = {
         *(0.01, 60.0),
         name='battery_update_period',
     ),
+    'state_file': _STATE_FILE,
     'console': _CONSOLE,
 }
 _BATTERY_AT_RUN_TIME = {
@@ -113,6 +117,7 @@ class BatterySettings:
     station: Pose = (0.0, 0.0, 0.0)
     dock_reach: float = 0.5
     update_period: float = 1.0
+    state_file: str = ''
     console: bool = True
 
 
@@ -219,6 +224,7 @@ _MOTION = {
         'MANUAL, RANDOM and Nav2: the room in which the robot starts; empty: as the map says that '
         'is built from a message.'
     ),
+    'state_file': _STATE_FILE,
     'random_seed': _RANDOM_SEED,
     'peer_timeout': _PEER_TIMEOUT,
     'console': _CONSOLE,
@@ -237,6 +243,7 @@ class MotionSettings:
     feedback_period: float = 0.2
     place_reach: float = 2.0
     robot_room: str = ''
+    state_file: str = ''
     random_seed: int = -1
     peer_timeout: float = 10.0
     console: bool = True

@@ -52,7 +52,8 @@ class MotionController(PatrolNode):
         localises = self._mode == 'SIMULATED' and self._settings.navigator == 'own'
         start = None if localises else self._settings.robot_room
         reach = self._settings.place_reach
-        self._recorder = PlaceRecorder(self, self._knowledge, reach, start)
+        state_file = self._settings.state_file
+        self._recorder = PlaceRecorder(self, self._knowledge, reach, start, state_file)
         self._tells_ends = not localises
         self._robot: Motion | None = None
         if self._mode == 'SIMULATED':

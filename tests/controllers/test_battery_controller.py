@@ -176,3 +176,32 @@ def test_bad_parameters_are_named(graph: Any, parameters: dict[str, Any], text: 
     with pytest.raises(ParameterError) as caught:
         graph.add(BatteryController, parameters)
     assert text in str(caught.value)
+
+
+@pytest.mark.parametrize('mode', ['MANUAL', 'SIMULATED'])
+def test_a_level_outlives_a_process_that_was_killed(graph: Any, tmp_path: Any, mode: str) -> None:
+    path = tmp_path / 'battery.json'
+    options = {'execution_mode': mode, 'console': False, 'state_file': str(path)}
+    first = graph.add(BatteryController, {**options, 'battery_initial_value': 68})
+    graph.until(lambda: path.exists() and '68' in path.read_text())
+    graph.drop(first)
+    levels = graph.listen(UInt8, 'battery_level', STATE_QOS)
+    graph.add(BatteryController, {**options, 'battery_initial_value': 100})
+    graph.until(lambda: values(levels)[-1:] == [68])
+
+
+@pytest.mark.parametrize('content', ['', '[]', '{"level": NaN}', '{"level": "full"}', 'x' * 20_000])
+def test_a_state_that_cannot_be_read_begins_anew(graph: Any, tmp_path: Any, content: str) -> None:
+    path = tmp_path / 'battery.json'
+    path.write_text(content)
+    levels = graph.listen(UInt8, 'battery_level', STATE_QOS)
+    graph.add(
+        BatteryController,
+        {
+            'execution_mode': 'MANUAL',
+            'console': False,
+            'state_file': str(path),
+            'battery_initial_value': 42,
+        },
+    )
+    graph.until(lambda: values(levels) == [42])

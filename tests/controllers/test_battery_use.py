@@ -21,7 +21,7 @@ PARAMETERS = BatteryParameters(
 
 def in_use(level: float = 50.0) -> tuple[Battery, BatteryInUse]:
     battery = Battery(PARAMETERS, level)
-    return battery, BatteryInUse(battery, (1.0, 0.0, 0.0), 0.5, now=0.0)
+    return battery, BatteryInUse(battery, (1.0, 0.0, 0.0), 0.5, since=0.0)
 
 
 def test_way_and_turn_are_paid_for() -> None:

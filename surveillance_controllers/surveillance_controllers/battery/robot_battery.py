@@ -30,6 +30,7 @@ class RobotBattery:
         settings: The station, and how often the model is stepped.
         battery: The battery.
         change: Carries out a change of the battery and publishes what became different.
+        since: When the battery had its level, seconds; None: it has it now.
     """
 
     def __init__(
@@ -38,12 +39,13 @@ class RobotBattery:
         settings: BatterySettings,
         battery: Battery,
         change: Callable[[Callable[[], None]], None],
+        since: float | None = None,
     ) -> None:
         self._node = node
         self._battery = battery
         self._change = change
         self._wait = ClockWait(node)
-        self._use = BatteryInUse(battery, settings.station, settings.dock_reach, self._wait.now())
+        self._use = BatteryInUse(battery, settings.station, settings.dock_reach, since)
         self._states = node.create_publisher(BatteryState, 'battery_state', STATE_QOS)
         node.create_subscription(PoseWithCovarianceStamped, 'amcl_pose', self._on_pose, STATE_QOS)
         node.create_subscription(JointState, 'joint_states', self._on_joints, SENSOR_QOS)

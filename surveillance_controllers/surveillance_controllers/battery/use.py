@@ -13,6 +13,9 @@ from collections.abc import Sequence
 from surveillance_controllers.battery.model import Battery
 from surveillance_controllers.geometry.poses import Pose, angle_between
 
+LONGEST_AWAY = 86_400.0
+"""A longer time between two steps is none, but a jump of the clock, seconds."""
+
 
 class MotionMeter:
     """Adds up way and turn between two readings.
@@ -57,14 +60,16 @@ class BatteryInUse:
         battery: The battery.
         station: Where the charging station is.
         dock_reach: Distance from the station within which the robot charges, metres.
-        now: Time at the start, seconds.
+        since: When the battery had its level, seconds; None: when time first passes.
     """
 
-    def __init__(self, battery: Battery, station: Pose, dock_reach: float, now: float) -> None:
+    def __init__(
+        self, battery: Battery, station: Pose, dock_reach: float, since: float | None
+    ) -> None:
         self._battery = battery
         self._station = station
         self._dock_reach = dock_reach
-        self._last = now
+        self._last = since
         self._meter = MotionMeter()
         self._joints: tuple[float, ...] | None = None
         self._arm_moved = False
@@ -95,7 +100,10 @@ class BatteryInUse:
 
     def advance(self, now: float) -> None:
         """Lets time pass up to `now` (seconds): draws, and charges at the station."""
-        passed, self._last = max(0.0, now - self._last), now
+        passed = 0.0 if self._last is None else now - self._last
+        self._last = now
+        if not 0.0 <= passed <= LONGEST_AWAY:
+            passed = 0.0  # Another clock.
         metres, radians = self._meter.take()
         moved, self._arm_moved = self._arm_moved, False
         self._battery.draw(passed, metres, radians, passed if moved else 0.0)

@@ -12,6 +12,7 @@ from std_msgs.msg import Header
 from surveillance_controllers.geometry.polyline import Points
 from surveillance_controllers.map_knowledge import KnowledgeError, MapKnowledge, answered
 from surveillance_controllers.motion.arrival import nearest_place
+from surveillance_controllers.state_file import StateFile
 from surveillance_interfaces.msg import OntologyMap, RobotPlace
 from surveillance_ontology.armor_client import FactSubscription
 from surveillance_runtime.conversions import nanoseconds_of
@@ -40,15 +41,22 @@ class PlaceRecorder:
         reach: How near to a place's point the robot is in that place, for `tell_point`, metres.
         start: The place the robot starts in, while neither `tell` nor the ontology says; empty:
             the one of `ontology_map/build_map`. None where the robot localises itself.
+        state_file: Keeps the place over a restart, for a robot that does not localise itself.
     """
 
     def __init__(
-        self, node: PatrolNode, knowledge: MapKnowledge, reach: float, start: str | None
+        self,
+        node: PatrolNode,
+        knowledge: MapKnowledge,
+        reach: float,
+        start: str | None,
+        state_file: str = '',
     ) -> None:
         self._node = node
         self._knowledge = knowledge
         self._reach = reach
-        self._start = start
+        self._kept = StateFile(node, state_file if start is not None else '')
+        self._start = start if start is None else self._kept.text('place') or start
         self._lock = threading.Lock()
         self._point: tuple[Points, Time] | None = None
         self._told: RobotPlace | None = None
@@ -78,6 +86,8 @@ class PlaceRecorder:
             stamp = stamp or self._node.get_clock().now().to_msg()
             self._told = RobotPlace(header=Header(stamp=stamp), place=place or '')
             self._topic.publish(self._told)
+            if place:
+                self._kept.save({'place': place})
         self._news.set()
 
     def tell_point(self, point: Points) -> None:
@@ -157,6 +167,10 @@ class PlaceRecorder:
 
     def _begin(self) -> None:
         """Takes the place in which an earlier process left the robot, or else where it starts."""
+        kept = self._kept.text('place')
+        if kept and kept in self._knowledge.places(self._node.stopping):
+            self.tell(kept)
+            return
         with answered():
             found = self._knowledge.connect(self._node.stopping).robot_places()
         if len(found) == 1:
