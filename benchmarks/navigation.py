@@ -1,6 +1,6 @@
 """Navigation measured: planning beside its peers, one step of control, and the whole stack's speed.
 
-    python benchmarks/navigation.py [--quick] [planning] [control] [stack]
+    python benchmarks/navigation.py [--quick] [planning] [control] [stack] [pace]
 
 Without a section's name all are run. Every figure stands beside its peer's from the same run.
 """
@@ -8,6 +8,7 @@ Without a section's name all are run. Every figure stands beside its peer's from
 from __future__ import annotations
 
 import argparse
+import itertools
 import logging
 import os
 import signal
@@ -19,6 +20,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 import networkx
@@ -334,10 +336,58 @@ def _await(condition: Callable[[], Any], patience: float) -> None:
         threading.Event().wait(0.05)
 
 
+def pace(*, quick: bool) -> None:
+    """Simulated seconds of a leg and of a stop: at full speed beside real time."""
+    rows = []
+    for name, speed, seconds in (
+        ('as fast as it goes', 0.0, 250.0 if quick else 900.0),
+        ('real time', 1.0, 30.0 if quick else 120.0),
+    ):
+        legs, stops = legs_and_stops(speed, seconds)
+        rows.append((name, f'{len(legs)}', f'{median(legs):.2f}', f'{median(stops):.2f}'))
+    table(
+        'A mission in simulated seconds, with no exploring: medians over its legs and stops.',
+        ('how', 'legs', 'leg, s/m', 'stop between two drives, s'),
+        rows,
+    )
+
+
+def legs_and_stops(speed: float, seconds: float) -> tuple[list[float], list[float]]:
+    """Return the seconds a metre of each leg, and the seconds between two drives."""
+    parameters: dict[str, dict[str, Any]] = {
+        'simulator': {'speed': speed},
+        'robot_behavior': {'exploration_seconds': 0.0},
+    }
+    with tempfile.TemporaryDirectory() as folder:
+        record = Path(folder) / 'mission.jsonl'
+        parameters['robot_behavior']['record'] = str(record)
+        patrol = Stack(ROOT / 'config' / 'seven_rooms.yaml', parameters)
+        drives: list[tuple[float, float, float]] = []
+        patrol.start()
+        try:
+            _await(lambda: patrol.robot.base.travelled > 0.1, 60.0)
+            moving, began, driven = True, patrol.robot.time, patrol.robot.base.travelled
+            end = began + seconds
+            while patrol.robot.time < end:
+                time.sleep(0.0005)
+                base, now = patrol.robot.base, patrol.robot.time
+                if moving and not base.is_moving:
+                    drives.append((began, now, base.travelled - driven))
+                    moving = False
+                elif not moving and base.is_moving:
+                    moving, began, driven = True, now, base.travelled
+        finally:
+            patrol.close()
+    legs = [(end - start) / metres for start, end, metres in drives[1:] if metres > 1.0]
+    stops = [second[0] - first[1] for first, second in itertools.pairwise(drives)]
+    return legs, stops
+
+
 SECTIONS: dict[str, Callable[..., None]] = {
     'planning': planning,
     'control': control,
     'stack': stack,
+    'pace': pace,
 }
 
 

@@ -30,7 +30,7 @@ from surveillance_behaviour.mission.mission_log import (
     cut_off,
     read,
 )
-from surveillance_behaviour.peers.announcing import DecisionTopic, RosAnnouncer
+from surveillance_behaviour.peers.announcing import DecisionTopic, MissionClock, RosAnnouncer
 from surveillance_behaviour.peers.decision_services import DecisionServices
 from surveillance_behaviour.peers.ports import Ontology, Ports
 from surveillance_behaviour.peers.ros_ports import (
@@ -45,7 +45,7 @@ from surveillance_fsm.ros import IntrospectionServer
 from surveillance_runtime.node import JOIN_SECONDS, PatrolNode, StartError
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
-from surveillance_runtime.waiting import AwaitedWork, ClockWait
+from surveillance_runtime.waiting import AwaitedWork
 
 
 class RobotBehavior(PatrolNode):
@@ -67,7 +67,7 @@ class RobotBehavior(PatrolNode):
         path = behaviour_parameters.record_path(self)
         left_at = self._where_it_was_cut_off(path)
         self._record = _open_record(path)
-        self._wait = ClockWait(self)
+        self._mission_clock = MissionClock(self)
         self._work: AwaitedWork | None = None
         patrols = self._behaviour == 'patrol'
         battery = BatteryMonitor()
@@ -84,9 +84,9 @@ class RobotBehavior(PatrolNode):
             announcer=self._announcer,
             decisions=decisions,
             motion=None if patrols else RosMotion(self, deadlines),
-            routine=RosRoutine(self, deadlines, battery) if patrols else None,
+            routine=RosRoutine(self, deadlines, battery, self._mission_clock) if patrols else None,
         )
-        clock = cast(fsm.Clock, self._wait)
+        clock = cast(fsm.Clock, self._mission_clock)
         self.mission = Mission(
             self._behaviour, settings, ports, battery, clock, self._record, left_at
         )
@@ -119,7 +119,7 @@ class RobotBehavior(PatrolNode):
 
     def _run(self) -> None:
         # Under use_sim_time nothing has a time before the first clock message.
-        if not self._wait.now() and not self._wait.sleep(1e-9, self.stopping):
+        if not self._mission_clock.now() and not self._mission_clock.sleep(1e-9, self.stopping):
             return
         try:
             while not self.stopping.is_set():
@@ -127,7 +127,7 @@ class RobotBehavior(PatrolNode):
                     self.machine.execute()
                 except fsm.SmachError as error:
                     self._announcer.waiting_for_help(f'the machine broke: {error}')
-                    self._wait.sleep(self.mission.recovery.pause(), self.stopping)
+                    self._mission_clock.sleep(self.mission.recovery.pause(), self.stopping)
                     self._announcer.waiting_for_help('')
         finally:
             self.mission.note('end')
@@ -165,12 +165,12 @@ class RobotBehavior(PatrolNode):
             generator,
             lambda warning: self.get_logger().warn(warning),
         )
-        battery.watch(lambda: decider.learn_draw(self._wait.now()))
+        battery.watch(lambda: decider.learn_draw(self._mission_clock.now()))
         self._work = AwaitedWork(self, 1)
         DecisionServices(
             self,
             decider,
-            self._wait.now,
+            self._mission_clock.now,
             lambda: self.mission.recovery.avoided(self.mission.now()),
             self._work,
         )

@@ -6,6 +6,8 @@ import math
 import threading
 from collections.abc import Callable
 
+from builtin_interfaces.msg import Time
+
 import surveillance_fsm as fsm
 from surveillance_behaviour import conversions
 from surveillance_behaviour.mission.mission import Mission
@@ -14,6 +16,39 @@ from surveillance_interfaces.msg import Decision as DecisionMessage
 from surveillance_interfaces.msg import MissionStatus
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import STATE_QOS
+from surveillance_runtime.waiting import ClockWait
+
+
+class MissionClock:
+    """The mission's clock, in seconds of ROS time.
+
+    Under `use_sim_time` it says on `mission_waits_until` until when the mission waits, zero for an
+    event, so that a simulator lets no time pass while the mission is at work.
+    """
+
+    def __init__(self, node: PatrolNode) -> None:
+        self._wait = ClockWait(node)
+        self._topic = None
+        if node.get_parameter('use_sim_time').value:
+            self._topic = node.create_publisher(Time, 'mission_waits_until', STATE_QOS)
+
+    def now(self) -> float:
+        """Return the seconds of ROS time."""
+        return self._wait.now()
+
+    def sleep(self, seconds: float, interrupt: fsm.Interrupt) -> bool:
+        """Wait; return False when the interrupt ended it early."""
+        self._announce(self.now() + seconds)
+        return self._wait.sleep(seconds, interrupt)
+
+    def wait_for_event(self) -> None:
+        """Say that what comes next ends by an event, whenever that is."""
+        self._announce(0.0)
+
+    def _announce(self, until: float) -> None:
+        if self._topic is not None:
+            fraction, whole = math.modf(until)
+            self._topic.publish(Time(sec=int(whole), nanosec=int(fraction * 1e9)))
 
 
 class DecisionTopic:

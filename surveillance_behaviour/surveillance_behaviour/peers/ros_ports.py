@@ -17,6 +17,7 @@ from std_srvs.srv import Empty
 from surveillance_behaviour import conversions
 from surveillance_behaviour.charging import BatteryMonitor
 from surveillance_behaviour.decision import ANY, RECHARGE
+from surveillance_behaviour.peers.announcing import MissionClock
 from surveillance_behaviour.peers.armor_knowledge import ArmorKnowledge, Whereabouts
 from surveillance_behaviour.peers.ports import (
     AwayError,
@@ -251,8 +252,15 @@ class RosReasoner:
 class RosRoutine:
     """``start``, ``motion/planner``, ``motion/controller`` and ``recharge``."""
 
-    def __init__(self, node: PatrolNode, deadlines: Deadlines, battery: BatteryMonitor) -> None:
+    def __init__(
+        self,
+        node: PatrolNode,
+        deadlines: Deadlines,
+        battery: BatteryMonitor,
+        clock: MissionClock,
+    ) -> None:
         self._deadlines = deadlines
+        self._clock = clock
         self._battery = battery
         self._start = ServiceCaller(node, Empty, 'start')
         self._planner = GoalCaller(node, Plan, 'motion/planner')
@@ -262,6 +270,7 @@ class RosRoutine:
     def start(self, interrupt: Interrupt) -> None:
         """Has the robot look around and build the ontology."""
         limits = self._deadlines
+        self._clock.wait_for_event()
         ask(self._start, Empty.Request(), limits.build, interrupt, limits.answer)
 
     def plan(self, target: str, interrupt: Interrupt) -> list[Point]:
@@ -296,6 +305,7 @@ class RosRoutine:
         try:
             watchdog.feed()
             limits = self._deadlines
+            self._clock.wait_for_event()
             call(self._recharge, Empty.Request(), LONGEST_CHARGE, either, limits.answer)
         except InterruptedWaitError:
             if interrupt.is_set() or not stalled.is_set():
