@@ -78,8 +78,9 @@ class Classification:
         self._requirements()
         drop_implied_atoms(program)
         program.clauses = list(dict.fromkeys(program.clauses))
-        gaps = (gap for gap in self._contexts.gaps if gap not in program.unsupported)
-        program.unsupported += gaps
+        cores = [frozenset((predicate,)) for predicate in program.classes.values()]
+        gaps = self._contexts.gaps([*cores, frozenset()])
+        program.unsupported += (gap for gap in gaps if gap not in program.unsupported)
 
     def _report_partial(self) -> None:
         """Reports what is defined by expressions whose members are not all recognised.
@@ -232,8 +233,9 @@ class Classification:
                 if condition.n == existential.n == 1:
                     self._only_neighbour(existential, condition)
                 elif condition.n > 1 and condition.origin is not None:
-                    text = axiom_text(condition.origin)
-                    self._contexts.gaps[f'{text}: {_TOGETHER}'] = None
+                    sentence = f'{axiom_text(condition.origin)}: {_TOGETHER}'
+                    if sentence not in program.unsupported:
+                        program.unsupported.append(sentence)
 
     def _only_neighbour(self, existential: Existential, condition: AtMost) -> None:
         labels = [existential.label]

@@ -6,7 +6,7 @@ individual the classes that matter, and adds or withdraws what their context imp
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 from surveillance_ontology.owl.axioms import Axiom
@@ -125,6 +125,10 @@ class ContextIndex:
         for fact in facts:
             if fact[0].holds(fact):
                 self._overdelete(fact)
+
+    def gaps(self) -> Iterable[str]:
+        """Sentences about axioms whose consequences for the individuals may be incomplete."""
+        return self._contexts.gaps({frozenset(held) for held in self._labels.values()})
 
     # --- reasons ---
 

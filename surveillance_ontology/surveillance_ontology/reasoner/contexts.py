@@ -134,15 +134,11 @@ class Context:
 
 
 class Contexts:
-    """Completes contexts of one program; rules of SWRL take no part.
-
-    Attributes:
-        gaps: Sentences about axioms whose consequences may be incomplete.
-    """
+    """Completes contexts of one program; rules of SWRL take no part."""
 
     def __init__(self, program: Program) -> None:
         self._program = program
-        self.gaps: dict[str, None] = {}
+        self._gaps: dict[Context, dict[str, AtLeast | AtMost | None]] = {}
         self._known: dict[tuple[Tokens, bool], Context] = {}
         self._queue: deque[Context] = deque()
         self._queued: set[Context] = set()
@@ -325,6 +321,22 @@ class Contexts:
             context = self._queue.popleft()
             self._queued.discard(context)
             self._complete(context)
+        return found
+
+    def gaps(self, cores: Iterable[Tokens]) -> dict[str, None]:
+        """Sentences about axioms whose consequences for these cores may be incomplete."""
+        found: dict[str, None] = {}
+        reached: dict[Context, None] = {}
+        for core in cores:
+            start = self.context(core)
+            if start not in reached:
+                reached.update(closure(start, lambda one: [edge.target for edge in one.edges]))
+        for context in reached:
+            if not context.clash:
+                for sentence, condition in self._gaps.get(context, {}).items():
+                    known = isinstance(condition, AtLeast) and condition.head in context.tokens
+                    if not known:
+                        found[sentence] = None
         return found
 
     def roles_above(self, role: Role) -> frozenset[Role]:
@@ -517,12 +529,8 @@ class Contexts:
                     if rule.roles <= edge.roles:
                         self._fire(context, edge, rule)
                 elif rule.xs <= tokens and _names(edge.target):
-                    self._nominal_gap(context, rule)
+                    self._gap(context, rule.origin, _NOMINALS)
         self._join_parent(context, edge)
-
-    def _nominal_gap(self, context: Context, rule: _EdgeRule) -> None:
-        if rule.origin is not None:
-            self.gaps[f'{axiom_text(rule.origin)}: {_NOMINALS}'] = None
 
     def _fire(self, context: Context, edge: _Edge, rule: _EdgeRule) -> None:
         head = rule.head
@@ -549,15 +557,15 @@ class Contexts:
             role = (condition.prop, condition.inverse)
             if role not in back:
                 continue
-            if named and condition.origin is not None:
-                self.gaps[f'{axiom_text(condition.origin)}: {_NOMINALS}'] = None
+            if named:
+                self._gap(context, condition.origin, _NOMINALS)
             if not _holds(condition.label, target.tokens):
                 continue
             if not _holds(condition.filler, context.tokens):
                 continue
             if condition.n != 1:
                 if any(role in other.roles for other in target.edges):
-                    self._case_gap(condition)
+                    self._case_gap(context, condition)
                 continue
             for other in target.edges:
                 if role in other.roles and _holds(condition.filler, other.target.tokens):
@@ -656,7 +664,7 @@ class Contexts:
                 else:
                     self._clash(context)
             else:
-                self._case_gap(condition)
+                self._case_gap(context, condition)
 
     def _most_different(self, context: Context, edges: list[_Edge]) -> int:
         """How many individuals pairwise known to be different some of the edges lead to."""
@@ -695,9 +703,19 @@ class Contexts:
             for rule in self.edge_rules.get(role, ())
         )
 
-    def _case_gap(self, condition: AtLeast | AtMost) -> None:
-        if condition.origin is not None:
-            self.gaps[f'{axiom_text(condition.origin)}: {_CASES}'] = None
+    def _case_gap(self, context: Context, condition: AtLeast | AtMost) -> None:
+        self._gap(context, condition.origin, _CASES, condition)
+
+    def _gap(
+        self,
+        context: Context,
+        origin: Axiom | None,
+        what: str,
+        condition: AtLeast | AtMost | None = None,
+    ) -> None:
+        """Notes an axiom some of whose consequences in a context may be missing."""
+        subject = 'an assertion' if origin is None else axiom_text(origin)
+        self._gaps.setdefault(context, {})[f'{subject}: {what}'] = condition
 
     # --- values ---
 
@@ -717,7 +735,7 @@ class Contexts:
                     if self._most_distinct(counted) >= least.n:
                         self._add(context, least.head)
                     else:
-                        self._case_gap(least)
+                        self._case_gap(context, least)
         for held in context.values:
             if held.values.size < held.count:
                 self._clash(context)
@@ -739,8 +757,8 @@ class Contexts:
                     elif head[1] not in held.props:
                         held.props.add(head[1])
                         self._changed = True
-                elif not (held.values & rule.values).decided and rule.origin is not None:
-                    self.gaps[f'{axiom_text(rule.origin)}: {_DATES}'] = None
+                elif not (held.values & rule.values).decided:
+                    self._gap(context, rule.origin, _DATES)
 
     def _counted_values(self, context: Context, condition: AtLeast | AtMost) -> list[_Values]:
         admitted = condition.values
@@ -766,7 +784,7 @@ class Contexts:
             if self._most_distinct(counted) > condition.n:
                 self._clash(context)
             else:
-                self._case_gap(condition)
+                self._case_gap(context, condition)
 
     def _most_distinct(self, counted: list[_Values]) -> int:
         best = 0

@@ -209,7 +209,9 @@ class Engine:
         """Sentences about what is not derived because it would need reasoning by cases."""
         network = self._network
         cases = OpenCases(self.program, network.context, network.lower, network.counters)
-        return cases.sentences()
+        yield from cases.sentences()
+        if network.contexts is not None:
+            yield from network.contexts.gaps()
 
     # --- touching ---
 

@@ -27,6 +27,7 @@ from surveillance_ontology.reasoner.clauses import (
 )
 
 _EMPTY: frozenset[Any] = frozenset()
+_DEEPEST = 16
 
 
 @lru_cache(maxsize=4096)
@@ -65,13 +66,27 @@ class _Writer:
         self.names: dict[int, str] = {}
         self.bound: set[int] = set()
         self.temporaries = 0
+        self.parts = 0
+        self.kept: list[str] = []
+        self.calling = ''
 
     def line(self, text: str) -> None:
         self.lines.append('    ' * self.depth + text)
 
     def open(self, text: str) -> None:
+        if self.depth >= _DEEPEST:
+            self._continue()
         self.line(text)
         self.depth += 1
+
+    def _continue(self) -> None:
+        """Goes on in a further function: Python nests no more than 20 blocks in one."""
+        self.parts += 1
+        name = f'part{self.parts}'
+        values = ', '.join([f'v{term}' for term in sorted(self.bound)] + self.kept)
+        self.line(f'{self.calling}{name}({values})')
+        self.lines.append(f'    def {name}({values}):')
+        self.depth = 2
 
     def use(self, thing: object) -> str:
         name = self.names.get(id(thing))
@@ -160,12 +175,17 @@ class _Writer:
             values = self.temporary()
             self.open(f'for v{x}, {values} in {succ}.items():')
             self.bound.add(x)  # type: ignore[arg-type]
+            self.kept = [values]
             self.open(f'if v{x} in {values}:')
+            self.kept = []
         else:
             values = self.temporary()
             self.open(f'for v{x}, {values} in {succ}.items():')
+            self.bound.add(x)  # type: ignore[arg-type]
+            self.kept = [values]
             self.open(f'for v{y} in {values}:')
-            self.bound.update((x, y))  # type: ignore[arg-type]
+            self.kept = []
+            self.bound.add(y)  # type: ignore[arg-type]
 
     def join(self, atoms: Sequence[BodyAtom], early: Callable[[], bool] | None = None) -> None:
         """Writes all atoms, cheapest first; `early` may write more once it finds its variables
@@ -293,6 +313,7 @@ def compile_support(
     With `outputs` it yields pairs (values of the outputs, premises).
     """
     writer = _Writer(context)
+    writer.calling = 'yield from '
     signature = _arguments(writer, terms)
     writer.join(body)
     premises = ''

@@ -152,10 +152,16 @@ class Network:
         support = compile_support(context, body, head.terms)
         origin = clause.origin
 
+        # An individual that the clause names is merged under its own name: the individual that
+        # represents it now may cease to.
+        first, second = (
+            str(term.value) if isinstance(term, Constant) else None for term in head.terms
+        )
+
         def request(x: str, y: str) -> None:
             if x != y:
                 for premises in support(x, y):
-                    merge(x, y, origin, premises)
+                    merge(first or x, second or y, origin, premises)
                     return
 
         triggered = False

@@ -16,7 +16,14 @@ from surveillance_ontology.owl import expressions as ex
 from surveillance_ontology.owl.axiom_text import axiom_text, expression_text
 from surveillance_ontology.owl.axioms import Axiom
 from surveillance_ontology.owl.expressions import ClassExpression, Literal, PropertyExpression
-from surveillance_ontology.owl.vocabulary import NOTHING, SWRLB, THING, TOP_LITERAL, local_name
+from surveillance_ontology.owl.vocabulary import (
+    NOTHING,
+    OWL,
+    SWRLB,
+    THING,
+    TOP_LITERAL,
+    local_name,
+)
 from surveillance_ontology.reasoner.clauses import (
     AtLeast,
     AtMost,
@@ -305,6 +312,7 @@ class Translation:
             self.required(expression)
         for kind, iri in negated:
             self._negate(kind, iri)
+        self._top_and_bottom()
         self._complement_labels()
         if any(
             isinstance(clause.head, PredicateAtom)
@@ -639,7 +647,11 @@ class Translation:
             self.only(body, expression.prop, expression.range)
         elif isinstance(expression, ex.ObjectMaxCardinality):
             prop, inverse = self._direction(expression.prop)
-            if expression.n == 0:
+            if expression.n == 0 and isinstance(normal(expression.filler), str | ex.ObjectOneOf):
+                y = self.fresh()
+                link = self.property(expression.prop, x, y)
+                self.imply((*body, link), negated(normal(expression.filler)), y)
+            elif expression.n == 0:
                 for related in self._related(expression.prop, expression.filler, x):
                     self.contradict((*body, *related), x)
             else:
@@ -670,6 +682,10 @@ class Translation:
             else:
                 for other in self.bodies(expression.operand, x):
                     self.contradict((*body, *other), x)
+                if isinstance(expression.operand, ex.ObjectOneOf):
+                    for name in expression.operand.individuals:
+                        pair = (x, Constant(name))
+                        self.clause(body, PredicateAtom(program.different, pair))
 
     def only(self, body: Body, prop: str, data_range: ex.DataRange) -> None:
         if self.test(data_range) is not None:
@@ -685,6 +701,17 @@ class Translation:
         else:
             first.disjoint.add(second)
             second.disjoint.add(first)
+
+    def _top_and_bottom(self) -> None:
+        """The properties that OWL itself gives a meaning."""
+        program = self.program
+        for name, table in (('ObjectProperty', program.objects), ('DataProperty', program.datas)):
+            bottom = table.get(f'{OWL}bottom{name}')
+            if bottom is not None:
+                self.contradict((PredicateAtom(bottom, (_X, _Y)),), _X)
+            if f'{OWL}top{name}' in table:
+                text = f'owl:top{name}: it is used like any other property'
+                program.unsupported.append(text)
 
     def _differs(self, x: Term, y: Term) -> PredicateAtom:
         return PredicateAtom(self.program.different, (x, y))
