@@ -10,6 +10,7 @@ from __future__ import annotations
 import ctypes
 import importlib
 import os
+import resource
 import signal
 import sys
 
@@ -31,9 +32,18 @@ def say_up() -> None:
         os.close(int(descriptor))
 
 
+def limit_memory() -> None:
+    """Has one huge allocation fail by itself: it costs the message that caused it, not the node."""
+    given = os.environ.pop('LAUNCH_MEMORY', None)
+    if given is not None:
+        most = int(given)
+        resource.setrlimit(resource.RLIMIT_DATA, (most, most))
+
+
 def main(argv: list[str]) -> int:
     parent, targets, *arguments = argv
     end_with_parent(int(parent))
+    limit_memory()
     parsed = []
     for target in targets.split(','):
         name, _, place = target.partition('=')

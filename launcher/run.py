@@ -45,6 +45,9 @@ COMPOSED = 'composed'
 NOT_RECORDED = 'off'
 RECORDER, PAGE = 'mission_recorder', 'mission_page'
 RECORDING, PLACE = 'recording', 'place.yaml'
+COMPOSED_SHARE = 3
+MEMORY = 2048
+"""Megabytes that a node may hold, unless the command line says otherwise."""
 BEHAVIOUR_NODE = 'robot_behavior'
 _NAMESPACE = re.compile(r'/?[A-Za-z]\w*(/[A-Za-z]\w*)*\Z', re.ASCII)
 MAX_DOMAIN = 101
@@ -75,6 +78,9 @@ class Run:
         keep: most of the recordings to keep, gigabytes.
         web, web_control: show the mission in browsers; let them act.
         web_address: where, as HOST:PORT, None for the page's own choice.
+        memory: megabytes that a node may hold before it is started again; 0: any.
+        alarm: a command that is run, with one line as its argument, when somebody is needed.
+        network: whether nodes of other machines are heard.
     """
 
     mode: str | None = None
@@ -94,6 +100,9 @@ class Run:
     web: bool = False
     web_control: bool = False
     web_address: str | None = None
+    memory: int = MEMORY
+    alarm: str = ''
+    network: bool = False
 
     def check(self) -> None:
         """Looks at everything that can be wrong before a process is started.
@@ -414,7 +423,11 @@ def run_mission(run: Run, config: Path, runs: Path) -> int:
     if run.composed:
         own = [files[node.name] for node in nodes]
         words = command(nodes, ros_arguments(own, run), os.getpid())
-        programs = [Program(COMPOSED, words, environ, takes_input=manual)]
+        # Everything together may hold what the nodes may hold by themselves, and shares much.
+        memory = run.memory * 2**20 * COMPOSED_SHARE
+        programs = [
+            Program(COMPOSED, words, environ, takes_input=manual, watched=True, memory=memory)
+        ]
     else:
         programs = [
             Program(
@@ -424,6 +437,8 @@ def run_mission(run: Run, config: Path, runs: Path) -> int:
                 takes_input=manual and bool(node.console),
                 leads=node.name == BEHAVIOUR_NODE,
                 says_up=True,
+                watched=True,
+                memory=run.memory * 2**20,
             )
             for node in nodes
         ]

@@ -7,6 +7,7 @@ descriptors, pauses and deadlines as the loop's timeout.
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import selectors
 import signal
@@ -17,19 +18,26 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from launcher.log_merge import MergedLog
+from launcher.process_watch import BEAT, FINISHED, Heartbeats, look_at, shown
 
-PAUSES = (0.5, 1.0, 2.0, 4.0, 8.0, 15.0, 30.0)
+PAUSES = (0.1, 0.5, 1.0, 2.0, 4.0, 8.0, 15.0, 30.0)
 """Seconds before the first, second, ... restart in a row; the last one is kept."""
 START_WITHIN = 1.5
 """Seconds after which a process that did not say that it is up no longer holds the next one up."""
 UP = 'LAUNCH_UP'
 """The environment variable with the descriptor that a process closes to say that it is up."""
+MEMORY = 'LAUNCH_MEMORY'
+"""The environment variable with the bytes of data that a process may map."""
 STEADY_AFTER = 20.0
 """A process that ran this long, in seconds, starts again from the first pause."""
 STOP_LEADERS_WITHIN = 1.2
 """Seconds that the processes which use the others have before those are told to stop as well."""
 STOP_WITHIN = 2.5
 """Seconds until whatever is left is killed."""
+LOOK_PERIOD = 0.5
+"""Seconds between two looks at the heartbeats and the memory of the processes."""
+TROUBLE_AFTER = 5
+"""Deaths in a row after which somebody is called."""
 EXIT_UNUSABLE = 2
 """The exit code with which a node says that its configuration does not let it start."""
 _LONGEST_LINE = 64 * 1024
@@ -46,6 +54,10 @@ class Program:
         takes_input: whether it reads lines, see `Supervisor.send`.
         leads: whether it uses the others, and so is stopped before them.
         says_up: whether it closes the descriptor in `UP` when the bulk of its start is done.
+        watched: whether it writes heartbeats to the descriptor in `process_watch.BEAT`. Such a
+            process is ended and started again when it hangs, and started again when it ends
+            without having said that it has finished.
+        memory: bytes of resident memory beyond which it is ended and started again; 0: any.
     """
 
     name: str
@@ -54,6 +66,8 @@ class Program:
     takes_input: bool = False
     leads: bool = False
     says_up: bool = False
+    watched: bool = False
+    memory: int = 0
 
 
 @dataclass
@@ -68,6 +82,9 @@ class Child:
     told_to_stop: bool = False
     killed: bool = False
     coming_up: bool = False
+    finished: bool = False
+    heartbeats: Heartbeats | None = None
+    ended_for: str = ''
     rest: bytes = field(default=b'', repr=False)
 
     @property
@@ -87,6 +104,7 @@ class Supervisor:
         pauses: seconds before a restart, see `PAUSES`.
         at_once: how many may come up at the same time; default: one more than there are
             processors, for each waits at times.
+        on_trouble: called with one line when a program dies again and again.
     """
 
     def __init__(
@@ -95,12 +113,15 @@ class Supervisor:
         log: MergedLog,
         pauses: Sequence[float] = PAUSES,
         at_once: int | None = None,
+        on_trouble: Callable[[str], None] = lambda _text: None,
     ) -> None:
         self.children = {program.name: Child(program) for program in programs}
         self._to_start: list[Child] = []
         self._at_once = at_once or (os.cpu_count() or 1) + 1
         self._log = log
         self._pauses = tuple(pauses)
+        self._on_trouble = on_trouble
+        self._look_at = math.inf
         self._selector = selectors.DefaultSelector()
         self._stopping_since: float | None = None
         self._code = 0
@@ -178,8 +199,9 @@ class Supervisor:
     def _start(self, child: Child) -> None:
         child.restart_at = None
         child.rest = b''
-        with self._awaited(child) as descriptors:
-            process = self._spawn(child, descriptors)
+        child.finished, child.ended_for = False, ''
+        with self._awaited(child) as up, self._listening(child) as beat:
+            process = self._spawn(child, {UP: up, BEAT: beat})
         child.process = process
         child.started = time.monotonic()
         assert process.stdout is not None
@@ -192,10 +214,10 @@ class Supervisor:
         self._log.say(f'started {child.program.name} (process {process.pid})')
 
     @contextlib.contextmanager
-    def _awaited(self, child: Child) -> Iterator[tuple[int, ...]]:
+    def _awaited(self, child: Child) -> Iterator[int | None]:
         """Gives what a process closes when it is up, or lets go of when it dies before that."""
         if not child.program.says_up:
-            yield ()
+            yield None
             return
         reader, writer = os.pipe()
 
@@ -208,14 +230,45 @@ class Supervisor:
         self._selector.register(reader, selectors.EVENT_READ, up)
         child.coming_up = True
         try:
-            yield (writer,)
+            yield writer
         finally:
             os.close(writer)
 
-    def _spawn(self, child: Child, descriptors: tuple[int, ...]) -> subprocess.Popen[bytes]:
+    @contextlib.contextmanager
+    def _listening(self, child: Child) -> Iterator[int | None]:
+        """Gives what a process writes its heartbeats to."""
+        if not child.program.watched:
+            yield None
+            return
+        reader, writer = os.pipe()
+        os.set_blocking(writer, False)
+        heartbeats = child.heartbeats = Heartbeats(time.monotonic())
+
+        def take() -> None:
+            chunk = os.read(reader, 4096)
+            if not chunk:
+                self._selector.unregister(reader)
+                os.close(reader)
+            elif child.heartbeats is heartbeats:
+                heartbeats.beat(time.monotonic())
+                child.finished = child.finished or FINISHED in chunk
+
+        self._selector.register(reader, selectors.EVENT_READ, take)
+        self._look_at = min(self._look_at, time.monotonic() + LOOK_PERIOD)
+        try:
+            yield writer
+        finally:
+            os.close(writer)
+
+    def _spawn(self, child: Child, given: Mapping[str, int | None]) -> subprocess.Popen[bytes]:
         environ = dict(child.program.environ)
-        if descriptors:
-            environ[UP] = str(descriptors[0])
+        descriptors = [descriptor for descriptor in given.values() if descriptor is not None]
+        for name, descriptor in given.items():
+            if descriptor is not None:
+                environ[name] = str(descriptor)
+        if child.program.memory:
+            # What is mapped is more than what is held.
+            environ[MEMORY] = str(2 * child.program.memory + 2**30)
         return subprocess.Popen(
             child.program.command,
             env=environ,
@@ -253,6 +306,7 @@ class Supervisor:
             code = process.wait()
             self._close(child, process)
             child.process = None
+            child.heartbeats = None
             self._after_death(child, code)
 
     def _close(self, child: Child, process: subprocess.Popen[bytes]) -> None:
@@ -276,7 +330,7 @@ class Supervisor:
             if code not in (0, -signal.SIGTERM) and not child.killed:
                 self._log.warn(f'{name} ended with {describe_exit(code)}')
             return
-        if code == 0:
+        if child.finished or (code == 0 and not child.program.watched):
             self._log.say(f'{name} has ended by itself')
             return
         if code == EXIT_UNUSABLE and not child.deaths:
@@ -286,7 +340,36 @@ class Supervisor:
         child.deaths = 1 if lived >= STEADY_AFTER else child.deaths + 1
         pause = self._pauses[min(child.deaths, len(self._pauses)) - 1]
         child.restart_at = time.monotonic() + pause
-        self._log.warn(f'{name} died ({describe_exit(code)}): starting it again in {pause:g} s')
+        why = child.ended_for or describe_exit(code)
+        self._log.warn(f'{name} died ({why}): starting it again in {pause:g} s')
+        if child.deaths == TROUBLE_AFTER:
+            self._trouble(f'{name} died {child.deaths} times in a row, last: {why}')
+
+    def _trouble(self, text: str) -> None:
+        self._log.error(f'{text}: somebody should have a look')
+        self._on_trouble(text)
+
+    def _watch(self, now: float) -> None:
+        """Ends what hangs or holds too much memory; it is started again as after a death."""
+        if now < self._look_at:
+            return
+        late = now - self._look_at
+        self._look_at = now + LOOK_PERIOD
+        for child in self.children.values():
+            if child.process is None or child.heartbeats is None or child.killed:
+                continue
+            if late > LOOK_PERIOD:  # the launcher itself did not run: the machine slept
+                child.heartbeats.excuse(now)
+                continue
+            look = look_at(child.process.pid)
+            problem = child.heartbeats.problem(now, look)
+            most = child.program.memory
+            if look is not None and most and look.memory > most:
+                problem = f'holds {shown(look.memory)} of memory, at most {shown(most)} are allowed'
+            if problem and not child.ended_for:
+                child.ended_for = problem
+                self._log.warn(f'{child.program.name} {problem}: ending it')
+                _kill_group(child.process.pid)
 
     def _timeout(self, end: float | None) -> float | None:
         times = [child.restart_at for child in self.children.values() if child.restart_at]
@@ -298,6 +381,8 @@ class Supervisor:
                 times.append(self._stopping_since + STOP_WITHIN)
         elif end is not None:
             times.append(end)
+        if self._stopping_since is None and any(c.heartbeats for c in self.children.values()):
+            times.append(self._look_at)
         if self._to_start:
             coming = [child.started for child in self.children.values() if child.coming_up]
             times += [started + START_WITHIN for started in coming]
@@ -337,6 +422,8 @@ class Supervisor:
             if child.restart_at is not None and now >= child.restart_at:
                 self._start(child)
         self._start_next()
+        if self._stopping_since is None:
+            self._watch(now)
         self._keep_stopping(now)
 
     @contextlib.contextmanager

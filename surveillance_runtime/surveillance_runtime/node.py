@@ -75,6 +75,7 @@ class PatrolNode(Node):  # type: ignore[misc]
         ended: Raised when the node's process shall end, wanted (`finish`) or not (`fail`).
         failure: Why the node cannot go on, once `fail` was called.
         unusable: Whether that is its configuration.
+        finished: Whether the node ended on purpose.
     """
 
     def __init__(self, name: str, **node_options: Any) -> None:
@@ -82,6 +83,7 @@ class PatrolNode(Node):  # type: ignore[misc]
         self.ended = Interrupt()
         self.failure: str | None = None
         self.unusable = False
+        self.finished = False
         self._specs: dict[str, ParameterSpec] = {}
         self._on_change: dict[str, Callable[[Any], None]] = {}
         self._threads: list[threading.Thread] = []
@@ -278,7 +280,8 @@ class PatrolNode(Node):  # type: ignore[misc]
             self.ended.set()
 
     def finish(self) -> None:
-        """End the node's process as wanted, as SIGTERM does: the exit code is 0."""
+        """End the node's process as wanted: the exit code is 0, and it is not started again."""
+        self.finished = True
         self.ended.set()
 
     def on_stop(self) -> None:

@@ -17,6 +17,8 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import rclpy
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.clock import Clock, ClockType
 from rclpy.executors import (
     ExternalShutdownException,
     ShutdownException,
@@ -31,6 +33,10 @@ from surveillance_runtime.node import JOIN_SECONDS, PatrolNode, StartError, give
 from surveillance_runtime.parameters import ParameterError
 
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+HEARTBEAT = 'LAUNCH_HEARTBEAT'
+"""The environment variable with the descriptor to which the launcher wants heartbeats."""
+BEAT_PERIOD = 0.25
+"""Seconds of real time between two heartbeats."""
 EXIT_CANNOT_START = 2
 """The exit code of a node whose configuration does not let it start."""
 
@@ -75,10 +81,13 @@ def run_nodes(
             spinner.executor.add_node(nodes[-1])
             nodes[-1].ended.subscribe(ending.come)
         check_taken(arguments, nodes)
+        heartbeat = Heartbeat(nodes)
         for node in nodes:
             node.get_logger().info('ready')
         spinner.start(on_end=ending.come)
         ending.wait()
+        if any(node.finished for node in nodes):
+            heartbeat.say_finished()
     except (ParameterError, StartError) as error:
         who = getattr(factory, '__name__', '') + ' ' if len(factories) > 1 else ''
         print(f'{who}cannot start: {_one_line(error)}', file=sys.stderr)
@@ -128,6 +137,38 @@ def check_taken(arguments: RosArguments, nodes: Sequence[PatrolNode]) -> None:
         if not takes and not entry.name.startswith('qos_overrides.'):
             names = ' or '.join(node.get_name() for node in nodes)
             raise ParameterError(f'{entry.origin}: not a parameter of {names} as configured')
+
+
+class Heartbeat:
+    """Tells the launcher that the executor goes round, where it asked to be told.
+
+    Args:
+        nodes: The nodes of the process; a timer of the first one beats.
+    """
+
+    def __init__(self, nodes: Sequence[PatrolNode]) -> None:
+        given = os.environ.pop(HEARTBEAT, None)
+        self._pipe = int(given) if given is not None else None
+        if self._pipe is not None:
+            os.set_blocking(self._pipe, False)
+            nodes[0].create_timer(
+                BEAT_PERIOD,
+                self._beat,
+                callback_group=ReentrantCallbackGroup(),
+                clock=Clock(clock_type=ClockType.STEADY_TIME),
+            )
+
+    def _beat(self) -> None:
+        self._write(b'.')
+
+    def say_finished(self) -> None:
+        """Say that the process ends on purpose, and is not to be started again."""
+        self._write(b'F')
+
+    def _write(self, word: bytes) -> None:
+        if self._pipe is not None:
+            with contextlib.suppress(OSError):  # the launcher is gone, or has not read for long
+                os.write(self._pipe, word)
 
 
 class _Ending:

@@ -14,12 +14,26 @@ programs = []
 for argument in sys.argv[1:]:
     name, _, script = argument.partition('=')
     command = [sys.executable, '-u', '-c', script]
-    leads = name.startswith('lead')
     programs.append(
-        Program(name, command, os.environ, takes_input=True, leads=leads, says_up=at_once > 0)
+        Program(
+            name,
+            command,
+            os.environ,
+            takes_input=True,
+            leads=name.startswith('lead'),
+            says_up=at_once > 0,
+            watched=name.startswith('watched'),
+            memory=int(os.environ.get('MEMORY', '0')),
+        )
     )
 log = MergedLog(None, [p.name for p in programs], colour=False)
-supervisor = Supervisor(programs, log, pauses=(0.01, 0.02), at_once=at_once or None)
+supervisor = Supervisor(
+    programs,
+    log,
+    pauses=(0.01, 0.02),
+    at_once=at_once or None,
+    on_trouble=lambda text: print('alarm:', text, flush=True),
+)
 supervisor.read_from(
     0, lambda line: print('sent', supervisor.send(*line.split(' ', 1)), flush=True)
 )

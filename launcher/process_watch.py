@@ -1,0 +1,98 @@
+"""Whether a process hangs, by its heartbeats and by what the kernel says of it."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+
+STOPPED_AFTER = 1.0
+"""Seconds without a heartbeat after which a process that was stopped by a signal is given up."""
+STUCK_AFTER = 3.0
+"""The same for one that uses no processor time, as in a deadlock."""
+BUSY_AFTER = 20.0
+"""The same for one that computes: a long piece of work, or an endless loop."""
+SILENT_START = 90.0
+"""Seconds that a process may take until its first heartbeat."""
+BEAT = 'LAUNCH_HEARTBEAT'
+"""The environment variable with the descriptor that a process writes its heartbeats to."""
+FINISHED = b'F'
+"""Written instead of a heartbeat by a process that ends on purpose."""
+_PAGE = os.sysconf('SC_PAGE_SIZE')
+_LEAST_SHARE = 0.02
+
+
+@dataclass(frozen=True)
+class Look:
+    """One look at a process.
+
+    Attributes:
+        state: The kernel's letter: R runs, S sleeps, T stopped, D waits for a device.
+        cpu: Processor time used so far, seconds.
+        memory: Resident memory, bytes.
+    """
+
+    state: str
+    cpu: float
+    memory: int
+
+
+def look_at(pid: int) -> Look | None:
+    """Return how a process is, None where the kernel does not say."""
+    try:
+        with open(f'/proc/{pid}/stat', encoding='utf-8', errors='replace') as file:
+            fields = file.read().rsplit(')', 1)[1].split()
+    except (OSError, IndexError):
+        return None
+    ticks = os.sysconf('SC_CLK_TCK')
+    return Look(fields[0], (int(fields[11]) + int(fields[12])) / ticks, int(fields[21]) * _PAGE)
+
+
+class Heartbeats:
+    """Judges one process by its heartbeats and by what the kernel says of it.
+
+    A process that gets no processor time on a busy machine is waited for: it is ready to run.
+
+    Args:
+        now: Steady time, seconds.
+    """
+
+    def __init__(self, now: float) -> None:
+        self._last = now
+        self._beats = 0
+        self._cpu: float | None = None
+        self._idle_since: float | None = None
+
+    def beat(self, now: float) -> None:
+        """Note a heartbeat."""
+        self._last = now
+        self._beats += 1
+        self._cpu = self._idle_since = None
+
+    def excuse(self, now: float) -> None:
+        """Begin to count anew: the watcher itself did not run."""
+        self._last = now
+        self._cpu = self._idle_since = None
+
+    def problem(self, now: float, look: Look | None) -> str:
+        """Return why the process is to be ended, empty while it is not."""
+        quiet = now - self._last
+        if look is None or quiet < STOPPED_AFTER:
+            return ''
+        if look.state == 'T':
+            return f'was stopped {quiet:.1f} s ago'
+        if not self._beats:
+            return f'did not come up in {SILENT_START:g} s' if quiet >= SILENT_START else ''
+        if self._cpu is None or self._idle_since is None:
+            self._cpu, self._idle_since = look.cpu, now
+        used, least = look.cpu - self._cpu, _LEAST_SHARE * (now - self._idle_since)
+        if look.state in ('R', 'D') or used > least:
+            self._cpu, self._idle_since = look.cpu, now
+        stuck = quiet >= STUCK_AFTER and now - self._idle_since >= 1.0
+        if stuck or quiet >= BUSY_AFTER:
+            return f'hangs: no heartbeat for {quiet:.1f} s'
+        return ''
+
+
+def shown(size: int) -> str:
+    """Return a size of memory in words."""
+    return f'{size / 2**20:.0f} MB'

@@ -1,0 +1,133 @@
+"""Heartbeats: what hangs is ended and comes back, what only waits for the machine is left alone."""
+
+from __future__ import annotations
+
+import os
+import signal
+from pathlib import Path
+
+import pytest
+
+from launcher.process_watch import (
+    BUSY_AFTER,
+    SILENT_START,
+    STOPPED_AFTER,
+    STUCK_AFTER,
+    Heartbeats,
+    Look,
+    look_at,
+)
+from tests.launcher.conftest import ROOT, gone
+
+DRIVER = str(Path(__file__).with_name('supervised.py'))
+ENVIRON = {**os.environ, 'PYTHONPATH': str(ROOT)}
+BEATING = (
+    'import os, time\n'
+    'pipe = int(os.environ["LAUNCH_HEARTBEAT"])\n'
+    'print("up", flush=True)\n'
+    'while True: os.write(pipe, b"."); time.sleep(0.1)'
+)
+ENDING = (
+    'import os, sys\n'
+    'os.write(int(os.environ["LAUNCH_HEARTBEAT"]), b"F" if {finished} else b".")\n'
+    'print("up", flush=True)\n'
+)
+
+
+def after(seconds: float, *looks: Look) -> str:
+    """The judgement that long after a heartbeat, with looks spread over the time."""
+    heartbeats = Heartbeats(0.0)
+    heartbeats.beat(0.0)
+    problems = [
+        heartbeats.problem(seconds * (number + 1) / len(looks), look)
+        for number, look in enumerate(looks)
+    ]
+    return problems[-1]
+
+
+def test_a_process_that_beats_is_well_whatever_it_does():
+    assert after(STOPPED_AFTER / 2, Look('T', 0.0, 0)) == ''
+
+
+def test_a_stopped_process_is_found_soon():
+    assert 'was stopped' in after(STOPPED_AFTER + 0.1, Look('T', 0.0, 0))
+
+
+def test_a_process_that_only_sleeps_is_stuck():
+    looks = [Look('S', 1.0, 0)] * 10
+    assert 'hangs' in after(STUCK_AFTER + 2.0, *looks)
+
+
+def test_a_process_that_waits_for_a_processor_or_computes_is_given_time():
+    waiting = [Look('R', 1.0, 0)] * 10
+    assert after(STUCK_AFTER + 5.0, *waiting) == ''
+    computing = [Look('S', 0.5 * number, 0) for number in range(10)]
+    assert after(STUCK_AFTER + 5.0, *computing) == ''
+    assert 'hangs' in after(BUSY_AFTER + 0.1, *waiting)
+
+
+def test_a_start_may_take_long_but_not_for_ever():
+    heartbeats = Heartbeats(0.0)
+    assert heartbeats.problem(SILENT_START - 1.0, Look('S', 0.0, 0)) == ''
+    assert 'did not come up' in heartbeats.problem(SILENT_START + 1.0, Look('S', 0.0, 0))
+
+
+def test_a_watcher_that_slept_begins_to_count_anew():
+    heartbeats = Heartbeats(0.0)
+    heartbeats.beat(0.0)
+    heartbeats.excuse(100.0)
+    assert heartbeats.problem(100.5, Look('T', 0.0, 0)) == ''
+
+
+def test_the_kernel_knows_this_process_and_no_other_of_its_number():
+    look = look_at(os.getpid())
+    assert look is not None
+    assert look.state == 'R'
+    assert look.memory > 2**20
+    assert look_at(2**22 + 1) is None
+
+
+def test_a_stopped_child_comes_back(start):
+    launch = start(DRIVER, f'watched={BEATING}', environ=ENVIRON)
+    first = int(launch.until(r'started watched \(process (\d+)\)')[1])
+    launch.until(r'watched +\| up')
+    seen = len(launch.lines)
+    os.kill(first, signal.SIGSTOP)
+    launch.until(r'watched was stopped .* ago: ending it', after=seen)
+    launch.until(r'watched +\| up', after=seen)
+    assert gone([first], 0)
+    assert launch.end(signal.SIGINT)[0] == 0
+
+
+@pytest.mark.parametrize('number', [signal.SIGTERM, signal.SIGINT])
+def test_a_stop_from_elsewhere_is_no_stop(start, number):
+    polite = f'import signal, sys; signal.signal({int(number)}, lambda *_: sys.exit(0))\n{BEATING}'
+    launch = start(DRIVER, f'watched={polite}', environ=ENVIRON)
+    first = int(launch.until(r'started watched \(process (\d+)\)')[1])
+    launch.until(r'watched +\| up')
+    seen = len(launch.lines)
+    os.kill(first, number)
+    launch.until(r'watched died \(exit code 0\): starting it again', after=seen)
+    launch.until(r'watched +\| up', after=seen)
+    assert launch.end(signal.SIGINT)[0] == 0
+
+
+def test_a_child_that_says_it_has_finished_is_left_alone(start):
+    launch = start(DRIVER, f'watched={ENDING.format(finished=True)}', environ=ENVIRON)
+    assert launch.end()[0] == 0
+    assert sum('started watched' in line for line in launch.lines) == 1
+
+
+def test_a_child_that_dies_again_and_again_calls_somebody(start):
+    launch = start(DRIVER, f'watched={ENDING.format(finished=False)}', environ=ENVIRON)
+    launch.until(r'ERROR: watched died 5 times in a row, last: exit code 0: somebody should')
+    launch.until(r'alarm: watched died 5 times in a row')
+    assert launch.end(signal.SIGINT)[0] == 0
+
+
+def test_a_child_that_takes_all_memory_is_ended(start):
+    greedy = f'kept = bytearray(80 * 2**20)\n{BEATING}'
+    environ = {**ENVIRON, 'MEMORY': str(50 * 2**20)}
+    launch = start(DRIVER, f'watched={greedy}', environ=environ)
+    launch.until(r'watched holds \d+ MB of memory, at most 50 MB are allowed: ending it')
+    assert launch.end(signal.SIGINT)[0] == 0
