@@ -88,8 +88,7 @@ def test_start_from_pixels_to_ontology_with_one_marker_covered_until_later(graph
     assert marker.call(in_view, 10.0).success
     graph.until(lambda: len(maps) > 1, timeout=60.0)
     assert {each.name for each in maps[-1].places} == {'E', 'C1', 'C2', 'R1', 'R2', 'R3', 'R4'}
-    reference.call(ReferenceName.Request(), 20.0)
-    assert set(armor.query.ind_b2_class('CORRIDOR')) == {'C1', 'C2', 'E'}
+    graph.until(lambda: set(armor.query.ind_b2_class('CORRIDOR')) == {'C1', 'C2', 'E'}, 20.0)
     assert set(armor.query.objectprop_b2_ind('hasDoor', 'C1')) == {'D1', 'D2', 'D5', 'D7'}
     assert maps[-1].robot_room == '', 'where the robot is by now is told by who knows it'
     position = ServiceCaller(graph.node, RoomPosition, 'ontology_map/room_position')
