@@ -5,6 +5,10 @@
 Through ROS every call is measured beside a bare std_srvs/Trigger call to another process, in random
 order in one loop, so that a busy machine slows all of them alike. The caller, the armor server, the
 map builder (which subscribes to changes) and the Trigger server are processes of their own.
+
+Under load: 50 clients of one process send 20 requests each at once, and answers are counted; one
+client asks while another process sends 1,000 malformed requests a second, or while a large ontology
+is loaded and saved. Its calls are beside the same calls on an idle server. Large: 100,000 axioms.
 """
 
 from __future__ import annotations
@@ -16,6 +20,7 @@ import statistics
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Callable, Mapping
 from contextlib import contextmanager
@@ -24,6 +29,7 @@ from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
 IRI = 'http://bnc/exp-rob-lab/2022-23'
+ONTOLOGY = ROOT / 'surveillance_ontology' / 'surveillance_ontology' / 'data' / 'surveillance.owl'
 PLACE = ROOT / 'config' / 'seven_rooms.yaml'
 TRIGGER = """
 from std_srvs.srv import Trigger
@@ -36,6 +42,28 @@ class Bare(PatrolNode):
         self.create_service(Trigger, 'bare', lambda _request, response: response)
 
 run_node(Bare)
+"""
+FLOOD = """
+import sys, time
+import rclpy
+from surveillance_interfaces.srv import ArmorDirective
+from surveillance_runtime.node import PatrolNode
+rclpy.init()
+node = PatrolNode('flood')
+client = node.create_client(ArmorDirective, 'armor_interface_srv')
+client.wait_for_service()
+request = ArmorDirective.Request()
+request.armor_request.command = 'ADD'
+request.armor_request.reference_name = 'surveillance'
+request.armor_request.args = ['<no iri', '\\x00']
+start = time.monotonic()
+sent = 0
+print('flooding', flush=True)
+while True:
+    while sent < (time.monotonic() - start) * 1000:
+        client.remove_pending_request(client.call_async(request))
+        sent += 1
+    time.sleep(0.001)
 """
 Row = tuple[str, float, str]
 """What was called, median milliseconds, and the comparison."""
@@ -198,9 +226,204 @@ def through_ros(rounds: int) -> list[Row]:
     return [(f'{name}, ROS', ms, f'{ms / reference:.2f} x Trigger') for name, ms in taken.items()]
 
 
+def under_load(seconds: float, axioms: int) -> list[Row]:
+    """A client beside others that ask much of the server."""
+    import rclpy
+
+    from surveillance_interfaces.srv import ArmorDirective
+    from surveillance_ontology.armor_client import ArmorClient
+    from surveillance_runtime.node import PatrolNode
+    from surveillance_runtime.process import ExecutorThread
+    from surveillance_runtime.testing import claim_domain
+
+    os.environ['ROS_DOMAIN_ID'] = str(claim_domain())
+    folder = tempfile.TemporaryDirectory()
+    write_large(Path(folder.name) / 'large.nt', axioms)
+    parameters = ['-p', 'store:=none', '-p', f'ontologies_folder:={folder.name}']
+    module = 'surveillance_ontology.armor_server_node'
+    server = subprocess.Popen(
+        [sys.executable, '-m', module, '--ros-args', *parameters, '--log-level', 'error'],
+        stderr=subprocess.DEVNULL,
+    )
+    rclpy.init()
+    node = PatrolNode('benchmark')
+    spinner = ExecutorThread()
+    spinner.executor.add_node(node)
+    spinner.start()
+    found: list[Row] = []
+    try:
+        client = ArmorClient(node, 'benchmark', 'surveillance', timeout=60.0)
+        client.utils.load_ref_from_file(str(ONTOLOGY), IRI)
+        client.manipulation.add_ind_to_class('R1', 'ROOM')
+
+        def ask() -> Any:
+            return client.query.ind_b2_class('ROOM')
+
+        idle = percentile(ask, seconds)
+        found.append(('a query, idle server: p99, ROS', idle, ''))
+        peers = [node.create_client(ArmorDirective, 'armor_interface_srv') for _ in range(50)]
+        request = ArmorDirective.Request()
+        for field, value in zip(
+            FIELDS, ('b', 'surveillance', 'QUERY', 'IND', 'CLASS'), strict=True
+        ):
+            setattr(request.armor_request, field, value)
+        request.armor_request.args = ['ROOM']
+        for peer in peers:
+            peer.wait_for_service()
+        start = time.perf_counter()
+        futures = [peer.call_async(request) for _ in range(20) for peer in peers]
+        while not all(f.done() for f in futures) and time.perf_counter() - start < 20:
+            time.sleep(0.01)
+        lost = sum(not future.done() for future in futures)
+        taken = (time.perf_counter() - start) * 1e3
+        found.append(('1,000 requests of 50 clients at once, ROS', taken, f'{lost} lost'))
+        # Each client is told of every answer to any of them, and drops those of others.
+        for peer in peers:
+            spinner.executor.create_task(node.destroy_client, peer)
+        client.batch([])
+        flood = subprocess.Popen([sys.executable, '-c', FLOOD], stdout=subprocess.PIPE, text=True)
+        assert flood.stdout is not None
+        flood.stdout.readline()
+        beside = percentile(ask, seconds)
+        flood.kill()
+        flood.wait()
+        name = 'a query beside 1,000 malformed a second: p99'
+        found.append((name, beside, f'{beside / idle:.1f} x idle'))
+        other = ArmorClient(node, 'other', 'large', timeout=120.0)
+        large = str(Path(folder.name) / 'large.nt')
+        for what, work in {
+            'LOAD': lambda: other.utils.load_ref_from_file(large, IRI),
+            'SAVE': lambda: other.utils.save('saved.nt'),
+            'a schema change': lambda: other.manipulation.add_class('NEW', 'C1'),
+        }.items():
+            busy = threading.Thread(target=work)
+            busy.start()
+            beside = percentile(ask, 60.0, busy.is_alive)
+            busy.join()
+            name = f'a query beside {what} of {axioms} axioms: p99'
+            found.append((name, beside, f'{beside / idle:.1f} x idle'))
+    finally:
+        spinner.stop()
+        node.destroy_node()
+        rclpy.try_shutdown()
+        server.kill()
+        server.wait()
+        folder.cleanup()
+    return found
+
+
+FIELDS = (
+    'client_name',
+    'reference_name',
+    'command',
+    'primary_command_spec',
+    'secondary_command_spec',
+)
+
+
+def percentile(
+    call: Callable[[], Any], seconds: float, go_on: Callable[[], bool] = lambda: True
+) -> float:
+    """The 99th percentile of a call's milliseconds, called every 2 ms."""
+    taken = []
+    end = time.perf_counter() + seconds
+    while time.perf_counter() < end and go_on():
+        start = time.perf_counter()
+        call()
+        taken.append(time.perf_counter() - start)
+        time.sleep(0.002)
+    return sorted(taken)[int(len(taken) * 0.99)] * 1e3
+
+
+def write_large(path: Path, axioms: int) -> None:
+    """Write an ontology of 200 classes and so many axioms."""
+    rdf = 'http://www.w3.org/1999/02/22-rdf-syntax-ns#'
+    xsd, owl = 'http://www.w3.org/2001/XMLSchema#', 'http://www.w3.org/2002/07/owl#'
+    below = 'http://www.w3.org/2000/01/rdf-schema#subClassOf'
+    with path.open('w') as file:
+        file.write(f'<{IRI}#p> <{rdf}type> <{owl}ObjectProperty> .\n')
+        file.write(f'<{IRI}#d> <{rdf}type> <{owl}DatatypeProperty> .\n')
+        for c in range(1, 200):
+            file.write(f'<{IRI}#C{c}> <{below}> <{IRI}#C{c // 3}> .\n')
+        for i in range(axioms // 3):
+            file.write(f'<{IRI}#i{i}> <{rdf}type> <{IRI}#C{i % 200}> .\n')
+            file.write(f'<{IRI}#i{i}> <{IRI}#p> <{IRI}#i{i * 7 % (axioms // 3)}> .\n')
+            file.write(f'<{IRI}#i{i}> <{IRI}#d> "{i}"^^<{xsd}long> .\n')
+
+
+def large(axioms: int, rounds: int) -> list[Row]:
+    """Calls inside the server on a large ontology."""
+    from surveillance_ontology.armor import ArmorClient, ArmorService, InProcessTransport, Settings
+
+    def resident() -> float:
+        return int(Path('/proc/self/statm').read_text().split()[1]) * 4096 / 1e6
+
+    found: list[Row] = []
+    with tempfile.TemporaryDirectory() as folder:
+        write_large(Path(folder) / 'large.nt', axioms)
+        service = ArmorService(Settings(folder))
+        client = ArmorClient('benchmark', 'large', InProcessTransport(service))
+        change, numbers = client.manipulation, iter(range(10**6, 10**7))
+
+        def once(call: Callable[[], Any]) -> float:
+            start = time.perf_counter()
+            call()
+            return (time.perf_counter() - start) * 1e3
+
+        def ask_after_change() -> None:
+            number = next(numbers)
+            change.replace_one_dataprop_b2_ind('d', 'i5', 'LONG', str(number))
+            assert client.query.sparql(f'SELECT ?x {{ ?x <{IRI}#d> {number} }}')
+
+        before = resident()
+        found.append(
+            (
+                f'LOAD of {axioms} axioms',
+                once(lambda: client.utils.load_ref_from_file('large.nt', IRI)),
+                '',
+            )
+        )
+        found.append(('first SPARQL', once(ask_after_change), ''))
+        found += [
+            (f'{name}, {axioms} axioms', ms, '')
+            for name, ms in medians(
+                {
+                    'SPARQL after a change': ask_after_change,
+                    'ADD CLASS': lambda: change.add_class(f'N{next(numbers)}'),
+                    'RENAME IND': lambda: change.rename_ind(
+                        f'i{next(numbers) - 10**6 + 10}', f'j{next(numbers)}'
+                    ),
+                },
+                rounds,
+            ).items()
+        ]
+        found += [
+            (f'{name}, {axioms} axioms', ms, '')
+            for name, ms in medians(
+                {
+                    'ADD CLASS CLASS': lambda: change.add_class(f'N{next(numbers)}', 'C1'),
+                    'RENAME CLASS': lambda: change.rename_class('C100', 'D100'),
+                },
+                2,
+            ).items()
+        ]
+        held = resident() - before
+        client.utils.drop_ref()
+        time.sleep(2.0)
+        left = resident() - before
+        found.append(('DROP', 0.0, f'{held:.0f} MB held before, {left:.0f} MB after'))
+        service.close()
+    return found
+
+
 def rows(quick: bool) -> list[Row]:
     """All rows of the table."""
-    return [*inside(200 if quick else 2000), *through_ros(200 if quick else 2000)]
+    return [
+        *inside(200 if quick else 2000),
+        *through_ros(200 if quick else 2000),
+        *under_load(2.0 if quick else 20.0, 10_000 if quick else 100_000),
+        *large(10_000 if quick else 100_000, 5 if quick else 20),
+    ]
 
 
 def main() -> None:

@@ -7,6 +7,8 @@ first reasoning) goes to a worker thread, so that other clients are not kept wai
 from __future__ import annotations
 
 import sys
+import time
+from collections import deque
 from functools import partial
 from typing import Any
 
@@ -29,8 +31,39 @@ PUBLISH_DELAY = 0.005
 """Seconds by which changes are told later, so that this delays no client's next directive."""
 SWITCH_INTERVAL = 0.0005
 """Seconds after which a thread that computes lets another one run; Python's default is 0.005."""
+SLICE = 0.005
+"""Seconds for which waiting requests are answered before the executor sees to other things."""
+MOST_WAITING = 5000
+"""Requests that are taken and wait; further ones wait in the middleware."""
 WORKERS = 4
 """Threads for directives that may take long, and as many for SPARQL queries."""
+
+
+class _Backlog:
+    """Requests that wait, taken in turn from each client that has some."""
+
+    def __init__(self) -> None:
+        self._clients: dict[str, deque[tuple[Any, Any]]] = {}
+        self._count = 0
+
+    def __len__(self) -> int:
+        return self._count
+
+    def put(self, request: Any, header: Any) -> None:
+        """Add a request with what its answer needs."""
+        name = request.armor_request.client_name
+        self._clients.setdefault(name, deque()).append((request, header))
+        self._count += 1
+
+    def take(self) -> tuple[Any, Any]:
+        """Take the oldest request of the client whose turn it is."""
+        name = next(iter(self._clients))
+        waiting = self._clients.pop(name)
+        taken = waiting.popleft()
+        if waiting:
+            self._clients[name] = waiting
+        self._count -= 1
+        return taken
 
 
 class ArmorServer(PatrolNode):
@@ -60,11 +93,16 @@ class ArmorServer(PatrolNode):
         self._work = AwaitedWork(self, WORKERS)
         self._queries = AwaitedWork(self, WORKERS)
         group = ReentrantCallbackGroup()
-        for kind, name, callback in (
-            (ArmorDirective, 'armor_interface_srv', self._on_directive),
-            (ArmorDirectiveList, 'armor_interface_serialized_srv', self._on_list),
-        ):
-            self.create_service(kind, name, callback, callback_group=group)
+        self._backlog = _Backlog()
+        self._single = self.create_service(
+            ArmorDirective, 'armor_interface_srv', self._on_directive, callback_group=group
+        )
+        self.create_service(
+            ArmorDirectiveList,
+            'armor_interface_serialized_srv',
+            self._on_list,
+            callback_group=group,
+        )
 
     def on_stop(self) -> None:
         """End the workers and queries that run."""
@@ -73,6 +111,47 @@ class ArmorServer(PatrolNode):
         self._service.close()
 
     async def _on_directive(self, request: Any, response: Any) -> Any:
+        self._take_more()
+        return await self._carry_out(request, response)
+
+    def _take_more(self) -> None:
+        """Take the requests that wait in the middleware as well.
+
+        The executor takes one request for each of its rounds, which costs more than most
+        directives, and a client that sends many keeps the others waiting.
+        """
+        idle = not self._backlog
+        while len(self._backlog) < MOST_WAITING:
+            with self._single.handle:
+                request, header = self._single.handle.service_take_request(ArmorDirective.Request)
+            if header is None:
+                break
+            self._backlog.put(request, header)
+        if idle and self._backlog:
+            self.executor.create_task(self._answer_backlog)
+
+    async def _answer_backlog(self) -> None:
+        end = time.monotonic() + SLICE
+        while self._backlog and time.monotonic() < end:
+            request, header = self._backlog.take()
+            directive = request_from_ros(request.armor_request)
+            answer = self._service.execute_at_once(directive)
+            if answer is None:
+                self.executor.create_task(self._answer_slow, request, header)
+                continue
+            response = ArmorDirective.Response()
+            fill_response(response.armor_response, answer)
+            self._single.send_response(response, header)
+        if self._backlog:
+            # Others first: those who subscribe, lists, and requests that came meanwhile.
+            self._take_more()
+            self.executor.create_task(self._answer_backlog)
+
+    async def _answer_slow(self, request: Any, header: Any) -> None:
+        response = await self._carry_out(request, ArmorDirective.Response())
+        self._single.send_response(response, header)
+
+    async def _carry_out(self, request: Any, response: Any) -> Any:
         directive = request_from_ros(request.armor_request)
         answer = self._service.execute_at_once(directive)
         if answer is None:

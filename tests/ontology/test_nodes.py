@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ from rclpy.task import Future
 from surveillance_interfaces.msg import OntologyMap, OntologyPlace, RoomConnection
 from surveillance_interfaces.srv import (
     AddRoom,
+    ArmorDirective,
     ReferenceName,
     RemoveRoom,
     RoomPosition,
@@ -161,6 +163,38 @@ def test_a_blocking_call_in_a_callback_says_so(graph: Any) -> None:
     graph.node.executor.create_task(callback)
     graph.until(lambda: said)
     assert 'call_async' in said[0]
+
+
+def test_a_client_beside_a_burst_of_another_is_answered_in_its_turn(graph: Any) -> None:
+    graph.add(ArmorServer)
+    clients = {
+        name: graph.node.create_client(ArmorDirective, 'armor_interface_srv')
+        for name in ('burst', 'good')
+    }
+    order: list[str] = []
+    done = threading.Event()
+
+    def send(name: str) -> None:
+        request = ArmorDirective.Request()
+        request.armor_request.client_name = name
+        request.armor_request.reference_name = 'map'
+        request.armor_request.command = 'MALFORMED'
+        clients[name].call_async(request).add_done_callback(lambda _future: count(name))
+
+    def count(name: str) -> None:
+        order.append(name)
+        if len(order) == 601:
+            done.set()
+
+    def both() -> None:
+        for _ in range(600):
+            send('burst')
+        send('good')
+
+    assert all(client.wait_for_service(5.0) for client in clients.values())
+    graph.node.executor.create_task(both)
+    assert done.wait(20.0), f'{601 - len(order)} of 601 requests were lost'
+    assert order.index('good') < 300
 
 
 def test_a_long_query_keeps_nobody_waiting(graph: Any) -> None:
