@@ -29,6 +29,7 @@ class Graph:
 
     Attributes:
         node: A plain node for scripted peers and clients.
+        may_fail: Whether callbacks may raise, which costs their message.
     """
 
     def __init__(self) -> None:
@@ -41,6 +42,7 @@ class Graph:
         rclpy.init(context=self.context, domain_id=_domain)
         self._spinner = ExecutorThread(self.context)
         self._nodes: list[PatrolNode] = []
+        self.may_fail = False
         self._changed = threading.Condition()
         self.node = self.add(PatrolNode, name='test')
         self._spinner.start()
@@ -91,9 +93,14 @@ class Graph:
             while not (value := predicate()):
                 remaining = deadline - time.monotonic()
                 assert remaining > 0, f'not within {timeout} s'
-                assert self._spinner.error is None, repr(self._spinner.error)
+                assert self.failure is None, repr(self.failure)
                 self._changed.wait(min(remaining, 0.01))
         return value
+
+    @property
+    def failure(self) -> BaseException | None:
+        """What a callback raised, unless the test wants callbacks to fail."""
+        return self._spinner.error or (None if self.may_fail else self._spinner.lost)
 
     def touch(self) -> None:
         """Make `until` look at its predicate now."""
@@ -121,8 +128,8 @@ class Graph:
         for node in reversed(self._nodes):
             node.destroy_node()
         rclpy.try_shutdown(context=self.context)
-        if self._spinner.error is not None:
-            raise self._spinner.error
+        if self.failure is not None:
+            raise self.failure
 
 
 @pytest.fixture

@@ -6,6 +6,8 @@ its long work. Stopping ends that work while messages still flow.
 
 from __future__ import annotations
 
+import inspect
+import os
 import threading
 import traceback
 from collections.abc import Callable, Sequence
@@ -17,6 +19,7 @@ from rcl_interfaces.msg import (
     ParameterDescriptor,
     SetParametersResult,
 )
+from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.client import Client
 from rclpy.event_handler import (
     PublisherEventCallbacks,
@@ -32,6 +35,7 @@ from rclpy.service import Service
 from rclpy.subscription import Subscription
 
 from surveillance_runtime.configuration import RosArguments, Setting, read_schema
+from surveillance_runtime.logging import CleanLogger, clean
 from surveillance_runtime.parameters import Check, ParameterError, ParameterSpec, element_type
 from surveillance_runtime.qos import CLIENT_QOS, SERVICE_QOS
 from surveillance_runtime.waiting import Interrupt
@@ -100,6 +104,7 @@ class PatrolNode(Node):  # type: ignore[misc]
                 for key, setting in self._overrides_given.items()
             ]
         super().__init__(name, **node_options)
+        self._logger = CleanLogger(self.get_logger().name)
         self.add_on_set_parameters_callback(self._check_parameters)
         self.add_post_set_parameters_callback(self._tell_parameters)
 
@@ -229,7 +234,33 @@ class PatrolNode(Node):  # type: ignore[misc]
     ) -> Service:
         """Create a service as rclpy does, with a queue that does not lose requests."""
         options.setdefault('qos_profile', SERVICE_QOS)
-        return super().create_service(srv_type, name, callback, **options)
+        answering = self._answering(callback, name)
+        return super().create_service(srv_type, name, answering, **options)
+
+    def _answering(self, callback: Callable[..., Any], name: str) -> Callable[..., Any]:
+        """A callback that answers whatever happens: who asked is not to wait for ever."""
+
+        def empty(error: Exception, request: Any, response: Any) -> Any:
+            report_exception(error, self, f'service {name}')
+            return _refusal(type(response)(), request, error)
+
+        if inspect.iscoroutinefunction(callback):
+
+            async def answer_later(request: Any, response: Any) -> Any:
+                try:
+                    return await callback(request, response)
+                except Exception as error:
+                    return empty(error, request, response)
+
+            return answer_later
+
+        def answer(request: Any, response: Any) -> Any:
+            try:
+                return callback(request, response)
+            except Exception as error:
+                return empty(error, request, response)
+
+        return answer
 
     def create_client(self, srv_type: Any, name: str, **options: Any) -> Client:
         """Create a client as rclpy does, with a queue that does not lose answers."""
@@ -315,6 +346,23 @@ class PatrolNode(Node):  # type: ignore[misc]
             told = self._on_change.get(parameter.name)
             if told is not None:
                 told(self._specs[parameter.name].accept(_plain(parameter.value)))
+
+
+def report_exception(error: BaseException, node: Node, what: str) -> None:
+    """Say in one line that a callback failed; its message is lost, the node goes on."""
+    frames = traceback.extract_tb(error.__traceback__)
+    place = f' ({os.path.basename(frames[-1].filename)}:{frames[-1].lineno})' if frames else ''
+    node.get_logger().error(f'{what}: {type(error).__name__}: {error}{place}; the message is lost')
+
+
+def _refusal(response: Any, request: Any, error: Exception) -> Any:
+    """An answer that says no, in the words of the services of parameters."""
+    no = SetParametersResult(successful=False, reason=clean(str(error)))
+    if isinstance(response, SetParameters.Response):
+        response.results = [no for _ in request.parameters]
+    elif isinstance(response, SetParametersAtomically.Response):
+        response.result = no
+    return response
 
 
 def _override(node: str, name: str, value: Any) -> Parameter:

@@ -24,12 +24,19 @@ from rclpy.executors import (
     ShutdownException,
     SingleThreadedExecutor,
 )
+from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from threadpoolctl import threadpool_limits
 
 from surveillance_runtime.configuration import RosArguments, argument_layer, split_arguments
 from surveillance_runtime.middleware import check_middleware
-from surveillance_runtime.node import JOIN_SECONDS, PatrolNode, StartError, give_arguments
+from surveillance_runtime.node import (
+    JOIN_SECONDS,
+    PatrolNode,
+    StartError,
+    give_arguments,
+    report_exception,
+)
 from surveillance_runtime.parameters import ParameterError
 
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM)
@@ -212,12 +219,14 @@ class ExecutorThread:
 
     Attributes:
         executor: Add nodes to it before `start`, or later from any thread.
-        error: What an executor's callback raised, once the thread has ended by it.
+        error: What ended the thread, where something did.
+        lost: What the last callback raised that failed.
     """
 
     def __init__(self, context: Any = None) -> None:
         self.executor = SingleThreadedExecutor(context=context)
         self.error: BaseException | None = None
+        self.lost: Exception | None = None
         self._thread: threading.Thread | None = None
         self._stopping = False
 
@@ -227,7 +236,7 @@ class ExecutorThread:
         def spin() -> None:
             try:
                 while not self._stopping:
-                    self.executor.spin_once()
+                    self._spin_once()
             except (ExternalShutdownException, ShutdownException):
                 pass
             except BaseException as error:
@@ -239,6 +248,21 @@ class ExecutorThread:
         self._thread = threading.Thread(target=spin, name='executor', daemon=True)
         self._thread.start()
 
+    def _spin_once(self) -> None:
+        """Spin; what a callback raises costs its message, never the process."""
+        try:
+            self.executor.spin_once()
+        except (ExternalShutdownException, ShutdownException):
+            raise
+        except Exception as error:
+            if self._stopping:
+                return
+            self.lost = error
+            node = _node_of(error) or next(iter(self.executor.get_nodes()), None)
+            if node is None:
+                raise
+            report_exception(error, node, 'callback')
+
     def stop(self) -> None:
         """End the spinning and join the thread, so that the nodes may be destroyed."""
         self._stopping = True
@@ -247,6 +271,18 @@ class ExecutorThread:
         if self._thread is not None:
             self._thread.join(JOIN_SECONDS)
         self.executor.shutdown(timeout_sec=JOIN_SECONDS)
+
+
+def _node_of(error: BaseException) -> Node | None:
+    """The node in whose code an exception was raised, if it can be told."""
+    found = None
+    step = error.__traceback__
+    while step is not None:
+        for value in (step.tb_frame.f_locals.get('self'), step.tb_frame.f_locals.get('node')):
+            if isinstance(value, PatrolNode):
+                found = value
+        step = step.tb_next
+    return found
 
 
 def _one_line(error: BaseException) -> str:

@@ -1,0 +1,94 @@
+"""A node's logger for input of any kind: lines of bounded length, without control characters.
+
+What arrives from the network ends up in log lines. A text with line breaks could write lines that
+look like another node's, a megabyte would fill the disk. Warnings and errors have a rate, too: what
+a peer sends a thousand times a second is said a few times, with a count of the rest.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+import rclpy.impl.rcutils_logger as rcutils
+from rclpy.logging import LoggingSeverity
+
+LONGEST = 1000
+"""Characters of a line; what is longer loses its middle."""
+WARNINGS_PER_SECOND = 5.0
+"""Warnings and errors of a node for each second, once a burst is used up."""
+LINES_PER_SECOND = 200.0
+"""The same for all lines."""
+_BURST_SECONDS = 4.0
+
+# rclpy tells the throttles of different callers apart by the first frame outside of these files.
+rcutils._internal_callers.append(os.path.realpath(__file__))
+
+
+def clean(text: str) -> str:
+    """Return a text as one line of bounded length: control characters are written as escapes."""
+    if len(text) > LONGEST:
+        left_out = len(text) - LONGEST
+        half = LONGEST // 2
+        text = f'{text[:half]} ... ({left_out} characters left out) ... {text[-half:]}'
+    if text.isprintable():
+        return text
+    return ''.join(each if each.isprintable() else _escaped(each) for each in text)
+
+
+def _escaped(character: str) -> str:
+    return character.encode('unicode_escape').decode('ascii')
+
+
+class Allowance:
+    """So many lines a second, and a burst after a pause.
+
+    Args:
+        rate: Lines a second in the long run.
+        now: Steady time, seconds.
+    """
+
+    def __init__(self, rate: float, now: Callable[[], float] = time.monotonic) -> None:
+        self._rate = rate
+        self._now = now
+        self._left = rate * _BURST_SECONDS
+        self._at = now()
+
+    def take(self) -> bool:
+        """Tell whether one more line may be written, and count it."""
+        now = self._now()
+        self._left = min(self._rate * _BURST_SECONDS, self._left + (now - self._at) * self._rate)
+        self._at = now
+        if self._left < 1.0:
+            return False
+        self._left -= 1.0
+        return True
+
+
+class CleanLogger(rcutils.RcutilsLogger):  # type: ignore[misc]
+    """A logger whose lines cannot be forged, grow without bound, or come without end."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(name)
+        self._lock = threading.Lock()
+        self._warnings = Allowance(WARNINGS_PER_SECOND)
+        self._lines = Allowance(LINES_PER_SECOND)
+        self._left_out = 0
+
+    def log(self, message: Any, severity: Any, **options: Any) -> bool:
+        """Log a message, as rclpy does, if the node has lines left."""
+        if not self.is_enabled_for(severity):
+            return False
+        with self._lock:
+            grave = severity >= LoggingSeverity.WARN and severity < LoggingSeverity.FATAL
+            if (grave and not self._warnings.take()) or not self._lines.take():
+                self._left_out += 1
+                return False
+            left_out, self._left_out = self._left_out, 0
+        text = clean(str(message))
+        if left_out:
+            text += f' ({left_out} lines left out before this one)'
+        return bool(super().log(text, severity, **options))

@@ -1,0 +1,111 @@
+"""An exception in a callback costs its message; log lines are bounded, whatever is in them."""
+
+from __future__ import annotations
+
+import threading
+
+import pytest
+from rcl_interfaces.msg import Parameter as ParameterMessage
+from rcl_interfaces.msg import ParameterValue
+from rcl_interfaces.srv import SetParameters, SetParametersAtomically
+from rclpy.qos import QoSProfile
+from std_msgs.msg import Int32
+from std_srvs.srv import Trigger
+
+from surveillance_runtime.calls import ServiceCaller
+from surveillance_runtime.logging import LONGEST, Allowance, clean
+from surveillance_runtime.node import PatrolNode
+
+
+class Failing(PatrolNode):
+    """Fails at every odd number, and at every question."""
+
+    def __init__(self, **node_options):
+        super().__init__('failing', **node_options)
+        self.got = []
+        self.level = self.parameter('level', 1, 'Level.')
+        self.create_subscription(Int32, 'number', self._on_number, QoSProfile(depth=100))
+        self.create_service(Trigger, 'sync', self._on_sync)
+        self.create_service(Trigger, 'later', self._on_later)
+
+    def _on_number(self, message):
+        if message.data % 2:
+            raise LookupError(f'no use for {message.data}\n[ERROR] [other]: forged')
+        self.got.append(message.data)
+
+    def _on_sync(self, _request, _response):
+        raise ZeroDivisionError('nothing left')
+
+    async def _on_later(self, _request, _response):
+        raise ZeroDivisionError('nothing left')
+
+
+def test_an_exception_in_a_callback_costs_that_message_alone(graph, capfd):
+    graph.may_fail = True
+    node = graph.add(Failing)
+    publisher = graph.node.create_publisher(Int32, 'number', 100)
+    graph.until(lambda: publisher.get_subscription_count())
+    for number in range(10):
+        publisher.publish(Int32(data=number))
+    graph.until(lambda: node.got == [0, 2, 4, 6, 8])
+    errors = [line for line in capfd.readouterr().err.splitlines() if 'LookupError' in line]
+    assert len(errors) == 5
+    assert r'callback: LookupError: no use for 1\n[ERROR]' in errors[0]
+    assert 'test_failing_callbacks.py:' in errors[0]
+
+
+@pytest.mark.parametrize('service', ['sync', 'later'])
+def test_a_service_whose_callback_fails_answers_all_the_same(graph, service):
+    graph.add(Failing)
+    response = ServiceCaller(graph.node, Trigger, service).call(Trigger.Request(), 10.0)
+    assert not response.success
+
+
+@pytest.mark.parametrize('kind', [SetParameters, SetParametersAtomically])
+def test_a_parameter_of_a_type_that_there_is_not_is_refused(graph, kind):
+    graph.add(Failing)
+    name = 'set_parameters' + ('_atomically' if kind is SetParametersAtomically else '')
+    caller = ServiceCaller(graph.node, kind, f'failing/{name}')
+    odd = ParameterMessage(name='level', value=ParameterValue(type=255))
+    for _ in range(2):
+        response = caller.call(kind.Request(parameters=[odd]), 10.0)
+        results = response.results if kind is SetParameters else [response.result]
+        assert [result.successful for result in results] == [False]
+
+
+def test_a_line_has_a_longest_length_and_no_control_characters():
+    assert clean('plain text, ümläuts') == 'plain text, ümläuts'
+    assert clean('a\nb\x1b[2Jc\x00') == r'a\nb\x1b[2Jc\x00'
+    long = clean('x' * 10**6)
+    assert len(long) < LONGEST + 60
+    assert '999000 characters left out' in long
+
+
+def test_warnings_have_a_rate_and_the_rest_is_counted(graph, capfd):
+    log = graph.add(PatrolNode, name='chatty').get_logger()
+    for number in range(500):
+        log.warn(f'number {number}')
+    log.info('the end')
+    lines = capfd.readouterr().err.splitlines()
+    assert 10 < sum('number' in line for line in lines) < 60
+    assert any('lines left out before this one' in line for line in lines)
+
+
+def test_an_allowance_grows_with_time():
+    time = 0.0
+    allowance = Allowance(2.0, lambda: time)
+    assert sum(allowance.take() for _ in range(100)) == 8
+    time = 1.0
+    assert sum(allowance.take() for _ in range(100)) == 2
+
+
+def test_lines_of_several_threads_are_counted_together(graph, capfd):
+    log = graph.add(PatrolNode, name='threads').get_logger()
+    threads = [
+        threading.Thread(target=lambda: [log.error('same') for _ in range(100)]) for _ in range(4)
+    ]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert sum('same' in line for line in capfd.readouterr().err.splitlines()) < 60
