@@ -515,7 +515,9 @@ class Container(State):
     def _execute_as_root(self, parent_ud: Any) -> Any:
         """Begin a run of its own, and watch it to its end."""
         control, wakeup = self.control, Interrupt()
-        run = Run(control.condition, self.fsm_clock, self._preempt_timeout, control.trace)
+        run = Run(
+            control.condition, control.lock, self.fsm_clock, self._preempt_timeout, control.trace
+        )
         thread = ExecutionThread(run, self.fsm_path, wakeup, self)
 
         def body() -> Any:
@@ -575,7 +577,7 @@ class Container(State):
         frame = self.fsm_frame
         if frame is None:
             return
-        with frame.run.condition:
+        with frame.run.lock:
             frame = self.fsm_frame
             if frame is not None:
                 frame.preempt()

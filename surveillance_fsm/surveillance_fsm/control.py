@@ -45,10 +45,13 @@ class Control:
 
     Attributes:
         condition: The one condition of the machine.
+        lock: Its lock.
     """
 
     def __init__(self, container: Any) -> None:
-        self.condition = threading.Condition(threading.RLock())
+        # The condition's lock by itself, too: it is taken sooner.
+        self.lock = threading.RLock()
+        self.condition = threading.Condition(self.lock)
         self._container = container
         self._run: Run | None = None
         self._paused = False
@@ -205,7 +208,7 @@ class Control:
         Raises:
             InvalidStateError: Another run has not ended.
         """
-        with self.condition:
+        with self.lock:
             if self._run is not None:
                 raise InvalidStateError(f"'{self._container.get_name()}' is running already")
             run.paused = self._paused
@@ -214,7 +217,7 @@ class Control:
 
     def end(self, run: Run) -> None:
         """Let go of a run that has ended."""
-        with self.condition:
+        with self.lock:
             self._left = run.left_behind
             self._run = None
             self.condition.notify_all()

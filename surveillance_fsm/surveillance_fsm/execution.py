@@ -418,6 +418,7 @@ class Run:
 
     Attributes:
         condition: The one condition of the machine; its lock guards everything slow.
+        lock: That lock by itself.
         clock: The machine's clock.
         preempt_timeout: See `DEFAULT_PREEMPT_TIMEOUT`; None waits for ever.
         trace: Where transitions are reported, if anywhere.
@@ -432,11 +433,13 @@ class Run:
     def __init__(
         self,
         condition: threading.Condition,
+        lock: threading.RLock,
         clock: Clock,
         preempt_timeout: float | None,
         trace: Trace | None,
     ) -> None:
         self.condition = condition
+        self.lock = lock
         self.clock = clock
         self.preempt_timeout = preempt_timeout
         self.trace = trace
@@ -542,13 +545,14 @@ class ExecutionThread:
             self._retire()
 
     def end(self, outcome: Any, error: BaseException | None) -> None:
-        """Note what it ended with, and wake whoever watches it; under the condition."""
+        """Note what it ended with; under the condition. `wakeup` is to be raised after."""
         self.outcome, self.error, self.done = outcome, error, True
+        # The two refer to each other, which is left to no garbage collector.
+        self.work = None
         self._retire()
-        self.wakeup.set()
 
     def _retire(self) -> None:
-        with self.run.condition:
+        with self.run.lock:
             if self in self.run.threads:
                 self.run.threads.remove(self)
 
@@ -654,11 +658,14 @@ class Work:
             here.thread = here.stack = None
             self._ended = True
             self._going_on.release()
-        with thread.run.condition:
-            if self.stack is thread.stack:
-                thread.end(outcome, error)
-            elif error is not None:
-                log.logwarn(f"'{thread.path}', left behind, ended with {type(error).__name__}")
+        with thread.run.lock:
+            if self.stack is not thread.stack:
+                if error is not None:
+                    log.logwarn(f"'{thread.path}', left behind, ended with {type(error).__name__}")
+                return
+            thread.end(outcome, error)
+        # Who wakes takes the condition at once.
+        thread.wakeup.set()
 
 
 _idle: list[_Worker] = []

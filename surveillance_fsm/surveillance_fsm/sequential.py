@@ -380,14 +380,16 @@ class SequentialFrame(Frame):
             self.preempted = current
             self.thread.asked()
             current.state.request_preempt()
-        self.run.condition.notify_all()
+        if self.run.paused:
+            self.run.condition.notify_all()
 
     def interrupted(self) -> None:
         """Make way for the container's raised interrupts."""
         self.attention = True
         if self.container.fsm_urgent(self.current.priority):
             self._cut()
-        self.run.condition.notify_all()
+        if self.run.paused:
+            self.run.condition.notify_all()
 
     def suspend(self) -> None:
         """Have the container put aside with its history."""

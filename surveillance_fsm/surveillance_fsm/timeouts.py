@@ -216,11 +216,14 @@ def supervise(run: Run, threads: Sequence[ExecutionThread], wakeup: Interrupt) -
         threads: The threads; each raises `wakeup` when it ends or its limits change.
         wakeup: What the wait ends by.
     """
-    with run.condition:
+    with run.lock:
         wakeup.clear()
-        if any(thread.done for thread in threads):
-            return
-        dues = [_due(thread) for thread in threads]
+        quiet = True
+        for thread in threads:
+            if thread.done:
+                return
+            quiet = quiet and not thread.watches and thread.asked_at is None
+        dues = [] if quiet else [_due(thread) for thread in threads]
     clocked = min((due for due, _ in dues if due is not None), default=None)
     steady = min((due for _, due in dues if due is not None), default=None)
     left = run.preempt_timeout if steady is None else max(0.0, steady - time.monotonic())
@@ -385,6 +388,7 @@ def take_over(
             thread.end(outcome, None)
         else:
             thread.end(None, outcome)
+        thread.wakeup.set()
         return
     thread.start(lambda: _go_on(thread, frames, outcome))
 
