@@ -1,106 +1,160 @@
 #!/usr/bin/env python3
-"""How fast the state machine engine is, beside `transitions` and `py_trees` in the same run.
+"""Measures the state machine engine beside its peers, in one run.
 
-Transitions per second: flat (a ring of three states), three levels nested, without and with a
-userdata counter that each state reads and writes, with introspection off and on (every transition
-noted with its time, duration and userdata). Preempt latency: from the request on the root to the
-return of the wait in the state five levels below, and to the end of the root's execution.
+    python3 benchmarks/fsm.py [--quick]
 
-    .venv/bin/python benchmarks/fsm.py --quick
+Peers are SMACH's pure-Python core (a checkout's folder that holds the package ``smach``, in the
+environment variable SMACH_PATH), YASMIN, transitions and py_trees; each is left out where it is not
+found. Absolute times depend on the computer: what counts is the ratio within one run.
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import gc
+import importlib
+import os
+import random
+import signal
 import statistics
 import sys
+import tempfile
 import threading
 import time
+import tracemalloc
 from collections import deque
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent / 'surveillance_behaviour'))
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent / 'surveillance_runtime'))
+CHECKOUT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(CHECKOUT / 'surveillance_fsm'))
 
-import surveillance_fsm as fsm
-from surveillance_fsm.history import TransitionFeed
+import surveillance_fsm as fsm  # noqa: E402
+from surveillance_fsm import history  # noqa: E402
+from surveillance_fsm.verify import verify  # noqa: E402
 
 RING = 3
 LEVELS = 3
 
 
-class Plain(fsm.State):
-    """Goes on until the machine has made enough transitions."""
+def states_of(library: Any) -> tuple[type, type]:
+    """The states of the ring for a library with SMACH's interface: plain, and with userdata."""
 
-    def __init__(self, limit: list[int]) -> None:
-        super().__init__(['next', 'done'])
-        self._left = limit
+    class Plain(library.State):  # type: ignore[misc,name-defined]
+        """Goes on until the machine has made enough transitions."""
 
-    def execute(self, ud: object) -> str:
-        left = self._left
-        left[0] -= 1
-        return 'next' if left[0] else 'done'
+        def __init__(self, limit: list[int]) -> None:
+            library.State.__init__(self, ['next', 'done'])
+            self.left = limit
+
+        def execute(self, ud: object) -> str:
+            left = self.left
+            left[0] -= 1
+            return 'next' if left[0] else 'done'
+
+    class Counting(library.State):  # type: ignore[misc,name-defined]
+        """The same, with the count in userdata."""
+
+        def __init__(self) -> None:
+            library.State.__init__(self, ['next', 'done'], ['left'], ['left'])
+
+        def execute(self, ud: Any) -> str:
+            ud.left -= 1
+            return 'next' if ud.left else 'done'
+
+    return Plain, Counting
 
 
-class Counting(fsm.State):
-    """The same, with the count in userdata."""
-
-    def __init__(self) -> None:
-        super().__init__(['next', 'done'], input_keys=['left'], output_keys=['left'])
-
-    def execute(self, ud: fsm.UserData) -> str:
-        ud.left -= 1
-        return 'next' if ud.left else 'done'
-
-
-def ring(states: Sequence[fsm.State], keys: Sequence[str] = ()) -> fsm.StateMachine:
+def ring(states: Sequence[Any], library: Any = fsm) -> Any:
     """A machine whose states follow one another in a ring."""
-    machine = fsm.StateMachine(['done'], keys, keys)
+    machine = library.StateMachine(['done'])
     with machine:
         for number, state in enumerate(states):
             target = f'S{(number + 1) % len(states)}'
-            fsm.StateMachine.add(f'S{number}', state, {'next': target})
+            library.StateMachine.add(f'S{number}', state, {'next': target, 'done': 'done'})
     return machine
 
 
-def flat(count: int) -> fsm.StateMachine:
+def flat(count: int, library: Any = fsm) -> Any:
     """A ring without userdata."""
-    left = [count]
-    return ring([Plain(left) for _ in range(RING)])
+    left, plain = [count], states_of(library)[0]
+    return ring([plain(left) for _ in range(RING)], library)
 
 
-def counting(count: int) -> fsm.StateMachine:
+def counting(count: int, library: Any = fsm) -> Any:
     """A ring with userdata."""
-    machine = ring([Counting() for _ in range(RING)])
+    state = states_of(library)[1]
+    machine = ring([state() for _ in range(RING)], library)
     machine.userdata.left = count
     return machine
 
 
-def nested(count: int) -> fsm.StateMachine:
+def nested(count: int, library: Any = fsm) -> Any:
     """A ring of three machines of three machines of three states each, with userdata.
 
     Each inner machine ends after its states, so that one transition in three enters or leaves one.
     """
+    state = states_of(library)[1]
 
-    def level(depth: int) -> fsm.StateMachine:
-        machine = fsm.StateMachine(['next', 'done'], ['left'], ['left'])
+    def level(depth: int) -> Any:
+        machine = library.StateMachine(['next', 'done'], ['left'], ['left'])
         with machine:
             for number in range(RING):
                 last = number == RING - 1
-                state = level(depth - 1) if depth > 1 else Counting()
+                inner = level(depth - 1) if depth > 1 else state()
                 target = 'next' if last else f'S{number + 1}'
-                fsm.StateMachine.add(f'S{number}', state, {'next': target})
+                library.StateMachine.add(f'S{number}', inner, {'next': target, 'done': 'done'})
         return machine
 
-    root = fsm.StateMachine(['done'])
+    root = library.StateMachine(['done'])
     with root:
         for number in range(RING):
             target = f'S{(number + 1) % RING}'
-            fsm.StateMachine.add(f'S{number}', level(LEVELS - 1), {'next': target})
+            library.StateMachine.add(
+                f'S{number}', level(LEVELS - 1), {'next': target, 'done': 'done'}
+            )
     root.userdata.left = count
     return root
+
+
+def traced(machine: Any) -> Any:
+    """Have transitions kept."""
+    machine.control.add_trace(deque(maxlen=1_000).append)
+    return machine
+
+
+def with_callback(machine: Any) -> Any:
+    """Have one callback called on each transition."""
+    machine.register_transition_cb(lambda userdata, active: None)
+    return machine
+
+
+def with_shutdown_check(machine: Any, library: Any = fsm) -> Callable[[], object]:
+    """Have the shutdown check asked between any two states."""
+
+    def work() -> None:
+        library.set_shutdown_check(lambda: False)
+        try:
+            machine.execute()
+        finally:
+            library.set_shutdown_check(None)
+
+    return work
+
+
+def with_feed(machine: Any, count: int) -> Callable[[], object]:
+    """Have every transition numbered and brought to a consumer; the clock stops with the last."""
+
+    def work() -> None:
+        seen = deque[int](maxlen=1)
+        feed = history.TransitionFeed(machine, lambda transition: seen.append(transition.sequence))
+        machine.execute()
+        feed.close(timeout=600.0)
+        assert seen[0] == count, f'{seen[0]} of {count} transitions came'
+
+    return work
 
 
 def timed(work: Callable[[], object]) -> float:
@@ -185,40 +239,127 @@ def run_py_trees(count: int) -> Callable[[], object]:
     return work
 
 
-class Sleeper(fsm.State):
-    """Waits for the preempt and notes when it woke."""
+def run_yasmin(count: int) -> Callable[[], object]:
+    """YASMIN: a ring of three states with a counter on the blackboard."""
+    import yasmin
 
-    def __init__(self) -> None:
-        super().__init__(['done', 'preempted'])
-        self.ready = threading.Semaphore(0)
-        self.woke = 0.0
+    class Count(yasmin.State):  # type: ignore[misc]
+        def __init__(self) -> None:
+            super().__init__(['next', 'done'])
 
-    def execute(self, ud: object) -> str:
-        self.ready.release()
-        if self.wait(60.0):
-            return 'done'
-        self.woke = time.perf_counter()
-        self.service_preempt()
-        return 'preempted'
+        def execute(self, blackboard: Any) -> str:
+            left = blackboard['left'] - 1
+            blackboard['left'] = left
+            return 'next' if left else 'done'
+
+    machine = yasmin.StateMachine(outcomes=['end'])
+    for number in range(RING):
+        target = f'S{(number + 1) % RING}'
+        machine.add_state(f'S{number}', Count(), transitions={'next': target, 'done': 'end'})
+    blackboard = yasmin.Blackboard()
+    blackboard['left'] = count
+    return lambda: machine(blackboard)
 
 
-def preempt_latencies(repeats: int, depth: int = 5) -> tuple[list[float], list[float]]:
-    """Seconds from the request to the deepest state's waking, and to the root's end."""
-    sleeper = Sleeper()
-    machine: fsm.State = sleeper
+# One execution, preempts, sizes.
+
+
+def one_state(library: Any = fsm) -> Any:
+    """A machine of one state."""
+    machine = library.StateMachine(['done'])
+    with machine:
+        library.StateMachine.add(
+            'ONLY', library.CBState(lambda ud: 'done', outcomes=['done']), {'done': 'done'}
+        )
+    return machine
+
+
+def time_of(work: Callable[[], object], repeats: int = 300, rounds: int = 20) -> float:
+    """Seconds that some work takes, the wall's: the best of several rounds."""
+    work()
+    best = float('inf')
+    for _ in range(rounds):
+        begin = time.perf_counter()
+        for _ in range(repeats):
+            work()
+        best = min(best, (time.perf_counter() - begin) / repeats)
+    return best
+
+
+def handing_over() -> float:
+    """Seconds to hand something to another thread and get it back: the least of two threads."""
+    there, back = threading.Lock(), threading.Lock()
+    there.acquire()
+    back.acquire()
+    going_on = True
+
+    def serve() -> None:
+        while True:
+            there.acquire()
+            if not going_on:
+                return
+            back.release()
+
+    def hand_over() -> None:
+        there.release()
+        back.acquire()
+
+    thread = threading.Thread(target=serve)
+    thread.start()
+    spent = time_of(hand_over)
+    going_on = False
+    there.release()
+    thread.join()
+    return spent
+
+
+def sleeper_of(library: Any) -> type:
+    """A state that waits for the preempt and notes when it left."""
+
+    class Sleeper(library.State):  # type: ignore[misc,name-defined]
+        def __init__(self) -> None:
+            library.State.__init__(self, ['done', 'preempted'])
+            self.ready = threading.Semaphore(0)
+            self.asked = threading.Event()
+            self.left = 0.0
+
+        def request_preempt(self) -> None:
+            library.State.request_preempt(self)
+            self.asked.set()
+
+        def execute(self, ud: object) -> str:
+            self.ready.release()
+            preempted = not self.wait(60.0) if library is fsm else self.asked.wait(60.0)
+            self.asked.clear()
+            self.left = time.perf_counter()
+            if not preempted:
+                return 'done'
+            self.service_preempt()
+            return 'preempted'
+
+    return Sleeper
+
+
+def preempt_latencies(
+    repeats: int, library: Any = fsm, depth: int = 5
+) -> tuple[list[float], list[float]]:
+    """Seconds from the request to the deepest state's exit, and to the root's end."""
+    sleeper = sleeper_of(library)()
+    machine = sleeper
     for _ in range(depth):
-        outer = fsm.StateMachine(['done', 'preempted'])
+        outer = library.StateMachine(['done', 'preempted'])
         with outer:
-            fsm.StateMachine.add('INNER', machine)
+            bound = {'done': 'done', 'preempted': 'preempted'}
+            library.StateMachine.add('INNER', machine, bound)
         machine = outer
     root = machine
-    woke, ended = [], []
+    exits, ends = [], []
     for _ in range(repeats):
-        ends: list[float] = []
+        ended: list[float] = []
 
-        def body(ends: list[float] = ends) -> None:
-            root.execute(None)
-            ends.append(time.perf_counter())
+        def body(ended: list[float] = ended) -> None:
+            root.execute(library.UserData())
+            ended.append(time.perf_counter())
 
         thread = threading.Thread(target=body)
         thread.start()
@@ -228,9 +369,228 @@ def preempt_latencies(repeats: int, depth: int = 5) -> tuple[list[float], list[f
         asked = time.perf_counter()
         root.request_preempt()
         thread.join()
-        woke.append(sleeper.woke - asked)
-        ended.append(ends[0] - asked)
-    return woke, ended
+        exits.append(sleeper.left - asked)
+        ends.append(ended[0] - asked)
+    return exits, ends
+
+
+def event_latencies(repeats: int) -> list[float]:
+    """Seconds from setting an event to its waiter's waking: what the computer takes by itself."""
+    woke: list[float] = []
+    for _ in range(repeats):
+        event, ready = threading.Event(), threading.Semaphore(0)
+
+        def wait(event: threading.Event = event, ready: threading.Semaphore = ready) -> None:
+            ready.release()
+            event.wait()
+            woke.append(time.perf_counter())
+
+        thread = threading.Thread(target=wait)
+        thread.start()
+        ready.acquire()
+        time.sleep(0.001)
+        begin = time.perf_counter()
+        event.set()
+        thread.join()
+        woke[-1] -= begin
+    return woke
+
+
+def bytes_of_a_state(library: Any, count: int = 5_000) -> float:
+    """Bytes that a state of a large machine takes, once it has been executed."""
+    state = states_of(library)[1]
+    gc.collect()
+    tracemalloc.start()
+    before = tracemalloc.get_traced_memory()[0]
+    machine = ring([state() for _ in range(count)], library)
+    machine.userdata.left = 3
+    machine.execute()
+    gc.collect()
+    size = (tracemalloc.get_traced_memory()[0] - before) / count
+    tracemalloc.stop()
+    return size
+
+
+def large_machine(width: int) -> fsm.StateMachine:
+    """A ring of states, each of which writes a key of its own and reads the one before."""
+
+    class Link(fsm.State):
+        def execute(self, ud: object) -> str:
+            return 'next'
+
+    machine = fsm.StateMachine(['done'])
+    with machine:
+        for number in range(width):
+            link = Link(['next', 'done'], [f'k{number - 1}'] if number else [], [f'k{number}'])
+            fsm.StateMachine.add(f'S{number}', link, {'next': f'S{(number + 1) % width}'})
+    return machine
+
+
+def deep_machine(depth: int) -> fsm.StateMachine:
+    """Machines in one another, with a loop in each."""
+    state = states_of(fsm)[1]
+    machine = fsm.StateMachine(['done'], ['left'], ['left'])
+    with machine:
+        if depth > 1:
+            fsm.StateMachine.add('INNER', deep_machine(depth - 1), {'done': 'S0'})
+        fsm.StateMachine.add('S0', state(), {'next': 'S1'})
+        fsm.StateMachine.add('S1', state(), {'next': 'S0'})
+    return machine
+
+
+# Faults.
+
+
+class Work(fsm.State):
+    """Takes a random time and serves preempts."""
+
+    def __init__(self, generator: random.Random) -> None:
+        super().__init__(['done', 'preempted'])
+        self.generator = generator
+
+    def execute(self, ud: object) -> str:
+        if self.wait(self.generator.choice([0.0, 1e-5, 1e-4, 5e-4])):
+            return 'done'
+        self.service_preempt()
+        return 'preempted'
+
+
+def lost_preempts(count: int, seed: int = 1) -> int:
+    """Preempts at random moments after which a mission of all four containers went on."""
+    generator = random.Random(seed)
+    each = fsm.Iterator(['preempted'], [], [], it=[1, 2, 3], exhausted_outcome='done')
+    with each:
+        fsm.Iterator.set_contained_state('EACH', Work(generator), loop_outcomes=['done'])
+    row = fsm.Sequence(['done', 'preempted'], 'done')
+    with row:
+        fsm.Sequence.add('ONE', Work(generator))
+        fsm.Sequence.add('ITEMS', each)
+    # Neither names preempted: the engine has to.
+    both = fsm.Concurrence(['done', 'preempted'], 'done')
+    with both:
+        fsm.Concurrence.add('ROW', row)
+        fsm.Concurrence.add('OTHER', Work(generator))
+    root = fsm.StateMachine(['preempted'])
+    with root:
+        fsm.StateMachine.add('BOTH', both, {'done': 'AGAIN'})
+        fsm.StateMachine.add('AGAIN', Work(generator), {'done': 'BOTH'})
+    lost = 0
+    for _ in range(count):
+        ends: list[Any] = []
+        thread = threading.Thread(target=lambda ends=ends: ends.append(root.execute()))  # type: ignore[misc]
+        thread.start()
+        begin = time.perf_counter()
+        delay = generator.uniform(0.0, 0.002)
+        while time.perf_counter() - begin < delay:
+            time.sleep(0.0)
+        root.request_preempt()
+        thread.join(5.0)
+        if ends != ['preempted'] or root.preempt_requested():
+            lost += 1
+            root.request_preempt()
+            thread.join()
+    return lost
+
+
+def mission(log: Any, checkpoint: Path, items: int) -> fsm.StateMachine:
+    """A mission over items that says in a log what it begins and what its checkpoint has done."""
+
+    def deed(ud: Any) -> str:
+        log.write(f'begun {ud.item}\n')
+        log.flush()
+        ud.done = [*ud.done, ud.item]
+        return 'next'
+
+    each = fsm.Iterator(
+        [], ['done'], ['done'], it=range(items), it_label='item', exhausted_outcome='all'
+    )
+    with each:
+        state = fsm.CBState(
+            deed, outcomes=['next'], input_keys=['item', 'done'], output_keys=['done']
+        )
+        fsm.Iterator.set_contained_state('ITEM', state, loop_outcomes=['next'])
+    root = fsm.StateMachine(['all'])
+    root.preempt_timeout = None
+    root.userdata.done = []
+    with root:
+        fsm.StateMachine.add('ITEMS', each)
+    # Before the checkpointer, which removes the file at the end.
+    root.register_termination_cb(lambda *_: log.write('end 0\n') and log.flush())
+    history.Checkpointer(root, checkpoint)
+
+    def saved(ud: Any, active: object) -> None:
+        # Registered after the checkpointer: what is done here is on the disk.
+        for item in ud.done[-1:]:
+            log.write(f'done {item}\n')
+            log.flush()
+
+    each.register_transition_cb(saved)
+    return root
+
+
+def faults_of_killed_missions(kills: int, seed: int = 2, items: int = 40) -> tuple[int, int, int]:
+    """SIGKILLs of missions that go on from their checkpoints.
+
+    Returns:
+        The kills; items that were begun again although they had been done; items that were lost.
+    """
+    generator, killed, repeated, lost = random.Random(seed), 0, 0, 0
+    with tempfile.TemporaryDirectory() as folder:
+        number = 0
+        while killed < kills:
+            number += 1
+            checkpoint, log = Path(folder) / f'{number}.json', Path(folder) / f'{number}.log'
+            while True:
+                child = os.fork()
+                if child == 0:
+                    _run_mission(checkpoint, log, items)
+                time.sleep(generator.uniform(0.0, 0.03))
+                with contextlib.suppress(ProcessLookupError):
+                    os.kill(child, signal.SIGKILL)
+                _, status = os.waitpid(child, 0)
+                killed += os.WIFSIGNALED(status)
+                if log.exists() and log.read_text().endswith('end 0\n'):
+                    break
+            done: set[str] = set()
+            begun: set[str] = set()
+            for line in log.read_text().splitlines():
+                word, item = line.split()
+                if word == 'done':
+                    done.add(item)
+                elif word == 'begun':
+                    repeated += item in done
+                    begun.add(item)
+            lost += items - len(begun)
+    return killed, repeated, lost
+
+
+def _run_mission(checkpoint: Path, log: Path, items: int) -> None:
+    """Run a mission in this process, from its checkpoint if there is one, and end the process."""
+    try:
+        with open(log, 'a', encoding='utf-8') as file:
+            machine = mission(file, checkpoint, items)
+            if checkpoint.exists():
+                history.load(machine, checkpoint)
+            machine.execute()
+        os._exit(0)
+    except BaseException as error:
+        print(f'mission failed: {error!r}', file=sys.stderr)
+        os._exit(1)
+
+
+# The run.
+
+
+def find_smach() -> Any:
+    """SMACH's core, if SMACH_PATH names a folder that has it."""
+    folder = os.environ.get('SMACH_PATH')
+    if not folder:
+        return None
+    sys.path.append(folder)
+    smach = importlib.import_module('smach')
+    quiet = [lambda message: None] * 4
+    smach.set_loggers(*quiet)
+    return smach
 
 
 def percentile(values: Sequence[float], share: float) -> float:
@@ -239,23 +599,8 @@ def percentile(values: Sequence[float], share: float) -> float:
     return ordered[min(len(ordered) - 1, int(share * len(ordered)))]
 
 
-def main() -> int:
-    """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument('--quick', action='store_true', help='a run below 50 s')
-    options = parser.parse_args()
-    count = 100_000 if options.quick else 600_000
-    slow_count = 30_000 if options.quick else 120_000
-    rounds = 5 if options.quick else 7
-
-    def traced(machine: fsm.StateMachine) -> fsm.StateMachine:
-        machine.control.add_trace(deque(maxlen=1_000).append)
-        return machine
-
-    def feed(machine: fsm.StateMachine) -> Callable[[], object]:
-        TransitionFeed(machine, lambda transition: None)
-        return machine.execute
-
+def throughput(count: int, slow: int, rounds: int, smach: Any) -> None:
+    """Print transitions a second, best of several rounds."""
     subjects: list[tuple[str, int, Callable[[], Callable[[], object]]]] = [
         ('this engine, flat', count, lambda: flat(count).execute),
         ('this engine, flat, traced', count, lambda: traced(flat(count)).execute),
@@ -263,41 +608,103 @@ def main() -> int:
         ('this engine, flat, userdata, traced', count, lambda: traced(counting(count)).execute),
         ('this engine, 3 levels, userdata', count, lambda: nested(count).execute),
         ('this engine, 3 levels, userdata, traced', count, lambda: traced(nested(count)).execute),
-        ('this engine, flat, userdata, feed', slow_count, lambda: feed(counting(slow_count))),
-        ('transitions, flat, counter', slow_count, lambda: run_transitions_library(slow_count)),
-        ('py_trees, flat, blackboard', slow_count, lambda: run_py_trees(slow_count)),
+        (
+            'this engine, userdata, a callback',
+            count,
+            lambda: with_callback(counting(count)).execute,
+        ),
+        (
+            'this engine, userdata, shutdown check',
+            count,
+            lambda: with_shutdown_check(counting(count)),
+        ),
+        ('this engine, userdata, feed to its end', slow, lambda: with_feed(counting(slow), slow)),
+        ('transitions, flat, counter', slow, lambda: run_transitions_library(slow)),
+        ('py_trees, flat, blackboard', slow, lambda: run_py_trees(slow)),
+        ('YASMIN, flat, blackboard', slow, lambda: run_yasmin(slow)),
     ]
+    if smach is not None:
+        few = max(slow // 10, 1_000)
+        subjects += [
+            ('SMACH, flat', few, lambda: flat(few, smach).execute),
+            ('SMACH, flat, userdata', few, lambda: counting(few, smach).execute),
+            ('SMACH, 3 levels, userdata', few, lambda: nested(few, smach).execute),
+        ]
     # Round by round, so that a busy moment of the computer meets all alike.
     best: dict[str, float] = {}
+    absent: set[str] = set()
     for _ in range(rounds):
         for name, number, make in subjects:
-            rate = number / timed(make())
-            best[name] = max(best.get(name, 0.0), rate)
-    peer = best['transitions, flat, counter']
-    print(f'Transitions per second, best of {rounds} rounds of {count:,} (peers {slow_count:,})')
-    print(f'{"":42}{"per second":>12}{"each":>10}{"x transitions":>15}')
+            if name in absent:
+                continue
+            try:
+                work = make()
+            except ImportError:
+                absent.add(name)
+                continue
+            best[name] = max(best.get(name, 0.0), number / timed(work))
+    unit = best['this engine, flat, userdata']
+    print(f'Transitions a second of processor time, best of {rounds} rounds')
+    print(f'{"":42}{"a second":>12}{"each":>10}{"share":>10}')
     for name, rate in best.items():
-        print(f'{name:42}{rate:12,.0f}{1e6 / rate:7.2f} us{rate / peer:15.1f}')
-    print()
-    for kind in ('flat', 'flat, userdata', '3 levels, userdata'):
-        off, on = best[f'this engine, {kind}'], best[f'this engine, {kind}, traced']
-        print(f'introspection, {kind}: {100 * (1 - on / off):.0f} % fewer transitions per second')
+        print(f'{name:42}{rate:12,.0f}{1e6 / rate:7.2f} us{rate / unit:10.2f}')
+    for name in sorted(absent):
+        print(f'{name:42}{"not installed":>12}')
     reading = min(clock_reading(count) for _ in range(rounds))
-    least = reading * best['this engine, flat']
-    print(
-        f'reading the clock and keeping its value: {1e6 * reading:.2f} us, by itself '
-        f'{100 * least / (1 + least):.0f} % fewer, flat'
-    )
-    repeats = 300 if options.quick else 3000
-    woke, ended = preempt_latencies(repeats)
+    print(f'a trace reads the clock and keeps its value: {1e6 * reading:.2f} us at the least')
+
+
+def figures(quick: bool, smach: Any) -> None:
+    """Print what is no rate: one execution, preempts, sizes, checks."""
+    libraries = [('this engine', fsm), *([('SMACH', smach)] if smach is not None else [])]
+    repeats = 300 if quick else 3000
+    print(f'\n{"From the request of a preempt on":42}{"median":>12}{"p99":>12}{"worst":>12}')
+    rows = [('one thread sets an Event for another', event_latencies(repeats))]
+    for name, library in libraries:
+        exits, ends = preempt_latencies(repeats, library)
+        rows += [
+            (f'{name}, 5 levels, deepest state exits', exits),
+            (f'{name}, 5 levels, root has ended', ends),
+        ]
+    for what, values in rows:
+        row = [statistics.median(values), percentile(values, 0.99), max(values)]
+        print(f'{what:42}{"".join(f"{1e3 * value:9.3f} ms" for value in row)}')
     print()
-    print(f'Preempt latency through 5 levels, {repeats} requests')
-    print(f'{"":42}{"median":>12}{"p99":>10}{"worst":>12}')
-    for name, values in (('deepest state wakes', woke), ('root has ended', ended)):
-        print(
-            f'{name:42}{statistics.median(values) * 1e3:9.3f} ms'
-            f'{percentile(values, 0.99) * 1e3:7.2f} ms{max(values) * 1e3:9.2f} ms'
-        )
+    for name, library in libraries:
+        spent = time_of(one_state(library).execute)
+        print(f'{f"{name}, execute() of one state":42}{1e6 * spent:9.1f} us')
+    unwatched = one_state()
+    unwatched.preempt_timeout = None
+    print(f'{"this engine, on the calling thread":42}{1e6 * time_of(unwatched.execute):9.1f} us')
+    print(f'{"two threads: there and back":42}{1e6 * handing_over():9.1f} us')
+    for name, library in libraries:
+        print(f'{f"{name}, bytes a state":42}{bytes_of_a_state(library):9,.0f}')
+    for what, machine in (
+        ('10,000 states', large_machine(10_000)),
+        ('50 levels', deep_machine(50)),
+    ):
+        begin = time.perf_counter()
+        found = len(verify(machine, ['left']))
+        spent = time.perf_counter() - begin
+        print(f'{f"verify, {what}":42}{spent:9.3f} s, {found} findings')
+
+
+def main() -> int:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=(__doc__ or '').splitlines()[0])
+    parser.add_argument('--quick', action='store_true', help='a run below 50 s')
+    options = parser.parse_args()
+    quick = options.quick
+    smach = find_smach()
+    if smach is None:
+        print('SMACH is left out: SMACH_PATH names no folder with it')
+    # Before anything else: the processes that are forked have one thread then.
+    kills, repeated, lost = faults_of_killed_missions(100 if quick else 1_000)
+    throughput(60_000 if quick else 600_000, 20_000 if quick else 120_000, 3 if quick else 7, smach)
+    figures(quick, smach)
+    preempts = 1_000 if quick else 10_000
+    print(f'\npreempts at random moments, {preempts:,}: {lost_preempts(preempts)} lost')
+    print(f'SIGKILLs of a checkpointed mission, {kills:,}: {repeated} items repeated, {lost} lost')
     return 0
 
 
