@@ -14,6 +14,7 @@ from surveillance_ontology.documents.nodes import (
     BUILT_IN,
     CHARACTERISTICS,
     DECLARATIONS,
+    IllFormedError,
     NodeReader,
 )
 from surveillance_ontology.documents.rdf_xml import Graph, Node
@@ -71,18 +72,31 @@ class Mapping(NodeReader):
         self._added = []
         types = [value for value in properties.get(_TYPE, ()) if isinstance(value, str)]
         special = next((_SPECIAL[name] for name in types if name in _SPECIAL), None)
+        if special is None and OWL + 'sourceIndividual' in properties:
+            special = Mapping._negative  # Its type is missing; nothing else has a source.
         if special is not None:
-            special(self, subject, properties)
+            self._attempt(subject, special, self, subject, properties)
             return
         for name in types:
-            self._type(subject, name)
+            self._attempt(subject, self._type, subject, name)
         if OWL + 'onProperty' in properties and not subject.startswith('_:'):
-            self._add(ax.EquivalentClasses((subject, self._restriction(subject, properties))))
+            self._attempt(subject, self._named_restriction, subject, properties)
         for predicate, values in properties.items():
             if predicate == _TYPE or predicate in _STRUCTURE:
                 continue
             for value in values:
-                self._triple(subject, predicate, value)
+                self._attempt(subject, self._triple, subject, predicate, value)
+
+    def _named_restriction(self, subject: str, properties: dict[str, list[Node]]) -> None:
+        self._add(ax.EquivalentClasses((subject, self._restriction(subject, properties))))
+
+    def _attempt(self, subject: str, read: Callable[..., None], *arguments: object) -> None:
+        """Reads one statement; an ill-formed class in it costs the statement alone."""
+        try:
+            read(*arguments)
+        except IllFormedError as error:
+            text = f'a statement about {local_name(subject)} is left out: {error.message}'
+            self.unsupported.append(f'line {error.line}: {text}' if error.line else text)
 
     def _triple(self, subject: str, predicate: str, value: Node) -> None:
         handler = _PREDICATES.get(predicate)
@@ -148,7 +162,6 @@ class Mapping(NodeReader):
 
     def _imports(self, subject: str, value: str) -> None:
         self._add(ax.Import(value))
-        self._report(subject, f'owl:imports <{value}> is not followed')
 
     def _sub_class(self, subject: str, value: str) -> None:
         self._add(ax.SubClassOf(self.expression(subject), self.expression(value)))

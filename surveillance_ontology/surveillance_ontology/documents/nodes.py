@@ -44,6 +44,10 @@ _CARDINALITIES = (
 BUILT_IN = (OWL, RDF, RDFS, XSD, SWRL)
 
 
+class IllFormedError(RdfSyntaxError):
+    """A class expression or data range that says nothing: its axiom is left out, and reported."""
+
+
 class NodeReader:
     """Indexes a graph by subject; reads lists, property and class expressions, data ranges."""
 
@@ -99,6 +103,10 @@ class NodeReader:
     def _fail(self, node: str, message: str) -> RdfSyntaxError:
         place = self._places.get(node) or self._places.get(self._subject_read, (0, 0))
         return RdfSyntaxError(message, *place)
+
+    def _ill_formed(self, node: str, message: str) -> IllFormedError:
+        self._open.clear()
+        return IllFormedError(message, *self._places.get(node, (0, 0)))
 
     # --- reading parts ---
 
@@ -195,7 +203,7 @@ class NodeReader:
                 for name, values in self._nodes.get(facet, {}).items():
                     facets += [(name, value) for value in values if isinstance(value, Literal)]
             return ex.DatatypeRestriction(self._resource(node, OWL + 'onDatatype'), tuple(facets))
-        raise self._fail(node, 'expected a data range')
+        raise self._ill_formed(node, 'expected a data range')
 
     def expression(self, node: Node) -> ex.ClassExpression:
         """The class expression a node stands for."""
@@ -227,7 +235,7 @@ class NodeReader:
             return ex.ObjectOneOf(tuple(self._resources(properties[OWL + 'oneOf'][0])))
         if OWL + 'onProperty' in properties:
             return self._restriction(node, properties)
-        raise self._fail(node, 'expected a class expression')
+        raise self._ill_formed(node, 'expected a class expression')
 
     def _restriction(self, node: str, properties: dict[str, list[Node]]) -> ex.ClassExpression:
         on = self._resource(node, OWL + 'onProperty')
@@ -259,4 +267,6 @@ class NodeReader:
             if counts_values:
                 return of_data(number, on, self.data_range(on_range or RDFS + 'Literal'))
             return of_objects(number, prop, self.expression(on_class or OWL + 'Thing'))
-        raise self._fail(node, f'restriction on {local_name(on)} states nothing that is understood')
+        raise self._ill_formed(
+            node, f'restriction on {local_name(on)} states nothing that is understood'
+        )

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from urllib.parse import unquote, urlsplit
 
 from surveillance_ontology.documents import foreign_formats
+from surveillance_ontology.documents.functional_syntax import FunctionalSyntax, is_functional
 from surveillance_ontology.documents.mapping import Mapping
 from surveillance_ontology.documents.ntriples import parse_ntriples
 from surveillance_ontology.documents.rdf_xml import Graph, RdfSyntaxError, parse_rdf_xml
 from surveillance_ontology.owl.assertions import uncollected
-from surveillance_ontology.owl.axioms import Axiom
+from surveillance_ontology.owl.axioms import Axiom, Import
+from surveillance_ontology.owl.vocabulary import local_name
 
 _NTRIPLES = re.compile(rb'<[^\s<>]*>\s+[<_]')
+_ENDINGS = ('.owl', '.rdf', '.ttl', '.ofn', '.owx', '.xml', '.nt')
 DEFAULT_SIZE_LIMIT = 256 * 1024 * 1024
 
 
@@ -36,7 +40,7 @@ class OntologyDocument:
     Attributes:
         axioms: In document order, without repeats.
         unsupported: One sentence for each statement that was not understood.
-        format: 'rdfxml', 'ntriples', 'owlxml' or 'turtle'.
+        format: 'rdfxml', 'ntriples', 'owlxml', 'turtle' or 'functional'.
         iri: The IRI in the document's owl:Ontology header, '' without one.
         prefixes: Namespace prefixes declared by the document.
     """
@@ -51,7 +55,12 @@ class OntologyDocument:
 def read_ontology(
     source: str | Path | bytes, iri: str, *, size_limit: int = DEFAULT_SIZE_LIMIT
 ) -> OntologyDocument:
-    """Reads a document: RDF/XML, OWL/XML, Turtle or N-Triples, told by how it begins.
+    """Reads a document and the documents beside it that it imports.
+
+    Its format is told by how it begins: RDF/XML, OWL/XML, Turtle, N-Triples, or OWL functional
+    syntax. An import is followed where a file of its name (with any ending) lies in the folder of
+    the document, or where it is a file IRI; its axioms then take the place of the import. Any other
+    import is reported.
 
     Args:
         source: A path, or the document itself as bytes.
@@ -61,6 +70,45 @@ def read_ontology(
     Raises:
         OntologyFileError: Not readable, too large, or not an ontology; nothing is half-read.
     """
+    folder = None if isinstance(source, bytes) else Path(source).parent
+    seen = set() if isinstance(source, bytes) else {Path(source).resolve()}
+    document = _read(source, iri, size_limit)
+    axioms: dict[Axiom, None] = {}
+    unsupported = list(document.unsupported)
+    pending = [(document, folder)]
+    for read, place in pending:
+        for axiom in read.axioms:
+            if not isinstance(axiom, Import):
+                axioms[axiom] = None
+                continue
+            path = _imported(axiom.iri, place)
+            if path is None:
+                axioms[axiom] = None
+                unsupported.append(f'owl:imports <{axiom.iri}> is not followed: no file beside it')
+            elif path.resolve() not in seen:
+                seen.add(path.resolve())
+                other = _read(path, axiom.iri, size_limit)
+                unsupported += (f'{path.name}: {text}' for text in other.unsupported)
+                pending.append((other, path.parent))
+    return replace(document, axioms=list(axioms), unsupported=unsupported)
+
+
+def _imported(iri: str, folder: Path | None) -> Path | None:
+    """The local file that an import names."""
+    if iri.startswith('file:'):
+        path = Path(unquote(urlsplit(iri).path))
+        return path if path.is_file() else None
+    name = local_name(iri.rstrip('/#')).rpartition('/')[2]
+    if folder is None or not name or name.startswith('.'):
+        return None
+    for candidate in (folder / name, *(folder / (name + ending) for ending in _ENDINGS)):
+        if candidate.is_file():
+            return candidate
+    return None
+
+
+def _read(source: str | Path | bytes, iri: str, size_limit: int) -> OntologyDocument:
+    """Reads one document."""
     if isinstance(source, bytes):
         name, data = '<document>', source
     else:
@@ -73,6 +121,8 @@ def read_ontology(
     if len(data) > size_limit:
         raise OntologyFileError(name, 0, 0, f'larger than the limit of {size_limit} bytes')
     start = data.lstrip(b'\xef\xbb\xbf \t\r\n')
+    if is_functional(start):
+        return _functional(name, data)
     try:
         with uncollected():
             graph, form = _parsed(data, start, iri)
@@ -83,6 +133,18 @@ def read_ontology(
         raise OntologyFileError(name, 0, 0, 'class expressions nest too deeply') from None
     return OntologyDocument(
         list(mapping.axioms), mapping.unsupported, form, mapping.iri, graph.prefixes
+    )
+
+
+def _functional(name: str, data: bytes) -> OntologyDocument:
+    try:
+        read = FunctionalSyntax(data.decode('utf-8-sig'))
+    except RdfSyntaxError as error:
+        raise OntologyFileError(name, error.line, error.column, error.message) from None
+    except UnicodeDecodeError as error:
+        raise OntologyFileError(name, 0, 0, f'its encoding cannot be read: {error}') from None
+    return OntologyDocument(
+        list(read.axioms), read.unsupported, 'functional', read.iri, read.prefixes
     )
 
 

@@ -177,7 +177,7 @@ def test_what_is_not_understood_is_reported_with_its_line() -> None:
     )
     assert Import('http://x/y') in read.axioms
     (sentence,) = read.unsupported
-    assert sentence.startswith('line 2: owl:imports <http://x/y>')
+    assert sentence.startswith('owl:imports <http://x/y> is not followed')
 
 
 ANNOTATED = """

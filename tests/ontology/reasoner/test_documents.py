@@ -1,0 +1,146 @@
+"""Functional syntax, documents with ill-formed parts, and imports."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from surveillance_ontology import KnowledgeBase, OntologyFileError, read_ontology
+from surveillance_ontology.owl import axioms as ax
+from surveillance_ontology.owl import expressions as ex
+from surveillance_ontology.owl.expressions import Literal, Variable
+from surveillance_ontology.owl.vocabulary import RDF, RDFS, THING, XSD
+
+IRI = 'http://x/'
+FUNCTIONAL = """
+# A comment.
+Prefix(:=<http://x/#>)
+Prefix(xsd:=<http://www.w3.org/2001/XMLSchema#>)
+Ontology(<http://x/> <http://x/1>
+Declaration(Class(:A))
+SubClassOf(Annotation(rdfs:comment "why \\"so\\""@EN) :A ObjectSomeValuesFrom(:p ObjectOneOf(:i)))
+EquivalentClasses(:B ObjectIntersectionOf(:A ObjectMinCardinality(2 ObjectInverseOf(:p) :C)))
+SubObjectPropertyOf(ObjectPropertyChain(:p :q) :r)
+TransitiveObjectProperty(:r)
+DataPropertyRange(:d DatatypeRestriction(xsd:integer xsd:minInclusive "1"^^xsd:integer))
+HasKey(:A (:p) (:d))
+NegativeDataPropertyAssertion(:d :i "5"^^xsd:long)
+ObjectPropertyAssertion(ObjectInverseOf(:p) :i :j)
+ClassAssertion(DataHasValue(:d "5"^^xsd:long) _:someone)
+DifferentIndividuals(:i :j :k)
+DLSafeRule(Body(ClassAtom(:A Variable(:x)) DataPropertyAtom(:d Variable(:x) Variable(:v)))
+           Head(DataPropertyAtom(:e Variable(:x) Variable(:v))))
+Nonsense(:A :B)
+SubClassOf(:A ObjectSomeValuesFrom(:p))
+)
+"""
+
+
+def test_functional_syntax_is_read() -> None:
+    document = read_ontology(FUNCTIONAL.encode(), IRI)
+    x = 'http://x/#'
+    some = ax.SubClassOf(x + 'A', ex.ObjectSomeValuesFrom(x + 'p', ex.ObjectOneOf((x + 'i',))))
+    note = Literal('why "so"', RDF + 'langString', 'en')
+    counted = ex.ObjectMinCardinality(2, ex.ObjectInverseOf(x + 'p'), x + 'C')
+    bound = (XSD + 'minInclusive', Literal('1', XSD + 'integer'))
+    five = Literal('5', XSD + 'long')
+    body = (
+        ex.ClassAtom(x + 'A', Variable(x + 'x')),
+        ex.DataPropertyAtom(x + 'd', Variable(x + 'x'), Variable(x + 'v')),
+    )
+    assert (document.format, document.iri) == ('functional', IRI)
+    assert document.axioms == [
+        ax.Declaration('class', x + 'A'),
+        some,
+        ax.AxiomAnnotation(some, ((RDFS + 'comment', note),)),
+        ax.EquivalentClasses((x + 'B', ex.ObjectIntersectionOf((x + 'A', counted)))),
+        ax.SubPropertyChainOf((x + 'p', x + 'q'), x + 'r'),
+        ax.TransitiveObjectProperty(x + 'r'),
+        ax.DataPropertyRange(x + 'd', ex.DatatypeRestriction(XSD + 'integer', (bound,))),
+        ax.HasKey(x + 'A', (x + 'p',), (x + 'd',)),
+        ax.NegativeDataPropertyAssertion(x + 'd', x + 'i', five),
+        ax.ObjectPropertyAssertion(x + 'p', x + 'j', x + 'i'),
+        ax.ClassAssertion(ex.DataHasValue(x + 'd', five), '_:someone'),
+        ax.DifferentIndividuals(frozenset((x + 'i', x + 'j', x + 'k'))),
+        ax.Rule(body, (ex.DataPropertyAtom(x + 'e', Variable(x + 'x'), Variable(x + 'v')),)),
+    ]
+    unknown, incomplete = document.unsupported
+    assert unknown == 'line 19: Nonsense is not understood'
+    assert incomplete.startswith('line 20: SubClassOf is not understood: expected 2 parts')
+
+
+@pytest.mark.parametrize(
+    ('text', 'place', 'words'),
+    [
+        ('Ontology(<x> SubClassOf(:A :B))', (1, 25), "prefix of ':A' is not declared"),
+        ('Prefix(:=<x>)\nOntology(<x> SubClassOf(:A', (2, 27), 'ends inside'),
+        ('Ontology(<x> SubClassOf(] :A))', (1, 25), 'prefix of'),
+        ('Ontology(<x> "text)', (1, 14), 'unexpected'),
+    ],
+)
+def test_errors_in_functional_syntax_name_their_place(
+    text: str, place: tuple[int, int], words: str
+) -> None:
+    with pytest.raises(OntologyFileError) as caught:
+        read_ontology(text.encode(), IRI)
+    assert (caught.value.line, caught.value.column) == place
+    assert words in str(caught.value)
+
+
+HEAD = (
+    '<rdf:RDF xmlns:rdf="http://www.w3.org/1999/02/22-rdf-syntax-ns#"'
+    ' xmlns:rdfs="http://www.w3.org/2000/01/rdf-schema#"'
+    ' xmlns:owl="http://www.w3.org/2002/07/owl#" xml:base="http://x/">\n'
+)
+
+
+def test_an_ill_formed_restriction_costs_its_axiom_alone() -> None:
+    text = (
+        HEAD + '<owl:Class rdf:ID="A"><rdfs:subClassOf rdf:resource="#B"/>\n'
+        '<rdfs:subClassOf><owl:Restriction><owl:onProperty rdf:resource="#p"/>\n'
+        '</owl:Restriction></rdfs:subClassOf></owl:Class></rdf:RDF>'
+    )
+    document = read_ontology(text.encode(), IRI)
+    assert ax.SubClassOf('http://x/#A', 'http://x/#B') in document.axioms
+    (sentence,) = document.unsupported
+    assert 'line 3: a statement about A is left out: restriction on p states nothing' in sentence
+
+
+def test_a_negative_assertion_needs_no_type() -> None:
+    text = (
+        HEAD + '<rdf:Description><owl:sourceIndividual rdf:resource="#i"/>\n'
+        '<owl:assertionProperty rdf:resource="#p"/>'
+        '<owl:targetIndividual rdf:resource="#j"/></rdf:Description></rdf:RDF>'
+    )
+    document = read_ontology(text.encode(), IRI)
+    x = 'http://x/#'
+    assert document.axioms == [ax.NegativeObjectPropertyAssertion(x + 'p', x + 'i', x + 'j')]
+
+
+def test_a_restriction_with_a_name_defines_it() -> None:
+    text = (
+        HEAD + '<owl:Class rdf:ID="A"><owl:onProperty rdf:resource="#p"/>'
+        '<owl:someValuesFrom rdf:resource="http://www.w3.org/2002/07/owl#Thing"/></owl:Class>'
+        '</rdf:RDF>'
+    )
+    document = read_ontology(text.encode(), IRI)
+    definition = ex.ObjectSomeValuesFrom('http://x/#p', THING)
+    assert ax.EquivalentClasses(('http://x/#A', definition)) in document.axioms
+
+
+def test_imports_of_files_beside_the_document_are_followed(tmp_path: Path) -> None:
+    def written(name: str, body: str) -> Path:
+        path = tmp_path / name
+        path.write_text(f'Prefix(:=<http://x/#>)\nOntology(<http://x/{name}>\n{body})')
+        return path
+
+    written('upper.ofn', 'Import(<http://x/main>) SubClassOf(:B :C)')
+    main = written('main.ofn', 'Import(<http://x/upper>) Import(<http://y/away>) SubClassOf(:A :B)')
+    document = read_ontology(main, IRI)
+    assert document.unsupported == [
+        'owl:imports <http://y/away> is not followed: no file beside it'
+    ]
+    kb = KnowledgeBase(IRI, document.axioms)
+    kb.reason()
+    assert kb.superclasses('http://x/#A') == {'http://x/#B', 'http://x/#C'}
