@@ -34,8 +34,8 @@ from whole_stack import ROOT, Stack, ros_arguments
 from launcher import node_table, run
 from surveillance_controllers.geometry import polyline
 from surveillance_controllers.motion.driving import Drive
+from surveillance_controllers.motion.localisation import Scan
 from surveillance_controllers.motion.pilot import Pilot
-from surveillance_controllers.motion.scans import Scan
 from surveillance_controllers.planning.grid_map import GridMap
 from surveillance_controllers.planning.grid_planning import GridPlanner, PlanningParameters
 from surveillance_runtime.place import generation as place_generation

@@ -7,7 +7,14 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from geometry_msgs.msg import Point, PoseStamped, PoseWithCovarianceStamped, Quaternion, Twist
+from geometry_msgs.msg import (
+    Point,
+    PoseStamped,
+    PoseWithCovarianceStamped,
+    Quaternion,
+    Transform,
+    Twist,
+)
 from geometry_msgs.msg import Pose as PoseMessage
 from nav_msgs.msg import OccupancyGrid
 from nav_msgs.msg import Path as PathMessage
@@ -18,8 +25,8 @@ from surveillance_controllers.geometry.polyline import Points
 from surveillance_controllers.geometry.poses import Pose
 
 if TYPE_CHECKING:
+    from surveillance_controllers.motion.localisation import Scan
     from surveillance_controllers.motion.path_following import Velocity
-    from surveillance_controllers.motion.scans import Scan
     from surveillance_controllers.planning.grid_map import GridMap
 
 
@@ -74,9 +81,29 @@ def battery_state(battery: Battery, *, charging: bool) -> BatteryState:
     return message
 
 
+FARTHEST = 1e6
+"""No coordinate of a place is larger, metres."""
+MOST_CELLS = 100_000_000
+"""Cells of the largest map that is taken."""
+MOST_RAYS = 100_000
+"""Rays of the largest scan that is taken."""
+LONGEST_RANGE = 1000.0
+"""No ray of a lidar goes farther, metres."""
+
+
 def pose_from(message: PoseMessage) -> Pose:
-    """A pose in the plane: x, y in metres and yaw in radians."""
-    q = message.orientation
+    """A pose in the plane: x, y in metres and yaw in radians.
+
+    Raises:
+        ValueError: A coordinate is not finite, or too large to be one.
+    """
+    p, q = message.position, message.orientation
+    if not all(map(math.isfinite, (p.x, p.y, q.x, q.y, q.z, q.w))):
+        raise ValueError('a pose with a coordinate that is not finite')
+    if max(abs(p.x), abs(p.y)) > FARTHEST:
+        raise ValueError(
+            f'a pose at ({p.x:g}, {p.y:g}) m: expected at most {FARTHEST:g} m from the origin'
+        )
     # Yaw of a quaternion in Z-Y-X order; exact for any tilt that is not straight up.
     yaw = math.atan2(2 * (q.w * q.z + q.x * q.y), 1 - 2 * (q.y * q.y + q.z * q.z))
     return message.position.x, message.position.y, yaw
@@ -120,6 +147,14 @@ def grid_from(message: OccupancyGrid) -> GridMap:
     from surveillance_controllers.planning.grid_map import GridMap
 
     info = message.info
+    if info.width * info.height > MOST_CELLS:
+        raise ValueError(
+            f'a map of {info.width} x {info.height} cells: expected at most {MOST_CELLS}'
+        )
+    if not 1e-4 <= info.resolution <= 100.0:
+        raise ValueError(
+            f'a map of {info.resolution:g} m a cell: expected between 0.0001 and 100 m'
+        )
     cells = np.array(message.data, dtype=np.int8)
     if cells.size != info.width * info.height:
         raise ValueError(
@@ -131,12 +166,55 @@ def grid_from(message: OccupancyGrid) -> GridMap:
     return GridMap(cells.reshape(info.height, info.width), float(info.resolution), (x, y))
 
 
-def scan_from(message: LaserScan) -> Scan:
-    """A turn of a lidar; rays that are out of its range or not a number met nothing."""
-    from surveillance_controllers.motion.scans import Scan
+def scan_from(message: LaserScan, mount: Pose = (0.0, 0.0, 0.0)) -> Scan:
+    """A turn of a lidar; rays that are out of its range or not a number met nothing.
 
+    Args:
+        message: The scan.
+        mount: Where the lidar sits on the robot, robot's frame.
+
+    Raises:
+        ValueError: Angles or reach are no lidar's, there are too many rays, or it was made before
+            time began.
+    """
+    from surveillance_controllers.motion.localisation import Scan
+
+    count = len(message.ranges)
+    first, step, reach = message.angle_min, message.angle_increment, message.range_max
+    if message.header.stamp.sec < 0:
+        raise ValueError(f'a scan made at {message.header.stamp.sec} s: expected 0 s or later')
+    if not 1 <= count <= MOST_RAYS:
+        raise ValueError(f'a scan of {count} rays: expected 1 to {MOST_RAYS}')
+    if not (math.isfinite(first) and math.isfinite(step) and abs(step) * count < 20.0):
+        raise ValueError(
+            f'a scan of {count} rays from {first:g} rad, {step:g} rad apart: expected one turn'
+        )
+    if abs(first) > 20.0 or (count > 1 and step == 0.0) or not reach > 0.0:
+        raise ValueError(
+            f'a scan from {first:g} rad, {step:g} rad apart, of {reach:g} m: expected one turn of '
+            'a lidar that reaches farther than 0 m'
+        )
+    reach = min(float(reach), LONGEST_RANGE)
     ranges = np.frombuffer(message.ranges, dtype=np.float32).astype(float)
-    angles = message.angle_min + message.angle_increment * np.arange(len(ranges))
+    angles = first + step * np.arange(count)
     # The lidar gives what is nearer than it can measure as its least range, or below it.
-    good = (ranges > 0) & (ranges < message.range_max)
-    return Scan(angles, np.where(good, ranges, np.inf), float(message.range_max))
+    good = (ranges > 0) & (ranges < reach)
+    return Scan(angles, np.where(good, ranges, np.inf), reach, mount)
+
+
+def planar_from(transform: Transform) -> Pose:
+    """A transform as a pose in the plane.
+
+    Raises:
+        ValueError: It is not finite, or leaves the plane by more than 0.1 rad.
+    """
+    message = PoseMessage(orientation=transform.rotation)
+    moved = transform.translation
+    message.position = Point(x=moved.x, y=moved.y, z=moved.z)
+    q = transform.rotation
+    # The z axis of the turned frame, as seen from the other one.
+    upright = 1 - 2 * (q.x * q.x + q.y * q.y)
+    pose = pose_from(message)
+    if upright < math.cos(0.1):
+        raise ValueError('a mount that is tilted: expected one in the plane of the floor')
+    return pose

@@ -26,6 +26,9 @@ from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.waiting import Interrupt
 
+RETRY_PERIOD = 0.1
+"""Pause before the ontology is asked again where the robot is, seconds."""
+
 
 class KnowledgeError(Exception):
     """Map or ontology do not answer, or not what is needed; the text is one line."""
@@ -180,16 +183,18 @@ class MapKnowledge:
         """The place that the robot is in, from whoever knows it, or else from the ontology.
 
         Raises:
-            KnowledgeError: Nobody knows, or the ontology does not answer.
+            KnowledgeError: Nobody knows within the deadline, or the ontology does not answer.
         """
-        if self._robot_place:
-            return self._robot_place
-        with answered():
-            found = self.connect(interrupt).robot_places()
-        if len(found) != 1:
-            what = f'several places: {", ".join(found)}' if found else 'no place'
-            raise KnowledgeError(f'the ontology has the robot in {what}')
-        return found[0]
+        deadline = time.monotonic() + self._timeout
+        while not self._robot_place:
+            with answered():
+                found = self.connect(interrupt).robot_places()
+            if len(found) == 1:
+                return found[0]
+            if time.monotonic() >= deadline or interrupt.wait(RETRY_PERIOD):
+                what = f'several places: {", ".join(found)}' if found else 'no place'
+                raise KnowledgeError(f'the ontology has the robot in {what}')
+        return self._robot_place
 
     def _on_robot_place(self, message: RobotPlace) -> None:
         self._robot_place = message.place

@@ -152,6 +152,8 @@ def _checked(points: Sequence[Any]) -> Points:
         raise GoalAbortedError('no points, expected at least one')
     if not np.isfinite(path).all():
         raise GoalAbortedError('a point is not finite')
+    if np.abs(path).max() > conversions.FARTHEST:
+        raise GoalAbortedError(f'a point is farther than {conversions.FARTHEST:g} m away')
     return path
 
 

@@ -6,10 +6,13 @@ import math
 
 import numpy as np
 import pytest
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import Quaternion, Transform, Vector3
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import BatteryState, LaserScan, PointCloud2
+from std_msgs.msg import Header
 
 from surveillance_controllers import conversions
 from surveillance_controllers.battery.model import Battery, BatteryParameters
@@ -113,3 +116,63 @@ def test_a_battery_s_state_is_told(level: float, charging: bool, status: int) ->
     assert state.power_supply_status == status
     assert state.charge == pytest.approx(state.capacity * level / 100)
     assert math.isnan(state.current) == (status != BatteryState.POWER_SUPPLY_STATUS_CHARGING)
+
+
+def scan_message(**fields: object) -> LaserScan:
+    sound: dict[str, object] = {
+        'angle_min': -1.0,
+        'angle_increment': 0.1,
+        'range_max': 8.0,
+        'ranges': [1.0] * 20,
+    }
+    return LaserScan(**{**sound, **fields})
+
+
+@pytest.mark.parametrize(
+    ('fields', 'text'),
+    [
+        ({'ranges': []}, 'a scan of 0 rays: expected 1'),
+        ({'angle_min': math.nan}, 'expected one turn'),
+        ({'angle_increment': math.inf}, 'expected one turn'),
+        ({'angle_increment': 5.0}, 'expected one turn'),
+        ({'angle_increment': 0.0}, 'expected one turn'),
+        ({'range_max': math.nan}, 'reaches farther than 0 m'),
+        ({'range_max': -1.0}, 'reaches farther than 0 m'),
+        ({'header': Header(stamp=Time(sec=-1))}, 'made at -1 s'),
+    ],
+)
+def test_a_scan_that_is_no_lidar_s_is_refused(fields: dict[str, object], text: str) -> None:
+    with pytest.raises(ValueError, match=text):
+        conversions.scan_from(scan_message(**fields))
+
+
+def test_a_reach_without_end_is_cut() -> None:
+    scan = conversions.scan_from(scan_message(range_max=math.inf))
+    assert scan.range_max == conversions.LONGEST_RANGE
+    assert len(scan.points) == 20
+
+
+@pytest.mark.parametrize('x', [math.nan, math.inf, -1e308])
+def test_a_pose_that_is_none_is_refused(x: float) -> None:
+    message = conversions.pose_message((0.0, 0.0, 0.0))
+    message.position.x = x
+    with pytest.raises(ValueError, match='a pose'):
+        conversions.pose_from(message)
+
+
+def test_a_map_too_large_or_without_size_is_refused() -> None:
+    message = grid_message(2, 2, 4)
+    message.info.width = message.info.height = 2**31
+    with pytest.raises(ValueError, match='expected at most'):
+        conversions.grid_from(message)
+    message = grid_message(2, 2, 4)
+    message.info.resolution = math.nan
+    with pytest.raises(ValueError, match='a map of nan m a cell'):
+        conversions.grid_from(message)
+
+
+def test_a_tilted_mount_is_refused() -> None:
+    level = Transform(translation=Vector3(x=0.2, y=-0.1), rotation=Quaternion(z=1.0, w=0.0))
+    assert conversions.planar_from(level) == pytest.approx((0.2, -0.1, math.pi))
+    with pytest.raises(ValueError, match='tilted'):
+        conversions.planar_from(Transform(rotation=Quaternion(x=1.0, w=0.0)))

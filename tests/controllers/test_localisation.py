@@ -11,8 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from surveillance_controllers.geometry.poses import composed, relative
-from surveillance_controllers.motion.localisation import Localiser
-from surveillance_controllers.motion.scans import Scan
+from surveillance_controllers.motion.localisation import Localiser, Scan
 
 POSES = st.tuples(st.floats(-5, 5), st.floats(-5, 5), st.floats(-3, 3))
 

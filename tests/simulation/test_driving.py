@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from surveillance_controllers.geometry import polyline
 from surveillance_controllers.motion.driving import Drive, State
+from surveillance_controllers.motion.localisation import Scan
 from surveillance_controllers.motion.pilot import Pilot
-from surveillance_controllers.motion.scans import Scan
 from surveillance_controllers.planning.grid_map import GridMap
 from surveillance_controllers.planning.grid_planning import GridPlanner, NoPath
 from surveillance_runtime.place import occupancy_grid

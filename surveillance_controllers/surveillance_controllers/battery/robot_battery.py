@@ -6,6 +6,7 @@ Reads `amcl_pose` (how far the robot drove, and whether it stands at the station
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import partial
 
@@ -57,13 +58,17 @@ class RobotBattery:
         return self._use.why_not_charging()
 
     def _on_pose(self, message: PoseWithCovarianceStamped) -> None:
-        self._use.see_pose(conversions.pose_from(message.pose.pose), self._wait.now())
+        try:
+            self._use.see_pose(conversions.pose_from(message.pose.pose), self._wait.now())
+        except ValueError as error:
+            self._node.get_logger().error(f'amcl_pose: {error}', throttle_duration_sec=5.0)
 
     def _on_joints(self, message: JointState) -> None:
         self._use.see_joints(message.position)
 
     def _on_drain(self, message: Float32) -> None:
-        percent = max(0.0, float(message.data))
+        # What is no number drains nothing.
+        percent = max(0.0, float(message.data)) if math.isfinite(message.data) else 0.0
         self._change(lambda: self._battery.set_level(self._battery.level - percent))
 
     def _update(self) -> None:

@@ -17,14 +17,45 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from surveillance_controllers.geometry.polyline import Points
 from surveillance_controllers.geometry.poses import Pose, composed, relative
-from surveillance_controllers.motion.scans import Scan
 from surveillance_controllers.planning.grid_map import GridMap, distance_to
+
+
+@dataclass(frozen=True, eq=False)
+class Scan:
+    """One turn of a lidar.
+
+    Attributes:
+        angles: Direction of each ray in the lidar's frame, shape (n,), rad.
+        ranges: How far each ray went, shape (n,), metres; infinite where it met nothing.
+        range_max: The lidar's reach, metres.
+        mount: Where the lidar sits on the robot, robot's frame.
+    """
+
+    angles: Points
+    ranges: Points
+    range_max: float
+    mount: Pose = (0.0, 0.0, 0.0)
+
+    @cached_property
+    def points(self) -> Points:
+        """The points met, in the robot's frame, shape (m, 2), m at most n."""
+        met = np.isfinite(self.ranges) & (self.ranges < self.range_max)
+        ranges, angles = self.ranges[met], self.angles[met]
+        x, y, yaw = self.mount
+        turned = angles + yaw
+        return np.stack([x + ranges * np.cos(turned), y + ranges * np.sin(turned)], axis=1)
+
+    def thinned(self, count: int) -> Scan:
+        """About `count` of the rays, evenly taken."""
+        step = max(1, len(self.angles) // count)
+        return Scan(self.angles[::step], self.ranges[::step], self.range_max, self.mount)
 
 
 @dataclass(frozen=True)
@@ -261,7 +292,7 @@ class Localiser:
 
     def explained(self, pose: Pose, scan: Scan) -> float:
         """The part of a scan's rays that go as far as they should from a pose, 0 to 1."""
-        expected = self.cast(pose, scan.angles, scan.range_max)
+        expected = self.cast(composed(pose, scan.mount), scan.angles, scan.range_max)
         measured = np.minimum(scan.ranges, scan.range_max)
         slack = self.parameters.hit + self.grid.resolution / 2
         return float((np.abs(expected - measured) <= slack).mean()) if len(measured) else 0.0
@@ -273,11 +304,13 @@ class Localiser:
             Shape of `angles`, metres, at most `range_max`; to half a cell.
         """
         step = self.grid.resolution / 2
-        way = np.arange(0.0, range_max + step, step)
+        # Nothing of the map is farther away than its diagonal is long.
+        rows, columns = self._occupied.shape
+        diagonal = math.hypot(rows, columns) * self.grid.resolution
+        way = np.arange(0.0, min(range_max, diagonal) + step, step)
         heading = angles + pose[2]
         x = pose[0] + np.cos(heading)[:, None] * way
         y = pose[1] + np.sin(heading)[:, None] * way
-        rows, columns = self._occupied.shape
         column = ((x - self.grid.origin[0]) * (1 / self.grid.resolution)).astype(np.int32)
         row = ((y - self.grid.origin[1]) * (1 / self.grid.resolution)).astype(np.int32)
         np.clip(column, 0, columns - 1, out=column)

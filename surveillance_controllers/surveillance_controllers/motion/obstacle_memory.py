@@ -11,8 +11,8 @@ import math
 import numpy as np
 
 from surveillance_controllers.geometry.polyline import Points
-from surveillance_controllers.geometry.poses import Pose
-from surveillance_controllers.motion.scans import Scan
+from surveillance_controllers.geometry.poses import Pose, composed
+from surveillance_controllers.motion.localisation import Scan
 from surveillance_controllers.planning.grid_map import GridMap, distance_to
 
 
@@ -80,6 +80,7 @@ class ObstacleMemory:
         if not self._seen:
             return
         cells = list(self._seen)
+        pose = composed(pose, scan.mount)
         away = (np.array(cells, dtype=float) + 0.5) * self._cell - pose[:2]
         distance = np.hypot(away[:, 0], away[:, 1])
         bearing = np.arctan2(away[:, 1], away[:, 0]) - pose[2]

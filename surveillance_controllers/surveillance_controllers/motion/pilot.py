@@ -15,11 +15,10 @@ from numpy.typing import ArrayLike
 from surveillance_controllers.geometry.polyline import Points
 from surveillance_controllers.geometry.poses import Pose
 from surveillance_controllers.motion.driving import Drive, Spin
-from surveillance_controllers.motion.localisation import LocalisationParameters, Localiser
+from surveillance_controllers.motion.localisation import LocalisationParameters, Localiser, Scan
 from surveillance_controllers.motion.obstacle_memory import ObstacleMemory
 from surveillance_controllers.motion.path_following import Velocity
 from surveillance_controllers.motion.place_regions import PlaceRegions, Segment
-from surveillance_controllers.motion.scans import Scan
 from surveillance_controllers.planning.grid_map import GridMap, with_walls
 
 SETTLE_SECONDS = 0.2

@@ -6,22 +6,24 @@ the robot is (`amcl_pose`) and what stands about that the map does not have (`ob
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
-from geometry_msgs.msg import PoseWithCovarianceStamped, Twist
+from geometry_msgs.msg import PoseWithCovarianceStamped, TransformStamped, Twist
 from nav_msgs.msg import OccupancyGrid, Odometry
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import LaserScan, PointCloud2
 
 from surveillance_controllers import conversions
 from surveillance_controllers.geometry.polyline import Points
-from surveillance_controllers.geometry.poses import Pose
+from surveillance_controllers.geometry.poses import Pose, composed, relative
 from surveillance_controllers.motion.driving import Drive, Spin, State
+from surveillance_controllers.motion.localisation import Scan
 from surveillance_controllers.motion.path_following import Velocity
 from surveillance_controllers.motion.pilot import Pilot
-from surveillance_controllers.motion.tf_correction import TfCorrection
 from surveillance_controllers.planning.grid_planning import NoPath
 from surveillance_interfaces.msg import DoorStates
 from surveillance_runtime.conversions import cloud_from_points, seconds_of
@@ -29,8 +31,21 @@ from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 from surveillance_runtime.waiting import Interrupt
 
+LONGEST_SILENCE = 0.25
+"""A robot whose lidar or odometry has been silent for longer stands, seconds of ROS time; scans
+come at 10 Hz."""
+BASE_FRAMES = ('base_link', 'base_footprint', '')
+"""Frames at the robot's centre."""
+WATCH_PERIOD = 0.05
+"""Time between two looks at that, seconds."""
 POSE_PERIOD = 0.19
 """Least time between two messages on amcl_pose, seconds: with every second scan at 10 Hz."""
+
+
+try:
+    from tf2_msgs.msg import TFMessage
+except ImportError:
+    TFMessage = None
 
 
 class RobotSilent(Exception):
@@ -46,6 +61,7 @@ class RobotBase:
         sensor_timeout: How long the sensors may be silent during a task, seconds of steady time.
         on_place: Told in the executor's thread in which place a scan found the robot, when that
             changed (None: not known any more), and the scan's stamp; must not block.
+        mount: Where the lidar sits on the robot; None: as `tf_static` says of the scan's frame.
     """
 
     def __init__(
@@ -54,6 +70,7 @@ class RobotBase:
         pilot: Pilot,
         sensor_timeout: float,
         on_place: Callable[[str | None, Any], None],
+        mount: Pose | None = None,
     ) -> None:
         self._node = node
         self._pilot = pilot
@@ -68,7 +85,12 @@ class RobotBase:
         self._commands = node.create_publisher(Twist, 'cmd_vel', 1)
         self._poses = node.create_publisher(PoseWithCovarianceStamped, 'amcl_pose', STATE_QOS)
         self._obstacles = node.create_publisher(PointCloud2, 'obstacles', STATE_QOS)
-        self._tf = TfCorrection(node)
+        self._tf = Transforms(node)
+        self._mount = mount
+        self._heard = {'scan': -math.inf, 'odom': -math.inf}
+        self._moving = False
+        self._silent = ''
+        node.create_timer(WATCH_PERIOD, self._watch)
         node.create_subscription(OccupancyGrid, 'map', self._on_map, STATE_QOS)
         node.create_subscription(DoorStates, 'door_states', self._on_doors, STATE_QOS)
         node.create_subscription(Odometry, 'odom', self._on_odometry, SENSOR_QOS)
@@ -155,7 +177,7 @@ class RobotBase:
             unsubscribe()
             with self._lock:
                 self._pilot.task = None
-                self._commands.publish(conversions.twist_from(Velocity()))
+                self._command(Velocity())
 
     def _await_step(self, interrupt: Interrupt) -> Pose | None:
         with self._stepped:
@@ -177,42 +199,82 @@ class RobotBase:
             self._stepped.notify_all()
 
     def _on_map(self, message: OccupancyGrid) -> None:
-        try:
+        with self._refusing('map'):
             grid = conversions.grid_from(message)
-        except ValueError as error:
-            self._node.get_logger().error(f'map: {error}')
-            return
-        with self._lock:
-            self._pilot.set_map(grid)
+            with self._lock:
+                self._pilot.set_map(grid)
 
     def _on_doors(self, message: DoorStates) -> None:
         with self._lock:
             self._pilot.set_closed(message.closed)
 
     def _on_odometry(self, message: Odometry) -> None:
-        with self._lock:
-            self._pilot.move(conversions.pose_from(message.pose.pose))
+        with self._refusing('odom'):
+            pose = conversions.pose_from(message.pose.pose)
+            with self._lock:
+                self._heard['odom'] = self._now()
+                self._pilot.move(pose)
 
     def _on_initial_pose(self, message: PoseWithCovarianceStamped) -> None:
-        pose = conversions.pose_from(message.pose.pose)
-        self._node.get_logger().info(f'told to be at ({pose[0]:.2f}, {pose[1]:.2f})')
-        with self._lock:
-            self._pilot.believe(pose)
+        with self._refusing('initialpose'):
+            pose = conversions.pose_from(message.pose.pose)
+            self._node.get_logger().info(f'told to be at ({pose[0]:.2f}, {pose[1]:.2f})')
+            with self._lock:
+                self._pilot.believe(pose)
 
     def _on_scan(self, message: LaserScan) -> None:
-        stamp = message.header.stamp
+        with self._refusing('scan'):
+            mount = self._mount or self._tf.mount_of(message.header.frame_id)
+            self._see(conversions.scan_from(message, mount), message.header.stamp)
+
+    def _see(self, scan: Scan, stamp: Any) -> None:
         measured = seconds_of(stamp)
         with self._stepped:
             before = self.place
-            velocity = self._pilot.see(conversions.scan_from(message), measured)
-            if velocity is not None and self._pilot.task is not None:
-                self._commands.publish(conversions.twist_from(velocity))
+            self._heard['scan'] = self._now()
+            velocity = self._pilot.see(scan, measured)
+            if velocity is not None and self._pilot.task is not None and not self._unheard():
+                self._command(velocity)
             self._publish_pose(measured, stamp)
             if self.place != before:
                 self._on_place(self.place, stamp)
             self._steps += 1
             self._stepped.notify_all()
         self._tell(stamp)
+
+    @contextmanager
+    def _refusing(self, topic: str) -> Iterator[None]:
+        """Lets a message that is not sound cost one line, and nothing else."""
+        try:
+            yield
+        except ValueError as error:
+            self._node.get_logger().error(f'{topic}: {error}', throttle_duration_sec=5.0)
+
+    # --- a robot that sees nothing stands ---
+
+    def _command(self, velocity: Velocity) -> None:
+        self._moving = velocity != Velocity()
+        self._commands.publish(conversions.twist_from(velocity))
+
+    def _now(self) -> float:
+        return float(self._node.get_clock().now().nanoseconds) / 1e9
+
+    def _unheard(self) -> str:
+        """The topic that has been silent for too long to drive on; empty: none."""
+        now = self._now()
+        return next((t for t, at in self._heard.items() if now - at > LONGEST_SILENCE), '')
+
+    def _watch(self) -> None:
+        with self._lock:
+            topic = self._unheard() if self._moving or self._silent else ''
+            if topic and self._moving:
+                self._command(Velocity())
+            if topic != self._silent:
+                self._silent = topic
+                if topic:
+                    self._node.get_logger().warn(
+                        f'nothing on the topic {topic} for {LONGEST_SILENCE:g} s: the robot stands'
+                    )
 
     def _publish_pose(self, measured: float, stamp: Any) -> None:
         pilot = self._pilot
@@ -243,3 +305,68 @@ class RobotBase:
             self._obstacles.publish(cloud)
         if pilot.odometry is not None:
             self._tf.tick(pilot.pose, pilot.odometry, stamp)
+
+
+class Transforms:
+    """What the robot's frames are to each other, where tf2_msgs is installed.
+
+    Publishes map -> odom on `tf`, and reads from `tf_static` where the lidar sits.
+
+    Args:
+        node: The node that localises.
+    """
+
+    def __init__(self, node: PatrolNode) -> None:
+        self._node = node
+        self._parents: dict[str, tuple[str, Pose]] = {}
+        self._unknown: set[str] = set()
+        self._publisher = None
+        if TFMessage is not None:
+            self._publisher = node.create_publisher(TFMessage, 'tf', 10)
+            latched = QoSProfile(
+                depth=100,
+                reliability=ReliabilityPolicy.RELIABLE,
+                durability=DurabilityPolicy.TRANSIENT_LOCAL,
+            )
+            node.create_subscription(TFMessage, 'tf_static', self._on_static, latched)
+
+    def tick(self, pose: Pose, odometry: Pose, stamp: Any) -> None:
+        """Publishes the correction that leads from the odometry to the pose."""
+        if self._publisher is None:
+            return
+        # map <- odom = (map <- base) (base <- odom)
+        x, y, yaw = composed(pose, relative(odometry, (0.0, 0.0, 0.0)))
+        transform = TransformStamped(child_frame_id='odom')
+        transform.header.frame_id, transform.header.stamp = 'map', stamp
+        transform.transform.translation.x, transform.transform.translation.y = x, y
+        transform.transform.rotation = conversions.pose_message((x, y, yaw)).orientation
+        self._publisher.publish(TFMessage(transforms=[transform]))
+
+    def mount_of(self, frame: str) -> Pose:
+        """Where a sensor's frame is on the robot; at its centre while nobody says."""
+        pose: Pose = (0.0, 0.0, 0.0)
+        at, passed = frame, 0
+        while at.rpartition('/')[2] not in BASE_FRAMES:
+            if at not in self._parents or passed > len(self._parents):
+                if frame not in self._unknown:
+                    self._unknown.add(frame)
+                    self._node.get_logger().warn(
+                        f'scan: where its frame {frame!r} is on the robot is not known: expected '
+                        f'it on tf_static below {BASE_FRAMES[0]}, or the parameter lidar_mount; '
+                        "it is taken for the robot's centre"
+                    )
+                return (0.0, 0.0, 0.0)
+            at, step = self._parents[at]
+            pose = composed(step, pose)
+            passed += 1
+        return pose
+
+    def _on_static(self, message: Any) -> None:
+        for each in message.transforms:
+            try:
+                pose = conversions.planar_from(each.transform)
+            except ValueError as error:
+                # Cameras and arms are tilted; only the lidar must not be.
+                self._node.get_logger().debug(f'tf_static: {each.child_frame_id}: {error}')
+                continue
+            self._parents[each.child_frame_id] = each.header.frame_id, pose

@@ -90,6 +90,7 @@ class RobotSettings:
     peer_timeout: float
     track_place: bool
     spin: bool
+    lidar_mount: Pose | None
 
 
 def robot_settings(node: PatrolNode, motion: MotionSettings) -> RobotSettings:
@@ -125,4 +126,18 @@ def robot_settings(node: PatrolNode, motion: MotionSettings) -> RobotSettings:
             'SIMULATED: motion/controller ends with one turn on the spot.',
             read_only=True,
         ),
+        lidar_mount=_mount(node),
     )
+
+
+def _mount(node: PatrolNode) -> Pose | None:
+    given: list[float] = node.parameter(
+        'lidar_mount',
+        [],
+        'SIMULATED: where the lidar sits on the robot: x, y in metres, yaw in radians; empty: as '
+        "tf_static says of the scan's frame.",
+        of=float,
+        check=lambda values: None if len(values) in (0, 3) else 'three numbers: x, y, yaw',
+        read_only=True,
+    )
+    return (given[0], given[1], given[2]) if given else None

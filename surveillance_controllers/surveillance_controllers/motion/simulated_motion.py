@@ -51,7 +51,7 @@ class SimulatedMotion:
         self._planner = GoalCaller(node, ComputePath, 'compute_path')
         pilot = Pilot(settings.doors, guesses=[settings.station])
         tell = recorder.tell if settings.track_place else lambda _place, _stamp: None
-        self._base = RobotBase(node, pilot, settings.sensor_timeout, tell)
+        self._base = RobotBase(node, pilot, settings.sensor_timeout, tell, settings.lidar_mount)
         self._base.set_positions(settings.positions)
         knowledge.assume(settings.positions)
         self._news = Interrupt()

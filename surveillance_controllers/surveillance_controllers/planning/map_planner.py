@@ -89,7 +89,10 @@ class MapPlanner:
             self._node.get_logger().error(f'obstacles: {error}')
 
     def _on_pose(self, message: PoseWithCovarianceStamped) -> None:
-        self._pose = conversions.pose_from(message.pose.pose)
+        try:
+            self._pose = conversions.pose_from(message.pose.pose)
+        except ValueError as error:
+            self._node.get_logger().error(f'amcl_pose: {error}', throttle_duration_sec=5.0)
 
     def _replace(self, make: Callable[[], Any], topic: str) -> None:
         try:

@@ -1,0 +1,129 @@
+"""The bridge between sensors and base: unsound messages are refused, who sees nothing stands."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from geometry_msgs.msg import PoseWithCovarianceStamped, TransformStamped, Twist
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import LaserScan
+
+from surveillance_controllers.geometry.poses import composed
+from surveillance_controllers.motion.driving import Drive, Spin
+from surveillance_controllers.motion.localisation import Localiser, Scan
+from surveillance_controllers.motion.path_following import Velocity
+from surveillance_controllers.motion.robot_base import LONGEST_SILENCE, RobotBase, Transforms
+from surveillance_runtime.qos import SENSOR_QOS
+
+
+class Steersman:
+    """Stands in for the pilot: drives as long as it sees."""
+
+    def __init__(self) -> None:
+        self.task: Drive | Spin | None = None
+        self.seen: list[Scan] = []
+        self.pose = self.odometry = self.place = self.missing = None
+        self.lost, self.jumps, self.obstacles_changed = False, 0, False
+
+    def see(self, scan: Scan, _now: float) -> Velocity:
+        self.seen.append(scan)
+        return Velocity(0.6, 0.0)
+
+    def move(self, _odometry: Any) -> None:
+        pass
+
+
+@pytest.fixture
+def steersman() -> Steersman:
+    return Steersman()
+
+
+def scan(**fields: Any) -> LaserScan:
+    return LaserScan(
+        angle_min=-1.0, angle_increment=0.1, range_max=8.0, ranges=[1.0] * 20, **fields
+    )
+
+
+def test_without_scans_or_odometry_the_robot_is_told_to_stand(
+    graph: Any, steersman: Steersman, capfd: Any
+) -> None:
+    pilot: Any = steersman
+    RobotBase(graph.node, pilot, 5.0, lambda _place, _stamp: None)
+    steersman.task = Spin()
+    told = graph.listen(Twist, 'cmd_vel', 1)
+    scans = graph.node.create_publisher(LaserScan, 'scan', SENSOR_QOS)
+    odometry = graph.node.create_publisher(Odometry, 'odom', SENSOR_QOS)
+
+    def drives(*publishers: Any) -> bool:
+        for publisher, message in publishers:
+            publisher.publish(message)
+        return bool(told and told[-1].linear.x > 0.0)
+
+    both = (scans, scan()), (odometry, Odometry())
+    graph.until(lambda: drives(*both))
+    graph.until(lambda: told[-1].linear.x == 0.0)
+    graph.until(lambda: drives(*both))
+    graph.until(lambda: not drives((scans, scan())), timeout=5.0)
+    assert 'nothing on the topic' in capfd.readouterr().err
+    assert LONGEST_SILENCE < 0.3
+
+
+def test_messages_that_are_not_sound_end_nothing(
+    graph: Any, steersman: Steersman, capfd: Any
+) -> None:
+    pilot: Any = steersman
+    RobotBase(graph.node, pilot, 5.0, lambda _place, _stamp: None)
+    scans = graph.node.create_publisher(LaserScan, 'scan', SENSOR_QOS)
+    poses = graph.node.create_publisher(PoseWithCovarianceStamped, 'initialpose', 1)
+    bad = PoseWithCovarianceStamped()
+    bad.pose.pose.position.x = math.nan
+
+    def seen() -> bool:
+        poses.publish(bad)
+        scans.publish(LaserScan(angle_min=math.nan, ranges=[1.0]))
+        scans.publish(scan())
+        return bool(steersman.seen)
+
+    graph.until(seen)
+    logged = capfd.readouterr().err
+    graph.until(lambda: seen() and 'initialpose: a pose with' in logged + capfd.readouterr().err)
+
+
+def test_a_lidar_s_mount_comes_from_the_static_transforms(graph: Any, capfd: Any) -> None:
+    frames = Transforms(graph.node)
+    transforms = []
+    for parent, child, x in (('base_link', 'mast', 0.1), ('mast', 'laser', 0.2), ('b', 'a', 1.0)):
+        step = TransformStamped(child_frame_id=child)
+        step.header.frame_id = parent
+        step.transform.translation.x = x
+        transforms.append(step)
+    transforms.append(TransformStamped(child_frame_id='b'))
+    transforms[-1].header.frame_id = 'a'
+    # tf2_msgs is no wheel: its message is a list of transforms.
+    frames._on_static(SimpleNamespace(transforms=transforms))
+    assert frames.mount_of('laser') == pytest.approx((0.3, 0.0, 0.0))
+    assert frames.mount_of('robot2/base_link') == (0.0, 0.0, 0.0)
+    for unknown in ('lidar', 'a', 'lidar'):
+        assert frames.mount_of(unknown) == (0.0, 0.0, 0.0)
+    logged = capfd.readouterr().err
+    assert logged.count("its frame 'lidar' is on the robot is not known") == 1
+    assert "its frame 'a' is" in logged
+
+
+@pytest.mark.parametrize('mount', [(0.3, -0.2, 0.0), (0.1, 0.0, math.pi), (-0.25, 0.1, 2.0)])
+def test_a_lidar_off_centre_or_turned_localises_as_well(
+    flat: Any, mount: tuple[float, float, float]
+) -> None:
+    pose = (1.2, 1.0, 0.4)
+    seen = flat.scan(composed(pose, mount))
+    mounted = Scan(seen.angles, seen.ranges, seen.range_max, mount)
+    localiser = Localiser(flat.grid, (1.3, 0.95, 0.45))
+    localiser.believe((1.3, 0.95, 0.45))
+    for step in range(5):
+        localiser.see(mounted, 0.1 * step)
+    assert localiser.pose == pytest.approx(pose, abs=0.04)
+    assert np.isfinite(mounted.points).all()
