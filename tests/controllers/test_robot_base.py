@@ -88,9 +88,14 @@ def test_messages_that_are_not_sound_end_nothing(
         scans.publish(scan())
         return bool(steersman.seen)
 
-    graph.until(seen)
-    logged = capfd.readouterr().err
-    graph.until(lambda: seen() and 'initialpose: a pose with' in logged + capfd.readouterr().err)
+    logged: list[str] = []
+
+    def told(text: str) -> bool:
+        logged.append(capfd.readouterr().err)
+        return text in ''.join(logged)
+
+    graph.until(lambda: seen() and told('initialpose: a pose with a coordinate'))
+    graph.until(lambda: seen() and told('scan: a scan of 1 rays from nan rad'))
 
 
 def test_a_lidar_s_mount_comes_from_the_static_transforms(graph: Any, capfd: Any) -> None:

@@ -61,7 +61,7 @@ class RobotBattery:
         try:
             self._use.see_pose(conversions.pose_from(message.pose.pose), self._wait.now())
         except ValueError as error:
-            self._node.get_logger().error(f'amcl_pose: {error}', throttle_duration_sec=5.0)
+            self._node.get_logger().error(f'amcl_pose: {error}')
 
     def _on_joints(self, message: JointState) -> None:
         self._use.see_joints(message.position)

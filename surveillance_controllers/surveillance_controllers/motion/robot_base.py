@@ -248,7 +248,7 @@ class RobotBase:
         try:
             yield
         except ValueError as error:
-            self._node.get_logger().error(f'{topic}: {error}', throttle_duration_sec=5.0)
+            self._node.get_logger().error(f'{topic}: {error}')
 
     # --- a robot that sees nothing stands ---
 

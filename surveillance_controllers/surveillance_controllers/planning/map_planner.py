@@ -92,7 +92,7 @@ class MapPlanner:
         try:
             self._pose = conversions.pose_from(message.pose.pose)
         except ValueError as error:
-            self._node.get_logger().error(f'amcl_pose: {error}', throttle_duration_sec=5.0)
+            self._node.get_logger().error(f'amcl_pose: {error}')
 
     def _replace(self, make: Callable[[], Any], topic: str) -> None:
         try:
