@@ -13,6 +13,7 @@ spends 2 s in each place it enters; all places count as just visited at the star
     python benchmarks/patrol.py                       all maps, a few minutes
     python benchmarks/patrol.py --quick               small maps, 2 hours
     python benchmarks/patrol.py --graph FILE ...      maps of patrolling_sim
+    python benchmarks/patrol.py --random 100          100 random maps within the rules
     python benchmarks/patrol.py --plot docs/patrol.png
 """
 
@@ -30,18 +31,23 @@ from pathlib import Path
 import yaml
 
 ROOT = Path(__file__).resolve().parents[1]
-for package in ('surveillance_behaviour', 'surveillance_ontology', 'surveillance_runtime'):
-    sys.path.insert(0, str(ROOT / package))
+for package in ('behaviour', 'fsm', 'ontology', 'runtime'):
+    sys.path.insert(0, str(ROOT / f'surveillance_{package}'))
 
+from surveillance_behaviour.decision import Rules  # noqa: E402
 from surveillance_behaviour.policy.graph import (  # noqa: E402
     GraphError,
     PatrolGraph,
     graph_of_places,
 )
 from surveillance_behaviour.policy.graph_files import read_patrolling_sim  # noqa: E402
-from surveillance_behaviour.policy.policies import DEFAULT_POLICY, make_policy  # noqa: E402
-from surveillance_behaviour.policy.rules import Rules  # noqa: E402
-from surveillance_behaviour.policy.simulation import Battery, Patrol, PatrolRun  # noqa: E402
+from surveillance_behaviour.policy.policies import DEFAULT_POLICY  # noqa: E402
+from surveillance_behaviour.policy.rule_bound import rule_bound  # noqa: E402
+from surveillance_behaviour.policy.simulation import (  # noqa: E402
+    Patrol,
+    PatrolRun,
+    SimulatedBattery,
+)
 from surveillance_runtime.place import read_place  # noqa: E402
 
 DAY = 86400.0
@@ -131,18 +137,18 @@ def patrol(
     policy: str,
     hours: float,
     threshold: float = URGENCY,
-    battery: Battery | None = None,
+    battery: SimulatedBattery | None = None,
 ) -> PatrolRun:
     """One patrol."""
     rules = Rules() if policy in RULED else Rules(())
     run = Patrol(
         place.graph,
         rules,
-        make_policy(policy, random.Random(SEED)),
         policy,
         threshold,
         place.start,
         battery,
+        random.Random(SEED),
     )
     for _ in run.until(hours * 3600.0):
         pass
@@ -211,6 +217,83 @@ def thresholds(place: Map, hours: float) -> None:
     print(table(rows), flush=True)
 
 
+def random_graph(count: int, seed: int) -> Map:
+    """Return a random planar map: a spanning tree of a triangulation and a quarter of its rest."""
+    import networkx
+    import numpy as np
+    from scipy.spatial import Delaunay
+
+    draw = np.random.default_rng(seed)
+    points = draw.uniform(0.0, 10.0 * math.sqrt(count), (count, 2))
+    corners = Delaunay(points).simplices
+    pairs = sorted(
+        {tuple(sorted((int(a), int(b)))) for t in corners for a in t for b in t if a < b}
+    )
+    lengths = {pair: math.dist(points[pair[0]], points[pair[1]]) for pair in pairs}
+    whole = networkx.Graph()
+    whole.add_weighted_edges_from((*pair, lengths[pair] * draw.uniform(0.7, 1.3)) for pair in pairs)
+    kept = {tuple(sorted(edge)) for edge in networkx.minimum_spanning_tree(whole).edges}
+    kept |= {pair for pair in pairs if draw.random() < 0.25}
+    legs: dict[str, dict[str, float]] = {f'P{number:03}': {} for number in range(count)}
+    for first, second in sorted(kept):
+        seconds = lengths[first, second] / SPEED
+        legs[f'P{first:03}'][f'P{second:03}'] = legs[f'P{second:03}'][f'P{first:03}'] = seconds
+    return Map(f'random {count}, seed {seed}', PatrolGraph(legs, DWELL), 'P000')
+
+
+def within_rules(places: Sequence[Map], periods: float) -> None:
+    """The ruled policies over a bound that knows the rules, once settled, by threshold / tour.
+
+    The bound is exhaustive on maps of up to nine places where the search ends; else the greater of
+    the tour's bound and, where a place has one way only, the threshold.
+    """
+    print('\nlongest time from visit to visit over the bound that knows the rules (* exhaustive)')
+    rows = [['map', 'threshold / tour', *RULED[:3]]]
+    ratios: dict[str, list[float]] = {policy: [] for policy in RULED[:3]}
+    worse = 0
+    for place in places:
+        graph, length = place.graph, place.graph.tour.length
+        for factor in (0.1, 0.5, 0.75, 1.0, 2.0):
+            threshold = factor * length
+            held = any(len(ways) == 1 for ways in graph.legs.values())
+            bound = max(graph.tour.bound, threshold if held else 0.0)
+            exact = rule_bound(graph, threshold) if len(graph.places) <= 9 else None
+            hours = periods * max(length, threshold) / 3600.0
+            found = {
+                policy: patrol(place, policy, hours, threshold).settled / (exact or bound)
+                for policy in RULED[:3]
+            }
+            worse += found['tour'] > 1.01 * min(found.values())
+            for policy, ratio in found.items():
+                ratios[policy].append(ratio)
+            star = '*' if exact else ''
+            cells = [f'{ratio:.3f}{star}' for ratio in found.values()]
+            rows.append([place.name, f'{factor:g}', *cells])
+    print(table(rows))
+    for policy, values in ratios.items():
+        values.sort()
+        print(
+            f'{policy}: median {values[len(values) // 2]:.3f}, '
+            f'90 % {values[int(0.9 * len(values))]:.3f}, worst {values[-1]:.3f} of {len(values)}; '
+            f'within 1.05: {sum(value <= 1.05 for value in values)}'
+        )
+    print(f'tour more than 1 % worse than oldest or lookahead: {worse}', flush=True)
+
+
+def first_choice(count: int) -> None:
+    """How long the first choice on a large map takes, and the next ones."""
+    place = random_graph(count, SEED)
+    run = Patrol(place.graph, Rules(), DEFAULT_POLICY, URGENCY, place.start)
+    began = time.perf_counter()
+    run.step()
+    first = time.perf_counter() - began
+    began = time.perf_counter()
+    for _ in range(200):
+        run.step()
+    following = (time.perf_counter() - began) / 200.0
+    print(f'\n{count} places: first choice {first:.2f} s, next {1000.0 * following:.2f} ms')
+
+
 def configured(places: Sequence[Map], hours: float) -> None:
     """What the threshold of config/parameters.yaml comes to, with the default policy."""
     text = (ROOT / 'config' / 'parameters.yaml').read_text(encoding='utf-8')
@@ -245,7 +328,10 @@ def strandings(place: Map, hours: float) -> None:
         draw = 100.0 / (factor * far)
         for keeps in (False, True):
             run = patrol(
-                place, DEFAULT_POLICY, hours, battery=Battery(draw=draw, keeps_reserve=keeps)
+                place,
+                DEFAULT_POLICY,
+                hours,
+                battery=SimulatedBattery(draw=draw, keeps_reserve=keeps),
             )
             rows.append(
                 [
@@ -324,6 +410,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         '--graph', nargs='+', metavar='FILE', help="maps in patrolling_sim's format"
     )
     parser.add_argument('--only', nargs='+', metavar='WORDS', help='maps with these in their names')
+    parser.add_argument('--random', type=int, default=6, metavar='N', help='random maps, too')
     parser.add_argument('--plot', type=Path, metavar='FILE.png', help='draw the ratios')
     options = parser.parse_args(arguments)
     hours = options.hours or (2.0 if options.quick else 24.0)
@@ -349,6 +436,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if len(place.graph.places) <= LARGE:
             thresholds(place, min(hours, 6.0))
             strandings(place, hours)
+    counts = [5, 8, 12, 20, 35, 60]
+    graphs = [random_graph(counts[n % len(counts)], n) for n in range(options.random)]
+    within_rules([place for place in chosen if len(place.graph.places) <= LARGE] + graphs, 25.0)
+    first_choice(1000)
     if not options.graph:
         small = [place for place in chosen if len(place.graph.places) <= LARGE]
         configured(small, min(hours, 6.0))

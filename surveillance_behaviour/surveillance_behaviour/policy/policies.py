@@ -8,7 +8,7 @@ it draws its chance from) stands in the world.
 seed      any allowed place, at random
 oldest    the allowed place that went unvisited longest
 lookahead the way to wherever on the whole map (time unvisited - time to get there) is highest
-tour      the place from which riding on, within the rules, leaves the least waiting
+tour      the place next on a round that was planned within the rules to leave the least waiting
 random    uniform choice, the literature's baseline
 CR        conscientious reactive: the neighbour idle longest (Machado et al. 2002)
 HCR       heuristic conscientious reactive: idleness and nearness, normalised (Almeida et al. 2004)
@@ -30,19 +30,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surveillance_behaviour.policy.graph import PatrolGraph
-from surveillance_behaviour.policy.rollout import Rollout
+from surveillance_behaviour.policy.plan import plan_of
 from surveillance_behaviour.policy.world import Score, World
 
 Scores = Mapping[str, Score]
 DEFAULT_POLICY = 'tour'
-MEAN_WEIGHT = 1e-3
-"""How much the mean wait counts beside the longest one where ``tour`` compares two ways."""
-SQUARES_WEIGHT = 1e-9
-"""How much the sum of all squared waits counts beside the longest wait of a ride."""
-RIDES_UP_TO = 150
-"""The largest map, in places, on which ``tour`` rides ahead step by step."""
-RULES_BIND = 0.25
-"""From which threshold on, as a part of the tour, the rules are thought of ahead."""
 
 
 class Policy(Protocol):
@@ -97,67 +89,28 @@ def lookahead(world: World, allowed: Sequence[str]) -> Scores:
 
 
 def tour(world: World, allowed: Sequence[str]) -> Scores:
-    """The longest wait of any place if the robot rides on from each candidate.
+    """How near each place is to the next target of the plan; see the module `plan`.
 
-    It rides round the tour, joined in whichever sense and at whichever pass through the candidate
-    leaves the least waiting. Where the threshold is long enough for the rules to forbid much of
-    that, two rides are thought through within the rules instead: round the tour as far as they
-    allow, and always to the place that went unvisited longest; the better one counts.
+    Where `oldest` or `lookahead` does better than every round that was found, it is followed.
     """
-    graph = world.graph
-    steps = np.array([graph.index[place] for place in graph.walk], dtype=np.intp)
-    bound_by_rules = world.rules and world.threshold >= RULES_BIND * graph.tour.length
-    small = len(graph.places) <= RIDES_UP_TO
-    rollout = Rollout(world) if bound_by_rules and small else None
-    scores = {}
-    for place in allowed:
-        first = graph.index[place]
-        start = graph.seconds(world.place, place)
-        longest, mean, waiting, way, begin = min(
-            (
-                (*_wait_on_the_way(world, way, start, int(begin)), sense, int(begin))
-                for sense, way in enumerate((steps, steps[::-1]))
-                for begin in np.flatnonzero(way == first)
-            ),
-        )
-        if rollout is None:
-            value = -(longest + MEAN_WEIGHT * mean)
-        else:
-            course = (steps, steps[::-1])[way].tolist()
-            rides = (rollout.run(first, course, begin), rollout.run(first))
-            best = min(rides, key=lambda ride: (ride.longest, ride.squares))
-            longest, waiting = best.longest, best.waiting
-            value = -(longest + SQUARES_WEIGHT * best.squares)
-        name = graph.places[waiting]
-        scores[place] = Score(
-            value,
+    plan = plan_of(world)
+    target = plan.advance(world)
+    if target is None:
+        return (oldest if plan.course.kind == 'oldest' else lookahead)(world, allowed)
+    name = world.graph.places[target]
+    return {
+        place: Score(
+            -plan.cost(world, place, target),
             name,
-            f'riding on from there leaves no place longer than {longest:.1f} s ({name})',
+            f'{_heads_for(place, name)}, which went unvisited for {world.unvisited(name):.1f} s; '
+            f'this round leaves no place longer than {plan.worth.longest:.1f} s',
         )
-    return scores
+        for place in allowed
+    }
 
 
-def _wait_on_the_way(
-    world: World, way: NDArray[np.intp], start: float, begin: int
-) -> tuple[float, float, int]:
-    """Longest and mean time the places will have waited when the robot meets them on its way.
-
-    Args:
-        world: Where the robot is now.
-        way: A closed walk as indices of places.
-        start: Seconds until the robot is at ``way[begin]``.
-        begin: Where on the walk it begins.
-
-    Returns:
-        The longest wait, the mean wait, seconds, and which place waits longest.
-    """
-    order = np.roll(way, -begin)
-    legs = world.graph.distances[order[:-1], order[1:]]
-    met = start + np.concatenate(([0.0], np.cumsum(legs)))
-    places, first = np.unique(order, return_index=True)
-    waits = world.idleness[places] + met[first]
-    worst = int(np.argmax(waits))
-    return float(waits[worst]), float(waits.mean()), int(places[worst])
+def _heads_for(place: str, target: str) -> str:
+    return 'it is the next on the round' if place == target else f'it leads to {target}'
 
 
 def heuristic_reactive(world: World, allowed: Sequence[str]) -> Scores:

@@ -13,8 +13,9 @@ the mean of both directions, in its shorter sense. All functions are determinist
 from __future__ import annotations
 
 import random
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,8 +28,9 @@ NEIGHBOURS = 12
 """How many nearest places each place is tried beside when a tour is improved."""
 ASCENT_STEPS = 150
 """Steps of the subgradient ascent that raises the lower bound."""
-KICKS = 2000
-"""How often a good tour of a large map is disturbed and improved again."""
+KICKS = 600_000
+"""How often a good tour is disturbed and improved again, times its places; at most `MOST_KICKS`."""
+MOST_KICKS = 2000
 
 
 @dataclass(frozen=True)
@@ -38,12 +40,17 @@ class Tour:
     Attributes:
         order: Indices of all places, each once; from the last one it goes back to the first.
         length: Length of the tour, in the unit of the distances.
-        bound: No closed tour is shorter than this.
+        find_bound: Finds a length that no closed tour falls below; None: the tour is exact.
     """
 
     order: tuple[int, ...]
     length: float
-    bound: float
+    find_bound: Callable[[], float] | None = None
+
+    @cached_property
+    def bound(self) -> float:
+        """No closed tour is shorter than this; found when it is first asked for."""
+        return self.length if self.find_bound is None else min(self.length, self.find_bound())
 
     @property
     def exact(self) -> bool:
@@ -57,12 +64,11 @@ def shortest_tour(distances: Matrix) -> Tour:
     if count <= EXACT_UP_TO:
         order = _exact_order(distances) if count > 2 else tuple(range(count))
         length = tour_length(distances, order)
-        return Tour(order, length, length)
+        return Tour(order, length)
     order = _good_order((distances + distances.T) / 2.0)
     order = min(order, order[::-1], key=lambda way: tour_length(distances, way))
     length = tour_length(distances, order)
-    bound = _one_tree_bound(np.minimum(distances, distances.T), length)
-    return Tour(order, length, min(length, bound))
+    return Tour(order, length, lambda: _one_tree_bound(np.minimum(distances, distances.T), length))
 
 
 def tour_over_blocks(distances: Matrix, blocks: Iterable[Sequence[int]]) -> Tour:
@@ -77,17 +83,17 @@ def tour_over_blocks(distances: Matrix, blocks: Iterable[Sequence[int]]) -> Tour
     """
     rings: list[list[int]] = []
     at: dict[int, list[int]] = {}
-    bound = 0.0
+    tours = []
     for members in blocks:
         chosen = np.asarray(members, dtype=np.intp)
         tour = shortest_tour(np.ascontiguousarray(distances[np.ix_(chosen, chosen)]))
-        bound += tour.bound
+        tours.append(tour)
         for place in members:
             at.setdefault(place, []).append(len(rings))
         rings.append([members[position] for position in tour.order])
     order = tuple(_joined(rings, at))
     length = tour_length(distances, order)
-    return Tour(order, length, min(bound, length))
+    return Tour(order, length, lambda: sum(tour.bound for tour in tours))
 
 
 def _joined(rings: list[list[int]], at: dict[int, list[int]]) -> Iterator[int]:
@@ -135,16 +141,18 @@ def _exact_order(distances: Matrix) -> tuple[int, ...]:
     while visited:
         order.append(last)
         visited, last = visited ^ (1 << last), int(came_from[visited, last])
-    return tuple(order)
+    return tuple(reversed(order))
 
 
 def _good_order(distances: Matrix) -> tuple[int, ...]:
     """The better of two first tours, each improved until no single change shortens it."""
-    tours = [_Improvement(distances, start(distances)) for start in (_preorder, _nearest)]
+    ranked = np.argsort(distances, axis=1, kind='stable')[:, 1 : NEIGHBOURS + 1].tolist()
+    rows = distances.tolist()
+    tours = [_Improvement(rows, ranked, start(distances)) for start in (_preorder, _nearest)]
     for tour in tours:
         tour.improve(list(tour.order))
     best = min(tours, key=lambda tour: tour_length(distances, tuple(tour.order)))
-    best.kick(KICKS, random.Random(0))
+    best.kick(min(MOST_KICKS, KICKS // len(distances)), random.Random(0))
     return tuple(best.order)
 
 
@@ -199,13 +207,12 @@ class _Improvement:
     (Bentley's don't-look bits), which makes it near linear in the number of places.
     """
 
-    def __init__(self, distances: Matrix, order: list[int]) -> None:
-        self._rows: list[list[float]] = distances.tolist()
+    def __init__(self, rows: list[list[float]], near: list[list[int]], order: list[int]) -> None:
+        self._rows = rows
+        self._near = near
         self.order = order
         self._at = [0] * len(order)
         self._note(0, len(order))
-        ranked = np.argsort(distances, axis=1, kind='stable')[:, 1 : NEIGHBOURS + 1]
-        self._near: list[list[int]] = ranked.tolist()
 
     def _note(self, first: int, end: int) -> None:
         for position in range(first, end):

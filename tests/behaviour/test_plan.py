@@ -1,0 +1,122 @@
+"""The plan within the rules: near the bound, and never worse than simple policies."""
+
+from __future__ import annotations
+
+import pytest
+
+from surveillance_behaviour.decision import Rules
+from surveillance_behaviour.policy.graph import PatrolGraph, graph_of_places
+from surveillance_behaviour.policy.leg_times import LegTimes
+from surveillance_behaviour.policy.rule_bound import rule_bound
+from surveillance_behaviour.policy.simulation import Patrol
+
+from .worlds import seven_rooms
+
+
+def grid(width: int, height: int) -> PatrolGraph:
+    positions = {f'P{x}{y}': (5.0 * x, 5.0 * y) for x in range(width) for y in range(height)}
+    ways = {
+        f'P{x}{y}': [
+            other
+            for other in (f'P{x + 1}{y}', f'P{x - 1}{y}', f'P{x}{y + 1}', f'P{x}{y - 1}')
+            if other in positions
+        ]
+        for x in range(width)
+        for y in range(height)
+    }
+    return graph_of_places(ways, positions, 1.0, 2.0)
+
+
+def chain(count: int) -> PatrolGraph:
+    legs: dict[str, dict[str, float]] = {f'P{number}': {} for number in range(count)}
+    for number in range(count - 1):
+        legs[f'P{number}'][f'P{number + 1}'] = legs[f'P{number + 1}'][f'P{number}'] = 5.0
+    return PatrolGraph(legs, 2.0)
+
+
+def settled(graph: PatrolGraph, policy: str, threshold: float) -> float:
+    patrol = Patrol(graph, Rules(), policy, threshold, graph.places[0])
+    for _ in patrol.until(25.0 * max(graph.tour.length, threshold)):
+        pass
+    return patrol.run.settled
+
+
+MAPS = {
+    'seven rooms': seven_rooms(),
+    'chain': chain(6),
+    'grid': grid(3, 3),
+    'large grid': grid(5, 5),
+}
+
+
+@pytest.mark.parametrize('name', list(MAPS))
+@pytest.mark.parametrize('factor', [0.1, 0.5, 0.75, 1.0, 2.0])
+def test_the_plan_is_no_worse_than_simple_policies(name: str, factor: float) -> None:
+    graph = MAPS[name]
+    threshold = factor * graph.tour.length
+    best = min(settled(graph, policy, threshold) for policy in ('oldest', 'lookahead'))
+    assert settled(graph, 'tour', threshold) <= 1.01 * best
+
+
+@pytest.mark.parametrize(
+    ('name', 'factor', 'least'),
+    [
+        ('seven rooms', 0.5, 1.0),
+        ('seven rooms', 1.0, 1.129),
+        ('chain', 1.0, 1.2),
+        ('chain', 2.0, 2.2),
+        ('grid', 0.1, 1.2),
+        ('grid', 1.0, 1.0),
+    ],
+)
+def test_the_plan_comes_within_a_twentieth_of_the_bound_that_knows_the_rules(
+    name: str, factor: float, least: float
+) -> None:
+    graph = MAPS[name]
+    threshold = factor * graph.tour.length
+    bound = rule_bound(graph, threshold)
+    assert bound == pytest.approx(least * graph.tour.length, rel=0.01)
+    assert settled(graph, 'tour', threshold) <= 1.05 * bound
+
+
+def test_a_map_that_is_too_large_has_no_exhaustive_bound() -> None:
+    assert rule_bound(grid(5, 5), 100.0) is None
+
+
+def test_costs_may_differ_by_direction() -> None:
+    legs = {
+        'A': {'B': 1.0, 'C': 9.0},
+        'B': {'A': 9.0, 'C': 1.0},
+        'C': {'B': 9.0, 'A': 1.0},
+    }
+    graph = PatrolGraph(legs)
+    assert graph.tour.length == 3.0
+    assert graph.tour.order in ((0, 1, 2), (1, 2, 0), (2, 0, 1))
+    assert settled(graph, 'tour', 0.5) == pytest.approx(3.0)
+
+
+def test_leg_times_are_learned_for_each_direction() -> None:
+    times = LegTimes(0.5)
+    assert times.expected('A', 'B', 10.0) == pytest.approx(20.0)
+    for _ in range(15):
+        times.observe('A', 'B', 30.0, 10.0, 12.0)
+    assert times.expected('A', 'B', 10.0) == pytest.approx(30.0, rel=0.05)
+    assert times.expected('B', 'A', 10.0) == pytest.approx(30.0, rel=0.05)
+    for _ in range(15):
+        times.observe('B', 'A', 24.0, 10.0, 12.0)
+    assert times.expected('B', 'A', 10.0) == pytest.approx(24.0, rel=0.05)
+    assert times.expected('A', 'B', 10.0) == pytest.approx(30.0, rel=0.05)
+    # A leg that was never driven follows from its length.
+    assert 20.0 < times.expected('A', 'C', 10.0) < 32.0
+
+
+def test_what_was_learned_outlives_its_process() -> None:
+    times = LegTimes(0.5)
+    for seconds in (20.0, 22.0, 21.0, 40.0):
+        times.observe('A', 'B', seconds, 8.0)
+    again = LegTimes(0.5)
+    again.restore(times.to_json())
+    assert again.expected('A', 'B', 8.0) == times.expected('A', 'B', 8.0)
+    assert again.spread == times.spread
+    with pytest.raises(ValueError, match='times of A to B: expected finite and positive'):
+        again.restore({'legs': [['A', 'B', 8.0, [-1.0]]], 'errors': []})
