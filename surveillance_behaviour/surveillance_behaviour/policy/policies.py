@@ -176,13 +176,16 @@ def _idle_ways(
 def cycle(world: World, allowed: Sequence[str]) -> Scores:
     """How soon each candidate comes on the closed tour, from where the robot is on it.
 
-    Where the tour passes a place several times, the robot is taken to be at the pass after which
-    the next steps have waited longest.
+    The tour may pass a place several times: the pass that the robot is on is remembered. A robot
+    that is elsewhere than the tour goes on takes the pass whose next steps have waited longest.
     """
-    graph = world.graph
-    walk = graph.walk
-    passes = [number for number, place in enumerate(walk) if place == world.place]
-    here = max(passes, key=lambda number: world.unvisited(walk[(number + 1) % len(walk)]))
+    walk, passes = world.graph.walk, world.memory.passes
+    here = (passes.get(walk, -1) + 1) % len(walk)
+    if walk[here] != world.place:
+        at = [number for number, place in enumerate(walk) if place == world.place]
+        here = max(at, key=lambda number: world.unvisited(walk[(number + 1) % len(walk)]))
+    passes.clear()
+    passes[walk] = here
     ahead = walk[here + 1 :] + walk[: here + 1]
     return {
         place: Score(

@@ -21,10 +21,12 @@ class PolicyMemory:
     Attributes:
         generator: Where the random policies draw from.
         plan: What a policy that plans ahead has planned; see `surveillance_behaviour.policy.plan`.
+        passes: Where on a tour the robot is, by the tour's steps.
     """
 
     generator: random.Random = field(default_factory=random.Random)
     plan: Any = None
+    passes: dict[tuple[str, ...], int] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
