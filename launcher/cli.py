@@ -29,7 +29,7 @@ EXIT_INTERRUPTED = 130
 PACKAGE_COMMANDS = {
     'watch': ('surveillance_operator.watch_command', 'show a running mission in this terminal'),
     'console': (
-        'surveillance_operator.console_node',
+        'surveillance_operator.console_command',
         'one prompt for a running mission: answers, doors, rooms, why, go',
     ),
     'replay': ('surveillance_operator.replay', 'show a recorded mission in a browser'),

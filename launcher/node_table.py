@@ -84,7 +84,7 @@ NODES = (
         CONSOLE,
         'surveillance_operator',
         'ConsoleNode',
-        'one prompt for the three controllers in MANUAL mode',
+        'one prompt for a mission: answers, doors, rooms, why, go',
     ),
     Node(
         'reasoner',

@@ -137,7 +137,9 @@ class Run:
         chosen = node_table.select(
             self.mode or node_table.DEFAULT_MODE, self.behaviour, self.only, self.without
         )
-        return (*chosen, node_table.find(node_table.CONSOLE)) if self.one_console else chosen
+        asks = self.mode == 'MANUAL' and any(node.console for node in chosen)
+        # First, so that it is there for what is typed at once.
+        return (node_table.find(node_table.CONSOLE), *chosen) if asks else chosen
 
     def observers(self) -> tuple[node_table.Node, ...]:
         """The nodes that only look on, in processes of their own; they start last."""
@@ -147,14 +149,6 @@ class Run:
         if self.web or self.web_control:
             names.append(PAGE)
         return tuple(node_table.find(name) for name in names)
-
-    @property
-    def one_console(self) -> bool:
-        """Whether a node reads the operator's lines for all controllers.
-
-        In processes of their own each controller reads its own input, which the launcher fills.
-        """
-        return self.composed and self.mode == 'MANUAL'
 
 
 def parameter_files(config: Path, run: Run) -> list[Path]:
@@ -232,9 +226,9 @@ def _option_entries(run: Run, folder: Path | None) -> Iterator[Entry]:
         for each in node_table.NODES:
             if each.console:
                 yield Entry(f'/**/{each.name}', 'execution_mode', run.mode, f'--mode {run.mode}')
-                yield Entry(
-                    f'/**/{each.name}', 'console', not run.one_console, f'--mode {run.mode}'
-                )
+                # In a whole run one console reads for all.
+                own = run.mode != 'MANUAL' or folder is None
+                yield Entry(f'/**/{each.name}', 'console', own, f'--mode {run.mode}')
 
 
 def _check_behaviour(merged: Configuration, run: Run) -> None:
@@ -434,7 +428,7 @@ def run_mission(run: Run, config: Path, runs: Path) -> int:
                 node.name,
                 command([node], ros_arguments([files[node.name]], run), os.getpid()),
                 environ,
-                takes_input=manual and bool(node.console),
+                takes_input=node.name == node_table.CONSOLE,
                 leads=node.name == BEHAVIOUR_NODE,
                 says_up=True,
                 watched=True,
@@ -460,11 +454,11 @@ def run_mission(run: Run, config: Path, runs: Path) -> int:
     log.say(f'watch it in a second terminal: {watch_command(run)}')
     supervisor = Supervisor(programs, log)
     console = None
-    if manual:
+    if any(node.name == node_table.CONSOLE for node in nodes):
         from launcher.console import OperatorConsole
 
-        reader = COMPOSED if run.one_console else None
-        console = OperatorConsole(supervisor, [n for n in nodes if n.console], log, reader)
+        reader = COMPOSED if run.composed else node_table.CONSOLE
+        console = OperatorConsole(supervisor, log, reader)
         console.start()
     try:
         code = supervisor.run(run.seconds)

@@ -1,7 +1,7 @@
-"""The node `console`: one prompt for all controllers.
+"""The node `console`: one prompt for a whole mission.
 
-Each line goes to the controller whose command it is, by that controller's service `~/command`; what
-the controllers announce is shown with the controller's name in front.
+It answers the controllers' requests of mode MANUAL, opens doors, sends the robot somewhere and asks
+why. What the controllers announce is shown with the controller's name in front.
 """
 
 from __future__ import annotations
@@ -14,31 +14,20 @@ from typing import Any, TextIO
 from std_msgs.msg import String
 
 from surveillance_controllers.manual.console import Console
-from surveillance_controllers.manual.console_commands import (
-    BATTERY,
-    EXIT,
-    HELP,
-    MOTION,
-    PLANNER,
-    STATUS,
-    CommandError,
-    Grammar,
-)
-from surveillance_interfaces.srv import ConsoleCommand
-from surveillance_runtime.calls import CallError, ServiceCaller
+from surveillance_operator.console_commands import CONTROLLED, answer, completions, help_text
+from surveillance_operator.mission_actions import MissionActions
+from surveillance_operator.mission_feed import MissionFeed
+from surveillance_operator.snapshot import Snapshot, decision_line
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
 
-COMMANDS = {
-    'battery_controller': BATTERY,
-    'planner_controller': PLANNER,
-    'motion_controller': MOTION,
-}
+FEED_PERIOD = 0.5
+"""Seconds between two looks at what the status line shows."""
 
 
 class ConsoleNode(PatrolNode):
-    """An operator's terminal for the three controllers.
+    """An operator's terminal for a mission.
 
     Args:
         console_source: Where the operator's lines come from; standard input unless given.
@@ -46,29 +35,29 @@ class ConsoleNode(PatrolNode):
 
     def __init__(self, console_source: TextIO | None = None, **node_options: Any) -> None:
         super().__init__('console', **node_options)
-        self._timeout = self.parameter(
+        timeout = self.parameter(
             'peer_timeout',
             2.0,
-            'How long a controller may take to appear and answer, s of real time.',
+            'How long a node may take to appear and answer, s of real time.',
             minimum=0.1,
             maximum=3600.0,
         )
-        self._grammar = Grammar([command for group in COMMANDS.values() for command in group])
-        self._controller_of = {c.name: name for name, group in COMMANDS.items() for c in group}
-        self._callers = {
-            name: ServiceCaller(self, ConsoleCommand, f'{name}/command') for name in COMMANDS
-        }
-        for name in COMMANDS:
+        self._actions = MissionActions(self, timeout)
+        self._feed = MissionFeed(self, FEED_PERIOD)
+        for name in CONTROLLED:
             self.create_subscription(
                 String, f'{name}/announcement', partial(self._on_announcement, name), STATE_QOS
             )
         self._console = Console(
-            'console', self._on_line, self._grammar.completions, source=console_source
+            'console', self._on_line, completions, source=console_source, status=self._status
         )
         self.stopping.subscribe(self._console.stop)
         if self._console.on_terminal:
-            _tell('You can type these commands:\n' + self._grammar.help())
+            _tell('You can type these commands:\n' + help_text())
         self.spawn(self._read)
+
+    def _status(self) -> str:
+        return status_line(self._feed.snapshot)
 
     def _on_announcement(self, controller: str, message: String) -> None:
         _tell(message.data, controller)
@@ -78,31 +67,27 @@ class ConsoleNode(PatrolNode):
             self.finish()
 
     def _on_line(self, line: str) -> None:
-        try:
-            command = self._grammar.parse(line)
-        except CommandError as error:
-            _tell(str(error))
-            return
-        if command is None:
-            return
-        if command.name == HELP.name:
-            _tell(self._grammar.help())
-        elif command.name == EXIT.name:
-            self.finish()
-        elif command.name == STATUS.name:
-            for controller in COMMANDS:
-                self._hand_on(controller, line)
-        else:
-            self._hand_on(self._controller_of[command.name], line)
+        for each in answer(line, self._actions, self._why):
+            if each.ends:
+                self.finish()
+            elif each.text:
+                _tell(each.text, each.who)
 
-    def _hand_on(self, controller: str, line: str) -> None:
-        request = ConsoleCommand.Request(line=line)
-        try:
-            answer = self._callers[controller].call(request, self._timeout, self.stopping)
-        except CallError as error:
-            _tell(f'{controller} does not answer: {error}')
-        else:
-            _tell(answer.answer, controller)
+    def _why(self) -> str:
+        snapshot = self._feed.snapshot
+        if snapshot.decision is None:
+            return 'no decision yet'
+        return f'{decision_line(snapshot)}\n{snapshot.decision.reason}'
+
+
+def status_line(snapshot: Snapshot) -> str:
+    """Return the mission in one line: what it does, where, how much charge is left."""
+    status = snapshot.status
+    if status is None or not snapshot.nodes:
+        return f' no mission on {snapshot.where} '
+    battery = '–' if snapshot.battery is None else f'{snapshot.battery:.0f} %'
+    paused = 'PAUSED · ' if snapshot.paused else ''
+    return f' {paused}{status.state} · {status.whereabouts} · battery {battery} '
 
 
 def _tell(text: str, controller: str = '') -> None:
@@ -111,5 +96,5 @@ def _tell(text: str, controller: str = '') -> None:
 
 
 def main(args: Sequence[str] | None = None) -> int:
-    """Runs the node until `exit`, the end of the input, or a signal."""
+    """Run the node until `exit`, the end of the input, or a signal."""
     return run_node(ConsoleNode, args)

@@ -21,6 +21,7 @@ from surveillance_interfaces.srv import (
     ConsoleCommand,
     DrainBattery,
     GoTo,
+    MarkerRoutine,
     PlaceObstacle,
     ReferenceName,
     RemoveObstacle,
@@ -61,6 +62,10 @@ class ActionError(ValueError):
     """What was asked for was not done; the message is one line that says why."""
 
 
+class NoAnswerError(ActionError, LookupError):
+    """The node that should do it is not there, or does not answer."""
+
+
 class MissionActions:
     """Calls the services of a mission.
 
@@ -83,6 +88,7 @@ class MissionActions:
             (AddRoom, 'ontology_map/add_room'),
             (RemoveRoom, 'ontology_map/remove_room'),
             (ReferenceName, 'ontology_map/reference_name'),
+            (MarkerRoutine, 'move_arm'),
             (GoTo, 'go_to'),
             (WhyNot, 'why_not'),
             (SetParameters, f'{BEHAVIOUR}/set_parameters'),
@@ -160,6 +166,13 @@ class MissionActions:
         value = ParameterValue(type=ParameterType.PARAMETER_STRING, string_value=policy)
         return self._set('policy', value, policy)
 
+    def move_arm(self, pose: str) -> str:
+        """Move the camera arm to a named pose: left, home, right, back; or stop it."""
+        number = getattr(MarkerRoutine.Request, pose.upper(), None) if pose.isalpha() else None
+        if not isinstance(number, int):
+            raise ActionError(f'{pose!r}: expected left, home, right, back or stop')
+        return self._told('move_arm', MarkerRoutine.Request(pos=number))
+
     def command(self, controller: str, line: str) -> str:
         """Give a controller one of its console's commands: the answers of mode MANUAL."""
         if controller not in CONTROLLERS:
@@ -227,7 +240,7 @@ class MissionActions:
                 request, self._timeout, self._node.stopping, discovery=min(0.5, self._timeout)
             )
         except CallError as error:
-            raise ActionError(str(error)) from None
+            raise NoAnswerError(str(error)) from None
 
 
 def _name(text: str) -> str:

@@ -19,22 +19,49 @@ EXIT_BAD_INPUT = 2
 
 class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
-        self.exit(EXIT_BAD_INPUT, f'watch: {message} (see {self.prog} --help)\n')
+        name = self.prog.split()[-1]
+        self.exit(EXIT_BAD_INPUT, f'{name}: {message} (see {self.prog} --help)\n')
 
 
-def _parse(argv: Sequence[str] | None) -> argparse.Namespace:
-    parser = _Parser(
-        prog='launch.py watch',
-        description='Shows a running mission, simulated or real, until Ctrl-C: the map with robot, '
-        'doors and obstacles, what the robot does and why. Where the output is no terminal, it '
-        'prints a line for each change.',
-    )
+def mission_parser(name: str, description: str) -> argparse.ArgumentParser:
+    """Return the parser of a command about a running mission; its errors are one line."""
+    parser = _Parser(prog=f'launch.py {name}', description=description)
     parser.add_argument('--namespace', default='', metavar='NAME', help="the robot's namespace")
     parser.add_argument(
         '--domain',
         type=int,
         metavar='N',
         help="the mission's ROS domain, 0 to 101 (default: ROS_DOMAIN_ID, else 0)",
+    )
+    return parser
+
+
+def ros_arguments(parser: argparse.ArgumentParser, options: argparse.Namespace) -> list[str]:
+    """Return the ROS arguments of a node that looks at a mission, and set its domain."""
+    if options.domain is not None and not 0 <= options.domain <= LAST_DOMAIN:
+        parser.error(f'--domain {options.domain}: expected a number from 0 to {LAST_DOMAIN}')
+    namespace = options.namespace and '/' + options.namespace.strip('/')
+    try:
+        validate_namespace(namespace or '/')
+    except InvalidNamespaceException:
+        parser.error(f'--namespace {namespace}: expected letters, digits and _ like robot1')
+    if options.domain is not None:
+        os.environ['ROS_DOMAIN_ID'] = str(options.domain)
+    # As in the nodes' own processes: shared memory that a killed one left behind hides others.
+    os.environ.setdefault('FASTDDS_BUILTIN_TRANSPORTS', 'UDPv4')
+    # What ROS logs would stand in the middle of what is shown.
+    arguments = ['--ros-args', '--disable-stdout-logs']
+    return [*arguments, '-r', f'__ns:={namespace}'] if namespace else arguments
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Watch until Ctrl-C; with --once the exit code is 1 when there was no mission to be seen."""
+    parser = mission_parser(
+        'watch',
+        'Shows a running mission, simulated or real, until q or Ctrl-C: the map with robot, doors '
+        'and obstacles, what the robot does and why. Keys: p holds the picture, d shows the '
+        'decision, n the nodes, e the events. Where the output is no terminal, it prints a line '
+        'for each change.',
     )
     parser.add_argument('--once', action='store_true', help='print one picture and end')
     parser.add_argument(
@@ -45,30 +72,10 @@ def _parse(argv: Sequence[str] | None) -> argparse.Namespace:
         help='with --once: longest wait for a mission (default: %(default)g)',
     )
     options = parser.parse_args(argv)
-    if options.domain is not None and not 0 <= options.domain <= LAST_DOMAIN:
-        parser.error(f'--domain {options.domain}: expected a number from 0 to {LAST_DOMAIN}')
     if not 0.1 <= options.timeout < 1e9:
         parser.error(f'--timeout {options.timeout:g}: expected 0.1 seconds or more')
-    try:
-        options.namespace = options.namespace and '/' + options.namespace.strip('/')
-        validate_namespace(options.namespace or '/')
-    except InvalidNamespaceException:
-        parser.error(f'--namespace {options.namespace}: expected letters, digits and _ like robot1')
-    return options
-
-
-def main(argv: Sequence[str] | None = None) -> int:
-    """Watch until Ctrl-C; with --once the exit code is 1 when there was no mission to be seen."""
-    options = _parse(argv)
-    if options.domain is not None:
-        os.environ['ROS_DOMAIN_ID'] = str(options.domain)
-    # As in the nodes' own processes: shared memory that a killed one left behind hides others.
-    os.environ.setdefault('FASTDDS_BUILTIN_TRANSPORTS', 'UDPv4')
-    # What ROS logs would stand in the middle of the picture.
-    arguments = ['--ros-args', '--disable-stdout-logs']
+    arguments = ros_arguments(parser, options)
     arguments += ['-p', f'once:={str(options.once).lower()}', '-p', f'timeout:={options.timeout}']
-    if options.namespace:
-        arguments += ['-r', f'__ns:={options.namespace}']
     return mission_view_node.main(arguments)
 
 

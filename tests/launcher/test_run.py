@@ -141,11 +141,16 @@ def test_a_run_folder_on_a_full_disk_is_named(tmp_path):
         write_parameters(tmp_path, run, configuration(CONFIG, run), run.nodes())
 
 
-def test_in_one_process_a_console_node_reads_for_all_controllers():
-    run = Run(mode='MANUAL', composed=True)
-    assert [node.name for node in run.nodes()][-1] == 'console'
-    assert settings_of('planner_controller', run)['console'] is False
-    assert 'console' not in [node.name for node in Run(mode='MANUAL').nodes()]
+@pytest.mark.parametrize('composed', [False, True])
+def test_a_console_node_reads_for_all_controllers(composed, tmp_path):
+    run = Run(mode='MANUAL', composed=composed)
+    assert [node.name for node in run.nodes()][0] == 'console'
+    merged = configuration(CONFIG, run, tmp_path)
+    resolved = merged.resolve('planner_controller', '/planner_controller')
+    assert resolved['console'].value is False
+    # A controller that is started by itself has its own prompt.
+    assert settings_of('planner_controller', run)['console'] is True
+    assert 'console' not in [node.name for node in Run(mode='RANDOM').nodes()]
 
 
 def test_ros_arguments_of_all_nodes():

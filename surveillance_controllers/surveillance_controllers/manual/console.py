@@ -32,6 +32,7 @@ class Console:
         on_line: Called with each line, without its end, on the thread of `run`.
         completions: The words that can follow a text; asked while the operator types.
         source: Where lines come from; standard input unless given.
+        status: What stands below the prompt of a terminal, asked for now and then.
         terminal: The two ends of a terminal for prompt_toolkit; asked of the system unless given.
 
     Attributes:
@@ -45,6 +46,7 @@ class Console:
         completions: Callable[[str], list[str]],
         *,
         source: TextIO | None = None,
+        status: Callable[[], str] | None = None,
         terminal: tuple[Input, Output] | None = None,
     ) -> None:
         self._name = name
@@ -52,6 +54,7 @@ class Console:
         self._completions = completions
         self._source = sys.stdin if source is None else source
         self._terminal = terminal
+        self._status = status
         self._stopped = False
         self._stop_reading: Callable[[], None] = lambda: None
         self.on_terminal = terminal is not None or _is_terminal(self._source)
@@ -124,7 +127,7 @@ class Console:
         # Only here, for most consoles never have a terminal and need not wait for the import.
         from surveillance_controllers.manual.terminal_lines import TerminalLines
 
-        terminal = TerminalLines(self._name, self._completions, self._terminal)
+        terminal = TerminalLines(self._name, self._completions, self._terminal, self._status)
         with self._lock:
             if self._stopped:
                 return 'stopped'

@@ -27,6 +27,7 @@ class TerminalLines:
         completions: The words that can follow a text.
         ends: The terminal's two ends; the process's own terminal unless given, and then without a
             file for the history.
+        status: What stands below the prompt, asked for every second.
     """
 
     def __init__(
@@ -34,6 +35,7 @@ class TerminalLines:
         name: str,
         completions: Callable[[str], list[str]],
         ends: tuple[Input, Output] | None = None,
+        status: Callable[[], str] | None = None,
     ) -> None:
         self._stopped = False
         given_input, given_output = ends or (_SilentInput(sys.stdin), None)
@@ -44,6 +46,8 @@ class TerminalLines:
             history=_history(name) if ends is None else InMemoryHistory(),
             input=given_input,
             output=given_output,
+            bottom_toolbar=status,
+            refresh_interval=1.0 if status is not None else 0,
         )
 
     @contextmanager
