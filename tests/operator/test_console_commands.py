@@ -9,6 +9,13 @@ import pytest
 from surveillance_operator.console_commands import Answer, answer, completions, help_text
 
 
+ANSWERS: dict[str, Any] = {
+    'why_not': ('R3 can wait', ['URGENT(R3)']),
+    'facts': [('ROOM(R3)', False), ('hasDoor(R3, D3)', True)],
+    'explain': [(0, 'R3 is ROOM'), (1, 'R3 hasDoor D3')],
+}
+
+
 class Scripted:
     """Notes each action and answers with its name."""
 
@@ -20,15 +27,9 @@ class Scripted:
             self.done.append((name, *given))
             if given and given[0] == 'nowhere':
                 raise ValueError('no place is called nowhere')
-            return self.answers.get(name, 'done')
+            return ANSWERS.get(name, 'done')
 
         return act
-
-    answers = {
-        'why_not': ('R3 can wait', ['URGENT(R3)']),
-        'facts': [('ROOM(R3)', False), ('hasDoor(R3, D3)', True)],
-        'explain': [(0, 'R3 is ROOM'), (1, 'R3 hasDoor D3')],
-    }
 
 
 def said(line: str, actions: Any = None) -> list[Answer]:
