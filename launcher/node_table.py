@@ -105,6 +105,12 @@ NODES = (
         'shows a running mission in the terminal',
     ),
     Node(
+        'mission_markers',
+        'surveillance_operator',
+        'MissionMarkers',
+        'shows a running mission to RViz, Foxglove and rqt',
+    ),
+    Node(
         'mission_page',
         'surveillance_operator',
         'MissionPage',

@@ -43,7 +43,7 @@ ONTOLOGIES = 'ontologies'
 STORE = 'armor_store'
 COMPOSED = 'composed'
 NOT_RECORDED = 'off'
-RECORDER, PAGE = 'mission_recorder', 'mission_page'
+RECORDER, MARKERS, PAGE = 'mission_recorder', 'mission_markers', 'mission_page'
 RECORDING, PLACE = 'recording', 'place.yaml'
 COMPOSED_SHARE = 3
 MEMORY = 2048
@@ -142,10 +142,10 @@ class Run:
         return (node_table.find(node_table.CONSOLE), *chosen) if asks else chosen
 
     def observers(self) -> tuple[node_table.Node, ...]:
-        """The nodes that only look on, in processes of their own; they start last."""
+        """The nodes that only look on; they start last."""
         names = []
         if self.record != NOT_RECORDED:
-            names.append(RECORDER)
+            names += [RECORDER, MARKERS]
         if self.web or self.web_control:
             names.append(PAGE)
         return tuple(node_table.find(name) for name in names)
@@ -438,9 +438,12 @@ def run_mission(run: Run, config: Path, runs: Path) -> int:
         ]
     place = parameter_files(config, run)[1]
     shutil.copyfile(place, folder / PLACE)
-    for node in observers:
-        words = command([node], ros_arguments([files[node.name]], run), os.getpid())
-        programs.append(Program(node.name, words, environ, says_up=True))
+    # What only listens shares a process; the page, which strangers talk to, has its own.
+    for together in ((RECORDER, MARKERS), (PAGE,)):
+        if members := [node for node in observers if node.name in together]:
+            own = [files[node.name] for node in members]
+            words = command(members, ros_arguments(own, run), os.getpid())
+            programs.append(Program(members[0].name, words, environ, says_up=True))
     names = [
         *(node.name for node in (*nodes, *observers)),
         *([COMPOSED] if run.composed else []),

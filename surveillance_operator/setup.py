@@ -19,6 +19,7 @@ setup(
     entry_points={
         'console_scripts': [
             'console = surveillance_operator.console_node:main',
+            'mission_markers = surveillance_operator.mission_markers_node:main',
             'mission_page = surveillance_operator.mission_page_node:main',
             'mission_recorder = surveillance_operator.mission_recorder_node:main',
             'mission_view = surveillance_operator.mission_view_node:main',

@@ -385,7 +385,7 @@ TOPICS: tuple[Topic, ...] = (
     Topic(f'{BEHAVIOUR}/fsm/transition', FsmTransition, _QUEUE, _on_transition),
     *(Topic(f'{name}/announcement', String, STATE_QOS, _on_request(name)) for name in CONTROLLERS),
     Topic(
-        'diagnostics',
+        '/diagnostics',
         DiagnosticArray,
         _MANY,
         lambda m, old: {'health': {**old.health, **conversions.health_from(m)}},

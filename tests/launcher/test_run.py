@@ -144,7 +144,7 @@ def test_a_run_folder_on_a_full_disk_is_named(tmp_path):
 @pytest.mark.parametrize('composed', [False, True])
 def test_a_console_node_reads_for_all_controllers(composed, tmp_path):
     run = Run(mode='MANUAL', composed=composed)
-    assert [node.name for node in run.nodes()][0] == 'console'
+    assert run.nodes()[0].name == 'console'
     merged = configuration(CONFIG, run, tmp_path)
     resolved = merged.resolve('planner_controller', '/planner_controller')
     assert resolved['console'].value is False

@@ -8,7 +8,6 @@ import pytest
 
 from surveillance_operator.console_commands import Answer, answer, completions, help_text
 
-
 ANSWERS: dict[str, Any] = {
     'why_not': ('R3 can wait', ['URGENT(R3)']),
     'facts': [('ROOM(R3)', False), ('hasDoor(R3, D3)', True)],
