@@ -426,13 +426,12 @@ def large_machine(width: int) -> fsm.StateMachine:
     return machine
 
 
-def deep_machine(depth: int) -> fsm.StateMachine:
-    """Machines in one another, with a loop in each."""
-    state = states_of(fsm)[1]
+def deep_machine(depth: int, state: type) -> fsm.StateMachine:
+    """Machines in one another, with a loop of states of a kind in each."""
     machine = fsm.StateMachine(['done'], ['left'], ['left'])
     with machine:
         if depth > 1:
-            fsm.StateMachine.add('INNER', deep_machine(depth - 1), {'done': 'S0'})
+            fsm.StateMachine.add('INNER', deep_machine(depth - 1, state), {'done': 'S0'})
         fsm.StateMachine.add('S0', state(), {'next': 'S1'})
         fsm.StateMachine.add('S1', state(), {'next': 'S0'})
     return machine
@@ -681,7 +680,7 @@ def figures(quick: bool, smach: Any) -> None:
         print(f'{f"{name}, bytes a state":42}{bytes_of_a_state(library):9,.0f}')
     for what, machine in (
         ('10,000 states', large_machine(10_000)),
-        ('50 levels', deep_machine(50)),
+        ('50 levels', deep_machine(50, states_of(fsm)[1])),
     ):
         begin = time.perf_counter()
         found = len(verify(machine, ['left']))
