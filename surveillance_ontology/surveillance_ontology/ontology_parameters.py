@@ -20,6 +20,9 @@ _SERVICE = {
         'Directories in which LOAD may read as well.',
         check=lambda value: None if value and all(value) else 'names of directories',
     ),
+    'history': Described(
+        'Axioms of past changes that are kept for QUERY AT, for each reference.', 0, 10_000_000
+    ),
     'sparql_timeout': Described('Longest time a SPARQL query may take, seconds.', 0.01, 3600.0),
     'overwrite_loaded': Described(
         'Let SAVE without a path write over the file that was loaded, as ARMOR 2.2 does.'
@@ -58,7 +61,10 @@ def described_service(node: PatrolNode, *, keep: bool = False) -> ArmorService:
     folder = _own_folder(node) if stored == 'auto' else Path(stored).expanduser()
     try:
         store = None if stored in ('', 'none') else Store(folder)
-        service = ArmorService(settings, log.info, log.warn, store)
+        clock = node.get_clock()
+        service = ArmorService(
+            settings, log.info, log.warn, store, lambda: clock.now().nanoseconds * 1e-9
+        )
         if store:
             kept = ', '.join(service.references.names()) or 'nothing'
             log.info(f'store {folder}, which holds {kept}; "-p store:=none" keeps nothing')

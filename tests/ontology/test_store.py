@@ -38,7 +38,7 @@ class Server:
 
     def start(self) -> None:
         store = Store(self._directory, self._compact_from)
-        settings = Settings(ontologies_folder=self._files)
+        settings = Settings(ontologies_folder=self._files, history=20)
         self.service = ArmorService(settings, print, self.notes.append, store)
         self.ask: Ask = asker(self.service)
 

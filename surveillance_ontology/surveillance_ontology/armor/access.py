@@ -47,6 +47,7 @@ class Settings:
         sparql_derived: SPARQL sees derived facts too; ARMOR shows it the asserted ones only.
         sparql_timeout: Longest time a SPARQL query may take, seconds, whatever it asks for.
         sparql_rows: Most rows of a SPARQL answer.
+        history: Axioms of past changes that are kept for QUERY AT, for each reference.
         max_file_bytes: Largest document that is loaded, and largest log of LOG FILE.
         max_arguments: Most arguments of one directive.
         max_characters: Most characters of all arguments of one directive together.
@@ -66,6 +67,7 @@ class Settings:
     sparql_derived: bool = True
     sparql_timeout: float = 30.0
     sparql_rows: int = 100_000
+    history: int = 20_000
     max_file_bytes: int = 64 * 1024 * 1024
     max_arguments: int = 100_000
     max_characters: int = 16 * 1024 * 1024

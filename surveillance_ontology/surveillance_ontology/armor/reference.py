@@ -12,6 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from surveillance_ontology.armor.history import History
 from surveillance_ontology.armor.protocol import DirectiveError
 from surveillance_ontology.armor.rendering import shown
 from surveillance_ontology.knowledge_base import KnowledgeBase
@@ -131,6 +132,7 @@ class Reference:
         revision: Counts what may have changed an answer, so that copies know when they are old.
         serial: Tells this reference from any other of the same name.
         dropped: The name does not stand for it any more.
+        history: What was asserted when.
     """
 
     name: str
@@ -144,6 +146,7 @@ class Reference:
     heavy: bool = False
     revision: int = 0
     dropped: bool = False
+    history: History = field(default_factory=History)
     serial: int = field(default_factory=itertools.count().__next__)
     lock: threading.RLock = field(default_factory=threading.RLock)
 
@@ -185,6 +188,7 @@ class Reference:
         """Take over the state of another reference of the same name."""
         self.kb, self.queue, self.mounted = other.kb, other.queue, other.mounted
         self.buffered_manipulation = other.buffered_manipulation
+        self.history = other.history
         self.backlog = len(other.queue)
         self.revision += 1
 

@@ -11,6 +11,7 @@ Nothing that a client sends makes it raise.
 from __future__ import annotations
 
 import contextlib
+import time
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
@@ -40,6 +41,7 @@ class ArmorService:
         screen: Writes a line of LOG SCREEN.
         warn: Told in one line of what went wrong inside and of what a client should know.
         store: Makes references durable; those it holds are there at once.
+        clock: Seconds since the epoch, for QUERY AT.
 
     Raises:
         JournalError: What is in the store cannot be read.
@@ -51,11 +53,12 @@ class ArmorService:
         screen: Callable[[str], None] = print,
         warn: Callable[[str], None] = print,
         store: Store | None = None,
+        clock: Callable[[], float] = time.time,
     ) -> None:
-        self.session = Session(settings or Settings(), screen, warn, store)
+        self.session = Session(settings or Settings(), screen, warn, store, clock)
         self._store = store
         if store:
-            for ref in store.recover():
+            for ref in store.recover(self.settings.history):
                 self.session.register(ref)
             for note in store.notes:
                 warn(note)
@@ -158,7 +161,7 @@ class ArmorService:
     def _undo(self, names: Iterable[str]) -> None:
         """Bring references back to what the store has of them."""
         assert self._store is not None
-        durable = {ref.name: ref for ref in self._store.recover()}
+        durable = {ref.name: ref for ref in self._store.recover(self.settings.history)}
         for name in names:
             kept, ref = durable.get(name), self.references.get(name)
             if kept is not None and ref is not None:
@@ -213,12 +216,12 @@ class ArmorService:
         self.session.check_free(ref, request.client_name)
         if directive.kind is Kind.CONTROL:
             if self._store and ref.queue:
-                self._store.flushed(ref.name)
+                self._store.flushed(ref.name, self.session.clock())
             directive.run(ref)
             return
         changes: list[Change] = directive.run(ref, *self._values(directive, request, ref))
         if self._store and changes:
-            self._store.changed(ref.name, changes)
+            self._store.changed(ref.name, changes, self.session.clock())
         ref.heavy |= directive.schema
         ref.submit(changes)
 

@@ -30,8 +30,10 @@ class Session:
         screen: Writes a line of LOG SCREEN.
         warn: Told in one line of what went wrong inside and of what a client should know.
         store: Makes references durable.
+        clock: Seconds since the epoch.
 
     Attributes:
+        clock: Seconds since the epoch.
         settings: What is allowed.
         paths: Which files may be read and written.
         log: The log of directives.
@@ -48,6 +50,7 @@ class Session:
         screen: Callable[[str], None],
         warn: Callable[[str], None],
         store: Store | None,
+        clock: Callable[[], float],
     ) -> None:
         self.settings = settings
         self.paths = SafePaths(
@@ -59,6 +62,7 @@ class Session:
         self.references = Registry()
         self.loading = threading.Lock()
         self._warn = warn
+        self.clock = clock
         self.store = store
         self._watchers: list[Watcher] = []
 
@@ -79,7 +83,12 @@ class Session:
 
     def follow(self, ref: Reference) -> None:
         """Tell the watchers of the changes of a reference's knowledge base."""
-        ref.kb.subscribe(lambda changes: self.tell(ref.name, changes))
+
+        def on_changes(changes: Changes) -> None:
+            ref.history.note(self.clock(), changes)
+            self.tell(ref.name, changes)
+
+        ref.kb.subscribe(on_changes)
 
     def tell(self, name: str, changes: Changes | None) -> None:
         """Tell the watchers of a change."""

@@ -28,6 +28,7 @@ from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
 
+from surveillance_ontology.armor.history import History, PastChange
 from surveillance_ontology.armor.reference import (
     AddAxiom,
     Change,
@@ -412,13 +413,16 @@ class Store:
         self._beginning = threading.Lock()
         self._names: set[str] = set()
 
-    def recover(self) -> list[Reference]:
+    def recover(self, history: int = 0) -> list[Reference]:
         """Make the references as they were answered for; their derived facts are up to date.
+
+        Args:
+            history: Axioms of past changes that are kept for each.
 
         Raises:
             JournalError: A record that this version does not know.
         """
-        recovery = _Recovery()
+        recovery = _Recovery(history)
         with self._lock:
             for record in self._journal.records():
                 try:
@@ -449,17 +453,17 @@ class Store:
         """Remember who is mounted."""
         self._write(['mount', name, client])
 
-    def buffered(self, name: str, on: bool) -> None:
-        """Remember that buffered manipulation was switched."""
-        self._write(['buffer', name, on])
+    def buffered(self, name: str, on: bool, time: float = 0.0) -> None:
+        """Remember that buffered manipulation was switched at a time."""
+        self._write(['buffer', name, on, time])
 
-    def changed(self, name: str, changes: Iterable[Change]) -> None:
-        """Remember changes, applied or queued as the reference is set up."""
-        self._write(['change', name, [encode(change) for change in changes]])
+    def changed(self, name: str, changes: Iterable[Change], time: float = 0.0) -> None:
+        """Remember changes at a time, applied or queued as the reference is set up."""
+        self._write(['change', name, [encode(change) for change in changes], time])
 
-    def flushed(self, name: str) -> None:
-        """Remember that the queue was applied."""
-        self._write(['flush', name])
+    def flushed(self, name: str, time: float = 0.0) -> None:
+        """Remember that the queue was applied at a time."""
+        self._write(['flush', name, time])
 
     @contextmanager
     def batch(self) -> Iterator[None]:
@@ -534,7 +538,7 @@ class Store:
                     self._names.discard(name)
 
 
-_State = tuple[str, dict[str, Any], list[Axiom], list[Change]]
+_State = tuple[str, dict[str, Any], list[Axiom], list[Change], list[PastChange]]
 
 
 def _state(ref: Reference) -> _State:
@@ -547,22 +551,31 @@ def _state(ref: Reference) -> _State:
         'buffered_manipulation': ref.buffered_manipulation,
         'buffered_reasoner': ref.buffered_reasoner,
         'mounted': ref.mounted,
+        'since': ref.history.since,
     }
-    return ref.name, settings, list(ref.kb.axioms()), list(ref.queue)
+    changes = list(ref.history.changes)
+    return ref.name, settings, list(ref.kb.axioms()), list(ref.queue), changes
 
 
 def _records(
-    name: str, settings: dict[str, Any], axioms: list[Axiom], queue: list[Change]
+    name: str,
+    settings: dict[str, Any],
+    axioms: list[Axiom],
+    queue: list[Change],
+    history: list[PastChange],
 ) -> Iterator[Record]:
     """Return the records of a reference: short ones, since damage costs a whole record."""
     yield ['load', name, settings, [], [encode(change) for change in queue]]
     for start in range(0, len(axioms), CHUNK):
         yield ['axioms', name, [encode(axiom) for axiom in axioms[start : start + CHUNK]]]
+    for past in history:
+        added, removed = ([encode(axiom) for axiom in part] for part in (past.added, past.removed))
+        yield ['past', name, past.time, added, removed]
     # Once more, should damage have hit the first.
     yield ['loaded', name, settings]
 
 
-_KINDS = frozenset({'axioms', 'mount', 'change', 'flush', 'buffer'})
+_KINDS = frozenset({'axioms', 'past', 'mount', 'change', 'flush', 'buffer'})
 
 
 class _Recovery:
@@ -573,9 +586,10 @@ class _Recovery:
         orphans: Records of references that are not there.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, history: int) -> None:
         self.references: dict[str, Reference] = {}
         self.orphans = 0
+        self._history = history
         self._early: dict[str, list[Axiom]] = {}
 
     def take(self, record: Record) -> None:
@@ -603,6 +617,10 @@ class _Recovery:
                 ref.kb.change(added)
         elif ref is None:
             self.orphans += 1
+        elif what == 'past':
+            when, added, removed = rest
+            came, went = (tuple(map(decode, part)) for part in (added, removed))
+            ref.history.append(PastChange(when, came, went))
         elif what == 'mount':
             ref.mounted = rest[0]
         elif what == 'change':
@@ -610,13 +628,13 @@ class _Recovery:
             if ref.buffered_manipulation:
                 ref.queue += changes
             else:
-                apply_all(ref.kb, changes)
+                self._apply(ref, changes, *rest[1:])
         elif what == 'flush':
-            self._flush(ref)
+            self._flush(ref, *rest)
         elif what == 'buffer':
             ref.buffered_manipulation = rest[0]
             if not rest[0]:
-                self._flush(ref)
+                self._flush(ref, *rest[1:])
 
     def _load(self, name: str, settings: dict[str, Any], axioms: list[Axiom]) -> None:
         try:
@@ -632,10 +650,16 @@ class _Recovery:
                 settings['buffered_manipulation'],
                 settings['buffered_reasoner'],
                 settings['mounted'],
+                history=History(settings.get('since', 0.0), self._history),
             )
         except KeyError as error:
             raise ValueError(f'no setting {error}') from None
 
-    def _flush(self, ref: Reference) -> None:
+    def _flush(self, ref: Reference, time: float = 0.0) -> None:
         queue, ref.queue = ref.queue, []
-        apply_all(ref.kb, queue)
+        self._apply(ref, queue, time)
+
+    def _apply(self, ref: Reference, changes: list[Change], time: float = 0.0) -> None:
+        unsubscribe = ref.kb.subscribe(lambda told: ref.history.note(time, told))
+        apply_all(ref.kb, changes)
+        unsubscribe()

@@ -24,7 +24,8 @@ from surveillance_ontology.armor.protocol import DirectiveError, DirectiveRespon
 from surveillance_ontology.armor.reference import Reference
 from surveillance_ontology.armor.rendering import parse_entity, parse_rendered, render_entity
 from surveillance_ontology.armor.rendering import render_literal as _literal
-from surveillance_ontology.knowledge_base import Fact
+from surveillance_ontology.armor.session import Session
+from surveillance_ontology.knowledge_base import Fact, KnowledgeBase
 from surveillance_ontology.owl.axioms import (
     Axiom,
     ClassAssertion,
@@ -216,6 +217,31 @@ def _facts(ref: Reference, pattern: str, asserted: bool) -> DirectiveResponse:
         raise DirectiveError(f'QUERY FACT: argument pattern {error}') from None
     found = {str(fact) for fact in candidates if wanted.matches(fact)}
     return DirectiveResponse(queried_objects=sorted(found))
+
+
+@query(
+    'QUERY AT',
+    text('time'),
+    text('pattern'),
+    flag('asserted', 'false'),
+    native=False,
+    slow=True,
+    summary='QUERY FACT at a time in the past, seconds since the epoch by the clock of the server: '
+    'what was asserted then, and what followed from it. As far back as the parameter history goes.',
+)
+def _at(
+    session: Session, ref: Reference, time: str, pattern: str, asserted: bool
+) -> DirectiveResponse:
+    try:
+        seconds = float(time)
+        with ref.lock:
+            axioms = ref.history.at(seconds, ref.kb.axioms())
+    except ValueError as error:
+        raise DirectiveError(f'QUERY AT: argument time {error}') from None
+    past = Reference(ref.name, KnowledgeBase(ref.kb.iri, axioms), ref.origin)
+    if not asserted:
+        past.kb.reason()
+    return _facts(past, pattern, asserted)
 
 
 def _asserted(ref: Reference, wanted: ShortFact) -> Iterable[ShortFact]:

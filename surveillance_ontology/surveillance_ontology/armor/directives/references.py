@@ -18,6 +18,7 @@ from surveillance_ontology.armor.access import (
     Settings,
 )
 from surveillance_ontology.armor.directives.table import control, flag, text, utility
+from surveillance_ontology.armor.history import History
 from surveillance_ontology.armor.protocol import (
     DirectiveError,
     DirectiveRequest,
@@ -134,6 +135,7 @@ def _load(
                 name, source, iri, reasoner, session.paths, session.settings, web=web
             )
             ref.buffered_manipulation, ref.buffered_reasoner = buffered, lazy
+            ref.history = History(session.clock(), session.settings.history)
             if session.store:
                 session.store.loaded(ref)
             session.register(ref)
@@ -152,7 +154,7 @@ def _rebuffer(session: Session, request: DirectiveRequest, buffered: bool) -> bo
         if ref.buffered_manipulation != buffered:
             session.check_free(ref, request.client_name)
             if session.store:
-                session.store.buffered(ref.name, buffered)
+                session.store.buffered(ref.name, buffered, session.clock())
             ref.buffer(buffered)
     return True
 
