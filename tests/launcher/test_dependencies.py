@@ -57,12 +57,16 @@ def installed() -> set[str]:
     }
 
 
+OWN = ('surveillance_interfaces', 'armor_api', 'launcher', 'tests')
+"""What the checkout holds beside its packages."""
+
+
 @pytest.mark.parametrize('folder', [*(f'{p}/{p}' for p in PACKAGES), 'launcher', 'tests'])
 def test_every_import_is_installed_by_the_set_up(folder):
     known = installed()
     benchmarks = {'benchmarks', *(path.stem for path in (ROOT / 'benchmarks').glob('*.py'))}
     for name, path in imports(ROOT / folder).items():
-        own = name in {*PACKAGES, 'surveillance_interfaces', 'launcher', 'tests', *benchmarks}
+        own = name in {*PACKAGES, *OWN, *benchmarks}
         if own or name in sys.stdlib_module_names or name in OPTIONAL | TYPES or ROS.match(name):
             continue
         distribution = DISTRIBUTIONS.get(name, name).lower().replace('_', '-')
