@@ -32,10 +32,10 @@ from skimage.graph import MCP_Geometric
 from whole_stack import ROOT, Stack, ros_arguments
 
 from launcher import node_table, run
-from surveillance_controllers.geometry import polyline
+from surveillance_controllers import geometry
 from surveillance_controllers.motion.driving import Drive
 from surveillance_controllers.motion.localisation import Scan
-from surveillance_controllers.motion.pilot import Pilot
+from surveillance_controllers.motion.navigator import Navigator
 from surveillance_controllers.planning.grid_map import GridMap
 from surveillance_controllers.planning.grid_planning import GridPlanner, PlanningParameters
 from surveillance_runtime.place import generation as place_generation
@@ -103,7 +103,7 @@ def planning(*, quick: bool) -> None:
         if side <= 500:
             best = _optimum(free, first, last) * grid.resolution
             reference = f'{best:.2f}'
-        bare_length = polyline.length(grid.centres_of(np.array(search())))
+        bare_length = geometry.length(grid.centres_of(np.array(search())))
         rows.append(
             (
                 f'{grid.cells.shape[1]}x{grid.cells.shape[0]}',
@@ -111,8 +111,8 @@ def planning(*, quick: bool) -> None:
                 f'{library:.1f}',
                 f'{ours / library:.2f}',
                 peer,
-                f'{polyline.length(path):.2f}',
-                f'{polyline.length(shortest):.2f}',
+                f'{geometry.length(path):.2f}',
+                f'{geometry.length(shortest):.2f}',
                 f'{bare_length:.2f}',
                 reference,
             )
@@ -187,10 +187,10 @@ def control(*, quick: bool) -> None:
     drawn = occupancy_grid.draw(world.plan)
     grid = GridMap(drawn.cells, drawn.resolution, drawn.origin)
     planner = GridPlanner(grid)
-    pilot = Pilot()
-    pilot.set_map(grid)
+    navigator = Navigator()
+    navigator.set_map(grid)
     angles = robot.lidar.angles
-    spent: dict[str, list[float]] = {'lidar': [], 'pilot': [], 'physics': []}
+    spent: dict[str, list[float]] = {'lidar': [], 'navigator': [], 'physics': []}
 
     def timed(part: str, work: Callable[[], Any]) -> Any:
         begun = time.process_time()
@@ -201,13 +201,13 @@ def control(*, quick: bool) -> None:
     stops = ('R1', 'R4') if quick else ('R1', 'R4', 'E', 'R3', 'R2', 'E')
     for stop in stops:
         goal = world.plan.place.positions[stop][:2]
-        pilot.move(robot.base.odometry)
-        pilot.task = Drive(planner.plan(robot.base.pose[:2], goal))
-        while not pilot.task.state.ended:
+        navigator.move(robot.base.odometry)
+        navigator.task = Drive(planner.plan(robot.base.pose[:2], goal))
+        while not navigator.task.state.ended:
             ranges = timed('lidar', robot.scan).astype(float)
             scan = Scan(angles, ranges, robot.lidar.range_max)
-            pilot.move(robot.base.odometry)
-            velocity = timed('pilot', lambda scan=scan: pilot.see(scan, robot.time))
+            navigator.move(robot.base.odometry)
+            velocity = timed('navigator', lambda scan=scan: navigator.see(scan, robot.time))
             robot.base.command(velocity.speed, velocity.turn)
             timed('physics', lambda: robot.advance(0.1))
     rows = [
@@ -316,7 +316,7 @@ def processes(seconds: float) -> tuple[float, float, float]:
 
 
 def _driven(poses: Sequence[tuple[float, float, float]]) -> float:
-    return polyline.length(np.array([pose[1:] for pose in poses])) if len(poses) > 1 else 0.0
+    return geometry.length(np.array([pose[1:] for pose in poses])) if len(poses) > 1 else 0.0
 
 
 def _cpu(processes: Sequence[subprocess.Popen[bytes]]) -> float:

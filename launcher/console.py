@@ -9,7 +9,7 @@ import threading
 
 from launcher.log_merge import MergedLog
 from launcher.supervisor import Supervisor
-from surveillance_controllers.manual.console import Console
+from surveillance_controllers.manual.prompt import Console
 from surveillance_operator.console_commands import completions, help_text
 
 

@@ -16,12 +16,12 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from std_msgs.msg import Bool, UInt8
 from std_srvs.srv import Empty
 
+from surveillance_controllers import stimuli
 from surveillance_controllers.battery.model import Battery
 from surveillance_controllers.battery.robot_battery import RobotBattery
 from surveillance_controllers.controller_parameters import battery_settings, execution_mode
-from surveillance_controllers.manual import stimuli
-from surveillance_controllers.manual.console_commands import BATTERY, BATTERY_SET, ParsedCommand
-from surveillance_controllers.manual.operator_console import OperatorConsole
+from surveillance_controllers.manual.commands import BATTERY, BATTERY_SET, ParsedCommand
+from surveillance_controllers.manual.requests import CommandConsole
 from surveillance_controllers.state_file import StateFile
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
@@ -57,7 +57,7 @@ class BatteryController(PatrolNode):
         self._recharged = AwaitedEvent(self)
         group = ReentrantCallbackGroup()
         self.create_service(Empty, 'recharge', self._on_recharge, callback_group=group)
-        self._console = OperatorConsole(self, BATTERY, self._carry_out, self._status)
+        self._console = CommandConsole(self, BATTERY, self._carry_out, self._status)
         self._change(lambda: None)
         self.get_logger().info(f'{self._mode} mode, battery at {self._battery.percent} %')
         if self._mode == 'MANUAL' and self._settings.console:
@@ -116,7 +116,7 @@ class BatteryController(PatrolNode):
 
     def _recharge(self) -> None:
         # Only here: a node that is never asked to recharge starts without the import.
-        from surveillance_controllers.manual.progress_display import charge_display
+        from surveillance_controllers.manual.terminal import charge_display
 
         charge = self._await_full if self._mode == 'SIMULATED' else self._fill
         try:

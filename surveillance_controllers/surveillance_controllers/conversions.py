@@ -21,8 +21,7 @@ from nav_msgs.msg import Path as PathMessage
 from sensor_msgs.msg import BatteryState, LaserScan
 
 from surveillance_controllers.battery.model import Battery
-from surveillance_controllers.geometry.polyline import Points
-from surveillance_controllers.geometry.poses import Pose
+from surveillance_controllers.geometry import Points, Pose
 
 if TYPE_CHECKING:
     from surveillance_controllers.motion.localisation import Scan

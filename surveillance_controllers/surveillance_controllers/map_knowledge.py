@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 
 from surveillance_controllers import conversions
-from surveillance_controllers.geometry.polyline import Points
+from surveillance_controllers.geometry import Points
 from surveillance_interfaces.msg import RobotPlace
 from surveillance_interfaces.srv import ReferenceName, RoomPosition
 from surveillance_ontology.armor_client import (

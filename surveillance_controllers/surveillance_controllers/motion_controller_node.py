@@ -13,18 +13,16 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 import numpy as np
 
-from surveillance_controllers import conversions
+from surveillance_controllers import conversions, geometry, stimuli
 from surveillance_controllers.controller_parameters import execution_mode, motion_settings
-from surveillance_controllers.geometry import polyline
-from surveillance_controllers.geometry.polyline import Points
-from surveillance_controllers.manual import request_texts, stimuli
-from surveillance_controllers.manual.console_commands import MOTION, ParsedCommand
-from surveillance_controllers.manual.operator_console import OperatorConsole
-from surveillance_controllers.manual.operator_desk import OperatorDesk
+from surveillance_controllers.geometry import Points
+from surveillance_controllers.manual import commands
+from surveillance_controllers.manual.commands import MOTION, ParsedCommand
+from surveillance_controllers.manual.requests import CommandConsole, RequestQueue
 from surveillance_controllers.map_knowledge import KnowledgeError, MapKnowledge
-from surveillance_controllers.motion.arrival import MotionFailed, place_reached
+from surveillance_controllers.motion.arrival import MotionFailedError, place_reached
 from surveillance_controllers.motion.place_recording import PlaceRecorder
-from surveillance_controllers.motion.stimulus_motion import glide
+from surveillance_controllers.stimuli import glide
 from surveillance_interfaces.action import Control, FollowPath
 from surveillance_runtime.action_server import GoalAbortedError, GoalRun, GoalServer
 from surveillance_runtime.node import PatrolNode
@@ -47,8 +45,8 @@ class MotionController(PatrolNode):
         self._settings = motion_settings(self)
         self._draw = stimuli.generator(self._settings.random_seed)
         self._knowledge = MapKnowledge(self, self._settings.peer_timeout)
-        self._desk: OperatorDesk[tuple[float, float]] = OperatorDesk(self._announce)
-        self._console = OperatorConsole(self, MOTION, self._carry_out, lambda: self._desk.status)
+        self._requests: RequestQueue[tuple[float, float]] = RequestQueue(self._announce)
+        self._console = CommandConsole(self, MOTION, self._carry_out, lambda: self._requests.status)
         localises = self._mode == 'SIMULATED' and self._settings.navigator == 'own'
         start = None if localises else self._settings.robot_room
         reach = self._settings.place_reach
@@ -65,10 +63,30 @@ class MotionController(PatrolNode):
             self._console.open(console_source)
 
     def _make_robot(self) -> Motion:
+        """The way to move that the parameters ask for."""
         # Only here, for the libraries behind it take their time to import.
-        from surveillance_controllers.motion.robot_motion import make_motion
+        from surveillance_controllers.motion.docking import DockingMotion
+        from surveillance_controllers.motion.nav2 import Nav2Motion
+        from surveillance_controllers.motion.navigation_motion import NavigationMotion
+        from surveillance_controllers.motion.robot_parameters import robot_settings
 
-        return make_motion(self, self._settings, self._knowledge, self._recorder)
+        settings = self._settings
+        motion: Motion
+        if settings.navigator == 'nav2':
+            motion = Nav2Motion(self, self._knowledge, settings)
+        else:
+            robot = robot_settings(self, settings)
+            motion = NavigationMotion(self, robot, self._knowledge, self._recorder)
+        if settings.docking == 'none':
+            return motion
+        return DockingMotion(
+            self,
+            motion,
+            settings.station,
+            settings.dock_reach,
+            settings.dock_type,
+            settings.peer_timeout,
+        )
 
     def _announce(self, text: str) -> None:
         self._console.announce(text)
@@ -77,7 +95,7 @@ class MotionController(PatrolNode):
         seconds, delta = command.values
         assert isinstance(seconds, float)
         assert isinstance(delta, float)
-        self._desk.answer((seconds, delta))
+        self._requests.answer((seconds, delta))
         return f'Moving for {seconds:g} s.'
 
     def _follow_path(self, goal: Any, run: GoalRun) -> FollowPath.Result:
@@ -87,7 +105,7 @@ class MotionController(PatrolNode):
         path = _checked(goal.path)
         try:
             end = self._move(path, run, report, 'follow a path')
-        except MotionFailed as failure:
+        except MotionFailedError as failure:
             position = conversions.point_from(path[0] if failure.end is None else failure.end)
             raise GoalAbortedError(str(failure), FollowPath.Result(position=position)) from failure
         if self._tells_ends:
@@ -100,7 +118,7 @@ class MotionController(PatrolNode):
 
         def report(position: Points) -> None:
             nonlocal passed
-            behind = polyline.points_passed(path, polyline.distance_nearest(path, position))
+            behind = geometry.points_passed(path, geometry.distance_nearest(path, position))
             if behind > passed:
                 passed = behind
                 point = conversions.point_from(path[passed - 1])
@@ -111,8 +129,8 @@ class MotionController(PatrolNode):
             end = self._move(path, run, report, 'move through via points')
             if not run.interrupt.is_set():
                 self._arrive(path[-1], end, run)
-        except (MotionFailed, KnowledgeError) as failure:
-            if isinstance(failure, MotionFailed):
+        except (MotionFailedError, KnowledgeError) as failure:
+            if isinstance(failure, MotionFailedError):
                 end = failure.end
             point = conversions.point_from(path[0] if end is None else end)
             raise GoalAbortedError(str(failure), Control.Result(reached_point=point)) from failure
@@ -135,9 +153,9 @@ class MotionController(PatrolNode):
         if self._robot is not None:
             return self._robot.follow(path, run, report)
         if self._mode == 'MANUAL':
-            answer = self._desk.ask(request_texts.move_request(what, path), run.interrupt)
+            answer = self._requests.ask(commands.move_request(what, path), run.interrupt)
             if answer is None:
-                raise MotionFailed(f'{what}: withdrawn before the operator answered', None)
+                raise MotionFailedError(f'{what}: withdrawn before the operator answered', None)
             seconds, delta = answer
         else:
             seconds, delta = stimuli.move(self._draw)

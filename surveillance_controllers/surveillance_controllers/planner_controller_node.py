@@ -14,14 +14,12 @@ from typing import TYPE_CHECKING, Any, TextIO
 import numpy as np
 from nav_msgs.msg import Path
 
-from surveillance_controllers import conversions
+from surveillance_controllers import conversions, geometry, stimuli
 from surveillance_controllers.controller_parameters import execution_mode, planner_settings
-from surveillance_controllers.geometry import polyline
-from surveillance_controllers.geometry.polyline import Points
-from surveillance_controllers.manual import request_texts, stimuli
-from surveillance_controllers.manual.console_commands import PLANNER, ParsedCommand, Point3
-from surveillance_controllers.manual.operator_console import OperatorConsole
-from surveillance_controllers.manual.operator_desk import OperatorDesk
+from surveillance_controllers.geometry import Points
+from surveillance_controllers.manual import commands
+from surveillance_controllers.manual.commands import PLANNER, ParsedCommand, Point3
+from surveillance_controllers.manual.requests import CommandConsole, RequestQueue
 from surveillance_controllers.map_knowledge import KnowledgeError, MapKnowledge
 from surveillance_interfaces.action import ComputePath, Plan
 from surveillance_runtime.action_server import GoalAbortedError, GoalRun, GoalServer
@@ -30,7 +28,7 @@ from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
 
 if TYPE_CHECKING:
-    from surveillance_controllers.planning.simulated_planning import SimulatedPlanning
+    from surveillance_controllers.planning.map_planner import NavigationPlanning
 
 
 class PlannerController(PatrolNode):
@@ -46,15 +44,17 @@ class PlannerController(PatrolNode):
         self._settings = planner_settings(self)
         self._draw = stimuli.generator(self._settings.random_seed)
         self._knowledge = MapKnowledge(self, self._settings.peer_timeout)
-        self._desk: OperatorDesk[tuple[Point3, ...]] = OperatorDesk(self._announce)
-        self._console = OperatorConsole(self, PLANNER, self._carry_out, lambda: self._desk.status)
-        self._simulated: SimulatedPlanning | None = None
+        self._requests: RequestQueue[tuple[Point3, ...]] = RequestQueue(self._announce)
+        self._console = CommandConsole(
+            self, PLANNER, self._carry_out, lambda: self._requests.status
+        )
+        self._simulated: NavigationPlanning | None = None
         if self._mode == 'SIMULATED':
             # Only here, for the libraries of the search take their time to import.
-            from surveillance_controllers.planning.simulated_planning import SimulatedPlanning
+            from surveillance_controllers.planning.map_planner import NavigationPlanning
 
             timeout = self._settings.peer_timeout
-            self._simulated = SimulatedPlanning(self, self._knowledge, timeout)
+            self._simulated = NavigationPlanning(self, self._knowledge, timeout)
         self._shown = self.create_publisher(Path, 'plan', STATE_QOS)
         GoalServer(self, ComputePath, 'compute_path', self._compute_path)
         GoalServer(self, Plan, 'motion/planner', self._plan)
@@ -68,7 +68,7 @@ class PlannerController(PatrolNode):
     def _carry_out(self, command: ParsedCommand) -> str:
         (points,) = command.values
         assert isinstance(points, tuple)
-        self._desk.answer(points)
+        self._requests.answer(points)
         count = '1 point' if len(points) == 1 else f'{len(points)} points'
         return f'A path with {count} between start and goal.'
 
@@ -87,7 +87,7 @@ class PlannerController(PatrolNode):
         for what, point in (('the robot', start), (f'place {goal.target!r}', target)):
             if not self._settings.environment.contains(point):
                 raise GoalAbortedError(
-                    f'{what} is at {request_texts.point(point)}: expected within '
+                    f'{what} is at {commands.point(point)}: expected within '
                     f'environment_size {self._settings.environment}'
                 )
         if self._mode == 'RANDOM':
@@ -95,8 +95,8 @@ class PlannerController(PatrolNode):
         else:
             path = self._path(start, target, run, f'plan the way to {goal.target}')
         self._show(path)
-        spacing = self._settings.spacing(polyline.length(path))
-        via_points = conversions.points_from_array(polyline.equally_spaced(path, spacing))
+        spacing = self._settings.spacing(geometry.length(path))
+        via_points = conversions.points_from_array(geometry.equally_spaced(path, spacing))
         for count in range(1, len(via_points) + 1):
             run.feedback(Plan.Feedback(via_points=via_points[:count]))
             if not run.sleep(self._settings.via_point_delay):
@@ -116,15 +116,15 @@ class PlannerController(PatrolNode):
     def _path(self, start: Points, goal: Points, run: GoalRun, what: str) -> Points:
         if not (np.isfinite(start).all() and np.isfinite(goal).all()):
             raise GoalAbortedError(
-                f'{what} from {request_texts.point(start)} to {request_texts.point(goal)}: '
+                f'{what} from {commands.point(start)} to {commands.point(goal)}: '
                 'expected finite coordinates'
             )
         if self._simulated is not None:
             return self._simulated.path(start, goal, run, what)
         between: Sequence[Point3] | None
         if self._mode == 'MANUAL':
-            text = request_texts.path_request(what, start, goal)
-            between = self._desk.ask(text, run.interrupt)
+            text = commands.path_request(what, start, goal)
+            between = self._requests.ask(text, run.interrupt)
             if between is None:
                 raise GoalAbortedError(f'{what}: withdrawn before the operator answered')
         else:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from surveillance_controllers.manual.console_commands import (
+from surveillance_controllers.manual.commands import (
     BATTERY,
     EXIT,
     HELP,

@@ -13,7 +13,7 @@ from typing import Any, TextIO
 
 from std_msgs.msg import String
 
-from surveillance_controllers.manual.console import Console
+from surveillance_controllers.manual.prompt import Console
 from surveillance_operator.console_commands import CONTROLLED, answer, completions, help_text
 from surveillance_operator.mission_actions import MissionActions
 from surveillance_operator.mission_feed import MissionFeed

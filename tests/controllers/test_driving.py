@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from surveillance_controllers.geometry.poses import composed
+from surveillance_controllers.geometry import composed
 from surveillance_controllers.motion.driving import Drive, RecoveryParameters, Spin, State
 from surveillance_controllers.motion.path_following import DriveParameters, Velocity
 

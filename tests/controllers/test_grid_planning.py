@@ -8,9 +8,13 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from skimage.graph import MCP_Geometric
 
-from surveillance_controllers.geometry import polyline
+from surveillance_controllers import geometry
 from surveillance_controllers.planning.grid_map import GridMap, distance_to, drawn_lines
-from surveillance_controllers.planning.grid_planning import GridPlanner, NoPath, PlanningParameters
+from surveillance_controllers.planning.grid_planning import (
+    GridPlanner,
+    NoPathError,
+    PlanningParameters,
+)
 
 RESOLUTION = 0.05
 ROBOT = PlanningParameters(radius=0.2)
@@ -27,7 +31,7 @@ def two_rooms(door: tuple[float, float] = (1.5, 2.5)) -> GridMap:
 
 def true_clearance(grid: GridMap, path: np.ndarray) -> float:
     """The least distance from points along a path to the occupied squares, by brute force."""
-    samples = polyline.equally_spaced(path, 0.02)
+    samples = geometry.equally_spaced(path, 0.02)
     low = grid.centres_of(np.argwhere(~grid.free)) - RESOLUTION / 2
     gap = np.maximum(low - samples[:, None], samples[:, None] - low - RESOLUTION)
     return float(np.hypot(*np.moveaxis(np.maximum(gap, 0), -1, 0)).min())
@@ -58,7 +62,7 @@ def test_a_path_goes_through_the_door_and_keeps_its_distance() -> None:
 def test_points_that_are_not_free_are_named(
     start: tuple[float, float], goal: tuple[float, float], text: str
 ) -> None:
-    with pytest.raises(NoPath) as caught:
+    with pytest.raises(NoPathError) as caught:
         GridPlanner(two_rooms(), ROBOT).plan(start, goal)
     assert text in str(caught.value)
 
@@ -66,18 +70,18 @@ def test_points_that_are_not_free_are_named(
 def test_what_blocks_is_named_and_gone_when_it_is_taken_away() -> None:
     planner = GridPlanner(two_rooms(), ROBOT)
     planner.set_closed({'D1': (4.02, 1.5, 4.02, 2.5)})
-    with pytest.raises(NoPath, match='the closed door D1 is in the way'):
+    with pytest.raises(NoPathError, match='the closed door D1 is in the way'):
         planner.plan((1, 1), (7, 1))
     planner.set_closed({})
     planner.set_obstacles([(4.1, y) for y in np.arange(1.5, 2.6, 0.05)])
-    with pytest.raises(NoPath, match=r'an obstacle at \(4\.10, .*\) is in the way'):
+    with pytest.raises(NoPathError, match=r'an obstacle at \(4\.10, .*\) is in the way'):
         planner.plan((1, 1), (7, 1))
     planner.set_obstacles([])
     assert planner.is_free(planner.plan((1, 1), (7, 1)))
 
 
 def test_an_opening_that_is_too_narrow_is_a_wall() -> None:
-    with pytest.raises(NoPath, match='walls lie between them, with no opening wide enough'):
+    with pytest.raises(NoPathError, match='walls lie between them, with no opening wide enough'):
         GridPlanner(two_rooms((2.0, 2.4)), ROBOT).plan((1, 1), (7, 1))
 
 
@@ -86,9 +90,9 @@ def test_an_obstacle_on_the_way_is_driven_around() -> None:
     straight = planner.plan((0.5, 2), (3, 2))
     planner.set_obstacles([(1.75, 2.0)])
     around = planner.plan((0.5, 2), (3, 2))
-    assert polyline.length(straight) == pytest.approx(2.5)
-    assert polyline.length(around) > 2.5
-    assert np.hypot(*(polyline.equally_spaced(around, 0.02) - (1.75, 2)).T).min() >= ROBOT.radius
+    assert geometry.length(straight) == pytest.approx(2.5)
+    assert geometry.length(around) > 2.5
+    assert np.hypot(*(geometry.equally_spaced(around, 0.02) - (1.75, 2)).T).min() >= ROBOT.radius
 
 
 def test_a_goal_that_an_obstacle_covers_is_approached() -> None:
@@ -97,7 +101,7 @@ def test_a_goal_that_an_obstacle_covers_is_approached() -> None:
     path = planner.plan((0.5, 2), (3, 2))
     assert ROBOT.radius <= np.hypot(*(path[-1] - (3, 2))) <= 0.35
     planner.set_closed({'D1': (3.0, 0.0, 3.0, 4.0)})
-    with pytest.raises(NoPath, match='the closed door D1 is in the way'):
+    with pytest.raises(NoPathError, match='the closed door D1 is in the way'):
         planner.plan((0.5, 2), (7, 2))
 
 
@@ -125,7 +129,7 @@ def test_in_any_clutter_a_path_is_free_and_not_longer_than_the_grid_s(seed: int)
     assume((planner.clearance([start, goal]) > robot.radius + robot.margin).all())
     try:
         path = planner.plan(start, goal)
-    except NoPath as problem:
+    except NoPathError as problem:
         assert 'with no opening wide enough' in str(problem)  # noqa: PT017
         return
     assert path[0] == pytest.approx(start)
@@ -135,7 +139,7 @@ def test_in_any_clutter_a_path_is_free_and_not_longer_than_the_grid_s(seed: int)
     cells_of = [tuple(c) for c in grid.cells_of([start, goal])]
     search.find_costs(cells_of[:1], cells_of[1:])
     on_grid = grid.centres_of(search.traceback(cells_of[1]))
-    assert polyline.length(path) <= polyline.length(on_grid) + 1e-6
+    assert geometry.length(path) <= geometry.length(on_grid) + 1e-6
 
 
 @given(st.tuples(*[st.floats(-3, 12)] * 2), st.tuples(*[st.floats(-3, 12)] * 2))
@@ -146,7 +150,7 @@ def test_any_two_points_give_a_free_path_or_a_reason(
     planner = TWO_ROOMS
     try:
         path = planner.plan(start, goal)
-    except NoPath as problem:
+    except NoPathError as problem:
         assert '\n' not in str(problem)  # noqa: PT017
         return
     assert path[-1] == pytest.approx(np.array(goal))

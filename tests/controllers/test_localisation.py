@@ -10,7 +10,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from surveillance_controllers.geometry.poses import composed, relative
+from surveillance_controllers.geometry import composed, relative
 from surveillance_controllers.motion.localisation import Localiser, Scan
 
 POSES = st.tuples(st.floats(-5, 5), st.floats(-5, 5), st.floats(-3, 3))

@@ -87,7 +87,7 @@ def test_a_path_that_cannot_be_followed_is_aborted_with_the_reason(
 
 
 def test_random_moves_take_seconds_of_the_range(graph: Any) -> None:
-    from surveillance_controllers.manual import stimuli
+    from surveillance_controllers import stimuli
 
     draw = stimuli.generator(7)
     for _ in range(200):

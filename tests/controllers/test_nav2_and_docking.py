@@ -15,7 +15,7 @@ import pytest
 
 from surveillance_controllers.motion import docking
 from surveillance_controllers.motion import nav2 as nav2_motion
-from surveillance_controllers.motion.arrival import MotionFailed
+from surveillance_controllers.motion.arrival import MotionFailedError
 from surveillance_runtime.calls import GoalEnd, UnavailableError
 from surveillance_runtime.node import StartError
 from surveillance_runtime.waiting import Interrupt
@@ -104,7 +104,7 @@ def test_what_nav2_cannot_do_fails_with_the_reason(
     graph: Any, servers: Servers, run: Any, end: Any, text: str
 ) -> None:
     servers.ends['navigate_to_pose'] = end
-    with pytest.raises(MotionFailed, match=text):
+    with pytest.raises(MotionFailedError, match=text):
         nav2(graph).follow(PATH, run, lambda _: None)
 
 
@@ -134,7 +134,7 @@ def test_a_way_to_elsewhere_does_not_dock(graph: Any, servers: Servers, run: Any
 def test_a_dock_that_is_not_found_fails_the_way(graph: Any, servers: Servers, run: Any) -> None:
     refused = SimpleNamespace(success=False, error_code=903)
     servers.ends['dock_robot'] = GoalEnd('aborted', refused)
-    with pytest.raises(MotionFailed, match=r'docking: .* aborted the goal \(error code 903\)'):
+    with pytest.raises(MotionFailedError, match=r'docking: .* aborted the goal \(error code 903\)'):
         docked(graph, (3.0, 4.0, 0.0)).follow(PATH, run, lambda _: None)
 
 

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from surveillance_controllers.geometry import polyline
-from surveillance_controllers.geometry.poses import composed
+from surveillance_controllers import geometry
+from surveillance_controllers.geometry import composed
 from surveillance_controllers.motion.path_following import (
     DriveParameters,
     PathFollower,
@@ -40,7 +40,7 @@ def follow(
     """Drives without errors until the end, or for as long as a slow robot would need."""
     follower = PathFollower(path, ROBOT)
     poses, velocities = [pose], [Velocity()]
-    for _ in range(int(60 + 30 * polyline.length(path)) * 10):
+    for _ in range(int(60 + 30 * geometry.length(path)) * 10):
         guidance = follower.step(pose, NOTHING, PERIOD)
         velocities.append(guidance.velocity)
         if guidance.done:
@@ -67,7 +67,7 @@ def test_any_path_is_followed_to_its_end_within_its_corridor(path: np.ndarray, y
     poses, velocities, arrived = follow(path, (float(path[0, 0]), float(path[0, 1]), yaw))
     assert arrived
     assert math.dist(poses[-1][:2], path[-1]) <= ROBOT.tolerance
-    line = polyline.equally_spaced(path, 0.02)
+    line = geometry.equally_spaced(path, 0.02)
     at = np.array(poses)[:, :2]
     off = np.hypot(*(at[:, None] - line).transpose(2, 0, 1)).min(axis=1)
     assert off.max() <= 0.25

@@ -7,12 +7,12 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from surveillance_controllers.geometry import polyline
+from surveillance_controllers import geometry
 from surveillance_controllers.motion.driving import Drive, State
 from surveillance_controllers.motion.localisation import Scan
-from surveillance_controllers.motion.pilot import Pilot
+from surveillance_controllers.motion.navigator import Navigator
 from surveillance_controllers.planning.grid_map import GridMap
-from surveillance_controllers.planning.grid_planning import GridPlanner, NoPath
+from surveillance_controllers.planning.grid_planning import GridPlanner, NoPathError
 from surveillance_runtime.place import occupancy_grid
 from surveillance_simulation.robot.robot import Robot
 from surveillance_simulation.world.world import World, read_world
@@ -51,9 +51,9 @@ def test_a_path_never_touches_a_wall_or_a_closed_door(
     assume(world.is_free(*start, RADIUS + 0.05))
     try:
         path = planner.plan(start, goal)
-    except NoPath:
+    except NoPathError:
         return
-    for x, y in polyline.equally_spaced(path, 0.02):
+    for x, y in geometry.equally_spaced(path, 0.02):
         assert world.is_free(float(x), float(y), RADIUS)
 
 
@@ -62,20 +62,20 @@ def driven(world: World, seed: int, goals: list[str]) -> tuple[Robot, float]:
     robot = Robot(world, rng=np.random.default_rng(seed))
     drawn = occupancy_grid.draw(world.plan)
     grid = GridMap(drawn.cells, drawn.resolution, drawn.origin)
-    planner, pilot = GridPlanner(grid), Pilot()
-    pilot.set_map(grid)
+    planner, navigator = GridPlanner(grid), Navigator()
+    navigator.set_map(grid)
     furthest = 0.0
     for goal in goals:
         path = planner.plan(robot.base.pose[:2], world.plan.place.positions[goal][:2])
-        drive = pilot.task = Drive(path)
-        line = polyline.equally_spaced(path, 0.02)
-        pilot.move(robot.base.odometry)
+        drive = navigator.task = Drive(path)
+        line = geometry.equally_spaced(path, 0.02)
+        navigator.move(robot.base.odometry)
         for _ in range(1200):
             if drive.state.ended:
                 break
             scan = Scan(robot.lidar.angles, robot.scan().astype(float), robot.lidar.range_max)
-            pilot.move(robot.base.odometry)
-            velocity = pilot.see(scan, robot.time)
+            navigator.move(robot.base.odometry)
+            velocity = navigator.see(scan, robot.time)
             assert velocity is not None
             robot.base.command(velocity.speed, velocity.turn)
             robot.advance(0.1)

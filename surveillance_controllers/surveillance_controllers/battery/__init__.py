@@ -1,1 +1,6 @@
-"""The battery: its model, what a robot draws, and its ROS side."""
+"""The model of a battery, and a battery in a robot that drives; plain Python."""
+
+from surveillance_controllers.battery.model import Battery, BatteryParameters
+from surveillance_controllers.battery.use import BatteryInUse, MotionMeter
+
+__all__ = ['Battery', 'BatteryInUse', 'BatteryParameters', 'MotionMeter']

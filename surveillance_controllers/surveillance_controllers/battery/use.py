@@ -11,7 +11,7 @@ import math
 from collections.abc import Sequence
 
 from surveillance_controllers.battery.model import Battery
-from surveillance_controllers.geometry.poses import Pose, angle_between
+from surveillance_controllers.geometry import Pose, angle_between
 
 LONGEST_AWAY = 86_400.0
 """A longer time between two steps is none, but a jump of the clock, seconds."""

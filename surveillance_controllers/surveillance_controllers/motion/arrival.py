@@ -7,11 +7,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from surveillance_controllers.geometry.polyline import Points
-from surveillance_controllers.manual import request_texts
+from surveillance_controllers.geometry import Points
+from surveillance_controllers.manual import commands
 
 
-class MotionFailed(Exception):
+class MotionFailedError(Exception):
     """The robot did not get where it should; the text says why.
 
     Args:
@@ -48,12 +48,12 @@ def place_reached(places: Mapping[str, Points], end: Points, reach: float) -> st
         reach: A place further away than this is not taken, metres.
 
     Raises:
-        MotionFailed: No place is within reach.
+        MotionFailedError: No place is within reach.
     """
     nearest, gap = nearest_place(places, end)
     if nearest is None or gap > reach:
-        raise MotionFailed(
-            f'the robot stopped at {request_texts.point(end)}: expected a place within {reach:g} m'
+        raise MotionFailedError(
+            f'the robot stopped at {commands.point(end)}: expected a place within {reach:g} m'
             + (f', {nearest} is {gap:.2f} m away' if nearest else ''),
             end,
         )

@@ -12,22 +12,21 @@ from typing import Any, Protocol
 from geometry_msgs.msg import PoseStamped
 
 from surveillance_controllers import conversions
-from surveillance_controllers.geometry.polyline import Points
-from surveillance_controllers.geometry.poses import Pose
-from surveillance_controllers.motion.arrival import MotionFailed
+from surveillance_controllers.geometry import Points, Pose
+from surveillance_controllers.motion.arrival import MotionFailedError
 from surveillance_runtime.action_server import GoalRun
 from surveillance_runtime.calls import CallError, GoalCaller
 from surveillance_runtime.node import PatrolNode, StartError
 
 
 class Motion(Protocol):
-    """What drives the robot: `SimulatedMotion` or `Nav2Motion`."""
+    """What drives the robot: `NavigationMotion` or `Nav2Motion`."""
 
     def follow(self, path: Points, run: GoalRun, report: Callable[[Points], None]) -> Points:
-        """Drives along a path; returns where the robot is then, or raises `MotionFailed`."""
+        """Drives along a path; returns where the robot is then, or raises `MotionFailedError`."""
 
     def place_reached(self, goal: Points, end: Points, run: GoalRun) -> str:
-        """The place the robot is in; raises `MotionFailed` when it is not the goal's."""
+        """The place the robot is in; raises `MotionFailedError` when it is not the goal's."""
 
     def look_around(self, run: GoalRun) -> None:
         """Looks around in the place."""
@@ -89,7 +88,7 @@ class DockingMotion:
         """Undocks where that is needed, drives, and docks where the way ends at the station.
 
         Raises:
-            MotionFailed: One of the three failed.
+            MotionFailedError: One of the three failed.
         """
         if self._docked:
             self._docked = False
@@ -127,7 +126,7 @@ class DockingMotion:
         try:
             end = caller.run(goal, accept_timeout=self._timeout, interrupt=run.interrupt)
         except CallError as error:
-            raise MotionFailed(f'{what}: {error}', at) from error
+            raise MotionFailedError(f'{what}: {error}', at) from error
         if end.status != 'succeeded' or not end.result.success:
             code = '' if end.result is None else f' (error code {end.result.error_code})'
-            raise MotionFailed(f'{what}: the docking server {end.status} the goal{code}', at)
+            raise MotionFailedError(f'{what}: the docking server {end.status} the goal{code}', at)

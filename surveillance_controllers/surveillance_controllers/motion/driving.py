@@ -16,8 +16,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import ArrayLike
 
-from surveillance_controllers.geometry.polyline import Points
-from surveillance_controllers.geometry.poses import Pose, angle_between, composed
+from surveillance_controllers.geometry import Points, Pose, angle_between, composed
 from surveillance_controllers.motion.path_following import (
     DriveParameters,
     Guidance,

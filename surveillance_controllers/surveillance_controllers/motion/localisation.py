@@ -22,8 +22,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from surveillance_controllers.geometry.polyline import Points
-from surveillance_controllers.geometry.poses import Pose, composed, relative
+from surveillance_controllers.geometry import Points, Pose, composed, relative
 from surveillance_controllers.planning.grid_map import GridMap, distance_to
 
 

@@ -14,9 +14,9 @@ from geometry_msgs.msg import PoseStamped
 
 from surveillance_controllers import conversions
 from surveillance_controllers.controller_parameters import MotionSettings
-from surveillance_controllers.geometry.polyline import Points
+from surveillance_controllers.geometry import Points
 from surveillance_controllers.map_knowledge import MapKnowledge
-from surveillance_controllers.motion.arrival import MotionFailed, place_reached
+from surveillance_controllers.motion.arrival import MotionFailedError, place_reached
 from surveillance_runtime.action_server import GoalRun
 from surveillance_runtime.calls import CallError, GoalCaller
 from surveillance_runtime.node import PatrolNode, StartError
@@ -65,7 +65,7 @@ class Nav2Motion:
             Where the robot is then, as Nav2 said last, shape (3,).
 
         Raises:
-            MotionFailed: It did not get there.
+            MotionFailedError: It did not get there.
         """
         goal = PoseStamped()
         goal.header.frame_id = 'map'
@@ -89,16 +89,16 @@ class Nav2Motion:
                 on_feedback=on_feedback,
             )
         except CallError as error:
-            raise MotionFailed(str(error), position) from error
+            raise MotionFailedError(str(error), position) from error
         if end.status != 'succeeded':
-            raise MotionFailed(f'Nav2 {end.status} the goal', position)
+            raise MotionFailedError(f'Nav2 {end.status} the goal', position)
         return path[-1] if position is None else position
 
     def place_reached(self, _goal: Points, end: Points, run: GoalRun) -> str:
         """The place nearest to where the robot is, shape (3,).
 
         Raises:
-            MotionFailed: No place is within reach.
+            MotionFailedError: No place is within reach.
             KnowledgeError: Map or ontology do not answer.
         """
         return place_reached(self._knowledge.places(run.interrupt), end, self._place_reach)

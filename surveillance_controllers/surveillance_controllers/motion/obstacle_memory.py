@@ -10,8 +10,7 @@ import math
 
 import numpy as np
 
-from surveillance_controllers.geometry.polyline import Points
-from surveillance_controllers.geometry.poses import Pose, composed
+from surveillance_controllers.geometry import Points, Pose, composed
 from surveillance_controllers.motion.localisation import Scan
 from surveillance_controllers.planning.grid_map import GridMap, distance_to
 

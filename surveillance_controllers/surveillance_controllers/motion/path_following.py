@@ -16,9 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from surveillance_controllers.geometry import polyline
-from surveillance_controllers.geometry.polyline import Points
-from surveillance_controllers.geometry.poses import Pose, angle_between
+from surveillance_controllers import geometry
+from surveillance_controllers.geometry import Points, Pose, angle_between
 
 
 @dataclass(frozen=True)
@@ -105,7 +104,7 @@ class PathFollower:
         given = np.asarray(path, dtype=float)[:, :2]
         keep = np.concatenate(([True], np.any(np.diff(given, axis=0) != 0, axis=1)))
         self.path: Points = given[keep]
-        self._along = polyline.distances_along(self.path)
+        self._along = geometry.distances_along(self.path)
         self.progress = 0.0
         self._velocity = Velocity()
 
@@ -201,7 +200,7 @@ class PathFollower:
             return True
         end = min(self.progress + ahead, self.length)
         count = max(2, math.ceil((end - self.progress) / 0.05) + 1)
-        way = polyline.point_at(self.path, np.linspace(self.progress, end, count))
+        way = geometry.point_at(self.path, np.linspace(self.progress, end, count))
         gaps = np.hypot(way[:, :1] - obstacles[:, 0], way[:, 1:] - obstacles[:, 1])
         return bool((gaps >= reach).all())
 
@@ -259,7 +258,7 @@ class PathFollower:
     def _target(self, position: Points) -> Points:
         p = self.parameters
         look = min(max(self._velocity.speed * p.look_time, p.shortest_look), p.longest_look)
-        ahead = polyline.point_at(self.path, self.progress + np.linspace(0.0, look, 9))
+        ahead = geometry.point_at(self.path, self.progress + np.linspace(0.0, look, 9))
         first = max(1, math.ceil(8 * p.shortest_look / look))
         for index in range(8, first, -1):
             line = ahead[index] - position

@@ -9,7 +9,7 @@ import time
 from builtin_interfaces.msg import Time
 from std_msgs.msg import Header
 
-from surveillance_controllers.geometry.polyline import Points
+from surveillance_controllers.geometry import Points
 from surveillance_controllers.map_knowledge import KnowledgeError, MapKnowledge, answered
 from surveillance_controllers.motion.arrival import nearest_place
 from surveillance_controllers.state_file import StateFile

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from surveillance_controllers.controller_parameters import MotionSettings
-from surveillance_controllers.geometry.polyline import Points
-from surveillance_controllers.geometry.poses import Pose
+from surveillance_controllers.geometry import Points, Pose
 from surveillance_controllers.motion.path_following import DriveParameters
 from surveillance_controllers.motion.place_regions import Segment, door_segment
 from surveillance_controllers.planning.grid_planning import PlanningParameters

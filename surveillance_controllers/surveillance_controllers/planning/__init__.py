@@ -1,1 +1,6 @@
-"""Paths on a grid map."""
+"""Paths over an occupancy grid, and routes over doors.
+
+`grid_map` has the map, `grid_planning` the planner (`GridPlanner`, `NoPathError`), `route_planning`
+routes (`route`, `NoRouteError`); none of them needs ROS. `map_planner` and `door_watch` are their
+ROS side. They are imported from their modules, for the libraries behind them take their time.
+"""

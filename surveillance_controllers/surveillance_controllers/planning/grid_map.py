@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from surveillance_controllers.geometry.polyline import Points
+from surveillance_controllers.geometry import Points
 
 OCCUPIED = 100
 """The value of a cell that certainly is occupied."""

@@ -24,8 +24,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from skimage.graph import MCP_Geometric
 
-from surveillance_controllers.geometry import polyline
-from surveillance_controllers.geometry.polyline import Points
+from surveillance_controllers import geometry
+from surveillance_controllers.geometry import Points
 from surveillance_controllers.planning.grid_map import GridMap, distance_to, drawn_lines, marked
 
 Lines = Mapping[str, tuple[float, float, float, float]]
@@ -35,7 +35,7 @@ _THROUGH = 1e4
 """Cost of a blocked cell in the search for what blocks; more than any detour."""
 
 
-class NoPath(Exception):
+class NoPathError(Exception):
     """There is no path; the text says why: what blocks it, or which point is not free."""
 
 
@@ -137,7 +137,7 @@ class GridPlanner:
             The path, shape (n, 2), n of at least 2, both points included.
 
         Raises:
-            NoPath: There is none; the text says what blocks it.
+            NoPathError: There is none; the text says what blocks it.
         """
         begin: Points = np.asarray(start, dtype=float)[:2]
         end: Points = np.asarray(goal, dtype=float)[:2]
@@ -147,7 +147,7 @@ class GridPlanner:
             goal_cell = self._cell_beside(end, goal_cell, start_cell)
             end = self.grid.centres_of(goal_cell)[0]
         if self._costs.regions[start_cell] != self._costs.regions[goal_cell]:
-            raise NoPath(
+            raise NoPathError(
                 f'no path from {_shown(begin)} to {_shown(end)}: '
                 f'{self._what_blocks(start_cell, goal_cell)}'
             )
@@ -185,7 +185,7 @@ class GridPlanner:
             west, south = self.grid.origin
             east = west + columns * self.grid.resolution
             north = south + rows * self.grid.resolution
-            raise NoPath(
+            raise NoPathError(
                 f'{what} {_shown(point)} lies outside of the map, which goes from '
                 f'({west:.2f}, {south:.2f}) to ({east:.2f}, {north:.2f})'
             )
@@ -199,7 +199,7 @@ class GridPlanner:
         if self._costs.regions[row, column] != 0:
             return row, column
         if not self.grid.free[row, column]:
-            raise NoPath(f'the start {_shown(start)} {self._why_not_free(start)}')
+            raise NoPathError(f'the start {_shown(start)} {self._why_not_free(start)}')
         reach = int(np.ceil(self.parameters.escape / self.grid.resolution))
         first_row, first_column = max(0, row - reach), max(0, column - reach)
         window = self._costs.regions[first_row : row + reach + 1, first_column : column + reach + 1]
@@ -210,7 +210,7 @@ class GridPlanner:
                 break
             if self._can_escape(start, self.grid.centres_of(found[index])[0]):
                 return int(found[index, 0]), int(found[index, 1])
-        raise NoPath(f'the start {_shown(start)} {self._why_not_free(start)}')
+        raise NoPathError(f'the start {_shown(start)} {self._why_not_free(start)}')
 
     def _cell_beside(
         self, goal: Points, cell: tuple[int, int], start: tuple[int, int]
@@ -229,7 +229,7 @@ class GridPlanner:
             if len(gaps) and gaps.min() <= reach:
                 nearest = found[int(np.argmin(gaps))]
                 return int(nearest[0]), int(nearest[1])
-        raise NoPath(f'the goal {_shown(goal)} {self._why_not_free(goal)}')
+        raise NoPathError(f'the goal {_shown(goal)} {self._why_not_free(goal)}')
 
     def _can_escape(self, start: Points, end: Points) -> bool:
         """Whether the way out only leads away from what is near: it must never come closer."""
@@ -254,7 +254,7 @@ class GridPlanner:
     def _nearest_extra(self, point: Points) -> str:
         gaps = {
             f'the closed door {name}': float(
-                np.hypot(*(polyline.equally_spaced(_ends(line), 0.05) - point).T).min()
+                np.hypot(*(geometry.equally_spaced(_ends(line), 0.05) - point).T).min()
             )
             for name, line in self._closed.items()
         }
@@ -369,7 +369,7 @@ def _ends(line: tuple[float, float, float, float]) -> Points:
 def _samples(path: Points, spacing: float) -> Points:
     if len(path) == 1:
         return path
-    return polyline.equally_spaced(path, spacing) if len(path) else path
+    return geometry.equally_spaced(path, spacing) if len(path) else path
 
 
 def _shown(point: Points) -> str:

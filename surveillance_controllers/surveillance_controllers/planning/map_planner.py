@@ -13,10 +13,17 @@ from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import PointCloud2
 
 from surveillance_controllers import conversions
-from surveillance_controllers.geometry.polyline import Points
-from surveillance_controllers.geometry.poses import Pose
+from surveillance_controllers.geometry import Points, Pose
+from surveillance_controllers.map_knowledge import MapKnowledge
+from surveillance_controllers.motion.robot_parameters import door_segments, planning_parameters
 from surveillance_controllers.planning.door_watch import DoorWatch
-from surveillance_controllers.planning.grid_planning import GridPlanner, NoPath, PlanningParameters
+from surveillance_controllers.planning.grid_planning import (
+    GridPlanner,
+    NoPathError,
+    PlanningParameters,
+)
+from surveillance_controllers.planning.route_planning import NoRouteError, route
+from surveillance_runtime.action_server import GoalAbortedError, GoalRun
 from surveillance_runtime.conversions import points_from_cloud
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import STATE_QOS
@@ -63,14 +70,14 @@ class MapPlanner:
             The path, shape (n, 3); its height goes evenly from the start's to the goal's.
 
         Raises:
-            NoPath: There is none, or no map; the text says why.
+            NoPathError: There is none, or no map; the text says why.
         """
         unsubscribe = interrupt.subscribe(self._has_map.set)
         self._has_map.wait(timeout)
         unsubscribe()
         if self._planner is None:
             self._has_map.clear()
-            raise NoPath(f'no map came on the topic map within {timeout:g} s')
+            raise NoPathError(f'no map came on the topic map within {timeout:g} s')
         closed = self._doors.closed_segments(interrupt)
         with self._lock:
             self._planner.set_closed(closed)
@@ -103,3 +110,51 @@ class MapPlanner:
         with self._lock:
             self._planner = planner
         self._has_map.set()
+
+
+class NavigationPlanning:
+    """Plans for one robot.
+
+    Args:
+        node: The planner's node.
+        knowledge: Map and ontology.
+        peer_timeout: How long map and ontology may take, seconds of steady time.
+    """
+
+    def __init__(self, node: PatrolNode, knowledge: MapKnowledge, peer_timeout: float) -> None:
+        self._node = node
+        self._knowledge = knowledge
+        self._timeout = peer_timeout
+        self._doors = DoorWatch(node, door_segments(node), knowledge, peer_timeout)
+        self._map = MapPlanner(node, planning_parameters(node), self._doors)
+
+    def start(self, target: str, run: GoalRun) -> Points:
+        """Where the robot is, shape (3,), once there is a route over doors from there to a place.
+
+        Raises:
+            GoalAbortedError: There is no route.
+            KnowledgeError: Map or ontology do not answer.
+        """
+        place = self._knowledge.robot_place(run.interrupt)
+        positions = self._knowledge.places(run.interrupt)
+        rooms_of = self._doors.rooms_of(run.interrupt)
+        try:
+            doors = route(rooms_of, self._doors.closed(rooms_of), place, target, positions)
+        except NoRouteError as error:
+            raise GoalAbortedError(str(error)) from error
+        self._node.get_logger().info(
+            f'{place} to {target}: through {", ".join(doors) or "no door"}'
+        )
+        pose = self._map.pose
+        return positions[place] if pose is None else np.array([pose[0], pose[1], 0.0])
+
+    def path(self, start: Points, goal: Points, run: GoalRun, what: str) -> Points:
+        """The path between two points, shape (n, 3).
+
+        Raises:
+            GoalAbortedError: There is none; the text says what blocks it.
+        """
+        try:
+            return self._map.plan(start, goal, self._timeout, run.interrupt)
+        except NoPathError as error:
+            raise GoalAbortedError(f'{what}: {error}') from error

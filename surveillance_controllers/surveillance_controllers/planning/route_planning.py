@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 
-class NoRoute(Exception):
+class NoRouteError(Exception):
     """No open doors lead there; the text names the closed doors that would."""
 
 
@@ -35,7 +35,7 @@ def route(
         positions: A point in each place, metres; the way through a place is measured by them.
 
     Raises:
-        NoRoute: There is no route over open doors.
+        NoRouteError: There is no route over open doors.
     """
     graph = nx.Graph()
     graph.add_nodes_from([start, goal])
@@ -50,7 +50,7 @@ def route(
     try:
         places = nx.shortest_path(graph, start, goal, weight='length')
     except nx.NetworkXNoPath:
-        raise NoRoute(_why(blocked, closed, start, goal)) from None
+        raise NoRouteError(_why(blocked, closed, start, goal)) from None
     return [graph[first][second]['door'] for first, second in pairwise(places)]
 
 

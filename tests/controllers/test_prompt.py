@@ -18,9 +18,9 @@ from prompt_toolkit.output import DummyOutput
 from std_msgs.msg import String, UInt8
 
 from surveillance_controllers.battery_controller_node import BatteryController
-from surveillance_controllers.manual.console import Console
-from surveillance_controllers.manual.console_commands import BATTERY, Grammar
-from surveillance_controllers.manual.terminal_lines import TerminalLines, WordCompleter
+from surveillance_controllers.manual.commands import BATTERY, Grammar
+from surveillance_controllers.manual.prompt import Console
+from surveillance_controllers.manual.terminal import TerminalLines, WordCompleter
 from surveillance_controllers.planner_controller_node import PlannerController
 from surveillance_interfaces.action import ComputePath
 from surveillance_operator.console_node import ConsoleNode

@@ -1,8 +1,8 @@
-"""A robot's sense of place and its steering in one: sensors go in, a velocity comes out.
+"""Localisation and velocity control of one robot: sensors go in, a velocity comes out.
 
-The pilot keeps the estimate of the pose, remembers obstacles that the map does not have, knows the
-place the robot is in, and carries out one task at a time: a `Drive` or a `Spin`. It knows no ROS;
-who feeds it takes care that calls do not overlap.
+The navigator keeps the estimate of the pose, remembers obstacles that the map does not have, knows
+the place the robot is in, and carries out one task at a time: a `Drive` or a `Spin`. It knows no
+ROS; who feeds it takes care that calls do not overlap.
 """
 
 from __future__ import annotations
@@ -12,8 +12,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
-from surveillance_controllers.geometry.polyline import Points
-from surveillance_controllers.geometry.poses import Pose
+from surveillance_controllers.geometry import Points, Pose
 from surveillance_controllers.motion.driving import Drive, Spin
 from surveillance_controllers.motion.localisation import LocalisationParameters, Localiser, Scan
 from surveillance_controllers.motion.obstacle_memory import ObstacleMemory
@@ -26,7 +25,7 @@ SETTLE_SECONDS = 0.2
 flicker."""
 
 
-class Pilot:
+class Navigator:
     """What drives one robot.
 
     Args:
@@ -64,7 +63,7 @@ class Pilot:
 
     @property
     def missing(self) -> str | None:
-        """What has not come yet of what the pilot needs; None when it is ready."""
+        """What has not come yet of what the navigator needs; None when it is ready."""
         if self._grid is None:
             return 'map'
         if self._odometry is None:

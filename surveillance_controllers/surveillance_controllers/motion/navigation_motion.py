@@ -8,16 +8,15 @@ from collections.abc import Callable
 import numpy as np
 
 from surveillance_controllers import conversions
-from surveillance_controllers.geometry.polyline import Points
-from surveillance_controllers.geometry.poses import Pose
+from surveillance_controllers.geometry import Points, Pose
 from surveillance_controllers.map_knowledge import KnowledgeError, MapKnowledge
-from surveillance_controllers.motion.arrival import MotionFailed
+from surveillance_controllers.motion.arrival import MotionFailedError
+from surveillance_controllers.motion.base_interface import RobotBase, RobotSilentError
 from surveillance_controllers.motion.driving import Drive, Spin, State
-from surveillance_controllers.motion.pilot import Pilot
+from surveillance_controllers.motion.navigator import Navigator
 from surveillance_controllers.motion.place_recording import RETRY_PERIOD, PlaceRecorder
-from surveillance_controllers.motion.robot_base import RobotBase, RobotSilent
 from surveillance_controllers.motion.robot_parameters import RobotSettings
-from surveillance_controllers.planning.grid_planning import NoPath
+from surveillance_controllers.planning.grid_planning import NoPathError
 from surveillance_interfaces.action import ComputePath
 from surveillance_ontology.patrol_ontology import DOORS
 from surveillance_runtime.action_server import GoalRun
@@ -26,7 +25,7 @@ from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.waiting import Interrupt
 
 
-class SimulatedMotion:
+class NavigationMotion:
     """Drives the base along paths.
 
     Args:
@@ -49,9 +48,9 @@ class SimulatedMotion:
         self._recorder = recorder
         self._wait_for_peer = settings.peer_timeout
         self._planner = GoalCaller(node, ComputePath, 'compute_path')
-        pilot = Pilot(settings.doors, guesses=[settings.station])
+        navigator = Navigator(settings.doors, guesses=[settings.station])
         tell = recorder.tell if settings.track_place else lambda _place, _stamp: None
-        self._base = RobotBase(node, pilot, settings.sensor_timeout, tell, settings.lidar_mount)
+        self._base = RobotBase(node, navigator, settings.sensor_timeout, tell, settings.lidar_mount)
         self._base.set_positions(settings.positions)
         knowledge.assume(settings.positions)
         self._news = Interrupt()
@@ -65,7 +64,7 @@ class SimulatedMotion:
             Where the robot is then, shape (3,).
 
         Raises:
-            MotionFailed: It did not get there.
+            MotionFailedError: It did not get there.
         """
         drive = Drive(path[:, :2], self._settings.drive)
         goal = path[-1]
@@ -82,10 +81,10 @@ class SimulatedMotion:
 
         try:
             end = _point(self._base.drive(drive, run.interrupt, on_step, another_path))
-        except RobotSilent as error:
-            raise MotionFailed(str(error), self._here()) from error
+        except RobotSilentError as error:
+            raise MotionFailedError(str(error), self._here()) from error
         if drive.state is State.FAILED:
-            raise MotionFailed(drive.reason, end)
+            raise MotionFailedError(drive.reason, end)
         report(end)
         self._recorder.tell(self._base.place_at(end))
         return end
@@ -99,24 +98,24 @@ class SimulatedMotion:
             _run: The goal that is carried out.
 
         Raises:
-            MotionFailed: It is not in the goal's place.
+            MotionFailedError: It is not in the goal's place.
         """
         wanted, place = self._base.place_at(goal), self._base.place_at(end)
         if place is None or place != wanted:
-            raise MotionFailed(f'the robot stopped in {place}: expected {wanted}', end)
+            raise MotionFailedError(f'the robot stopped in {place}: expected {wanted}', end)
         return place
 
     def look_around(self, run: GoalRun) -> None:
         """Turns once on the spot, as the place's exploration asks for.
 
         Raises:
-            MotionFailed: The robot's sensors are silent.
+            MotionFailedError: The robot's sensors are silent.
         """
         if self._settings.spin:
             try:
                 self._base.spin(Spin(), run.interrupt)
-            except RobotSilent as error:
-                raise MotionFailed(str(error), self._here()) from error
+            except RobotSilentError as error:
+                raise MotionFailedError(str(error), self._here()) from error
 
     def _here(self) -> Points | None:
         pose = self._base.pose
@@ -152,9 +151,9 @@ class SimulatedMotion:
                 interrupt=run.interrupt,
             )
         except CallError as error:
-            raise NoPath(str(error)) from error
+            raise NoPathError(str(error)) from error
         if end.status != 'succeeded':
-            raise NoPath('the planner finds no other path')
+            raise NoPathError('the planner finds no other path')
         return conversions.array_from_points(end.result.path)[:, :2]
 
 

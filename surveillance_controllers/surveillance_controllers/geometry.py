@@ -1,12 +1,37 @@
-"""Paths as arrays of points: their length, the point a way along, and points at equal distances.
-
-A path is an array of shape (n, d), d = 2 or 3, in metres; consecutive points may coincide.
-"""
+"""Poses in the plane, and paths as lines through points."""
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+Pose = tuple[float, float, float]
+"""x, y in metres, yaw in radians, anticlockwise from the x axis."""
+
+
+def angle_between(first: float, second: float) -> float:
+    """The turn from one yaw to another, -pi to pi, radians."""
+    return math.remainder(second - first, math.tau)
+
+
+def composed(pose: Pose, step: Pose) -> Pose:
+    """The pose reached from `pose` by a step given in its own frame."""
+    cos, sin = math.cos(pose[2]), math.sin(pose[2])
+    return (
+        pose[0] + cos * step[0] - sin * step[1],
+        pose[1] + sin * step[0] + cos * step[1],
+        math.remainder(pose[2] + step[2], math.tau),
+    )
+
+
+def relative(first: Pose, second: Pose) -> Pose:
+    """The step, in the first pose's own frame, that leads to the second."""
+    dx, dy = second[0] - first[0], second[1] - first[1]
+    cos, sin = math.cos(first[2]), math.sin(first[2])
+    return cos * dx + sin * dy, cos * dy - sin * dx, angle_between(first[2], second[2])
+
 
 Points = NDArray[np.float64]
 

@@ -1,4 +1,4 @@
-"""The pilot's sense of place, what it remembers of obstacles, and the places of a map."""
+"""The navigator's sense of place, what it remembers of obstacles, and the places of a map."""
 
 from __future__ import annotations
 
@@ -8,103 +8,103 @@ from typing import Any
 import numpy as np
 import pytest
 
-from surveillance_controllers.geometry.poses import composed
+from surveillance_controllers.geometry import composed
 from surveillance_controllers.motion.driving import Drive, State
+from surveillance_controllers.motion.navigator import Navigator
 from surveillance_controllers.motion.obstacle_memory import ObstacleMemory
 from surveillance_controllers.motion.path_following import Velocity
-from surveillance_controllers.motion.pilot import Pilot
 from surveillance_controllers.motion.place_regions import PlaceRegions, door_segment
-from surveillance_controllers.planning.route_planning import NoRoute, route
+from surveillance_controllers.planning.route_planning import NoRouteError, route
 
 
 @pytest.fixture
-def pilot(flat: Any) -> Pilot:
-    pilot = Pilot({'D1': flat.DOOR})
-    pilot.set_positions(flat.POSITIONS)
-    pilot.set_map(flat.grid)
-    return pilot
+def navigator(flat: Any) -> Navigator:
+    navigator = Navigator({'D1': flat.DOOR})
+    navigator.set_positions(flat.POSITIONS)
+    navigator.set_map(flat.grid)
+    return navigator
 
 
 def test_a_pilot_says_what_it_waits_for(flat: Any) -> None:
-    pilot = Pilot()
+    navigator = Navigator()
     scan = flat.scan((2, 1.5, 0))
-    assert pilot.see(scan, 0.0) is None
-    assert pilot.missing == 'map'
-    pilot.set_map(flat.grid)
-    assert pilot.missing == 'odom'
-    pilot.move((2, 1.5, 0))
-    assert pilot.missing == 'scan'
-    pilot.see(scan, 0.1)
-    assert pilot.missing is None
-    assert pilot.pose == pytest.approx((2, 1.5, 0), abs=0.05)
+    assert navigator.see(scan, 0.0) is None
+    assert navigator.missing == 'map'
+    navigator.set_map(flat.grid)
+    assert navigator.missing == 'odom'
+    navigator.move((2, 1.5, 0))
+    assert navigator.missing == 'scan'
+    navigator.see(scan, 0.1)
+    assert navigator.missing is None
+    assert navigator.pose == pytest.approx((2, 1.5, 0), abs=0.05)
 
 
-def test_a_drive_through_the_door_changes_the_place_once(flat: Any, pilot: Pilot) -> None:
+def test_a_drive_through_the_door_changes_the_place_once(flat: Any, navigator: Navigator) -> None:
     true = (2.0, 1.5, 0.0)
-    pilot.move(true)
-    pilot.task = Drive([[2.0, 1.5], [5.5, 1.5]])
+    navigator.move(true)
+    navigator.task = Drive([[2.0, 1.5], [5.5, 1.5]])
     places: list[str | None] = []
     for step in range(300):
-        velocity = pilot.see(flat.scan(true), 0.1 * step)
+        velocity = navigator.see(flat.scan(true), 0.1 * step)
         assert velocity is not None
-        if not places or places[-1] != pilot.place:
-            places.append(pilot.place)
-        if pilot.task.state.ended:
+        if not places or places[-1] != navigator.place:
+            places.append(navigator.place)
+        if navigator.task.state.ended:
             break
         true = composed(true, (velocity.speed * 0.1, 0.0, velocity.turn * 0.1))
-        pilot.move(true)
-    assert pilot.task.state is State.ARRIVED
+        navigator.move(true)
+    assert navigator.task.state is State.ARRIVED
     assert places == ['A', 'B']
     assert true[:2] == pytest.approx((5.5, 1.5), abs=0.12)
 
 
-def test_a_pose_that_is_told_is_taken(flat: Any, pilot: Pilot) -> None:
-    pilot.believe((5.5, 1.0, 1.0))
-    pilot.move((0.0, 0.0, 0.0))
-    pilot.see(flat.scan((5.5, 1.0, 1.0)), 0.0)
-    assert pilot.pose == pytest.approx((5.5, 1.0, 1.0), abs=0.05)
-    assert pilot.place == 'B'
+def test_a_pose_that_is_told_is_taken(flat: Any, navigator: Navigator) -> None:
+    navigator.believe((5.5, 1.0, 1.0))
+    navigator.move((0.0, 0.0, 0.0))
+    navigator.see(flat.scan((5.5, 1.0, 1.0)), 0.0)
+    assert navigator.pose == pytest.approx((5.5, 1.0, 1.0), abs=0.05)
+    assert navigator.place == 'B'
 
 
 def test_a_robot_whose_odometry_begins_at_zero_is_taken_to_be_at_the_station(flat: Any) -> None:
     station = (5.5, 2.0, 2.0)
-    pilot = Pilot(guesses=[station])
-    pilot.set_map(flat.grid)
-    pilot.move((0.0, 0.0, 0.0))
-    pilot.see(flat.scan((5.45, 2.05, 1.9)), 0.0)
-    assert pilot.pose == pytest.approx((5.45, 2.05, 1.9), abs=0.05)
+    navigator = Navigator(guesses=[station])
+    navigator.set_map(flat.grid)
+    navigator.move((0.0, 0.0, 0.0))
+    navigator.see(flat.scan((5.45, 2.05, 1.9)), 0.0)
+    assert navigator.pose == pytest.approx((5.45, 2.05, 1.9), abs=0.05)
 
 
-def test_an_obstacle_on_the_path_makes_the_drive_ask(flat: Any, pilot: Pilot) -> None:
+def test_an_obstacle_on_the_path_makes_the_drive_ask(flat: Any, navigator: Navigator) -> None:
     true = (1.0, 1.5, 0.0)
-    pilot.move(true)
-    pilot.task = Drive([[1.0, 1.5], [3.5, 1.5]])
-    pilot.see(flat.scan(true), 0.0)
-    pilot.obstacles_changed = False
-    pilot.see(flat.scan(true, [(2.6, 1.5, 0.15)]), 1.0)
-    assert pilot.obstacles_changed
-    assert pilot.task.state is State.ASKING
-    gaps = np.hypot(*(pilot.obstacles - (2.6, 1.5)).T)
+    navigator.move(true)
+    navigator.task = Drive([[1.0, 1.5], [3.5, 1.5]])
+    navigator.see(flat.scan(true), 0.0)
+    navigator.obstacles_changed = False
+    navigator.see(flat.scan(true, [(2.6, 1.5, 0.15)]), 1.0)
+    assert navigator.obstacles_changed
+    assert navigator.task.state is State.ASKING
+    gaps = np.hypot(*(navigator.obstacles - (2.6, 1.5)).T)
     assert len(gaps) > 3
     assert np.abs(gaps - 0.15).max() < 0.1
 
 
-def test_a_closed_door_is_no_obstacle_once_it_is_known(flat: Any, pilot: Pilot) -> None:
+def test_a_closed_door_is_no_obstacle_once_it_is_known(flat: Any, navigator: Navigator) -> None:
     true = (2.5, 1.5, 0.0)
-    pilot.move(true)
-    pilot.see(flat.scan(true, closed=True), 0.0)
-    assert len(pilot.obstacles) > 3
-    pilot.set_closed(['D1', 'unheard of'])
-    assert len(pilot.obstacles) == 0
-    pilot.see(flat.scan(true, closed=True), 1.0)
-    assert len(pilot.obstacles) == 0
+    navigator.move(true)
+    navigator.see(flat.scan(true, closed=True), 0.0)
+    assert len(navigator.obstacles) > 3
+    navigator.set_closed(['D1', 'unheard of'])
+    assert len(navigator.obstacles) == 0
+    navigator.see(flat.scan(true, closed=True), 1.0)
+    assert len(navigator.obstacles) == 0
 
 
-def test_without_a_task_nothing_is_commanded(flat: Any, pilot: Pilot) -> None:
-    pilot.move((2, 1.5, 0))
-    assert pilot.see(flat.scan((2, 1.5, 0)), 0.0) is None
-    pilot.task = Drive([[2, 1.5]])
-    assert pilot.see(flat.scan((2, 1.5, 0)), 0.1) == Velocity()
+def test_without_a_task_nothing_is_commanded(flat: Any, navigator: Navigator) -> None:
+    navigator.move((2, 1.5, 0))
+    assert navigator.see(flat.scan((2, 1.5, 0)), 0.0) is None
+    navigator.task = Drive([[2, 1.5]])
+    assert navigator.see(flat.scan((2, 1.5, 0)), 0.1) == Velocity()
 
 
 def test_obstacles_are_forgotten_when_rays_go_through_them(flat: Any) -> None:
@@ -175,6 +175,6 @@ def test_the_shortest_route_over_open_doors_is_taken() -> None:
 def test_without_a_route_the_closed_doors_are_named(
     closed: list[str], goal: str, text: str
 ) -> None:
-    with pytest.raises(NoRoute) as caught:
+    with pytest.raises(NoRouteError) as caught:
         route(DOORS, closed, 'R1', goal, POINTS)
     assert str(caught.value) == text

@@ -12,16 +12,16 @@ from geometry_msgs.msg import PoseWithCovarianceStamped, TransformStamped, Twist
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
 
-from surveillance_controllers.geometry.poses import composed
+from surveillance_controllers.geometry import composed
+from surveillance_controllers.motion.base_interface import LONGEST_SILENCE, RobotBase, Transforms
 from surveillance_controllers.motion.driving import Drive, Spin
 from surveillance_controllers.motion.localisation import Localiser, Scan
 from surveillance_controllers.motion.path_following import Velocity
-from surveillance_controllers.motion.robot_base import LONGEST_SILENCE, RobotBase, Transforms
 from surveillance_runtime.qos import SENSOR_QOS
 
 
 class Steersman:
-    """Stands in for the pilot: drives as long as it sees."""
+    """Stands in for the navigator: drives as long as it sees."""
 
     def __init__(self) -> None:
         self.task: Drive | Spin | None = None
@@ -51,8 +51,8 @@ def scan(**fields: Any) -> LaserScan:
 def test_without_scans_or_odometry_the_robot_is_told_to_stand(
     graph: Any, steersman: Steersman, capfd: Any
 ) -> None:
-    pilot: Any = steersman
-    RobotBase(graph.node, pilot, 5.0, lambda _place, _stamp: None)
+    navigator: Any = steersman
+    RobotBase(graph.node, navigator, 5.0, lambda _place, _stamp: None)
     steersman.task = Spin()
     told = graph.listen(Twist, 'cmd_vel', 1)
     scans = graph.node.create_publisher(LaserScan, 'scan', SENSOR_QOS)
@@ -75,8 +75,8 @@ def test_without_scans_or_odometry_the_robot_is_told_to_stand(
 def test_messages_that_are_not_sound_end_nothing(
     graph: Any, steersman: Steersman, capfd: Any
 ) -> None:
-    pilot: Any = steersman
-    RobotBase(graph.node, pilot, 5.0, lambda _place, _stamp: None)
+    navigator: Any = steersman
+    RobotBase(graph.node, navigator, 5.0, lambda _place, _stamp: None)
     scans = graph.node.create_publisher(LaserScan, 'scan', SENSOR_QOS)
     poses = graph.node.create_publisher(PoseWithCovarianceStamped, 'initialpose', 1)
     bad = PoseWithCovarianceStamped()

@@ -1,19 +1,23 @@
-"""Gives a controller its console: commands from its own terminal or pipe, and from a service.
+"""Queue of pending operator requests (MANUAL mode), and the commands that answer them.
 
-The service `~/command` takes the same lines, so that one console elsewhere can serve all
-controllers; what the operator is told also goes out on the topic `~/announcement`.
+A worker thread that carries out an action calls `RequestQueue.ask` and sleeps until somebody
+answers or its goal is interrupted; requests are answered in the order in which they came. Commands
+come from the controller's own terminal or pipe and from the service `~/command`, so that one
+console elsewhere can serve all controllers; what the operator is told also goes out on the topic
+`~/announcement`.
 """
 
 from __future__ import annotations
 
 import sys
+import threading
 from collections.abc import Callable, Sequence
-from typing import Any, TextIO
+from dataclasses import dataclass, field
+from typing import Any, Generic, Protocol, TextIO, TypeVar
 
 from std_msgs.msg import String
 
-from surveillance_controllers.manual.console import Console
-from surveillance_controllers.manual.console_commands import (
+from surveillance_controllers.manual.commands import (
     EXIT,
     HELP,
     STATUS,
@@ -22,13 +26,96 @@ from surveillance_controllers.manual.console_commands import (
     Grammar,
     ParsedCommand,
 )
+from surveillance_controllers.manual.prompt import Console
 from surveillance_interfaces.srv import ConsoleCommand
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import STATE_QOS
 
+Answer = TypeVar('Answer')
 
-class OperatorConsole:
-    """The console of one controller.
+
+class Interruption(Protocol):
+    """A flag that calls back when it is raised, as `surveillance_runtime.waiting.Interrupt`
+    does."""
+
+    def is_set(self) -> bool:
+        """Tells whether the flag is raised."""
+
+    def subscribe(self, callback: Callable[[], None]) -> Callable[[], None]:
+        """Has `callback` called when the flag is raised (at once if it is); returns what undoes
+        that."""
+
+
+@dataclass(eq=False)
+class _Request(Generic[Answer]):
+    description: str
+    answered: threading.Event = field(default_factory=threading.Event)
+    answer: Answer | None = None
+
+
+class RequestQueue(Generic[Answer]):
+    """The pending requests of one controller.
+
+    Args:
+        announce: Shows the operator a text of one or more lines.
+    """
+
+    def __init__(self, announce: Callable[[str], None]) -> None:
+        self._announce = announce
+        self._lock = threading.Lock()
+        self._waiting: list[_Request[Answer]] = []
+
+    @property
+    def status(self) -> str:
+        """What waits at the moment, in words."""
+        with self._lock:
+            waiting = [request.description for request in self._waiting]
+        return '\n'.join(waiting) if waiting else 'No request is waiting.'
+
+    def ask(self, description: str, interruption: Interruption) -> Answer | None:
+        """Waits until the operator answers.
+
+        Args:
+            description: What is asked, shown to the operator: lines of text.
+            interruption: Ends the wait; the operator is told.
+
+        Returns:
+            The answer, or None when the wait was interrupted.
+        """
+        request: _Request[Answer] = _Request(description)
+        with self._lock:
+            self._waiting.append(request)
+        self._announce(description)
+        unsubscribe = interruption.subscribe(request.answered.set)
+        try:
+            request.answered.wait()
+        finally:
+            unsubscribe()
+            with self._lock:
+                withdrawn = request in self._waiting
+                if withdrawn:
+                    self._waiting.remove(request)
+        if withdrawn:
+            self._announce('The request was withdrawn: ' + description.partition('\n')[0])
+            return None
+        return request.answer
+
+    def answer(self, answer: Answer) -> None:
+        """Answers the request that has waited longest.
+
+        Raises:
+            CommandError: No request is waiting.
+        """
+        with self._lock:
+            if not self._waiting:
+                raise CommandError('no request is waiting: expected one before this command')
+            request = self._waiting.pop(0)
+        request.answer = answer
+        request.answered.set()
+
+
+class CommandConsole:
+    """The commands of one controller.
 
     Args:
         node: The controller.

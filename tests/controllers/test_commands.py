@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from surveillance_controllers.manual.console_commands import (
+from surveillance_controllers.manual.commands import (
     BATTERY,
     LONGEST_LINE,
     MOTION,

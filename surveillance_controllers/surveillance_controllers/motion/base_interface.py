@@ -1,4 +1,4 @@
-"""The robot for `motion_controller` in SIMULATED mode: its sensors and its drive, as topics.
+"""Bridge between the sensor topics, the navigator and the base (SIMULATED mode).
 
 Reads `map`, `door_states`, `odom`, `scan` and `initialpose`; commands `cmd_vel`; publishes where
 the robot is (`amcl_pose`) and what stands about that the map does not have (`obstacles`).
@@ -18,13 +18,12 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import LaserScan, PointCloud2
 
 from surveillance_controllers import conversions
-from surveillance_controllers.geometry.polyline import Points
-from surveillance_controllers.geometry.poses import Pose, composed, relative
+from surveillance_controllers.geometry import Points, Pose, composed, relative
 from surveillance_controllers.motion.driving import Drive, Spin, State
 from surveillance_controllers.motion.localisation import Scan
+from surveillance_controllers.motion.navigator import Navigator
 from surveillance_controllers.motion.path_following import Velocity
-from surveillance_controllers.motion.pilot import Pilot
-from surveillance_controllers.planning.grid_planning import NoPath
+from surveillance_controllers.planning.grid_planning import NoPathError
 from surveillance_interfaces.msg import DoorStates
 from surveillance_runtime.conversions import cloud_from_points, seconds_of
 from surveillance_runtime.node import PatrolNode
@@ -48,16 +47,16 @@ except ImportError:
     TFMessage = None
 
 
-class RobotSilent(Exception):
+class RobotSilentError(Exception):
     """What the robot's sensors must give does not come; the text names the topic."""
 
 
 class RobotBase:
-    """Feeds a pilot and obeys it.
+    """Passes sensor messages to the navigator and publishes its commands.
 
     Args:
         node: The motion controller's node.
-        pilot: What steers.
+        navigator: What steers.
         sensor_timeout: How long the sensors may be silent during a task, seconds of steady time.
         on_place: Told in the executor's thread in which place a scan found the robot, when that
             changed (None: not known any more), and the scan's stamp; must not block.
@@ -67,13 +66,13 @@ class RobotBase:
     def __init__(
         self,
         node: PatrolNode,
-        pilot: Pilot,
+        navigator: Navigator,
         sensor_timeout: float,
         on_place: Callable[[str | None, Any], None],
         mount: Pose | None = None,
     ) -> None:
         self._node = node
-        self._pilot = pilot
+        self._navigator = navigator
         self._sensor_timeout = sensor_timeout
         self._on_place = on_place
         self._lock = threading.RLock()
@@ -100,21 +99,21 @@ class RobotBase:
     @property
     def place(self) -> str | None:
         """The place the robot is in; None while that is not known."""
-        return None if self._pilot.lost else self._pilot.place
+        return None if self._navigator.lost else self._navigator.place
 
     @property
     def pose(self) -> Pose | None:
         """Where the robot is, map frame."""
-        return self._pilot.pose
+        return self._navigator.pose
 
     def place_at(self, point: Points) -> str | None:
         """The place that a point is in."""
-        return self._pilot.place_at(point)
+        return self._navigator.place_at(point)
 
     def set_positions(self, positions: Mapping[str, Points]) -> None:
         """Takes the places: a point in each."""
         with self._lock:
-            self._pilot.set_positions(positions)
+            self._navigator.set_positions(positions)
 
     def drive(
         self,
@@ -129,13 +128,13 @@ class RobotBase:
             drive: The drive.
             interrupt: Ends it early: the robot brakes.
             on_step: Told the pose now and then.
-            another_path: Finds a path from a pose to the drive's goal; raises `NoPath`.
+            another_path: Finds a path from a pose to the drive's goal; raises `NoPathError`.
 
         Returns:
             Where the robot is then.
 
         Raises:
-            RobotSilent: The sensors gave nothing for too long.
+            RobotSilentError: The sensors gave nothing for too long.
         """
         with self._carrying_out(drive, interrupt):
             while not drive.state.ended and not interrupt.is_set():
@@ -147,19 +146,19 @@ class RobotBase:
                     self._node.get_logger().info(f'{drive.reason}: looking for another path')
                     try:
                         path = another_path(pose)
-                    except NoPath as error:
+                    except NoPathError as error:
                         with self._lock:
                             drive.no_path(str(error))
                     else:
                         with self._lock:
                             drive.new_path(path)
-        return self._pilot.pose or (float('nan'),) * 3
+        return self._navigator.pose or (float('nan'),) * 3
 
     def spin(self, spin: Spin, interrupt: Interrupt) -> None:
         """Turns once on the spot; blocks.
 
         Raises:
-            RobotSilent: The sensors gave nothing for too long.
+            RobotSilentError: The sensors gave nothing for too long.
         """
         with self._carrying_out(spin, interrupt):
             while not spin.done and not interrupt.is_set():
@@ -167,16 +166,16 @@ class RobotBase:
 
     @contextmanager
     def _carrying_out(self, task: Drive | Spin, interrupt: Interrupt) -> Iterator[None]:
-        """Hands a task to the pilot; afterwards the robot stands."""
+        """Hands a task to the navigator; afterwards the robot stands."""
         with self._lock:
-            self._pilot.task = task
+            self._navigator.task = task
         unsubscribe = interrupt.subscribe(self._wake)
         try:
             yield
         finally:
             unsubscribe()
             with self._lock:
-                self._pilot.task = None
+                self._navigator.task = None
                 self._command(Velocity())
 
     def _await_step(self, interrupt: Interrupt) -> Pose | None:
@@ -188,11 +187,11 @@ class RobotBase:
             if interrupt.is_set():
                 return None
             if self._steps == before:
-                topic = self._pilot.missing or 'scan'
-                raise RobotSilent(
+                topic = self._navigator.missing or 'scan'
+                raise RobotSilentError(
                     f'nothing came on the topic {topic} for {self._sensor_timeout:g} s'
                 )
-            return self._pilot.pose
+            return self._navigator.pose
 
     def _wake(self) -> None:
         with self._stepped:
@@ -202,25 +201,25 @@ class RobotBase:
         with self._refusing('map'):
             grid = conversions.grid_from(message)
             with self._lock:
-                self._pilot.set_map(grid)
+                self._navigator.set_map(grid)
 
     def _on_doors(self, message: DoorStates) -> None:
         with self._lock:
-            self._pilot.set_closed(message.closed)
+            self._navigator.set_closed(message.closed)
 
     def _on_odometry(self, message: Odometry) -> None:
         with self._refusing('odom'):
             pose = conversions.pose_from(message.pose.pose)
             with self._lock:
                 self._heard['odom'] = self._now()
-                self._pilot.move(pose)
+                self._navigator.move(pose)
 
     def _on_initial_pose(self, message: PoseWithCovarianceStamped) -> None:
         with self._refusing('initialpose'):
             pose = conversions.pose_from(message.pose.pose)
             self._node.get_logger().info(f'told to be at ({pose[0]:.2f}, {pose[1]:.2f})')
             with self._lock:
-                self._pilot.believe(pose)
+                self._navigator.believe(pose)
 
     def _on_scan(self, message: LaserScan) -> None:
         with self._refusing('scan'):
@@ -232,8 +231,8 @@ class RobotBase:
         with self._stepped:
             before = self.place
             self._heard['scan'] = self._now()
-            velocity = self._pilot.see(scan, measured)
-            if velocity is not None and self._pilot.task is not None and not self._unheard():
+            velocity = self._navigator.see(scan, measured)
+            if velocity is not None and self._navigator.task is not None and not self._unheard():
                 self._command(velocity)
             self._publish_pose(measured, stamp)
             if self.place != before:
@@ -277,34 +276,34 @@ class RobotBase:
                     )
 
     def _publish_pose(self, measured: float, stamp: Any) -> None:
-        pilot = self._pilot
-        if pilot.pose is None or 0 <= measured - self._pose_sent < POSE_PERIOD:
+        navigator = self._navigator
+        if navigator.pose is None or 0 <= measured - self._pose_sent < POSE_PERIOD:
             return
-        deviation = (5.0, 3.0) if pilot.lost else (0.03, 0.02)
-        estimate = conversions.pose_estimate(pilot.pose, *deviation)
+        deviation = (5.0, 3.0) if navigator.lost else (0.03, 0.02)
+        estimate = conversions.pose_estimate(navigator.pose, *deviation)
         estimate.header.stamp = stamp
         self._pose_sent = measured
         self._poses.publish(estimate)
 
     def _tell(self, stamp: Any) -> None:
-        pilot = self._pilot
-        if pilot.pose is None:
+        navigator = self._navigator
+        if navigator.pose is None:
             return
-        if pilot.lost != self._was_lost:
-            self._was_lost = pilot.lost
-            if pilot.lost:
+        if navigator.lost != self._was_lost:
+            self._was_lost = navigator.lost
+            if navigator.lost:
                 self._node.get_logger().warn('lost: what is seen does not fit the map')
-        if pilot.jumps != self._jumps:
-            self._jumps = pilot.jumps
-            x, y, _ = pilot.pose
+        if navigator.jumps != self._jumps:
+            self._jumps = navigator.jumps
+            x, y, _ = navigator.pose
             self._node.get_logger().info(f'found itself at ({x:.2f}, {y:.2f})')
-        if pilot.obstacles_changed:
-            pilot.obstacles_changed = False
-            cloud = cloud_from_points(pilot.obstacles)
+        if navigator.obstacles_changed:
+            navigator.obstacles_changed = False
+            cloud = cloud_from_points(navigator.obstacles)
             cloud.header.stamp = stamp
             self._obstacles.publish(cloud)
-        if pilot.odometry is not None:
-            self._tf.tick(pilot.pose, pilot.odometry, stamp)
+        if navigator.odometry is not None:
+            self._tf.tick(navigator.pose, navigator.odometry, stamp)
 
 
 class Transforms:

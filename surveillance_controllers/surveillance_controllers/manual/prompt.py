@@ -125,7 +125,7 @@ class Console:
 
     def _run_terminal(self) -> str:
         # Only here, for most consoles never have a terminal and need not wait for the import.
-        from surveillance_controllers.manual.terminal_lines import TerminalLines
+        from surveillance_controllers.manual.terminal import TerminalLines
 
         terminal = TerminalLines(self._name, self._completions, self._terminal, self._status)
         with self._lock:

@@ -1,4 +1,7 @@
-"""Lines typed on a terminal, with editing, history and completion by prompt_toolkit."""
+"""Terminal of an operator: line editing with history and completion, and the progress of a charge.
+
+The libraries behind it take their time to import: import it where it is needed only.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +11,7 @@ import termios
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
+from typing import TextIO
 
 from prompt_toolkit import PromptSession
 from prompt_toolkit.completion import CompleteEvent, Completer, Completion
@@ -17,6 +21,8 @@ from prompt_toolkit.input import Input
 from prompt_toolkit.input.vt100 import Vt100Input
 from prompt_toolkit.output import Output
 from prompt_toolkit.patch_stdout import patch_stdout
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 
 class TerminalLines:
@@ -131,3 +137,48 @@ def _history(name: str) -> History:
     except OSError:
         return InMemoryHistory()
     return FileHistory(str(path))
+
+
+PLAIN_STEP = 10
+"""Percent between two plain lines."""
+
+
+@contextmanager
+def charge_display(
+    start: float, stream: TextIO | None = None, *, bar: bool = True
+) -> Iterator[Callable[[float], None]]:
+    """Shows a charge while the context lasts.
+
+    Args:
+        start: Charge at the beginning, percent.
+        stream: Where to show it; standard output unless given.
+        bar: Allows a moving bar. Give False where something else moves the terminal's cursor.
+
+    Yields:
+        A function to call with each new charge in percent.
+    """
+    stream = sys.stdout if stream is None else stream
+    console = Console(file=stream)
+    if bar and console.is_terminal:
+        columns = (
+            TextColumn('{task.description}'),
+            BarColumn(),
+            TextColumn('{task.percentage:>3.0f} %'),
+            TimeElapsedColumn(),
+        )
+        with Progress(*columns, console=console) as progress:
+            task = progress.add_task('Charging', total=100.0, completed=round(start))
+            yield lambda percent: progress.update(task, completed=percent)
+        return
+    shown = -1
+
+    def show(percent: float) -> None:
+        nonlocal shown
+        step = int(percent // PLAIN_STEP)
+        if step > shown:
+            shown = step
+            print(f'Charging: {step * PLAIN_STEP} %', file=stream, flush=True)
+
+    shown = int(start // PLAIN_STEP) - 1
+    show(start)
+    yield show

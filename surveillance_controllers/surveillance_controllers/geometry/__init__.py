@@ -1,1 +1,0 @@
-"""Poses and polylines in the plane."""
