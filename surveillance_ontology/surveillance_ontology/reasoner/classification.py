@@ -177,9 +177,21 @@ class Classification:
         if not labels or not relevant:
             return
         everything = contexts.context(relevant, bare=True)
-        stated = {PredicateAtom(token, (_X,)) for token in relevant - everything.derived}
-        if everything.clash or set(contexts.heads_of(everything)) - alone - stated:
+        if everything.clash or not self._follow_alone(relevant, alone):
             program.contexts, program.relevant = contexts, relevant
+
+    def _follow_alone(self, relevant: frozenset[Predicate], alone: set[HeadAtom]) -> bool:
+        """Whether all classes together imply no more than the existentials do one by one."""
+        contexts = self._contexts
+        everything = contexts.context(relevant, bare=True)
+        stated = {PredicateAtom(token, (_X,)) for token in relevant - everything.derived}
+        for head in set(contexts.heads_of(everything)) - alone - stated:
+            if not isinstance(head, PredicateAtom) or head.predicate not in relevant:
+                return False
+            others = contexts.context(relevant - {head.predicate}, bare=True)
+            if others.clash or head.predicate in others.derived:
+                return False
+        return True
 
     def _add_clause(self, body: tuple[Predicate, ...], head: HeadAtom) -> None:
         atoms = tuple(PredicateAtom(predicate, (_X,)) for predicate in body)
@@ -256,6 +268,8 @@ class Classification:
                 atoms = (*atoms, RangeAtom(condition.filler, (_Y,), condition.values))
             clauses.append(Clause(atoms, narrow, existential.origin))
             outside = ~filler
+            if condition.values is not None:
+                outside = outside & condition.values
             if not outside.is_empty:
                 atom = RangeAtom(outside.contains, (_Y,), outside)
                 nothing = PredicateAtom(self.program.nothing, (_X,))
