@@ -20,9 +20,11 @@ from typing import TypeAlias
 from surveillance_ontology.owl.assertions import Assertions, is_assertion, uncollected
 from surveillance_ontology.owl.axiom_text import axiom_text
 from surveillance_ontology.owl.axioms import (
+    Annotation,
     Axiom,
     ClassAssertion,
     DataPropertyAssertion,
+    Declaration,
     DifferentIndividuals,
     EquivalentClasses,
     ObjectPropertyAssertion,
@@ -138,6 +140,60 @@ class Feed:
         changes = Changes(self._sequence, tuple(added), tuple(removed), self._consistent)
         for callback in tuple(self._subscribers):
             callback(changes)
+
+
+def justify(
+    axioms: Iterable[Axiom],
+    goal: Axiom | None,
+    likely: Iterable[Axiom],
+    schema: Iterable[Axiom],
+    assumed: tuple[Axiom, ...] = (),
+) -> tuple[Axiom, ...]:
+    """A smallest set of axioms from which a goal follows (Junker, "QuickXplain", AAAI 2004).
+
+    Args:
+        axioms: Where to look.
+        goal: A fact; None for a contradiction.
+        likely: Axioms that a proof uses; with the schema they are tried first.
+        schema: The axioms that are not about individuals.
+        assumed: Axioms that are there in any case.
+    """
+    fixed = list(assumed)
+
+    def follows(chosen: Iterable[Axiom]) -> bool:
+        kb = KnowledgeBase('', [*fixed, *chosen])
+        consistent = kb.reason()
+        return not consistent if goal is None else consistent and kb.holds(goal)
+
+    declared = [axiom for axiom in schema if isinstance(axiom, Declaration)]
+    used = list(dict.fromkeys(axiom for axiom in likely if axiom not in fixed))
+    fixed += declared
+    choices = (used, list(dict.fromkeys([*used, *schema])), list(dict.fromkeys(axioms)))
+    for choice in choices:
+        candidates = [a for a in choice if not isinstance(a, Declaration | Annotation)]
+        if follows(candidates):
+            fixed = list(assumed)
+            if not follows(candidates):
+                candidates = [*declared, *candidates]
+            return tuple(_fewest(candidates, follows))
+    return ()
+
+
+def _fewest(candidates: list[Axiom], follows: Callable[[Iterable[Axiom]], bool]) -> list[Axiom]:
+    """The candidates without those that are not needed."""
+
+    def narrow(known: list[Axiom], changed: bool, rest: list[Axiom]) -> list[Axiom]:
+        if changed and follows(known):
+            return []
+        if len(rest) == 1:
+            return rest
+        middle = len(rest) // 2
+        first, second = rest[:middle], rest[middle:]
+        later = narrow([*known, *first], bool(first), second)
+        earlier = narrow([*known, *later], bool(later), first)
+        return [*earlier, *later]
+
+    return narrow([], True, candidates) if candidates else []
 
 
 def visible(engine: Engine | None) -> set[Axiom]:
@@ -435,6 +491,19 @@ class KnowledgeBase:
                 if axiom not in self._told.removed and axiom not in self._told.axioms:
                     yield axiom  # type: ignore[misc]
 
+    def holds(self, fact: Axiom) -> bool:
+        """Whether a fact is asserted or was derived: what `explain` explains."""
+        if fact in self._told.axioms:
+            return True
+        engine = self._usable
+        if engine is None or fact in self._told.removed:
+            return False
+        if isinstance(fact, SubClassOf):
+            if isinstance(fact.sub, str) and isinstance(fact.sup, str):
+                return fact.sup in (fact.sub, THING, *self.superclasses(fact.sub))
+            return False
+        return engine.understands(fact) and engine.holds(fact)
+
     def explain(self, fact: Axiom) -> Explanation | None:
         """Why a fact holds; None when it is neither asserted nor derived.
 
@@ -442,23 +511,55 @@ class KnowledgeBase:
         between named classes.
         """
         if fact in self._told.axioms:
-            return Explanation(axiom_text(fact), 'asserted')
+            return Explanation(axiom_text(fact), 'asserted', axioms=(fact,))
         engine = self._usable
-        if engine is None or fact in self._told.removed:
+        if engine is None or not self.holds(fact):
             return None
-        if isinstance(fact, SubClassOf):
-            if fact.sup in self.superclasses(str(fact.sub)):
-                return Explanation(axiom_text(fact), 'axiom', 'the class hierarchy')
-            return None
-        if not engine.understands(fact):
-            return None
-        return Reasons(engine).of_fact(fact)
+        found = None
+        if not isinstance(fact, SubClassOf):
+            found = Reasons(engine, self._schema_axioms).of_fact(fact)
+        return found or self._listed(axiom_text(fact), self.justification(fact))
 
     def explain_inconsistency(self) -> Explanation | None:
         """Why the ontology contradicts itself; None where the last `reason` found it does not."""
         if self._engine is None or self._consistent:
             return None
-        return Reasons(self._engine).of_inconsistency()
+        found = Reasons(self._engine, self._schema_axioms).of_inconsistency()
+        return found or self._listed('the ontology is inconsistent', self.justification(None))
+
+    def justification(self, fact: Axiom | None) -> tuple[Axiom, ...]:
+        """The fewest asserted axioms to which a fact is owed: without any of them it would not
+        follow from the others.
+
+        Args:
+            fact: As for `explain`; None asks for a contradiction.
+
+        Returns:
+            The axioms; none where the fact does not hold.
+        """
+        if fact in self._told.axioms:
+            return (fact,)
+        holds = not self.consistent if fact is None else self.holds(fact)
+        if not holds or self._engine is None:
+            return ()
+        reasons = Reasons(self._engine, lambda *_: ())
+        proof = None
+        if fact is None:
+            proof = reasons.of_inconsistency()
+        elif not isinstance(fact, SubClassOf):
+            proof = reasons.of_fact(fact)
+        schema = [axiom for axiom in self._told.axioms if not is_assertion(axiom)]
+        return justify(self._told.axioms, fact, proof.sources() if proof else (), schema)
+
+    def _schema_axioms(self, assumed: tuple[Axiom, ...], goal: Axiom | None) -> tuple[Axiom, ...]:
+        """The axioms about classes and properties by which assumptions imply something."""
+        schema = [axiom for axiom in self._told.axioms if not is_assertion(axiom)]
+        found = justify([*schema, *assumed], goal, (), schema, assumed)
+        return tuple(axiom for axiom in found if axiom not in assumed)
+
+    def _listed(self, text: str, axioms: tuple[Axiom, ...]) -> Explanation:
+        parts = tuple(Explanation(axiom_text(a), 'asserted', axioms=(a,)) for a in axioms)
+        return Explanation(text, 'axiom', 'these axioms together', parts, axioms=axioms)
 
     # --- changes ---
 

@@ -205,6 +205,17 @@ class Engine:
         """Whether no contradiction is derived."""
         return not self._nothing.members
 
+    def holds(self, axiom: Axiom) -> bool:
+        """Whether an assertion was derived or is asserted."""
+        if isinstance(axiom, SameIndividual):
+            return len({self.equality.find(name) for name in axiom.individuals}) == 1
+        if isinstance(axiom, DifferentIndividuals):
+            names = sorted(self.equality.find(name) for name in axiom.individuals)
+            pairs = [(a, b) for n, a in enumerate(names) for b in names[n + 1 :]]
+            return all(self.difference.different(*pair) for pair in pairs)
+        fact = self.fact_of(axiom)
+        return fact is not None and bool(fact[0].holds(fact))
+
     def open_cases(self) -> Iterator[str]:
         """Sentences about what is not derived because it would need reasoning by cases."""
         network = self._network

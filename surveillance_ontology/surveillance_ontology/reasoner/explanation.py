@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 
 from surveillance_ontology.owl import axioms as ax
 from surveillance_ontology.owl import expressions as ex
@@ -29,6 +29,7 @@ class Explanation:
         premises: What the fact follows from by that rule or axiom; empty for an asserted fact.
         reason: A calculation that replaces the listing of premises in the sentence, '' where none
             is needed.
+        axioms: The asserted axioms of this step: the assertion itself, or what was applied.
     """
 
     fact_text: str
@@ -36,6 +37,14 @@ class Explanation:
     because: str = ''
     premises: tuple[Explanation, ...] = ()
     reason: str = ''
+    axioms: tuple[Axiom, ...] = ()
+
+    def sources(self) -> tuple[Axiom, ...]:
+        """Every asserted axiom of the derivation, without repeats."""
+        found = dict.fromkeys(self.axioms)
+        for premise in self.premises:
+            found.update(dict.fromkeys(premise.sources()))
+        return tuple(found)
 
     def tree(self) -> str:
         """The whole derivation, one fact a line, premises indented below what follows from them."""
@@ -76,10 +85,21 @@ _SIGNS = {
 
 
 class Reasons:
-    """Explains what one engine holds."""
+    """Explains what one engine holds.
 
-    def __init__(self, engine: Engine) -> None:
+    Args:
+        engine: Whose facts.
+        justify: Gives the axioms by which assertions imply another one; none where it cannot tell.
+    """
+
+    def __init__(
+        self,
+        engine: Engine,
+        justify: Callable[[tuple[Axiom, ...], Axiom | None], tuple[Axiom, ...]],
+    ) -> None:
         self._engine = engine
+        self._justification = justify
+        self._merging: set[Merge] = set()
         self._view = FactView(engine)
 
     # --- questions ---
@@ -126,9 +146,7 @@ class Reasons:
             proof = engine.proofs.find((nothing, name))
             if proof is not None:
                 found = self._explained(proof)
-                return Explanation(
-                    'the ontology is inconsistent', found.kind, found.because, found.premises
-                )
+                return replace(found, fact_text='the ontology is inconsistent')
         return None
 
     # --- proofs ---
@@ -149,16 +167,43 @@ class Reasons:
         unique = tuple(dict.fromkeys(premises))
         if isinstance(origin, Rule):
             name = f'the rule {origin.label}' if origin.label else f'the rule {axiom_text(origin)}'
-            return Explanation(text, 'rule', name, unique, self._calculation(origin, proof))
+            reason = self._calculation(origin, proof)
+            return Explanation(text, 'rule', name, unique, reason, (origin,))
         if isinstance(origin, Axiom):
-            because = axiom_text(origin)
-        elif isinstance(origin, str):
+            return Explanation(text, 'axiom', axiom_text(origin), unique, axioms=(origin,))
+        named = self._justify(proof)
+        if isinstance(origin, str):
             because = origin
-        elif predicate is self._engine.program.different:
-            because = 'otherwise there would be a contradiction'
+        elif named:
+            because = ' and '.join(map(axiom_text, named))
         else:
-            because = 'the class hierarchy'
-        return Explanation(text, 'axiom', because, unique)
+            because = 'the axioms about its classes and properties'
+        return Explanation(text, 'axiom', because, unique, axioms=named)
+
+    def _justify(self, proof: Proof) -> tuple[Axiom, ...]:
+        """The axioms by which a step without one of its own follows from its premises."""
+        assumed = [self._stated(premise.fact) for premise in proof.premises]
+        goal = self._stated(proof.fact)
+        is_clash = proof.fact[0] is self._engine.program.nothing
+        if (goal is None and not is_clash) or not all(assumed):
+            return ()
+        facts = tuple(axiom for axiom in assumed if axiom is not None)
+        return self._justification(facts, None if is_clash else goal)
+
+    def _stated(self, fact: Fact) -> Axiom | None:
+        """A fact as an assertion, where it can be written as one."""
+        predicate = fact[0]
+        program = self._engine.program
+        if predicate is program.different:
+            return ax.DifferentIndividuals(frozenset(fact[1:]))
+        name = predicate.expression
+        if name is None or isinstance(name, tuple):
+            return None
+        if predicate.kind == 'class':
+            return ax.ClassAssertion(name, fact[1])
+        if predicate.kind == 'data':
+            return ax.DataPropertyAssertion(name, fact[1], self._view.literal(fact[2]))
+        return ax.ObjectPropertyAssertion(name, fact[1], fact[2])
 
     def _premise(self, proof: Proof) -> list[Explanation]:
         """A premise; an unnamed class in between gives way to its own premises."""
@@ -175,11 +220,13 @@ class Reasons:
             for other in sorted(engine.equality.same(name)):
                 for axiom in engine.about(other):
                     if isinstance(axiom, ax.Assertion) and engine.fact_of(axiom) == fact:
-                        written = Explanation(axiom_text(axiom), 'asserted')
+                        written = Explanation(axiom_text(axiom), 'asserted', axioms=(axiom,))
                         same = self._renamings(axiom, fact)
                         if not same:
                             return (
-                                written if fact[0].kind == 'data' else Explanation(text, 'asserted')
+                                written
+                                if fact[0].kind == 'data'
+                                else Explanation(text, 'asserted', axioms=(axiom,))
                             )
                         return self._joined(text, [written, *same])
         return Explanation(text, 'asserted')
@@ -206,19 +253,28 @@ class Reasons:
         axiom = engine.difference.stating(engine.equality.same(x), engine.equality.same(y))
         if axiom is None:
             return Explanation(text, 'asserted')
-        return Explanation(text, 'axiom', axiom_text(axiom))
+        return Explanation(text, 'axiom', axiom_text(axiom), axioms=(axiom,))
 
     def _sameness(self, first: str, second: str) -> list[Explanation]:
-        return [self._merge(merge) for merge in self._engine.equality.path(first, second)]
+        path = self._engine.equality.path(first, second)
+        return [self._merge(merge) for merge in path if merge not in self._merging]
 
     def _merge(self, merge: Merge) -> Explanation:
         text = f'{local_name(merge.first)} is the same as {local_name(merge.second)}'
         if isinstance(merge.origin, ax.SameIndividual):
-            return Explanation(text, 'asserted')
-        premises = [Explanation(self.text(fact), 'asserted') for fact in merge.premises]
+            return Explanation(text, 'asserted', axioms=(merge.origin,))
+        # The premises were found before the merge, so no premise is explained by it.
+        self._merging.add(merge)
+        premises: list[Explanation] = []
+        for written in merge.premises:
+            proof = self._engine.proofs.find(self._engine.current(written))
+            if proof is not None:
+                premises.append(self._explained(proof))
+        self._merging.discard(merge)
         kind = 'rule' if isinstance(merge.origin, Rule) else 'axiom'
         because = axiom_text(merge.origin) if merge.origin else 'at most one is allowed'
-        return Explanation(text, kind, because, tuple(premises))
+        origin = () if merge.origin is None else (merge.origin,)
+        return Explanation(text, kind, because, tuple(premises), axioms=origin)
 
     def _joined(self, text: str, parts: list[Explanation]) -> Explanation:
         return Explanation(text, 'axiom', 'the same individual under another name', tuple(parts))

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
+from surveillance_ontology import KnowledgeBase
 from surveillance_ontology.owl.axioms import (
+    Axiom,
     ClassAssertion,
     DifferentIndividuals,
     SameIndividual,
     SubClassOf,
 )
+from surveillance_ontology.owl.expressions import ObjectSomeValuesFrom
 from tests.ontology.reasoner.patrol_map import (
+    IRI,
     NOW,
     PLACES_DIFFER,
     VISITS,
@@ -117,3 +123,57 @@ def test_disjoint_classes_are_explained() -> None:
     assert explanation is not None
     assert 'these classes are disjoint' in explanation.sentence()
     assert 'C2 is DOOR' in explanation.tree()
+
+
+def test_a_subclass_fact_is_explained_by_its_axioms() -> None:
+    kb = KnowledgeBase(
+        IRI,
+        [
+            SubClassOf(n('A'), ObjectSomeValuesFrom(n('p'), n('B'))),
+            SubClassOf(n('B'), n('C')),
+            SubClassOf(n('B'), n('E')),
+            SubClassOf(ObjectSomeValuesFrom(n('p'), n('C')), n('D')),
+            SubClassOf(n('D'), n('E')),
+            ClassAssertion(n('A'), n('i')),
+        ],
+    )
+    kb.reason()
+    fact = SubClassOf(n('A'), n('D'))
+    explanation = kb.explain(fact)
+    assert explanation is not None
+    texts = {premise.fact_text for premise in explanation.premises}
+    assert texts == {'A SubClassOf p some B', 'B SubClassOf C', 'p some C SubClassOf D'}
+    assert set(kb.justification(fact)) == set(explanation.sources())
+    why = kb.explain(ClassAssertion(n('D'), n('i')))
+    assert why is not None
+    assert all(text in why.tree() for text in texts)
+
+
+def test_a_justification_is_enough_and_no_axiom_of_it_is_spare() -> None:
+    kb = seven_rooms(link('isIn', 'Robot1', 'C1'), without=[PLACES_DIFFER, *VISITS])
+    facts = [
+        *(ClassAssertion(n(cls), n('E')) for cls in ('ROOM', 'CORRIDOR', 'LOCATION')),
+        SameIndividual(frozenset((n('E'), n('C1')))),
+        link('hasDoor', 'E', 'D1'),
+        SubClassOf(n('CORRIDOR'), n('LOCATION')),
+    ]
+    for fact in facts:
+        axioms = kb.justification(fact)
+        assert axioms
+        assert holds_in(axioms, fact)
+        for spare in axioms:
+            assert not holds_in([axiom for axiom in axioms if axiom != spare], fact)
+
+
+def test_a_contradiction_has_a_justification() -> None:
+    kb = seven_rooms(link('isIn', 'Robot1', 'C1'))
+    axioms = kb.justification(None)
+    assert set(axioms) >= {link('isIn', 'Robot1', 'C1'), link('isIn', 'Robot1', 'E')}
+    assert len(axioms) == 4
+    assert not KnowledgeBase(IRI, axioms).reason()
+    assert seven_rooms().justification(None) == ()
+
+
+def holds_in(axioms: Iterable[Axiom], fact: Axiom) -> bool:
+    kb = KnowledgeBase(IRI, axioms)
+    return kb.reason() and kb.holds(fact)
