@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from surveillance_behaviour.decision import DecisionSettings
+from surveillance_behaviour.mission.mission_log import RecordError, account_of, read
 from surveillance_behaviour.peers.ports import (
     Ontology,
     PeerError,
@@ -60,10 +61,19 @@ class Experience:
     def of_record(cls, record: str) -> Experience:
         """Return what was learned on the mission of a record; new for an empty name.
 
-        A file that cannot be read counts as none; `problem` says what is wrong with it.
+        The visits in the record itself count where they are later. A file that cannot be read
+        counts as none; `problem` says what is wrong with it.
         """
         experience = cls(Path(record + '.experience.json') if record else None)
         experience.problem = experience._read()
+        if record and Path(record).is_file():
+            try:
+                visits = account_of(read(record)).visits
+            except RecordError as error:
+                experience.problem = str(error)
+                return experience
+            for place, at in visits.items():
+                experience.visits[place] = max(at, experience.visits.get(place, at))
         return experience
 
     problem: str = ''

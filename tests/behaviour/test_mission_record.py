@@ -16,8 +16,10 @@ from surveillance_behaviour.mission.mission_log import (
     CutOff,
     MissionRecord,
     RecordError,
+    account_of,
     cut_off,
     read,
+    read_all,
     summarize,
 )
 
@@ -165,6 +167,43 @@ def test_what_another_simulation_wrote_says_nothing(path: Path) -> None:
         record.decision(61.0, 'C1', 'URGENT', 'why')
         record.start(1.0, 'surveillance', 'C1', ['E', 'C1'])
     assert cut_off(read(path)) == CutOff(1.0, 'C1')
+
+
+def test_a_long_record_is_read_from_its_last_file_and_sums_up_all(path: Path) -> None:
+    whole = path.with_name('whole.jsonl')
+    with MissionRecord(path, segment_bytes=3000) as record, MissionRecord(whole) as other:
+        for each in (record, other):
+            each.start(0.0, 'patrol', 'E', ['E', 'C1', 'R1'])
+            for turn in range(300):
+                each.decision(2.0 * turn, 'C1', 'ROOM' if turn % 3 else 'recharge', 'because')
+                each.visit(2.0 * turn + 1.0, 'C1' if turn % 2 else 'R1', 1.5)
+            each.failure(700.0, 'moving', 'a door is closed')
+    packed = sorted(path.parent.glob('mission.jsonl.*.gz'))
+    assert len(packed) >= 8
+    assert path.stat().st_size < 6000
+    assert str(summarize(read(path))) == str(summarize(read(whole)))
+    assert cut_off(read(path)) == cut_off(read(whole))
+    assert account_of(read(path)).visits == account_of(read(whole)).visits
+    assert list(read_all(path)) == read(whole)
+    with MissionRecord(path, segment_bytes=3000) as record:
+        record.visit(800.0, 'E')
+    assert summarize(read(path)).visits['E'] == 1
+
+
+def test_a_writer_that_was_killed_between_two_files_loses_nothing(path: Path) -> None:
+    with MissionRecord(path) as record:
+        record.start(0.0, 'patrol', 'E', ['E'])
+    os.rename(path, path.with_name('mission.jsonl.next'))
+    with MissionRecord(path) as record:
+        record.visit(1.0, 'E')
+    assert [event.name for event in read(path)] == ['start', 'visit']
+
+
+def test_a_damaged_snapshot_is_named(path: Path) -> None:
+    path.parent.mkdir()
+    path.write_text('{"event": "snapshot", "time": 1, "account": {"summary": {}}}\n')
+    with pytest.raises(RecordError, match='a snapshot of the mission record is damaged'):
+        summarize(read(path))
 
 
 def test_an_empty_record_says_so(path: Path) -> None:

@@ -12,19 +12,33 @@ and the event's own fields::
     {"event": "exploring", "time": 1.0, "place": "E", "seconds": 1.0}
     {"event": "decision", "time": 2.0, "place": "C1", "rule": "URGENT", "reason": "..."}
     {"event": "visit", "time": 9.4, "place": "C1", "distance": 5.4, "path": [[5, 10], ...]}
+
+A record of a month stays small to read: a file that has grown to :data:`SEGMENT_BYTES` is packed as
+``FILE.0001.gz``, ``FILE.0002.gz``, ..., and the new one begins with a ``snapshot`` of all that was
+counted. `read` takes the last file only, which tells how the mission stands and sums up all of it;
+`read_all` gives every event.
+
+To go on with a mission (``launch.py --resume``), hand the same file to `robot_behavior` and
+`reasoner` as the parameter ``record``: the one goes on where `cut_off` says, and the visits, leg
+times and the battery's draw come from the record and from ``FILE.experience.json`` beside it.
 """
 
 from __future__ import annotations
 
 import errno
+import glob
+import gzip
 import json
 import math
 import os
+import shutil
+import zlib
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import TracebackType
+from typing import Any
 
 from surveillance_behaviour.decision import RECHARGE
 
@@ -37,8 +51,13 @@ EVENTS: Mapping[str, tuple[str, ...]] = {
     'recharge': ('place', 'seconds'),
     'failure': ('what', 'reason'),
     'end': (),
+    'snapshot': ('account',),
 }
 """The events of a record with the fields each must have, beside ``event`` and ``time``."""
+
+
+SEGMENT_BYTES = 4_000_000
+"""Size from which on a record's file is packed away and a new one begun."""
 
 
 class RecordError(ValueError):
@@ -78,15 +97,22 @@ class MissionRecord:
 
     Args:
         path: The file; made with its directory when missing, continued when it exists.
+        segment_bytes: Size from which on it is packed away and a new one begun.
 
     Raises:
         RecordError: The file cannot be opened for writing.
     """
 
-    def __init__(self, path: str | Path) -> None:
+    def __init__(self, path: str | Path, segment_bytes: int = SEGMENT_BYTES) -> None:
         self.path = Path(path)
+        self._segment_bytes = segment_bytes
+        self._account = Account()
+        self._next = self.path.with_name(self.path.name + '.next')
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
+            if self._next.exists() and not self.path.exists():
+                # A writer was killed between the two steps of a change of files.
+                os.replace(self._next, self.path)
             self._file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
             self._cut_torn_line()
         except OSError as error:
@@ -99,6 +125,10 @@ class MissionRecord:
         complete = content.rfind(b'\n') + 1
         if complete != len(content):
             os.ftruncate(self._file, complete)
+        try:
+            self._account = account_of(_events(content[:complete], f'{self.path}'))
+        except RecordError:
+            self._account = Account()  # Whoever reads it says which line is broken.
 
     def write(self, name: str, time: float, **fields: object) -> None:
         """Appends one event.
@@ -124,6 +154,26 @@ class MissionRecord:
             raise RecordError(
                 f'cannot write the mission record {self.path}: {error.strerror}'
             ) from None
+        self._account.take(Event(name, round(time, 3), json.loads(line)))
+        if os.fstat(self._file).st_size >= self._segment_bytes:
+            self._begin_segment(time)
+
+    def _begin_segment(self, time: float) -> None:
+        """Pack the file away and begin a new one; if that cannot be done now, it is done later."""
+        snapshot = {'event': 'snapshot', 'time': round(time, 3), 'account': self._account.to_json()}
+        number = 1 + len(_segments(self.path))
+        packed = self.path.with_name(f'{self.path.name}.{number:04}.gz')
+        try:
+            with open(self.path, 'rb') as old, gzip.open(packed, 'wb', 6) as new:
+                shutil.copyfileobj(old, new)
+            self._next.write_text(json.dumps(snapshot) + '\n', encoding='utf-8')
+            file = os.open(self._next, os.O_RDWR | os.O_APPEND)
+            os.replace(self._next, self.path)
+        except OSError:
+            packed.unlink(missing_ok=True)
+            return
+        os.close(self._file)
+        self._file = file
 
     def start(self, time: float, machine: str, place: str, places: Sequence[str]) -> None:
         """A machine starts, or starts again, in ``place``; ``places`` are all to be patrolled."""
@@ -185,11 +235,32 @@ def read(path: str | Path) -> list[Event]:
         content = Path(path).read_bytes()
     except OSError as error:
         raise RecordError(f'cannot read the mission record {path}: {error.strerror}') from None
-    return [
-        _event(line, f'{path}:{number}')
-        for number, line in enumerate(content.split(b'\n')[:-1], start=1)
-        if line.strip()
-    ]
+    return list(_events(content, f'{path}'))
+
+
+def read_all(path: str | Path) -> Iterator[Event]:
+    """Give every event of a record, those that were packed away too, one file at a time.
+
+    Raises:
+        RecordError: A file cannot be read, or a finished line is not an event.
+    """
+    for packed in _segments(Path(path)):
+        try:
+            content = gzip.decompress(packed.read_bytes())
+        except (OSError, EOFError, zlib.error) as error:
+            raise RecordError(f'cannot read the mission record {packed}: {error}') from None
+        yield from (e for e in _events(content, f'{packed}') if e.name != 'snapshot')
+    yield from (event for event in read(path) if event.name != 'snapshot')
+
+
+def _segments(path: Path) -> list[Path]:
+    return sorted(path.parent.glob(glob.escape(path.name) + '.[0-9][0-9][0-9][0-9]*.gz'))
+
+
+def _events(content: bytes, where: str) -> Iterator[Event]:
+    for number, line in enumerate(content.split(b'\n')[:-1], start=1):
+        if line.strip():
+            yield _event(line, f'{where}:{number}')
 
 
 def _event(line: bytes, where: str) -> Event:
@@ -252,26 +323,95 @@ class Summary:
         return '\n'.join(lines)
 
 
+@dataclass
+class Account:
+    """What is counted and known of a mission while its events are taken one by one.
+
+    Attributes:
+        summary: Counts, without the waits that go on.
+        last_seen: Since when each place waits, seconds.
+        now: Time of the last event; None: there was none.
+        left_at: Where the mission stands; None: it ended as told, or never began.
+        visits: When the robot was in each place last, seconds on the present clock.
+    """
+
+    summary: Summary = field(default_factory=Summary)
+    last_seen: dict[str, float] = field(default_factory=dict)
+    now: float | None = None
+    left_at: CutOff | None = None
+    visits: dict[str, float] = field(default_factory=dict)
+
+    def take(self, event: Event) -> None:
+        """Count one event.
+
+        Raises:
+            RecordError: A snapshot does not hold what it should.
+        """
+        if event.name == 'snapshot':
+            self._restore(event.fields['account'])
+            self.now = event.time
+            return
+        summary = self.summary
+        if self.now is None or event.time < self.now:
+            # Another clock: another simulation.
+            _close_gaps(summary, self.last_seen, self.now)
+            self.last_seen = dict.fromkeys(summary.visits, event.time)
+            self.left_at = None
+            self.visits = {}
+        else:
+            summary.seconds += event.time - self.now
+        self.now = event.time
+        _count(summary, event, self.last_seen)
+        if event.name == 'visit':
+            self.visits[event.text('place')] = event.time
+        self.left_at = _after(self.left_at, event)
+        if self.left_at is not None:
+            self.left_at = replace(self.left_at, time=event.time)
+
+    def to_json(self) -> dict[str, object]:
+        """Return everything, for a snapshot."""
+        left_at = None if self.left_at is None else dict(vars(self.left_at))
+        if left_at is not None and math.isinf(left_at['explored']):
+            left_at['explored'] = -1.0
+        return {
+            'summary': vars(self.summary),
+            'last_seen': self.last_seen,
+            'left_at': left_at,
+            'visits': self.visits,
+        }
+
+    def _restore(self, kept: Any) -> None:
+        try:
+            summary = Summary(**kept['summary'])
+            for counter in ('visits', 'rules', 'failures'):
+                setattr(summary, counter, Counter(getattr(summary, counter)))
+            left_at = None if kept['left_at'] is None else CutOff(**kept['left_at'])
+            if left_at is not None and left_at.explored < 0.0:
+                left_at = replace(left_at, explored=math.inf)
+            self.summary, self.left_at = summary, left_at
+            self.last_seen, self.visits = dict(kept['last_seen']), dict(kept['visits'])
+        except (KeyError, TypeError, ValueError) as error:
+            raise RecordError(f'a snapshot of the mission record is damaged: {error}') from None
+
+
+def account_of(events: Iterable[Event]) -> Account:
+    """Count a record."""
+    account = Account()
+    for event in events:
+        account.take(event)
+    return account
+
+
 def summarize(events: Iterable[Event]) -> Summary:
-    """Counts a record.
+    """Sum up a record.
 
     The time a place went unvisited runs from start to first visit, from visit to visit, and from
     the last visit to the end. When the clock jumps back (another simulation writes to the
     same file), the events from there on count as a mission of their own and their times add up.
     """
-    summary = Summary()
-    last_seen: dict[str, float] = {}
-    now: float | None = None
-    for event in events:
-        if now is None or event.time < now:
-            _close_gaps(summary, last_seen, now)
-            last_seen = dict.fromkeys(summary.visits, event.time)
-        else:
-            summary.seconds += event.time - now
-        now = event.time
-        _count(summary, event, last_seen)
-    _close_gaps(summary, last_seen, now)
-    return summary
+    account = account_of(events)
+    _close_gaps(account.summary, account.last_seen, account.now)
+    return account.summary
 
 
 def _count(summary: Summary, event: Event, last_seen: dict[str, float]) -> None:
@@ -358,15 +498,8 @@ class CutOff:
 
 
 def cut_off(events: Iterable[Event]) -> CutOff | None:
-    """Where the last mission of a record stood; None when it ended as told, or never began."""
-    known: CutOff | None = None
-    for event in events:
-        if known is not None and event.time < known.time:
-            known = None  # Another clock: another simulation.
-        known = _after(known, event)
-        if known is not None:
-            known = replace(known, time=event.time)
-    return known
+    """Return where the last mission of a record stood; None: it ended as told, or never began."""
+    return account_of(events).left_at
 
 
 def _after(known: CutOff | None, event: Event) -> CutOff | None:
