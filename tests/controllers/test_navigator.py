@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from surveillance_controllers.motion.navigator import Navigator
 from surveillance_controllers.motion.obstacle_memory import ObstacleMemory
 from surveillance_controllers.motion.path_following import Velocity
 from surveillance_controllers.motion.place_regions import PlaceRegions, door_segment
+from surveillance_controllers.planning.door_watch import DoorWatch
 from surveillance_controllers.planning.route_planning import NoRouteError, route
 
 
@@ -25,7 +27,7 @@ def navigator(flat: Any) -> Navigator:
     return navigator
 
 
-def test_a_pilot_says_what_it_waits_for(flat: Any) -> None:
+def test_a_navigator_says_what_it_waits_for(flat: Any) -> None:
     navigator = Navigator()
     scan = flat.scan((2, 1.5, 0))
     assert navigator.see(scan, 0.0) is None
@@ -141,6 +143,9 @@ def test_regions_are_divided_by_the_door(flat: Any) -> None:
     assert regions.place_at((4.2, 1.5)) == 'B'
     assert regions.place_at((5.2, 3.15)) == 'B'
     assert regions.place_at((40, 1)) is None
+    without_b = PlaceRegions(flat.grid, [flat.DOOR], {'A': flat.POSITIONS['A']})
+    assert without_b.place_at((5.2, 1.5)) == 'A', 'the way out of a room that is on no map'
+    assert PlaceRegions(flat.grid, [], {}).place_at((0.5, 2.8)) is None
     assert regions.place_at((math.nan, 1)) is None
 
 
@@ -178,3 +183,12 @@ def test_without_a_route_the_closed_doors_are_named(
     with pytest.raises(NoRouteError) as caught:
         route(DOORS, closed, 'R1', goal, POINTS)
     assert str(caught.value) == text
+
+
+def test_a_door_whose_room_was_taken_from_the_map_is_not_closed_by_that(graph: Any) -> None:
+    stub: Any = SimpleNamespace(connect=lambda interrupt: interrupt.wait())
+    doors = DoorWatch(graph.node, {'D1': (0, 0, 1, 0), 'D2': (0, 0, 1, 0)}, stub, 1.0)
+    assert doors.closed({'D1': {'C', 'R'}, 'D2': {'C', 'E'}}) == set()
+    assert doors.closed({'D1': {'C', 'R'}, 'D2': {'C'}, 'D3': {'E'}}) == {'D2'}, 'E is still there'
+    assert doors.closed({'D1': {'C'}, 'D2': {'C', 'E'}}) == set(), 'R is not'
+    assert doors.closed({}) == set(), 'nothing is known'

@@ -32,6 +32,10 @@ def door_segment(x: float, y: float, yaw: float, width: float) -> Segment:
     return x - along_x, y - along_y, x + along_x, y + along_y
 
 
+BESIDE = 0.3
+"""How far beside a door one is in one of its two rooms, metres."""
+
+
 class PlaceRegions:
     """The places of a map.
 
@@ -48,6 +52,7 @@ class PlaceRegions:
         positions: Mapping[str, ArrayLike],
     ) -> None:
         self._grid = grid
+        doors = list(doors)
         self._points = {
             name: np.asarray(point, dtype=float)[:2] for name, point in positions.items()
         }
@@ -66,21 +71,45 @@ class PlaceRegions:
             region = self._region(point)
             if region is not None:
                 self._places.setdefault(region, []).append(name)
+        self._beside: dict[int, set[int]] = {}
+        for door in doors:
+            first, second = (self._region(point) for point in _sides(door))
+            if first is not None and second is not None and first != second:
+                self._beside.setdefault(first, set()).add(second)
+                self._beside.setdefault(second, set()).add(first)
 
     def place_at(self, point: ArrayLike) -> str | None:
-        """The place that a point (x, y in metres) belongs to; None off the map or in no place."""
+        """The place that a point (x, y in metres) belongs to; None off the map.
+
+        A room without a place (it was taken from the map, or never entered) belongs to the place
+        that one comes into through its doors.
+        """
         xy = np.asarray(point, dtype=float)[:2]
         region = self._region(xy)
-        names = self._places.get(region, []) if region is not None else []
-        if not names:
+        if region is None:
             return None
-        return min(names, key=lambda name: math.dist(self._points[name], xy))
+        seen, front = {region}, {region}
+        while front:
+            names = [name for each in front for name in self._places.get(each, ())]
+            if names:
+                return min(names, key=lambda name: math.dist(self._points[name], xy))
+            front = {other for each in front for other in self._beside.get(each, ())} - seen
+            seen |= front
+        return None
 
     def _region(self, point: np.ndarray) -> int | None:
         cell = self._grid.cells_of(point)
         if not np.isfinite(point).all() or not self._grid.contains(cell)[0]:
             return None
         return int(self._regions[cell[0, 0], cell[0, 1]])
+
+
+def _sides(door: Segment) -> tuple[np.ndarray, np.ndarray]:
+    """A point on each side of a door, metres."""
+    x1, y1, x2, y2 = door
+    middle = np.array([(x1 + x2) / 2, (y1 + y2) / 2])
+    across = np.array([y1 - y2, x2 - x1]) / max(math.hypot(x2 - x1, y2 - y1), 1e-9)
+    return middle + BESIDE * across, middle - BESIDE * across
 
 
 def _stretched(line: Segment, by: float) -> Segment:

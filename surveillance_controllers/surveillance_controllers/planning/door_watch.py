@@ -45,6 +45,7 @@ class DoorWatch:
         self._timeout = timeout
         self._contacts: frozenset[str] = frozenset()
         self._told: frozenset[str] = frozenset()
+        self._sides: dict[str, set[str]] = {}
         self._news = Interrupt()
         self._set_door = ServiceCaller(node, SetDoor, 'ontology_map/set_door')
         node.create_subscription(DoorStates, 'door_states', self._on_states, STATE_QOS)
@@ -65,8 +66,20 @@ class DoorWatch:
             return {}
 
     def closed(self, rooms_of: Mapping[str, set[str]]) -> frozenset[str]:
-        """The doors that are closed, by their contacts or because they join no two places."""
-        half = {door for door in self._segments if len(rooms_of.get(door, ())) < 2}
+        """The doors that are closed, by their contacts or because they join no two places.
+
+        A door whose other room was taken from the map is not closed by that: who is in that room
+        must be able to leave it.
+        """
+        rooms = {room for sides in rooms_of.values() for room in sides}
+        for door, sides in rooms_of.items():
+            if sides - self._sides.get(door, set()):
+                self._sides[door] = self._sides.get(door, set()) | sides
+        half = {
+            door
+            for door in self._segments
+            if len(rooms_of.get(door, ())) < 2 and self._sides.get(door, set()) <= rooms
+        }
         return self._contacts | half if rooms_of else self._contacts
 
     def closed_segments(self, interrupt: Interrupt) -> dict[str, Segment]:
