@@ -204,7 +204,7 @@ def planner_settings(node: PatrolNode) -> PlannerSettings:
 
 _MOTION = {
     'navigator': Described(
-        'SIMULATED: who drives the base: this node, or Nav2 by its action navigate_to_pose.',
+        'SIMULATED: who drives the base: this node, or Nav2 by its action navigate_through_poses.',
         choices=('own', 'nav2'),
     ),
     'docking': Described(

@@ -73,7 +73,7 @@ class MotionController(PatrolNode):
         settings = self._settings
         motion: Motion
         if settings.navigator == 'nav2':
-            motion = Nav2Motion(self, self._knowledge, settings)
+            motion = Nav2Motion(self, self._knowledge, self._recorder, settings)
         else:
             robot = robot_settings(self, settings)
             motion = NavigationMotion(self, robot, self._knowledge, self._recorder)

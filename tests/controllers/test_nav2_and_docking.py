@@ -12,12 +12,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from geometry_msgs.msg import PoseWithCovarianceStamped
 
 from surveillance_controllers.motion import docking
 from surveillance_controllers.motion import nav2 as nav2_motion
 from surveillance_controllers.motion.arrival import MotionFailedError
-from surveillance_runtime.calls import GoalEnd, UnavailableError
+from surveillance_runtime.calls import CallInterruptedError, GoalEnd, UnavailableError
 from surveillance_runtime.node import StartError
+from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.waiting import Interrupt
 
 PATH = np.array([[0.0, 0, 0], [3, 0, 0], [3, 4, 0]])
@@ -48,7 +50,7 @@ class Servers:
 def servers(monkeypatch: pytest.MonkeyPatch) -> Servers:
     servers = Servers()
     for package, names in (
-        ('nav2_msgs', ['NavigateToPose']),
+        ('nav2_msgs', ['NavigateThroughPoses']),
         ('opennav_docking_msgs', ['DockRobot', 'UndockRobot']),
     ):
         module = ModuleType(f'{package}.action')
@@ -66,10 +68,21 @@ def run() -> Any:
     return SimpleNamespace(interrupt=Interrupt())
 
 
-def nav2(graph: Any) -> nav2_motion.Nav2Motion:
+class Recorder:
+    """Keeps the points that it is told."""
+
+    def __init__(self) -> None:
+        self.points: list[Any] = []
+
+    def tell_point(self, point: Any, *, passing: bool) -> None:
+        assert passing
+        self.points.append(tuple(point))
+
+
+def nav2(graph: Any, recorder: Any = None) -> nav2_motion.Nav2Motion:
     settings: Any = SimpleNamespace(place_reach=2.0, peer_timeout=1.0)
     knowledge: Any = None
-    return nav2_motion.Nav2Motion(graph.node, knowledge, settings)
+    return nav2_motion.Nav2Motion(graph.node, knowledge, recorder, settings)
 
 
 def at(x: float, y: float) -> Any:
@@ -77,33 +90,59 @@ def at(x: float, y: float) -> Any:
     return SimpleNamespace(current_pose=SimpleNamespace(pose=SimpleNamespace(position=position)))
 
 
-def test_nav2_is_sent_to_the_path_s_end_facing_along_it(
-    graph: Any, servers: Servers, run: Any
-) -> None:
+def test_nav2_is_led_along_the_path(graph: Any, servers: Servers, run: Any) -> None:
     servers.feedback = [at(1, 0), at(2.9, 3.9)]
     seen: list[Any] = []
     end = nav2(graph).follow(PATH, run, seen.append)
     ((name, goal),) = servers.asked
-    assert name == 'navigate_to_pose'
-    assert goal.pose.header.frame_id == 'map'
-    pose = goal.pose.pose
-    assert (pose.position.x, pose.position.y) == (3, 4)
-    assert pose.orientation.z == pytest.approx(np.sin(np.pi / 4))
+    assert name == 'navigate_through_poses'
+    assert all(pose.header.frame_id == 'map' for pose in goal.poses)
+    points = [(pose.pose.position.x, pose.pose.position.y) for pose in goal.poses]
+    expected = [(1.4, 0), (2.8, 0), (3, 1.2), (3, 2.6), (3, 4)]
+    assert np.array(points) == pytest.approx(np.array(expected))
+    assert goal.poses[-1].pose.orientation.z == pytest.approx(np.sin(np.pi / 4))
     assert [tuple(p) for p in seen] == [(1, 0, 0), (2.9, 3.9, 0)]
     assert tuple(end) == (2.9, 3.9, 0)
+
+
+def test_a_goal_that_was_cancelled_is_no_failure(graph: Any, servers: Servers, run: Any) -> None:
+    servers.feedback = [at(1, 0)]
+    servers.ends['navigate_through_poses'] = CallInterruptedError('interrupted')
+    assert tuple(nav2(graph).follow(PATH, run, lambda _: None)) == (1, 0, 0)
+
+
+def test_the_place_is_tracked_on_the_way(graph: Any, servers: Servers) -> None:
+    recorder = Recorder()
+    motion = nav2(graph, recorder)
+    poses = graph.node.create_publisher(PoseWithCovarianceStamped, 'amcl_pose', STATE_QOS)
+    message = PoseWithCovarianceStamped()
+    message.pose.pose.position.x = 2.5
+
+    def told() -> bool:
+        poses.publish(message)
+        return bool(recorder.points)
+
+    graph.until(told)
+    assert recorder.points[-1] == (2.5, 0.0, 0.0)
+    message.pose.pose.position.x = float('nan')
+    motion._on_pose(message)
 
 
 @pytest.mark.parametrize(
     ('end', 'text'),
     [
         (GoalEnd('aborted', None), 'Nav2 aborted the goal'),
-        (UnavailableError('action navigate_to_pose: no server'), 'navigate_to_pose: no server'),
+        (
+            GoalEnd('aborted', SimpleNamespace(error_code=9101, error_msg='No path found')),
+            'the goal .error code 9101, No path found.',
+        ),
+        (UnavailableError('action navigate_through_poses: no server'), 'poses: no server'),
     ],
 )
 def test_what_nav2_cannot_do_fails_with_the_reason(
     graph: Any, servers: Servers, run: Any, end: Any, text: str
 ) -> None:
-    servers.ends['navigate_to_pose'] = end
+    servers.ends['navigate_through_poses'] = end
     with pytest.raises(MotionFailedError, match=text):
         nav2(graph).follow(PATH, run, lambda _: None)
 
@@ -118,17 +157,17 @@ def test_a_way_to_the_station_ends_in_the_dock_and_the_next_one_begins_by_undock
     motion = docked(graph, (3.2, 4.0, 1.0))
     motion.follow(PATH, run, lambda _: None)
     motion.look_around(run)
-    assert [name for name, _ in servers.asked] == ['navigate_to_pose', 'dock_robot']
+    assert [name for name, _ in servers.asked] == ['navigate_through_poses', 'dock_robot']
     goal = servers.asked[-1][1]
     assert (goal.dock_type, goal.use_dock_id) == ('charger', False)
     assert goal.dock_pose.pose.position.x == 3.2
     motion.follow(PATH[::-1], run, lambda _: None)
-    assert [name for name, _ in servers.asked[2:]] == ['undock_robot', 'navigate_to_pose']
+    assert [name for name, _ in servers.asked[2:]] == ['undock_robot', 'navigate_through_poses']
 
 
 def test_a_way_to_elsewhere_does_not_dock(graph: Any, servers: Servers, run: Any) -> None:
     docked(graph, (9.0, 9.0, 0.0)).follow(PATH, run, lambda _: None)
-    assert [name for name, _ in servers.asked] == ['navigate_to_pose']
+    assert [name for name, _ in servers.asked] == ['navigate_through_poses']
 
 
 def test_a_dock_that_is_not_found_fails_the_way(graph: Any, servers: Servers, run: Any) -> None:
@@ -145,6 +184,6 @@ def test_without_their_messages_both_say_what_to_install(
         monkeypatch.setitem(sys.modules, package, None)
         monkeypatch.setitem(sys.modules, f'{package}.action', None)
     with pytest.raises(StartError, match='install ros-jazzy-nav2-msgs'):
-        nav2_motion.navigate_to_pose()
+        nav2_motion.navigate_through_poses()
     with pytest.raises(StartError, match='install ros-jazzy-opennav-docking-msgs'):
         docking.docking_actions()

@@ -1,41 +1,51 @@
-"""Motion for `motion_controller` by Nav2: the last point of a path becomes a NavigateToPose goal.
+"""Motion for `motion_controller` by Nav2: a path becomes a NavigateThroughPoses goal.
 
-Nav2's messages come with Nav2; without them this way to move cannot start and says so.
+Nav2 so goes the way that was planned here, through the doors that are open. (Its action FollowPath
+has the name of this project's own, `follow_path`.) Nav2's messages come with Nav2; without them
+this way to move cannot start and says so.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
 
 from surveillance_controllers import conversions
 from surveillance_controllers.controller_parameters import MotionSettings
-from surveillance_controllers.geometry import Points
+from surveillance_controllers.geometry import Points, equally_spaced
 from surveillance_controllers.map_knowledge import MapKnowledge
 from surveillance_controllers.motion.arrival import MotionFailedError, place_reached
+from surveillance_controllers.motion.place_recording import PlaceRecorder
 from surveillance_runtime.action_server import GoalRun
-from surveillance_runtime.calls import CallError, GoalCaller
+from surveillance_runtime.calls import CallError, CallInterruptedError, GoalCaller
 from surveillance_runtime.node import PatrolNode, StartError
+from surveillance_runtime.qos import STATE_QOS
+
+SPACING = 1.5
+"""The largest distance of the poses that Nav2 is led through, metres."""
+TRACK_PERIOD = 0.5
+"""Least time between two looks at the place that the robot passes, seconds."""
 
 
-def navigate_to_pose() -> Any:
+def navigate_through_poses() -> Any:
     """Nav2's action type.
 
     Raises:
         StartError: nav2_msgs is not installed.
     """
     try:
-        from nav2_msgs.action import NavigateToPose
+        from nav2_msgs.action import NavigateThroughPoses
     except ImportError:
         raise StartError(
             'parameter navigator: got nav2, but the Python package nav2_msgs is not installed: '
             'install ros-jazzy-nav2-msgs and source its workspace, or use navigator:=own'
         ) from None
-    return NavigateToPose
+    return NavigateThroughPoses
 
 
 class Nav2Motion:
@@ -44,22 +54,32 @@ class Nav2Motion:
     Args:
         node: The motion controller's node.
         knowledge: Map and ontology.
+        recorder: Is told where the robot is on its way, from the topic `amcl_pose`.
         settings: How long Nav2 may take to appear and accept a goal, and how near a place is.
 
     Raises:
         StartError: nav2_msgs is not installed.
     """
 
-    def __init__(self, node: PatrolNode, knowledge: MapKnowledge, settings: MotionSettings) -> None:
+    def __init__(
+        self,
+        node: PatrolNode,
+        knowledge: MapKnowledge,
+        recorder: PlaceRecorder,
+        settings: MotionSettings,
+    ) -> None:
         self._node = node
         self._knowledge = knowledge
+        self._recorder = recorder
         self._place_reach = settings.place_reach
-        self._type = navigate_to_pose()
+        self._type = navigate_through_poses()
         self._timeout = settings.peer_timeout
-        self._navigator = GoalCaller(node, self._type, 'navigate_to_pose')
+        self._navigator = GoalCaller(node, self._type, 'navigate_through_poses')
+        self._tracked = -math.inf
+        node.create_subscription(PoseWithCovarianceStamped, 'amcl_pose', self._on_pose, STATE_QOS)
 
     def follow(self, path: Points, run: GoalRun, report: Callable[[Points], None]) -> Points:
-        """Sends the robot to the end of a path of shape (n, 3); Nav2 finds its own way there.
+        """Sends the robot along a path of shape (n, 3).
 
         Returns:
             Where the robot is then, as Nav2 said last, shape (3,).
@@ -67,13 +87,6 @@ class Nav2Motion:
         Raises:
             MotionFailedError: It did not get there.
         """
-        goal = PoseStamped()
-        goal.header.frame_id = 'map'
-        goal.header.stamp = self._node.get_clock().now().to_msg()
-        way = path[-1] - path[-2] if len(path) > 1 else np.array([1.0, 0.0, 0.0])
-        goal.pose = conversions.pose_message(
-            (float(path[-1][0]), float(path[-1][1]), math.atan2(way[1], way[0]))
-        )
         position: Points | None = None
 
         def on_feedback(feedback: Any) -> None:
@@ -83,16 +96,46 @@ class Nav2Motion:
 
         try:
             end = self._navigator.run(
-                self._type.Goal(pose=goal),
+                self._type.Goal(poses=self._poses(path)),
                 accept_timeout=self._timeout,
                 interrupt=run.interrupt,
                 on_feedback=on_feedback,
             )
+        except CallInterruptedError:
+            # It was cancelled, which is no failure.
+            return path[0] if position is None else position
         except CallError as error:
             raise MotionFailedError(str(error), position) from error
         if end.status != 'succeeded':
-            raise MotionFailedError(f'Nav2 {end.status} the goal', position)
+            raise MotionFailedError(f'Nav2 {end.status} the goal{_why(end.result)}', position)
         return path[-1] if position is None else position
+
+    def _poses(self, path: Points) -> list[PoseStamped]:
+        """The poses behind the start, each facing along the path."""
+        points = equally_spaced(path, SPACING)
+        if len(points) == 1:
+            points = np.vstack([path[-1], path[-1]])
+        stamp = self._node.get_clock().now().to_msg()
+        poses = []
+        for before, at in pairwise(points):
+            pose = PoseStamped()
+            pose.header.frame_id, pose.header.stamp = 'map', stamp
+            yaw = math.atan2(at[1] - before[1], at[0] - before[0])
+            pose.pose = conversions.pose_message((float(at[0]), float(at[1]), yaw))
+            poses.append(pose)
+        return poses
+
+    def _on_pose(self, message: PoseWithCovarianceStamped) -> None:
+        now = float(self._node.get_clock().now().nanoseconds) / 1e9
+        if 0.0 <= now - self._tracked < TRACK_PERIOD:
+            return
+        try:
+            x, y, _ = conversions.pose_from(message.pose.pose)
+        except ValueError as error:
+            self._node.get_logger().error(f'amcl_pose: {error}')
+            return
+        self._tracked = now
+        self._recorder.tell_point(np.array([x, y, 0.0]), passing=True)
 
     def place_reached(self, _goal: Points, end: Points, run: GoalRun) -> str:
         """The place nearest to where the robot is, shape (3,).
@@ -105,3 +148,11 @@ class Nav2Motion:
 
     def look_around(self, _run: GoalRun) -> None:
         """Nothing: Nav2's own behaviours turn the robot where that is wanted."""
+
+
+def _why(result: Any) -> str:
+    """What Nav2 says of a goal that it did not reach, in brackets; empty: nothing."""
+    code = getattr(result, 'error_code', 0)
+    text = str(getattr(result, 'error_msg', '')).strip()
+    said = [f'error code {code}'] * bool(code) + [text] * bool(text)
+    return f' ({", ".join(said)})' if said else ''

@@ -58,7 +58,7 @@ class PlaceRecorder:
         self._kept = StateFile(node, state_file if start is not None else '')
         self._start = start if start is None else self._kept.text('place') or start
         self._lock = threading.Lock()
-        self._point: tuple[Points, Time] | None = None
+        self._point: tuple[Points, Time, bool] | None = None
         self._told: RobotPlace | None = None
         self._written: RobotPlace | None = None
         self._written_at = 0.0
@@ -90,11 +90,17 @@ class PlaceRecorder:
                 self._kept.save({'place': place})
         self._news.set()
 
-    def tell_point(self, point: Points) -> None:
-        """Takes where the robot is as a point of shape (3,), metres; from any thread, returns at
-        once. The place is the nearest one, as soon as the map says where the places are."""
+    def tell_point(self, point: Points, *, passing: bool = False) -> None:
+        """Takes where the robot is as a point; from any thread, returns at once.
+
+        The place is the nearest one within reach, as soon as the map says where the places are.
+
+        Args:
+            point: Shape (3,), metres.
+            passing: The robot is on its way: out of every place's reach its place stays as it was.
+        """
         with self._lock:
-            self._point = point, self._node.get_clock().now().to_msg()
+            self._point = point, self._node.get_clock().now().to_msg(), passing
         self._news.set()
 
     def _on_build_map(self, message: OntologyMap) -> None:
@@ -158,9 +164,12 @@ class PlaceRecorder:
             found = self._point
         if found is None:
             return
-        point, stamp = found
+        point, stamp, passing = found
         place, gap = nearest_place(self._knowledge.places(self._node.stopping), point)
-        self.tell(place if gap <= self._reach else None, stamp)
+        if gap <= self._reach:
+            self.tell(place, stamp)
+        elif not passing:
+            self.tell(None, stamp)
         with self._lock:
             if self._point is found:
                 self._point = None
