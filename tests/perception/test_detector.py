@@ -14,7 +14,9 @@ from surveillance_perception.detection.dictionaries import DICTIONARY_NAMES, dic
 from surveillance_perception.testing.marker_scene import (
     BACKDROPS,
     Degradation,
+    Glare,
     Panel,
+    Shadow,
     backdrop_of,
     corners_in_image,
     image_of,
@@ -211,3 +213,41 @@ def test_any_image_is_looked_at_without_an_error_of_opencv():
             image = sheet[100 : 100 + height, 100 : 100 + width]
         for detection in DETECTOR.detect(image, [generator.normal(0, 1e6, (4, 2))]):
             assert np.isfinite(detection.corners).all()
+
+
+def test_marker_two_pixels_from_the_edge_is_read_whatever_its_id():
+    image = np.full((160, 160), 220, np.uint8)
+    for marker_id in range(100):
+        image[2:72, 2:72] = DICTIONARY.generateImageMarker(marker_id, 70)
+        assert [each.marker_id for each in DETECTOR.detect(image)] == [marker_id]
+
+
+def lit(degradation, **changes):
+    return seen([Panel(14, 2.0, 0.3, roll=0.1, **changes)], degradation)
+
+
+MIDDLE = tuple(corners_in_image(Panel(14, 2.0), CAMERA).mean(axis=0))
+
+
+@pytest.mark.parametrize(
+    ('degradation', 'changes'),
+    [
+        (Degradation(shadows=(Shadow(MIDDLE, 0.4),)), {}),
+        (Degradation(shadows=(Shadow(MIDDLE, 2.1, 0.3),)), {}),
+        (Degradation(shadows=(Shadow(MIDDLE, 4.0, 0.5, 4.0),)), {}),
+        (Degradation(glares=(Glare(MIDDLE, 8.0),)), {}),
+        (Degradation(vignette=0.8, light=0.5), {}),
+        (Degradation(shutter=50.0), {}),
+        (Degradation(jpeg=15), {}),
+        (Degradation(), {'curl': 0.9}),
+        (Degradation(motion=4.0, noise=6.0), {}),
+    ],
+)
+def test_marker_is_read_under_real_light(degradation, changes):
+    assert set(found(DETECTOR.detect(lit(degradation, **changes)))) == {14}
+
+
+def test_thin_margin_on_a_dark_wall_is_enough():
+    for margin in (0.2, 0.3, 1.0):
+        image = seen([Panel(14, 2.0, 0.2, margin=margin)], backdrop='dark')
+        assert set(found(DETECTOR.detect(image))) == {14}

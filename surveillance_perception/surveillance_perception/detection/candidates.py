@@ -25,40 +25,66 @@ Quads = npt.NDArray[np.float64]
 _MAX_HULL_CORNERS = 8
 _MIN_SOLIDITY = 0.5
 _MAX_GROWTH = 1.6
+_WIDE_WINDOW = 21
+_SAME_SIZE = 0.06
+_SAME_BOX = 3
 _PER_SIDE = 6
 _INNER = 5
 _LEAST_CORRELATION = 0.55
-_LEAST_INNER_DEVIATION = 0.28
+_LEAST_SIDE, _WORST_SIDE = 0.15, 0.5
+_LEAST_INNER_DEVIATION = 0.18
 _CELL_PIXELS = 6.0
 
 
 def dark_masks(
     image: Grey, windows: Sequence[int], contrast: float, bridges: Sequence[int]
-) -> Iterator[Grey]:
-    """Masks (height, width) of what is darker than its neighbourhood, the most telling first.
+) -> Iterator[tuple[Grey, int]]:
+    """Masks of what is dark, the most telling first, and the factor by which each is smaller.
 
     Args:
         image: (height, width) grey levels.
-        windows: Sides in pixels of the neighbourhoods, odd; one mask for each.
+        windows: Sides in pixels of the neighbourhoods that a border is compared with, odd; one
+            mask for each. Wide ones, which only large markers need, are taken from the halved
+            image.
         contrast: How many grey levels darker.
         bridges: Lengths in pixels of gaps to close in the first mask, along columns and along
             rows, each in a mask of its own: a marker seen at a flat angle has a border thinner
             than a pixel, which breaks at white rows of its code.
+
+    Yields:
+        A mask for each window; one of what is darker than a quarter of white, and one split where
+        the image's grey levels part best: a shadow's edge, which is dark beside the light, is
+        still brighter than ink in the light. Then the masks with gaps closed.
     """
+    halved = cv2.resize(
+        image,
+        (max(1, image.shape[1] // 2), max(1, image.shape[0] // 2)),
+        interpolation=cv2.INTER_AREA,
+    )
     first: Grey | None = None
     for window in windows:
+        wide = window >= _WIDE_WINDOW and first is not None
         dark = cv2.adaptiveThreshold(
-            image, 255, cv2.ADAPTIVE_THRESH_MEAN_C, cv2.THRESH_BINARY_INV, window, contrast
+            halved if wide else image,
+            255,
+            cv2.ADAPTIVE_THRESH_MEAN_C,
+            cv2.THRESH_BINARY_INV,
+            max(3, window // 4 * 2 + 1) if wide else window,
+            contrast,
         )
         first = dark if first is None else first
-        yield dark
+        yield dark, 2 if wide else 1
+    split, _ = cv2.threshold(halved, 0, 255, cv2.THRESH_BINARY_INV + cv2.THRESH_OTSU)
+    white = float(np.percentile(halved[::4, ::4], 98.0))
+    yield cv2.threshold(image, white / 4.0, 255, cv2.THRESH_BINARY_INV)[1], 1
+    yield cv2.threshold(image, split, 255, cv2.THRESH_BINARY_INV)[1], 1
     for length in bridges:
         for shape in ((length, 1), (1, length)):
-            yield cv2.morphologyEx(first, cv2.MORPH_CLOSE, np.ones(shape, np.uint8))
+            yield cv2.morphologyEx(first, cv2.MORPH_CLOSE, np.ones(shape, np.uint8)), 1
 
 
 def quads_around(
-    masks: Iterable[Grey],
+    masks: Iterable[tuple[Grey, int]],
     *,
     min_length: float = 8.0,
     min_width: float = 2.0,
@@ -68,8 +94,8 @@ def quads_around(
     """Quadrilaterals around the blobs of masks that do not touch the edge.
 
     Args:
-        masks: Images (height, width), blobs are not 0. A blob with the same upright box and
-            area as one before is left out.
+        masks: Images (height, width), blobs are not 0, and by how much each is smaller than the
+            image itself. A blob with the same upright box and area as one before is left out.
         min_length: Longer side in pixels of the smallest blob's upright box.
         min_width: Shorter side of it.
         min_area: Area in pixels of the smallest blob's hull.
@@ -78,41 +104,58 @@ def quads_around(
     Returns:
         (n, 4, 2) corners in pixels, clockwise as seen.
     """
-    found = []
-    seen: set[tuple[float, ...]] = set()
-    for mask in masks:
+    found: list[Quads] = []
+    seen: set[tuple[int, ...]] = set()
+    for mask, scale in masks:
         if len(seen) > limit:
             break
+        quads = []
+        length, breadth = min_length / scale, max(2.0, min_width / scale)
         contours, _ = cv2.findContours(mask, cv2.RETR_LIST, cv2.CHAIN_APPROX_SIMPLE)
         height, width = mask.shape
         for contour in contours:
             if len(contour) < 4:
                 continue
             left, top, across, down = cv2.boundingRect(contour)
-            if max(across, down) < min_length or min(across, down) < min_width:
+            if max(across, down) < length or min(across, down) < breadth:
                 continue
             if left == 0 or top == 0 or left + across == width or top + down == height:
                 continue
             # outer outlines run the other way round than the outlines of holes
             area = -cv2.contourArea(contour, oriented=True)
-            blob = (left, top, across, down, area)
-            if area <= 0 or blob in seen:
+            if area <= 0:
+                continue
+            right, bottom = (left + across) * scale, (top + down) * scale
+            blob = tuple(each // _SAME_BOX for each in (left * scale, top * scale, right, bottom))
+            if blob in seen:
                 continue
             seen.add(blob)
-            quad = _quad_around(contour, area, min_area)
+            quad = _quad_around(contour, area, min_area / scale**2)
             if quad is not None:
-                found.append(quad)
-    return _clockwise(np.array(found)) if found else np.zeros((0, 4, 2))
+                quads.append(quad)
+        if quads:
+            # a pixel's middle has whole coordinates, in a halved image as well
+            found.append((np.array(quads) + 0.5) * scale - 0.5)
+    return _clockwise(np.concatenate(found)) if found else np.zeros((0, 4, 2))
 
 
 def distinct(quads: Quads, distance: float) -> npt.NDArray[np.int64]:
-    """Indices of the quads with no corner within `distance` pixels of an earlier one's."""
+    """Indices of the quads whose middle and size are not those of an earlier one.
+
+    Args:
+        quads: (m, 4, 2) corners in pixels, the best first.
+        distance: How near middles are taken for the same, pixels.
+    """
+    middles = quads.mean(axis=1)
+    sizes = np.linalg.norm(quads - middles[:, None], axis=2).mean(axis=1)
+    near = np.abs(middles[:, None] - middles[None]).max(axis=2) < distance
+    near &= np.abs(sizes[:, None] - sizes[None]) < np.maximum(distance, _SAME_SIZE * sizes)
     kept: list[int] = []
-    for index, quad in enumerate(quads):
-        others = quads[kept]
-        gaps = [np.abs(np.roll(quad, turn, axis=0) - others).max(axis=(1, 2)) for turn in range(4)]
-        if not (np.min(gaps, axis=0) < distance).any():
+    taken = np.zeros(len(quads), bool)
+    for index in range(len(quads)):
+        if not taken[index]:
             kept.append(index)
+            taken |= near[index]
     return np.array(kept, dtype=np.int64)
 
 
@@ -195,7 +238,9 @@ class BorderCheck:
         self._side = side
         along = np.linspace(-0.85, 0.85, _PER_SIDE)
         inner = np.linspace(-1.0, 1.0, _INNER) * (1.0 - 3.0 / side)
-        points = [_border(along, 1.0 + 1.0 / side), _border(along, 1.0 - 1.0 / side)]
+        cell = 2.0 / side
+        points = [_border(along, 1.0 + cell * part) for part in (0.2, 0.5)]
+        points.append(_border(along, 1.0 - cell * 0.5))
         points.append(np.stack([each.ravel() for each in np.meshgrid(inner, inner)]))
         flat = np.concatenate(points, axis=1)
         self._grid = np.vstack([flat, np.ones(flat.shape[1])])
@@ -217,19 +262,20 @@ class BorderCheck:
         levels = levels_for(homographies, self._side, _CELL_PIXELS)
         values = pyramid.sample(homographies, self._grid, levels).astype(float)
         count = 4 * _PER_SIDE
-        margin, border, inner = (
-            values[:, :count],
-            values[:, count : 2 * count],
-            values[:, 2 * count :],
-        )
+        near, far, border = (values[:, k * count : (k + 1) * count] for k in range(3))
+        inner = values[:, 3 * count :]
+        # a white margin may be thinner than half a cell
+        thin = near.mean(axis=1) > far.mean(axis=1)
+        margin = np.where(thin[:, None], near, far)
         contrast = margin.mean(axis=1) - border.mean(axis=1)
         variance = (margin.var(axis=1) + border.var(axis=1)) / 2.0
         correlation = contrast / np.sqrt(contrast**2 + 4.0 * variance + 1e-6)
-        by_side = (margin - border).reshape(-1, 4, _PER_SIDE).mean(axis=2).min(axis=1)
+        by_side = np.sort((margin - border).reshape(-1, 4, _PER_SIDE).mean(axis=2), axis=1)
         passed = (
             (contrast > least_contrast)
             & (correlation > _LEAST_CORRELATION)
-            & (by_side > 0.0 * contrast)
+            & (by_side[:, 1] > _LEAST_SIDE * contrast)
+            & (by_side[:, 0] > -_WORST_SIDE * contrast)
             & (inner.std(axis=1) > _LEAST_INNER_DEVIATION * contrast)
         )
         return np.where(passed, correlation, -1.0)

@@ -13,7 +13,7 @@ The way from an image to markers:
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import cv2
@@ -38,10 +38,19 @@ from surveillance_perception.detection.image_sampling import (
 )
 from surveillance_perception.detection.preprocessing import PreparedImage, prepare
 
-_SAME_QUAD = 1.0
+_SAME_QUAD = 2.0
 _SAME_MARKER = 0.5
 _LARGE_CELL = 8.0
 _BATCH = 64
+_CAREFUL = 96
+_COVER = 0.7
+_CLEAR, _CLEAR_KNOWN = 1.8, 1.3
+_WRONG = 0.2
+_WRONG_BORDER = 0.3
+_RIGHT_BORDER = 3
+_RIGHT_LEAD = 1.6
+_FEW_SPARE_BITS = 12.0
+_STRICT = 1.8
 
 
 @dataclass(frozen=True)
@@ -68,10 +77,10 @@ class DetectorSettings:
     dictionary: str = 'DICT_5X5_100'
     known_ids: frozenset[int] | None = None
     windows: tuple[int, ...] = (15, 31)
-    bridges: tuple[int, ...] = (5, 7)
+    bridges: tuple[int, ...] = (5,)
     contrast: float = 7.0
     min_length: float = 8.0
-    max_outlines: int = 400
+    max_outlines: int = 250
     max_candidates: int = 1000
     blur: float = 0.8
     least_correlation: float = 0.85
@@ -120,7 +129,9 @@ class MarkerDetector:
         dictionary = dictionary_named(self.settings.dictionary)
         if self.settings.known_ids is not None:
             MarkerCodes.of(dictionary, self.settings.known_ids)
-        self._reader = MarkerReader(MarkerCodes.of(dictionary), self.settings.blur)
+        codes = MarkerCodes.of(dictionary)
+        self._reader = MarkerReader(codes, self.settings.blur)
+        self._even_reader = MarkerReader(codes, self.settings.blur, even=True)
         self._border = BorderCheck(self._reader.codes.side)
 
     def detect(
@@ -151,10 +162,35 @@ class MarkerDetector:
         if not len(quads):
             return []
         found: list[Detection] = []
+        # what shows a code without a mistake is read first, and what is left with more care
+        steps = (
+            (self._reader.read_plain, len(quads)),
+            (self._reader.read, _CAREFUL),
+            (self._even_reader.read, _CAREFUL),
+        )
+        for read, most in steps:
+            quads = quads[~_covered(quads, found)]
+            if not len(quads):
+                break
+            if read == self._even_reader.read:
+                quads = quads[self._reader.uneven(pyramid, homographies_of(quads))]
+            self.left_out += max(0, len(quads) - most)
+            quads = quads[:most]
+            found += _without_overlaps(self._read(read, pyramid, quads, prepared.grey), found)
+        return found
+
+    def _read(
+        self,
+        read: Callable[[ImagePyramid, Array], Readings],
+        pyramid: ImagePyramid,
+        quads: Quads,
+        grey: Grey,
+    ) -> list[Detection]:
+        found: list[Detection] = []
         for start in range(0, len(quads), _BATCH):
-            readings = self._reader.read(pyramid, homographies_of(quads[start : start + _BATCH]))
-            found += self._accepted(readings, prepared.grey)
-        return _without_overlaps(found)
+            readings = read(pyramid, homographies_of(quads[start : start + _BATCH]))
+            found += self._accepted(readings, grey)
+        return found
 
     def _candidates(self, prepared: PreparedImage, pyramid: ImagePyramid) -> Quads:
         settings = self.settings
@@ -172,25 +208,38 @@ class MarkerDetector:
 
     def _accepted(self, readings: Readings, grey: Grey) -> list[Detection]:
         settings, codes = self.settings, self._reader.codes
-        ids = codes.ids[readings.entries]
+        glared = readings.glared >= 0
+        entries = np.where(glared, readings.glared, readings.entries)
+        ids = codes.ids[entries]
         known = np.ones(len(ids), bool)
+        lead = np.full(len(ids), settings.unknown_lead)
         if settings.known_ids is not None:
             known = np.isin(ids, list(settings.known_ids))
             lead = np.where(known, settings.known_lead, settings.unknown_lead)
-        else:
-            lead = np.full(len(ids), settings.unknown_lead)
-        accepted = (
+        plausible = (readings.wrong <= _WRONG * codes.bits**2) & (
+            readings.wrong_border <= _WRONG_BORDER * 4 * (codes.side - 1)
+        )
+        correlated = (
             (readings.correlation > settings.least_correlation)
             & (readings.inner > settings.least_inner_correlation)
             & (readings.lead > lead)
         )
+        # how much a code says beyond telling the dictionary's markers apart
+        spare = codes.bits**2 - np.log2(len(codes.ids))
+        strict = _STRICT if spare < _FEW_SPARE_BITS else 1.0
+        right = (readings.wrong_border <= _RIGHT_BORDER) & (
+            ((readings.wrong == 0) & (readings.inner_lead > _RIGHT_LEAD * strict))
+            | ((readings.wrong <= min(1, codes.correction)) & (readings.inner_lead > lead * strict))
+        )
+        clear = readings.lead > np.where(lead < settings.unknown_lead, _CLEAR_KNOWN, _CLEAR) * lead
+        accepted = (correlated & (plausible | clear)) | (plausible & right) | glared
         confidence = readings.correlation * (1.0 - 1.0 / np.maximum(readings.lead, 1.0))
         chosen = np.flatnonzero(accepted)
         chosen = chosen[np.argsort(-confidence[chosen])]
         corners = corners_of(readings.homographies)
         detections: list[Detection] = []
         for index in chosen:
-            outline = np.roll(corners[index], -int(codes.turns[readings.entries[index]]), axis=0)
+            outline = np.roll(corners[index], -int(codes.turns[entries[index]]), axis=0)
             if any(_overlap(outline, other.corners) for other in detections):
                 continue
             outline = _sharpened(outline, grey, codes.side)
@@ -200,12 +249,23 @@ class MarkerDetector:
         return detections
 
 
-def _without_overlaps(found: list[Detection]) -> list[Detection]:
+def _without_overlaps(found: list[Detection], before: Sequence[Detection] = ()) -> list[Detection]:
     kept: list[Detection] = []
     for each in sorted(found, key=lambda detection: -detection.confidence):
-        if not any(_overlap(each.corners, other.corners) for other in kept):
+        if not any(_overlap(each.corners, other.corners) for other in [*before, *kept]):
             kept.append(each)
     return kept
+
+
+def _covered(quads: Quads, found: Sequence[Detection]) -> npt.NDArray[np.bool_]:
+    """Which quads (m,) have their middle in a marker that is read."""
+    covered = np.zeros(len(quads), bool)
+    middles = quads.mean(axis=1)
+    for each in found:
+        middle = each.corners.mean(axis=0)
+        reach = np.linalg.norm(each.corners - middle, axis=1).mean()
+        covered |= np.linalg.norm(middles - middle, axis=1) < _COVER * reach
+    return covered
 
 
 def _sharpened(outline: Array, grey: Grey, side: int) -> Array:

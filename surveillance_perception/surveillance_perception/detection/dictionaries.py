@@ -98,12 +98,14 @@ class MarkerCodes:
         ids: (k,) marker id of each entry.
         turns: (k,) quarter turns clockwise by which the entry's image is turned.
         cells: (k, bits + 4, bits + 4) +1 white, -1 black, with border and margin.
+        correction: Wrong cells that the dictionary can correct.
     """
 
     bits: int
     ids: npt.NDArray[np.int64]
     turns: npt.NDArray[np.int64]
     cells: Cells
+    correction: int
 
     @property
     def side(self) -> int:
@@ -135,4 +137,5 @@ class MarkerCodes:
             for turn in range(4):
                 cells[index * 4 + turn, 2:-2, 2:-2] = np.rot90(code, -turn)
         ids = np.repeat(np.array(list(chosen), np.int64), 4)
-        return cls(bits, ids, np.tile(np.arange(4), len(chosen)), cells)
+        turns = np.tile(np.arange(4), len(chosen))
+        return cls(bits, ids, turns, cells, max(0, int(dictionary.maxCorrectionBits)))

@@ -65,10 +65,15 @@ class ImagePyramid:
         return np.asarray(sampled, dtype=np.float32)
 
 
+def cell_widths(homographies: Array, cells: int) -> Array:
+    """Width in pixels (m,) of a marker's cell across its narrower direction."""
+    return np.asarray(np.linalg.norm(jacobians_of(homographies), axis=1).min(axis=1) * 2.0 / cells)
+
+
 def levels_for(homographies: Array, cells: int, cell_pixels: float) -> npt.NDArray[np.int64]:
     """How often to halve the image so that a cell is at most `cell_pixels` wide."""
-    side = np.linalg.norm(jacobians_of(homographies), axis=1).min(axis=1) * 2.0 / cells
-    level = np.floor(np.log2(np.maximum(side / cell_pixels, 1e-3))) + 1
+    width = cell_widths(homographies, cells)
+    level = np.floor(np.log2(np.maximum(width / cell_pixels, 1e-3))) + 1
     return np.asarray(np.clip(level, 0, _LAST_LEVEL), dtype=np.int64)
 
 

@@ -20,6 +20,7 @@ import numpy.typing as npt
 from scipy.special import ndtr
 
 from surveillance_perception.detection.dictionaries import MarkerCodes
+from surveillance_perception.detection.illumination import evenly_lit
 from surveillance_perception.detection.image_sampling import (
     Array,
     ImagePyramid,
@@ -30,12 +31,13 @@ from surveillance_perception.detection.image_sampling import (
 
 Indices = npt.NDArray[np.int64]
 
-_SAMPLES_PER_CELL = 3
-_MARGIN_SAMPLES = 2
+SAMPLES_PER_CELL = 3
+_MARGIN_SAMPLES = 1
 _LEVEL_CELL_PIXELS = 4.0
 _DAMPING = 1e-3
 _LARGEST_STEP = 0.4
-_SHORTLIST = 24
+_SHORTLIST = 12
+_SETTLED = 2e-3
 _DEVIATIONS = np.geomspace(0.02, 2.0, 96)
 
 
@@ -47,15 +49,25 @@ class Footprint(NamedTuple):
 
 
 class TemplateFit:
-    """Compares quadrilaterals of an image with the codes of a dictionary."""
+    """Compares quadrilaterals of an image with the codes of a dictionary.
 
-    def __init__(self, codes: MarkerCodes) -> None:
+    Args:
+        codes: The dictionary.
+        even: Whether patches are read by local contrast, as under shadows.
+
+    Attributes:
+        codes: The dictionary.
+        count: Samples along a side of a patch.
+    """
+
+    def __init__(self, codes: MarkerCodes, *, even: bool = False) -> None:
         self.codes = codes
+        self._even = even
         cells = codes.side + 2
         self._flat = codes.cells.reshape(len(codes.ids), cells * cells)
-        step = 2.0 / codes.side / _SAMPLES_PER_CELL
-        self._count = codes.side * _SAMPLES_PER_CELL + 2 * _MARGIN_SAMPLES
-        positions: Array = (np.arange(self._count, dtype=float) - (self._count - 1) / 2.0) * step
+        step = 2.0 / codes.side / SAMPLES_PER_CELL
+        self.count = codes.side * SAMPLES_PER_CELL + 2 * _MARGIN_SAMPLES
+        positions: Array = (np.arange(self.count, dtype=float) - (self.count - 1) / 2.0) * step
         x, y = (each.ravel() for each in np.meshgrid(positions, positions))
         self._grid = np.stack([x, y, np.ones_like(x)])
         within = np.abs(positions) < 1.0 - 2.0 / codes.side
@@ -74,7 +86,17 @@ class TemplateFit:
 
     def sample(self, pyramid: ImagePyramid, homographies: Array, levels: Indices) -> Patches:
         """Patches (m, n) of the image under each homography."""
-        return pyramid.sample(homographies, self._grid, levels)
+        patches = pyramid.sample(homographies, self._grid, levels)
+        return evenly_lit(patches, self.count, SAMPLES_PER_CELL) if self._even else patches
+
+    def cells(self, patches: Patches) -> Patches:
+        """Values (m, side, side) of the marker's cells, their middles counting most."""
+        side, step = self.codes.side, SAMPLES_PER_CELL
+        square = patches.reshape(-1, self.count, self.count)
+        inside = square[:, _MARGIN_SAMPLES:-_MARGIN_SAMPLES, _MARGIN_SAMPLES:-_MARGIN_SAMPLES]
+        parts = inside.reshape(-1, side, step, side, step)
+        middle = parts[:, :, step // 2, :, step // 2]
+        return np.asarray((middle + parts.mean(axis=(2, 4))) / 2.0)
 
     def footprint(self, homographies: Array, levels: Indices, blur: float | Array) -> Footprint:
         """Blur of each candidate.
@@ -93,37 +115,58 @@ class TemplateFit:
         index = np.searchsorted(_DEVIATIONS, deviation).clip(0, len(_DEVIATIONS) - 1)
         return Footprint(index[:, 1], index[:, 0])
 
-    def score(self, patches: Patches, footprint: Footprint) -> tuple[Indices, Patches]:
+    def score(
+        self, patches: Patches, footprint: Footprint, listed: Indices | None = None
+    ) -> tuple[Indices, Patches]:
         """The most likely codes of each patch and their correlations, the best one first.
+
+        Args:
+            patches: (m, n) grey levels.
+            footprint: Blur of each.
+            listed: (m, j) entries to choose from; None for all codes.
 
         Returns:
             (m, j) entries and (m, j) correlations, j at most `_SHORTLIST`.
         """
         down, across = self._profile[footprint.down], self._profile[footprint.across]
         centred = patches - patches.mean(axis=1, keepdims=True)
-        square = centred.reshape(-1, self._count, self._count)
+        square = centred.reshape(-1, self.count, self.count)
         agreement = (down.transpose(0, 2, 1) @ square @ across).reshape(len(patches), -1)
-        agreement = agreement @ self._flat.T
-        listed = min(_SHORTLIST, agreement.shape[1])
-        entries = np.argpartition(-agreement, listed - 1, axis=1)[:, :listed]
+        if listed is None:
+            everything = agreement @ self._flat.T
+            count = min(_SHORTLIST, everything.shape[1])
+            listed = np.argpartition(-everything, count - 1, axis=1)[:, :count]
         rows = np.arange(len(patches))[:, None]
-        energy = self._energy(self._flat[entries], footprint)
+        codes = self._flat[listed]
+        energy = self._energy(codes, footprint)
         spread = np.einsum('mn,mn->m', centred, centred)
         scale = np.sqrt(np.maximum(energy * spread[:, None], 1e-6))
-        correlation = agreement[rows, entries] / scale
+        correlation = (codes @ agreement[:, :, None])[:, :, 0] / scale
         order = np.argsort(-correlation, axis=1)
-        return entries[rows, order], correlation[rows, order]
+        return listed[rows, order], correlation[rows, order]
 
-    def inner_correlation(
+    def correlation(self, patches: Patches, entries: Indices, footprint: Footprint) -> Patches:
+        """Correlation (m,) of patches with one code each."""
+        drawn = self._render(entries, footprint)
+        drawn = drawn - drawn.mean(axis=1, keepdims=True)
+        seen = patches - patches.mean(axis=1, keepdims=True)
+        energy = np.square(drawn).sum(axis=1) * np.square(seen).sum(axis=1)
+        return np.asarray((drawn * seen).sum(axis=1) / np.sqrt(np.maximum(energy, 1e-6)))
+
+    def inner_correlations(
         self, patches: Patches, entries: Indices, footprint: Footprint
     ) -> Patches:
-        """Correlation (m,) over the code's own cells, without border and margin."""
-        drawn = self._render(entries, footprint)[:, self._inside]
+        """Correlations (m, j) of codes (m, j) over their own cells, without border and margin."""
+        count, listed = entries.shape
+        repeated = Footprint(footprint.down.repeat(listed), footprint.across.repeat(listed))
+        drawn = self._render(entries.ravel(), repeated)[:, self._inside]
+        drawn = drawn.reshape(count, listed, -1)
         seen = patches[:, self._inside]
-        drawn = drawn - drawn.mean(axis=1, keepdims=True)
+        drawn = drawn - drawn.mean(axis=2, keepdims=True)
         seen = seen - seen.mean(axis=1, keepdims=True)
-        energy = np.einsum('mn,mn->m', drawn, drawn) * np.einsum('mn,mn->m', seen, seen)
-        product = np.einsum('mn,mn->m', drawn, seen)
+        energy = np.einsum('mjn,mjn->mj', drawn, drawn)
+        energy = energy * np.einsum('mn,mn->m', seen, seen)[:, None]
+        product = np.einsum('mjn,mn->mj', drawn, seen)
         return np.asarray(product / np.sqrt(np.maximum(energy, 1e-6)))
 
     def refine(
@@ -148,17 +191,20 @@ class TemplateFit:
         damping = _DAMPING * np.trace(hessian, axis1=1, axis2=2) / 8.0 + 1e-9
         hessian += damping[:, None, None] * np.eye(8)
         solve = np.linalg.inv(hessian).astype(np.float32)
+        least = 0.05 if self._even else 1.0
         result = homographies
         for _ in range(iterations):
             patches = self.sample(pyramid, result, levels)[:, :, None]
             contrast = (flat[:, None] @ patches)[:, 0, 0] / energy
-            contrast = np.where(np.abs(contrast) < 1.0, 1.0, contrast)
+            contrast = np.where(np.abs(contrast) < least, least, contrast)
             change = np.asarray((solve @ (steepest @ patches))[:, :, 0], dtype=float)
             change /= contrast[:, None]
             largest = np.abs(change).max(axis=1, keepdims=True)
             change *= np.minimum(1.0, _LARGEST_STEP / np.maximum(largest, 1e-9))
             result = np.asarray(result @ np.linalg.inv(_warps(change)))
             result = result / result[:, 2:, 2:]
+            if largest.max(initial=0.0) < _SETTLED:
+                break
         return result
 
     def _render(self, entries: Indices, footprint: Footprint) -> Patches:
@@ -172,7 +218,7 @@ class TemplateFit:
         down, across = self._profile[footprint.down], self._profile[footprint.across]
         slope_x = down @ cells @ self._slope[footprint.across].transpose(0, 2, 1)
         slope_y = self._slope[footprint.down] @ cells @ across.transpose(0, 2, 1)
-        flat = (len(entries), 1, self._count * self._count)
+        flat = (len(entries), 1, self.count * self.count)
         return np.asarray(
             slope_x.reshape(flat) * self._warp_x + slope_y.reshape(flat) * self._warp_y
         )
@@ -185,7 +231,7 @@ class TemplateFit:
         weighed = cells @ gram.reshape(-1, size, size)
         total = (cells @ mean.reshape(-1, size, 1))[:, :, 0]
         squares = np.einsum('mjc,mjc->mj', weighed, cells)
-        return np.asarray(squares - total * total / self._count**2)
+        return np.asarray(squares - total * total / self.count**2)
 
 
 def _profiles(positions: Array, side: int) -> tuple[Patches, Patches]:

@@ -7,12 +7,14 @@ sensor do to it (`Degradation`) comes last. Every random number comes from the c
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 import numpy.typing as npt
+from scipy.special import ndtr
 
 from surveillance_perception.detection.camera_model import Array, CameraModel
 
@@ -20,6 +22,7 @@ ImageArray = npt.NDArray[np.uint8]
 
 BACKDROPS = ('plain', 'clouds', 'bricks', 'boards', 'boxes', 'letters', 'stripes', 'leaves')
 _SUPERSAMPLING = 8
+_STRIPS = 24
 _WHITE, _BLACK = 225.0, 25.0
 
 
@@ -36,6 +39,8 @@ class Panel:
         roll: Rotation about the line of sight, radians.
         offset: Pixel of the marker's centre, from the image's centre.
         margin: White border in cells of the marker.
+        curl: Angle in radians over which the sheet's width is bent about its vertical middle line,
+            as paper that comes off a wall.
     """
 
     marker_id: int
@@ -46,6 +51,39 @@ class Panel:
     roll: float = 0.0
     offset: tuple[float, float] = (0.0, 0.0)
     margin: float = 1.5
+    curl: float = 0.0
+
+
+@dataclass(frozen=True)
+class Shadow:
+    """A straight shadow edge: one side of it is darker.
+
+    Attributes:
+        through: Pixel (x, y) that the edge runs through.
+        direction: Angle in radians of the normal that points to the dark side.
+        brightness: Factor on the dark side.
+        softness: Standard deviation in pixels of the edge's width; 0 is hard.
+    """
+
+    through: tuple[float, float]
+    direction: float
+    brightness: float = 0.5
+    softness: float = 0.0
+
+
+@dataclass(frozen=True)
+class Glare:
+    """A reflection that adds light in a round spot.
+
+    Attributes:
+        centre: Pixel (x, y) of its middle.
+        deviation: Standard deviation in pixels.
+        strength: Grey levels added in the middle.
+    """
+
+    centre: tuple[float, float]
+    deviation: float
+    strength: float = 255.0
 
 
 @dataclass(frozen=True)
@@ -58,6 +96,12 @@ class Degradation:
         light: Factor on the brightness before the sensor (0.1: a dark room, 3: overexposed).
         slope: Brightness falls from 1 + slope on the left to 1 - slope on the right.
         noise: Standard deviation of the sensor's noise in grey levels.
+        shadows: Shadow edges across the image.
+        glares: Reflections.
+        vignette: Share of the brightness that the corners lack.
+        shutter: Pixels by which the lowest row is shifted against the top one, because a rolling
+            shutter reads it later in a pan.
+        jpeg: Quality of a JPEG compression, 1 to 100; 0 for none.
     """
 
     blur: float = 0.5
@@ -66,6 +110,11 @@ class Degradation:
     light: float = 1.0
     slope: float = 0.0
     noise: float = 2.0
+    shadows: tuple[Shadow, ...] = ()
+    glares: tuple[Glare, ...] = ()
+    vignette: float = 0.0
+    shutter: float = 0.0
+    jpeg: int = 0
 
 
 def corners_in_camera(panel: Panel, camera: CameraModel) -> Array:
@@ -97,7 +146,12 @@ def degrade(
     scene: npt.NDArray[np.float32], degradation: Degradation, generator: np.random.Generator
 ) -> ImageArray:
     """Light, lens, motion and sensor applied to a scene of grey levels."""
-    result = scene
+    result = _lit(scene, degradation)
+    if degradation.shutter:
+        rows = scene.shape[0]
+        lean = np.array([[1.0, degradation.shutter / rows, -degradation.shutter / 2], [0, 1, 0]])
+        size = (scene.shape[1], rows)
+        result = cv2.warpAffine(result, lean, size, borderMode=cv2.BORDER_REPLICATE)
     if degradation.blur > 0:
         result = cv2.GaussianBlur(result, (0, 0), degradation.blur)
     if degradation.motion > 1:
@@ -109,7 +163,33 @@ def degrade(
     if degradation.noise > 0:
         grain = generator.standard_normal(result.shape, dtype=np.float32)
         result = result + np.float32(degradation.noise) * grain
-    return np.asarray(np.clip(np.rint(result), 0, 255), dtype=np.uint8)
+    pixels = np.asarray(np.clip(np.rint(result), 0, 255), dtype=np.uint8)
+    if degradation.jpeg:
+        quality = (cv2.IMWRITE_JPEG_QUALITY, degradation.jpeg)
+        packed = cv2.imencode('.jpg', pixels, quality)[1]
+        pixels = np.asarray(cv2.imdecode(packed, cv2.IMREAD_GRAYSCALE), dtype=np.uint8)
+    return pixels
+
+
+def _lit(scene: npt.NDArray[np.float32], degradation: Degradation) -> npt.NDArray[np.float32]:
+    if not (degradation.shadows or degradation.glares or degradation.vignette):
+        return scene
+    height, width = scene.shape
+    y, x = np.mgrid[:height, :width].astype(np.float32)
+    light = np.ones_like(scene)
+    for shadow in degradation.shadows:
+        across = math.cos(shadow.direction), math.sin(shadow.direction)
+        depth = (x - shadow.through[0]) * across[0] + (y - shadow.through[1]) * across[1]
+        dark = ndtr(depth / max(shadow.softness, 0.3))
+        light *= 1.0 - (1.0 - shadow.brightness) * dark
+    if degradation.vignette:
+        radius = np.hypot(x - width / 2.0, y - height / 2.0) / math.hypot(width / 2.0, height / 2.0)
+        light *= 1.0 - degradation.vignette * radius**2
+    added = np.zeros_like(scene)
+    for glare in degradation.glares:
+        square = (x - glare.centre[0]) ** 2 + (y - glare.centre[1]) ** 2
+        added += glare.strength * np.exp(-square / (2.0 * glare.deviation**2))
+    return np.asarray(scene * light + added, dtype=np.float32)
 
 
 def backdrop_of(
@@ -118,7 +198,7 @@ def backdrop_of(
     """Grey levels (height, width) of a background without any marker.
 
     Args:
-        kind: One of `BACKDROPS`.
+        kind: One of `BACKDROPS`, or 'dark': a dark wall.
         camera: Gives the size.
         generator: Source of every random choice.
 
@@ -130,6 +210,8 @@ def backdrop_of(
     clouds = level + 18.0 * _clouds(shape, generator)
     if kind == 'plain':
         drawn = np.full(shape, level)
+    elif kind == 'dark':
+        drawn = level / 4.0 + 6.0 * _clouds(shape, generator)
     elif kind == 'clouds':
         drawn = level + 70.0 * _clouds(shape, generator)
     elif kind == 'bricks':
@@ -152,6 +234,11 @@ def backdrop_of(
 
 def _panel_points(panel: Panel, camera: CameraModel, half: float) -> Array:
     square = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], dtype=float) * half
+    return _in_camera(panel, camera, square)
+
+
+def _in_camera(panel: Panel, camera: CameraModel, points: Array) -> Array:
+    """Points (n, 3) of the panel, x right, y down, in the optical frame, metres."""
     axis = np.array([math.cos(panel.axis), math.sin(panel.axis), 0.0]) * panel.turn
     turned = cv2.Rodrigues(axis)[0] @ cv2.Rodrigues(np.array([0.0, 0.0, panel.roll]))[0]
     principal = np.array([camera.matrix[0, 2], camera.matrix[1, 2]])
@@ -162,7 +249,19 @@ def _panel_points(panel: Panel, camera: CameraModel, half: float) -> Array:
     right = np.cross([0.0, 1.0, 0.0], sight)
     right /= np.linalg.norm(right)
     facing = np.column_stack([right, np.cross(sight, right), sight])
-    return np.asarray(square @ (facing @ turned).T + sight * panel.distance)
+    bent = _curled(points, panel.curl, panel.size)
+    return np.asarray(bent @ (facing @ turned).T + sight * panel.distance)
+
+
+def _curled(points: Array, curl: float, size: float) -> Array:
+    """Points of a sheet bent about its vertical middle line: `curl` radians over the marker."""
+    if not curl:
+        return points
+    radius = size / curl
+    angle = points[:, 0] / radius
+    return np.column_stack(
+        [radius * np.sin(angle), points[:, 1], points[:, 2] + radius * (1.0 - np.cos(angle))]
+    )
 
 
 def _paste(
@@ -172,25 +271,40 @@ def _paste(
     dictionary: cv2.aruco.Dictionary,
 ) -> None:
     cells = dictionary.markerSize + 2
-    side = panel.size * (1.0 + 2.0 * panel.margin / cells)
-    outline = camera.project(_panel_points(panel, camera, side / 2.0))
-    low = np.maximum(np.floor(outline.min(axis=0)).astype(int) - 1, 0)
-    high = np.minimum(
-        np.ceil(outline.max(axis=0)).astype(int) + 2, [scene.shape[1], scene.shape[0]]
-    )
+    half = panel.size * (1.0 + 2.0 * panel.margin / cells) / 2.0
+    strips = 1 if not panel.curl else _STRIPS
+    edges = np.linspace(-half, half, strips + 1)
+    outlines = []
+    for left, right in itertools.pairwise(edges):
+        flat = np.array([[left, -half, 0], [right, -half, 0], [right, half, 0], [left, half, 0]])
+        outlines.append(camera.project(_in_camera(panel, camera, flat)))
+    points = np.concatenate(outlines)
+    low = np.maximum(np.floor(points.min(axis=0)).astype(int) - 1, 0)
+    high = np.minimum(np.ceil(points.max(axis=0)).astype(int) + 2, [scene.shape[1], scene.shape[0]])
     width, height = (high - low).tolist()
     if width <= 0 or height <= 0:
         return
-    extent = float(np.linalg.norm(np.roll(outline, -1, axis=0) - outline, axis=1).max())
+    extent = float(np.ptp(points, axis=0).max())
     factor = _SUPERSAMPLING if extent < 120 else 3
     texture = _sheet(panel, dictionary, min(64, max(4, round(extent * factor / cells))))
     size = texture.shape[0]
-    source = np.array([[0, 0], [size, 0], [size, size], [0, size]], np.float32) - 0.5
-    target = ((outline - low + 0.5) * factor - 0.5).astype(np.float32)
-    homography = cv2.getPerspectiveTransform(source, target)
     shape = (width * factor, height * factor)
-    fine = cv2.warpPerspective(texture, homography, shape, flags=cv2.INTER_LINEAR)
-    cover = cv2.warpPerspective(np.ones_like(texture), homography, shape, flags=cv2.INTER_LINEAR)
+    fine = np.zeros(shape[::-1], np.float32)
+    cover = np.zeros_like(fine)
+    for index, outline in enumerate(outlines):
+        start, end = size * index / strips, size * (index + 1) / strips
+        source = np.array([[start, 0], [end, 0], [end, size], [start, size]], np.float32) - 0.5
+        target = ((outline - low + 0.5) * factor - 0.5).astype(np.float32)
+        homography = cv2.getPerspectiveTransform(source, target)
+        seen = cv2.warpPerspective(texture, homography, shape, flags=cv2.INTER_LINEAR)
+        if strips == 1:
+            share = cv2.warpPerspective(np.ones_like(texture), homography, shape)
+        else:
+            share = np.zeros_like(fine)
+            cv2.fillConvexPoly(share, np.rint(target).astype(np.int32), 1.0)
+            seen = seen * share
+        fine = np.where(share > 0, seen, fine) if strips > 1 else seen
+        cover = np.maximum(cover, share)
     grey = cv2.resize(fine, (width, height), interpolation=cv2.INTER_AREA)
     share = cv2.resize(cover, (width, height), interpolation=cv2.INTER_AREA)
     part = scene[low[1] : high[1], low[0] : high[0]]
