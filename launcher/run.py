@@ -220,6 +220,7 @@ def _option_entries(run: Run, folder: Path | None) -> Iterator[Entry]:
     if folder is not None:
         yield Entry(node, 'record', str(folder / RECORD), 'this run')
         yield Entry('/**/reasoner', 'record', str(folder / RECORD), 'this run')
+        yield Entry('/**/initial_state', 'record', str(folder / RECORD), 'this run')
         yield from _observer_entries(run, folder)
     # Without one that was asked for, the mode is what the parameter files say.
     if run.mode:

@@ -78,6 +78,7 @@ def start_nodes(context: LaunchContext) -> list[Node]:
     own: dict[str, dict[str, object]] = {
         'robot_behavior': {'behaviour': behaviour, 'record': argument('record')},
         'reasoner': {'record': argument('record')},
+        'initial_state': {'record': argument('record')},
     }
     for controller in ALWAYS['surveillance_controllers']:
         own[controller] = {'execution_mode': mode, 'console': False}

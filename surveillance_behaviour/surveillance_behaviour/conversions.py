@@ -8,7 +8,7 @@ from typing import Any
 from geometry_msgs.msg import Point as PointMessage
 from sensor_msgs.msg import BatteryState
 
-from surveillance_behaviour.map_from_markers.survey import PlaceNote
+from surveillance_behaviour.map_from_markers.assembly import PlaceNote
 from surveillance_behaviour.peers.ports import Point
 from surveillance_behaviour.policy.world import Decision
 from surveillance_interfaces.msg import Decision as DecisionMessage

@@ -1,9 +1,18 @@
-"""The `initial_state` node: looks around for markers and has the map built from them."""
+"""The `initial_state` node: looks around for markers and has the map built from them.
+
+A map that is not complete when the patrol begins is extended while it patrols: by markers that come
+into view, and by a scan every `look_again` seconds. What was found is kept in
+``<record>.survey.json``, so that a scan whose node was killed goes on where it was.
+"""
 
 from __future__ import annotations
 
+import contextlib
+import json
+import os
 import queue
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from nav_msgs.msg import Odometry
@@ -11,10 +20,15 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from std_srvs.srv import Empty
 
 from surveillance_behaviour.conversions import map_message
+from surveillance_behaviour.map_from_markers.assembly import (
+    PlaceNote,
+    Survey,
+    SurveyReport,
+    notes_of,
+)
+from surveillance_behaviour.map_from_markers.camera_scanner import CameraScanner
+from surveillance_behaviour.map_from_markers.initial_scan import InitialScan, Progress
 from surveillance_behaviour.map_from_markers.marker_inquiry import MarkerInquiry
-from surveillance_behaviour.map_from_markers.ros_eyes import RosEyes
-from surveillance_behaviour.map_from_markers.surroundings import LookingAround
-from surveillance_behaviour.map_from_markers.survey import PlaceNote, Survey, SurveyReport, notes_of
 from surveillance_interfaces.msg import OntologyMap
 from surveillance_interfaces.srv import ReferenceName
 from surveillance_runtime.calls import CallError, ServiceCaller
@@ -26,7 +40,7 @@ from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 from surveillance_runtime.waiting import AwaitedEvent
 
 _BUILD_SECONDS = 20.0
-_LOOKING = {
+_SCAN = {
     'poses': Described("The arm's poses for looking around.", 1, 4),
     'deadline': Described('Seconds after which what was found has to do.', 0.0),
     'dwell': Described('Rest at each view of a scan, seconds.', 0.0),
@@ -39,27 +53,47 @@ class InitialState(PatrolNode):
     def __init__(self, **node_options: Any) -> None:
         super().__init__('initial_state', **node_options)
         self._configured = described_place(self, source='markers', required=True)
-        self._looking = declare_fields(
+        self._scan = declare_fields(
             self,
-            LookingAround(),
-            _LOOKING,
-            on_change=lambda *change: setattr(self._looking, *change),
+            InitialScan(),
+            _SCAN,
+            on_change=lambda *change: setattr(self._scan, *change),
         )
         pictures = self.parameter('pictures', 6, 'Pictures to take at each pose.', minimum=1)
         patience = self.parameter(
             'patience', 2.0, 'Seconds after which a pose is left without them.', minimum=0.0
         )
+        look_again: float = self.parameter(
+            'look_again',
+            60.0,
+            'Seconds between two scans while places are missing on patrol; 0: none.',
+            minimum=0.0,
+            read_only=True,
+        )
+        record: str = self.parameter(
+            'record',
+            '',
+            'Mission record beside which `FILE.survey.json` keeps what was found; empty: none.',
+            read_only=True,
+        )
         self._survey = Survey(self.get_parameter('robot_room').value, (0.0, 0.0))
+        self._progress = Progress()
+        self._file = Path(record + '.survey.json') if record else None
+        self._kept = ''
+        self._missing: list[str] = []
+        self._take_kept()
         self._sent: tuple[PlaceNote, ...] = ()
         self._finished = False
         self._found = AwaitedEvent(self)
         self._events: queue.SimpleQueue[str] = queue.SimpleQueue()
         self._inquiry = MarkerInquiry(self, self._survey, self._events)
-        self._eyes = RosEyes(self, pictures, patience)
+        self._camera = CameraScanner(self, pictures, patience)
         self._reference = ServiceCaller(self, ReferenceName, 'ontology_map/reference_name')
         self._map = self.create_publisher(OntologyMap, 'ontology_map/build_map', STATE_QOS)
         self.create_subscription(Odometry, 'odom', self._on_odometry, SENSOR_QOS)
         self.create_service(Empty, 'start', self._on_start, callback_group=ReentrantCallbackGroup())
+        if look_again > 0.0 and self._configured is None:
+            self.create_timer(look_again, lambda: self._events.put('look'))
         self.spawn(self._work, 'initial state')
 
     def on_stop(self) -> None:
@@ -88,6 +122,35 @@ class InitialState(PatrolNode):
                 ended = self._start()
             elif event == 'id' and ended and self._configured is None:
                 self._extend(self._inquiry.judge())
+            elif event == 'look' and ended and self._missing:
+                self._camera.scan(0.24, 0.6, self._scan.dwell, self._all_found)
+                self._camera.home()
+                self._extend(self._inquiry.judge())
+
+    def _all_found(self) -> bool:
+        return self.stopping.is_set() or self._inquiry.judge().complete
+
+    def _keep(self) -> None:
+        """Write what was found, if that has changed."""
+        kept = json.dumps({**self._survey.to_json(), **vars(self._progress)})
+        if self._file is None or kept == self._kept:
+            return
+        self._kept = kept
+        new = self._file.with_name(self._file.name + '.new')
+        with contextlib.suppress(OSError):
+            new.write_text(kept, encoding='utf-8')
+            os.replace(new, self._file)
+
+    def _take_kept(self) -> None:
+        if self._file is None or not self._file.exists():
+            return
+        try:
+            kept = json.loads(self._file.read_text(encoding='utf-8'))
+            self._survey.restore(kept)
+            poses = [int(number) for number in kept['poses']]
+            self._progress = Progress(poses, float(kept['seconds']))
+        except (OSError, KeyError, TypeError, ValueError) as error:
+            self.get_logger().warn(f'{self._file}: what was found before is not used: {error}')
 
     def _start(self) -> bool:
         """Find out and send the map; False when the node stops first."""
@@ -96,12 +159,14 @@ class InitialState(PatrolNode):
             self._publish(notes, self._configured.start)
         else:
             logger = self.get_logger()
-            report = self._looking.run(
-                self._eyes,
+            report = self._scan.run(
+                self._camera,
                 self._inquiry.judge,
                 lambda: self.get_clock().now().nanoseconds / 1e9,
                 lambda sentence: logger.info(sentence),
                 self.stopping.is_set,
+                self._progress,
+                self._keep,
             )
             if self.stopping.is_set():
                 return False
@@ -118,13 +183,20 @@ class InitialState(PatrolNode):
             new = [place.room for place in report.places if place.room not in known]
             self.get_logger().info(f'the map is extended: {", ".join(new) or "new doors"}')
             self._publish(report.places, '')
+            self._keep()
+        missing = report.sentences()
+        if missing != self._missing:
+            self._missing = missing
+            for sentence in missing or ['all places are found']:
+                self.get_logger().info(sentence)
 
     def _tell(self, report: SurveyReport) -> None:
         found = ', '.join(sorted(place.room for place in report.places))
         if report.complete:
             self.get_logger().info(f'all places are found: {found}')
             return
-        for sentence in report.sentences():
+        self._missing = report.sentences()
+        for sentence in self._missing:
             self.get_logger().warn(sentence)
         self.get_logger().warn(f'patrolling without what is missing: {found}')
 

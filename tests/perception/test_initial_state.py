@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -10,10 +11,12 @@ from std_msgs.msg import Int32
 from std_srvs.srv import Empty
 
 from surveillance_behaviour.initial_state_node import InitialState
+from surveillance_interfaces.action import ScanSurroundings
 from surveillance_interfaces.msg import OntologyMap
 from surveillance_interfaces.srv import MarkerRoutine, ReferenceName
 from surveillance_perception.marker_server_node import MarkerServer
-from surveillance_runtime.node import StartError
+from surveillance_runtime.action_server import GoalServer
+from surveillance_runtime.node import PatrolNode, StartError
 from surveillance_runtime.qos import STATE_QOS
 
 CONFIGURED = {
@@ -93,6 +96,39 @@ def test_later_markers_extend_the_map(graph: Any) -> None:
     robot.show(16)
     graph.until(lambda: len(robot.maps) == 3)
     assert robot.rooms() == {'E', 'C2', 'R3', 'R4'}
+
+
+def test_a_map_that_is_not_complete_is_looked_at_again_on_patrol(graph: Any) -> None:
+    robot = Robot(graph, {1: [11, 12, 13, 14, 15, 16]})
+    arm = graph.add(PatrolNode, name='arm')
+
+    def look(_goal: Any, _run: Any) -> Any:
+        robot.show(17)
+        return ScanSurroundings.Result()
+
+    GoalServer(arm, ScanSurroundings, 'scan_surroundings', look, lambda _goal: True)
+    graph.add(MarkerServer)
+    options = {'robot_room': 'E', 'patience': 0.1, 'deadline': 0.0, 'look_again': 0.2}
+    graph.add(InitialState, parameters=options)
+    graph.until(robot.start().done)
+    assert 'R4' not in {place.name for place in robot.maps[0].places}
+    graph.until(lambda: 'R4' in robot.rooms())
+
+
+def test_a_scan_whose_node_was_killed_goes_on_where_it_was(graph: Any, tmp_path: Path) -> None:
+    robot = Robot(graph, {1: [11, 12, 13], 2: [14, 15, 16, 17]})
+    graph.add(MarkerServer)
+    options = {'robot_room': 'E', 'patience': 0.3, 'record': str(tmp_path / 'mission.jsonl')}
+    first = graph.add(InitialState, parameters=options)
+    robot.start()
+    kept = tmp_path / 'mission.jsonl.survey.json'
+    graph.until(lambda: kept.exists() and '"poses": [1]' in kept.read_text())
+    graph.remove(first)
+    done = len(robot.poses)
+    graph.add(InitialState, parameters=options)
+    graph.until(robot.start().done)
+    assert robot.rooms() == {'E', 'C1', 'C2', 'R1', 'R2', 'R3', 'R4'}
+    assert 1 not in robot.poses[done:]
 
 
 def test_without_its_room_the_robot_is_in_the_nearest_place(graph: Any) -> None:

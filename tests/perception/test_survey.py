@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from surveillance_behaviour.map_from_markers.surroundings import LookingAround
-from surveillance_behaviour.map_from_markers.survey import PlaceNote, Survey
+from surveillance_behaviour.map_from_markers.assembly import PlaceNote, Survey
+from surveillance_behaviour.map_from_markers.initial_scan import InitialScan
 from surveillance_perception.marker_registry import read_registry
 
 REGISTRY = read_registry(Path(__file__).parents[2] / 'config' / 'markers.yaml')
@@ -147,7 +147,7 @@ class Eyes:
 
 def look(eyes, deadline=30.0):
     said = []
-    looking = LookingAround(deadline=deadline, dwell=0.5)
+    looking = InitialScan(deadline=deadline, dwell=0.5)
     report = looking.run(eyes, eyes.survey.report, lambda: eyes.time, said.append, lambda: False)
     return report, said
 

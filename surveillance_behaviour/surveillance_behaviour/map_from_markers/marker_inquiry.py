@@ -7,7 +7,7 @@ import queue
 from std_msgs.msg import Int32
 
 from surveillance_behaviour.conversions import place_note_from
-from surveillance_behaviour.map_from_markers.survey import Survey, SurveyReport
+from surveillance_behaviour.map_from_markers.assembly import Survey, SurveyReport
 from surveillance_interfaces.msg import MarkerDetectionArray
 from surveillance_interfaces.srv import RoomInformation
 from surveillance_runtime.calls import CallError, ServiceCaller

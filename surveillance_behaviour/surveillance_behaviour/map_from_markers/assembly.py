@@ -12,6 +12,7 @@ import math
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from surveillance_runtime.place import Place
 
@@ -107,6 +108,26 @@ class Survey:
         """Take note that a marker stands for nothing."""
         if marker_id not in self._notes:
             self._discarded.add(marker_id)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return what was noted, to be kept in a file."""
+        notes = {
+            str(marker_id): [note.room, list(note.position), dict(note.connections)]
+            for marker_id, note in self._notes.items()
+        }
+        return {'notes': notes, 'discarded': sorted(self._discarded)}
+
+    def restore(self, kept: Mapping[str, Any]) -> None:
+        """Take what `to_json` gave.
+
+        Raises:
+            KeyError, TypeError, ValueError: It is something else.
+        """
+        for marker_id, (room, (x, y), doors) in kept['notes'].items():
+            connections = {str(door): str(behind) for door, behind in doors.items()}
+            self.note(int(marker_id), PlaceNote(str(room), (float(x), float(y)), connections))
+        for marker_id in kept['discarded']:
+            self.discard(int(marker_id))
 
     def report(self) -> SurveyReport:
         """Judge all notes together."""

@@ -1,4 +1,4 @@
-"""Looking around until the map is whole, or until a deadline.
+"""The scan at the start: until the map is whole, or until a deadline.
 
 First the arm's poses; then whole scans around the horizon, each with more overlap, a further reach
 up and down and a longer rest than the one before, so that a marker missed at the edge of a picture,
@@ -8,16 +8,16 @@ at a flat angle or in poor light has another chance from a slightly different vi
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
-from surveillance_behaviour.map_from_markers.survey import SurveyReport
+from surveillance_behaviour.map_from_markers.assembly import SurveyReport
 
 _OVERLAP = 0.12
 _REACH = 0.3
 
 
-class Eyes(Protocol):
+class Camera(Protocol):
     """What turns the camera. Each blocks until the camera has rested and its pictures were seen."""
 
     def pose(self, number: int) -> None:
@@ -34,8 +34,21 @@ class Eyes(Protocol):
 
 
 @dataclass
-class LookingAround:
-    """How to look around.
+class Progress:
+    """How far a scan has come; it goes on from there after a restart.
+
+    Attributes:
+        poses: Numbers of the poses that are done.
+        seconds: How long it has looked.
+    """
+
+    poses: list[int] = field(default_factory=list)
+    seconds: float = 0.0
+
+
+@dataclass
+class InitialScan:
+    """How to scan.
 
     Attributes:
         poses: Numbers of the poses, in order.
@@ -49,39 +62,53 @@ class LookingAround:
 
     def run(
         self,
-        eyes: Eyes,
+        camera: Camera,
         judge: Callable[[], SurveyReport],
         now: Callable[[], float],
         say: Callable[[str], None],
         stopping: Callable[[], bool],
+        progress: Progress | None = None,
+        keep: Callable[[], None] = lambda: None,
     ) -> SurveyReport:
         """Look until everything fits, the deadline has passed and there is something to patrol.
 
         Args:
-            eyes: What turns the camera.
+            camera: What turns the camera.
             judge: What has been found so far.
             now: Seconds.
             say: Told what goes on.
             stopping: Tells whether to give up.
+            progress: How far it has come before; kept up to date.
+            keep: Called whenever there is progress worth keeping.
         """
-        begin = now()
+        progress = progress or Progress()
+        begin = now() - progress.seconds
 
         def late() -> bool:
             return now() - begin >= self.deadline
 
-        def enough() -> bool:
+        def enough(pose: int | None = None) -> bool:
             report = judge()
+            if not stopping():
+                # Only now all that was seen at the pose has been asked for.
+                progress.poses += [pose] if pose is not None else []
+                progress.seconds = now() - begin
+                keep()
             return stopping() or report.complete or (late() and bool(report.places))
 
+        begun_before = bool(progress.poses)
         for number in self.poses:
-            eyes.pose(number)
-            if enough():
+            if begun_before and enough():
                 break
+            if number not in progress.poses:
+                camera.pose(number)
+                if enough(number):
+                    break
         overlap, reach, dwell, told = _OVERLAP, _REACH, self.dwell, False
         while not enough():
             for sentence in judge().sentences():
                 say(f'looking on: {sentence}')
-            eyes.scan(overlap, reach, dwell, enough)
+            camera.scan(overlap, reach, dwell, enough)
             overlap = min(overlap + _OVERLAP, 0.5)
             reach = min(reach * 1.5, 1.2)
             dwell = min(dwell * 2.0, 4.0 * self.dwell)
@@ -89,5 +116,5 @@ class LookingAround:
                 told = True
                 say('nothing to patrol was found yet; looking on')
         if not stopping():
-            eyes.home()
+            camera.home()
         return judge()

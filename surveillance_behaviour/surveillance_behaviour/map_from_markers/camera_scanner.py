@@ -1,4 +1,4 @@
-"""The camera on its arm, as `surroundings` turns it, over ROS."""
+"""The camera on its arm, as `initial_scan` turns it, over ROS."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from surveillance_runtime.waiting import ClockWait, Interrupt
 _ARM_SECONDS = 30.0
 
 
-class RosEyes:
+class CameraScanner:
     """Moves the arm over `move_arm` and `scan_surroundings`, and waits for pictures at rest.
 
     Args:
