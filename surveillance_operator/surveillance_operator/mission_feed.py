@@ -188,6 +188,9 @@ class MissionFeed:
             self._clock_time = clock.sec + clock.nanosec / 1e9
         came: list[tuple[Topic, Any]] = []
         for topic, subscription in self._topics:
+            # A scan is shown from the pose of its moment: without a new one it is not wanted.
+            if topic.stream and not any(each.kind is PoseWithCovarianceStamped for each, _ in came):
+                continue
             for _ in range(subscription.qos.depth):
                 if (taken := subscription.take()) is None:
                     break

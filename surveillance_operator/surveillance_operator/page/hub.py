@@ -14,7 +14,7 @@ from collections.abc import AsyncIterator
 from surveillance_operator.frames import PARTS, Framer, Parts
 from surveillance_operator.snapshot import Snapshot
 
-LEAST_PERIOD = 0.03
+LEAST_PERIOD = 0.015
 """Seconds between two messages to one viewer."""
 HEARTBEAT = 2.0
 """Seconds after which a viewer is told the time at least."""

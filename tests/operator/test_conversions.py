@@ -1,0 +1,66 @@
+"""What a message may not do to a view."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from geometry_msgs.msg import Pose
+from nav_msgs.msg import OccupancyGrid
+from sensor_msgs.msg import LaserScan, PointCloud2
+from std_msgs.msg import UInt8
+
+from surveillance_interfaces.msg import Decision
+from surveillance_operator import conversions
+from surveillance_operator.mission_feed import TOPICS, read_message
+from surveillance_operator.snapshot import Snapshot
+
+TOPIC = {topic.name: topic for topic in TOPICS}
+
+
+def grid(**info: Any) -> OccupancyGrid:
+    message = OccupancyGrid(data=[0, 0])
+    message.info.width, message.info.height, message.info.resolution = 2, 1, 0.5
+    for name, value in info.items():
+        setattr(message.info, name, value)
+    return message
+
+
+@pytest.mark.parametrize(
+    ('topic', 'message', 'words'),
+    [
+        ('decision', Decision(candidates=['A'], scores=[]), '0 scores came for 1 candidates'),
+        ('decision', Decision(candidates=['A'], scores=[math.nan]), 'score of A is not a number'),
+        ('map', grid(width=3), '2 cells came'),
+        ('map', grid(resolution=0.0), '2 cells came'),
+        ('map', grid(resolution=math.nan), '2 cells came'),
+        ('battery_level', UInt8(data=200), 'a level of 200 %'),
+        ('obstacles', PointCloud2(width=9, height=9, point_step=12), '0 bytes came for 81 points'),
+        ('obstacles', PointCloud2(width=10**6, height=1), 'expected at most'),
+        ('scan', LaserScan(angle_min=math.inf), 'angles are not finite'),
+    ],
+)
+def test_a_message_that_cannot_be_used_is_said_and_changes_nothing(
+    topic: str, message: Any, words: str
+) -> None:
+    before = Snapshot(pose=(0.0, 0.0, 0.0), battery=50.0)
+    after = read_message(before, TOPIC[topic], message)
+    assert words in after.silent[topic]
+    assert after.battery == 50.0
+    assert after.grid is None
+
+
+def test_a_pose_that_is_not_finite_is_refused() -> None:
+    pose = Pose()
+    pose.position.x = math.nan
+    with pytest.raises(ValueError, match='expected finite numbers'):
+        conversions.pose_from(pose)
+
+
+def test_a_scan_leaves_out_what_is_no_hit() -> None:
+    ranges = [1.0, math.inf, math.nan, 0.0, 9.0, 2.0]
+    scan = LaserScan(angle_increment=math.pi / 2, range_min=0.1, range_max=8.0, ranges=ranges)
+    points = conversions.scan_from(scan)
+    np.testing.assert_allclose(points, [[1.0, 0.0], [0.0, 2.0]], atol=1e-5)

@@ -1,0 +1,148 @@
+"""Replaying a recording, over real HTTP and without ROS, and its report."""
+
+from __future__ import annotations
+
+import http.client
+import json
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from surveillance_behaviour.mission.mission_log import MissionRecord
+from surveillance_operator import replay, report
+from surveillance_operator.page.hub import Hub
+from surveillance_operator.page.server import Page
+from surveillance_operator.recording.timeline import Timeline
+from surveillance_operator.replay import Player
+from surveillance_operator.report import ReportError, draw_picture, write_report
+from tests.operator.test_timeline import record
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Path:
+    folder = tmp_path / 'runs' / '20260101-000000'
+    folder.mkdir(parents=True)
+    record(folder / 'timeline.jsonl')
+    (folder / 'place.yaml').write_bytes((ROOT / 'config/seven_rooms.yaml').read_bytes())
+    with MissionRecord(folder / 'mission.jsonl') as mission:
+        mission.start(0.0, 'surveillance', 'E', ['R1', 'R2', 'R3', 'R4', 'E', 'C1', 'C2'])
+        mission.decision(1.0, 'C1', 'CORRIDOR', '<b>C1</b> waits longest')
+        mission.visit(11.0, 'C1', 5.4)
+        mission.failure(12.0, 'MOVE', 'no way')
+        mission.recharge(20.0, 'E', 5.0)
+        mission.end(60.0)
+    return folder
+
+
+@pytest.fixture
+def page(run: Path) -> Iterator[Page]:
+    hub = Hub()
+    player = Player(Timeline(run / 'timeline.jsonl'), hub)
+    page = Page(hub, questions={}, actions=player.actions(), port=0, replay=True)
+    page.player = player  # type: ignore[attr-defined]
+    page.start()
+    yield page
+    page.stop()
+
+
+def act(page: Page, name: str, **fields: Any) -> dict[str, Any]:
+    connection = http.client.HTTPConnection('127.0.0.1', page.port, timeout=10)
+    origin = {'Origin': f'http://127.0.0.1:{page.port}'}
+    connection.request('POST', f'/act/{name}', json.dumps(fields), origin)
+    answer: dict[str, Any] = json.loads(connection.getresponse().read())
+    connection.close()
+    return answer
+
+
+def shown(page: Page) -> dict[str, Any]:
+    connection = http.client.HTTPConnection('127.0.0.1', page.port, timeout=10)
+    connection.request('GET', '/events')
+    answer = connection.getresponse()
+    while not (line := answer.readline()).startswith(b'data: '):
+        assert line
+    connection.close()
+    parts: dict[str, Any] = json.loads(line[6:])['p']
+    return parts
+
+
+def test_a_viewer_moves_in_time(page: Page) -> None:
+    assert shown(page)['pose'] == [0.0, 0.0, 0.0]
+    assert act(page, 'seek', to=120)['ok']
+    parts = shown(page)
+    assert parts['pose'] == [12.0, 0.0, 0.0]
+    assert parts['replay']['at'] == 120.0
+    assert parts['replay']['length'] == 199.0
+    assert len(parts['trail']) == 121
+    assert act(page, 'jump', kind='decision')['ok']
+    assert shown(page)['decision']['number'] == 4
+    assert act(page, 'jump', kind='failure') == {
+        'ok': False,
+        'text': 'no failure after this moment',
+    }
+    assert act(page, 'speed', speed=1000)['ok'] is False
+    assert act(page, 'seek')['ok'] is False
+
+
+def test_it_plays_at_its_speed(page: Page) -> None:
+    player: Player = page.player  # type: ignore[attr-defined]
+    act(page, 'speed', speed=100)
+    player._forward(50.0)
+    assert shown(page)['pose'] == [5.0, 0.0, 0.0]
+    act(page, 'pause')
+    assert shown(page)['replay']['playing'] is False
+
+
+def test_no_ros_is_started(run: Path) -> None:
+    code = 'import sys, surveillance_operator.replay; sys.exit("rclpy" in sys.modules)'
+    assert subprocess.run([sys.executable, '-c', code], cwd=ROOT, check=False).returncode == 0
+
+
+def test_the_report_is_one_file_that_tells_everything(run: Path) -> None:
+    text = write_report(run).read_text()
+    for words in ('&lt;b&gt;C1&lt;/b&gt; waits longest', 'no way', 'Recharges (1)', 'class="way"', 'below'):
+        assert words in text
+    assert '<b>C1' not in text  # what nodes wrote stays text
+    assert 'src=' not in text
+    assert 'http' not in text.replace('http://www.w3.org', '')
+    picture = draw_picture(run)
+    assert picture is not None
+    assert picture.stat().st_size > 10_000
+
+
+def test_the_commands_find_runs_and_say_what_is_wrong(
+    run: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    runs = str(run.parent)
+    assert report.main(['last', '--runs', runs]) == 0
+    assert str(run / 'report.html') in capsys.readouterr().out
+    for main, name in ((report.main, 'report'), (replay.main, 'replay')):
+        assert main(['nowhere', '--runs', runs]) == 2
+        error = capsys.readouterr().err
+        assert error.startswith(f'{name}: nowhere: expected the folder of a run')
+        assert '20260101-000000' in error
+        assert error.count('\n') == 1
+
+
+def test_a_run_without_a_visit_has_no_report(run: Path) -> None:
+    (run / 'mission.jsonl').write_text('')
+    with pytest.raises(ReportError, match='no visit was recorded'):
+        write_report(run)
+
+
+def test_a_long_recording_is_ready_and_jumps_at_once(tmp_path: Path) -> None:
+    path = tmp_path / 'timeline.jsonl'
+    with open(path, 'w') as file:
+        for tick in range(100_000):
+            head = f'{{"t":{1e9 + tick},"k":{int(tick % 60 == 0)},"e":"",'
+            file.write(head + f'"now":{tick},"p":{{"pose":[{tick},0,0]}}}}\n')
+    began = time.perf_counter()
+    line = Timeline(path)
+    assert time.perf_counter() - began < 10  # measured in benchmarks/operator.py: far less
+    assert line.at(1e9 + 54_321)[2]['pose'] == [54_321, 0, 0]
