@@ -29,7 +29,7 @@ from surveillance_fsm.execution import (
     Exit,
     Frame,
     History,
-    LeftBehind,
+    LeftBehindError,
     Node,
     SpecialStep,
 )
@@ -469,7 +469,7 @@ class ConcurrentFrame(Frame):
             The first error of one of them, which stopped the others.
 
         Raises:
-            LeftBehind: The machine went on without the concurrence.
+            LeftBehindError: The machine went on without the concurrence.
         """
         running = dict(self._threads)
         first_error: BaseException | None = None
@@ -548,7 +548,7 @@ class ConcurrentFrame(Frame):
         self._stop(running, _preempt)
         for thread in running.values():
             thread.disown()
-        raise LeftBehind
+        raise LeftBehindError
 
     # Interrupts.
 
@@ -572,7 +572,7 @@ class ConcurrentFrame(Frame):
         outcome = _execute(node)
         with run.condition:
             if self.stale:
-                raise LeftBehind
+                raise LeftBehindError
             self.thread.heeded()
             self.current = TOGETHER
             pending = branch.state.preempt_requested()

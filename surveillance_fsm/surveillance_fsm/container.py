@@ -32,7 +32,7 @@ from surveillance_fsm.execution import (
     Exit,
     Frame,
     History,
-    LeftBehind,
+    LeftBehindError,
     Node,
     Run,
 )
@@ -558,7 +558,7 @@ class Container(State):
         stack.append(frame)
         try:
             if stack is not thread.stack:
-                raise LeftBehind
+                raise LeftBehindError
             history, self.fsm_history = self.fsm_history, None
             if self.fsm_aside:
                 with thread.run.condition:

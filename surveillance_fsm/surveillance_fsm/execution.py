@@ -47,7 +47,7 @@ IDLE_SECONDS = 10.0
 """How long a thread waits for the next execution before it ends."""
 
 
-class LeftBehind(BaseException):
+class LeftBehindError(BaseException):
     """Unwinds a thread that the machine went on without."""
 
 
@@ -566,9 +566,9 @@ class ExecutionThread:
             self._retire()
 
     def check(self) -> None:
-        """Raise `LeftBehind` in a thread that is not the present one any more."""
+        """Raise `LeftBehindError` in a thread that is not the present one any more."""
         if this_thread.thread is self and this_thread.stack is not self.stack:
-            raise LeftBehind
+            raise LeftBehindError
 
     # The side of whoever asks it to stop.
 
@@ -650,7 +650,7 @@ class Work:
         outcome, error = None, None
         try:
             outcome = self._context.run(self._body)
-        except LeftBehind:
+        except LeftBehindError:
             return
         except BaseException as raised:
             error = raised

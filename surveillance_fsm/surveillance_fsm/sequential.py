@@ -21,7 +21,7 @@ from surveillance_fsm.execution import (
     Exit,
     Frame,
     History,
-    LeftBehind,
+    LeftBehindError,
     Node,
     SpecialStep,
 )
@@ -174,7 +174,7 @@ class SequentialFrame(Frame):
                 if still and not (self.attention or self.stale) and run.paused and not run.steps:
                     run.condition.wait()
                 if self.stale:
-                    raise LeftBehind
+                    raise LeftBehindError
                 self.thread.heeded()
                 self.attention = False
                 target, moves = self._decide(_Move(left, outcome, target, kind), ended, moved)
