@@ -12,7 +12,13 @@ from typing import Any
 
 from surveillance_fsm import log
 from surveillance_fsm.clock import Interrupt
-from surveillance_fsm.container import Container, forget, forget_progress, stop_for_now
+from surveillance_fsm.container import (
+    Container,
+    forget,
+    forget_progress,
+    stop_for_now,
+    take_note,
+)
 from surveillance_fsm.exceptions import (
     InvalidStateError,
     InvalidTransitionError,
@@ -337,7 +343,6 @@ class ConcurrentFrame(Frame):
         outcomes: What each state ended with; None for those that have not ended.
     """
 
-    bounds_itself = True
     container: Concurrence
     current: Node | Exit
 
@@ -357,6 +362,18 @@ class ConcurrentFrame(Frame):
         self._told_to_stop: set[str] = set()
         self._left_behind: set[str] = set()
 
+    @property
+    def bounds_itself(self) -> bool:
+        """Whether the frame waits for states on threads of their own, and watches those."""
+        return not isinstance(self.current, Node)
+
+    def successor(self) -> Frame:
+        """A copy for the thread that takes this execution over, while an interrupt's state runs."""
+        frame = super().successor()
+        assert isinstance(frame, ConcurrentFrame)
+        frame.outcomes = self.outcomes
+        return frame
+
     # From the beginning to the end.
 
     def execute(self, history: History | None) -> Any:
@@ -374,15 +391,29 @@ class ConcurrentFrame(Frame):
             container.call_start_cbs()
         if run.trace is not None:
             self.note((SpecialStep(self.path, '', '', 'start'), '', run.now(), NO_USERDATA))
-        outcome = self._run_states()
-        if outcome is not SUSPENDED:
-            container.call_termination_cbs(list(container.fsm_states), outcome)
-            container.fsm_copy_output_keys(self.parent_ud)
-        return outcome
+        return self._finish(self._run_states())
 
     def proceed(self, outcome: Any) -> Any:
-        """Never: the concurrence's own thread waits for the states, and does not hang."""
-        raise NotImplementedError
+        """Go on as if the interrupt's state that hangs had just returned `outcome`."""
+        node, stack = self.current, self.thread.stack
+        assert isinstance(node, Node)
+        try:
+            ending = self._end_branch(node, outcome)
+            return self._finish(self._run_states() if ending is None else ending)
+        except BaseException:
+            if self.container.fsm_frame is self:
+                self.container.fsm_frame = None
+            raise
+        finally:
+            self.ended = True
+            if stack and stack[-1] is self:
+                stack.pop()
+
+    def _finish(self, outcome: Any) -> Any:
+        if outcome is not SUSPENDED:
+            self.container.call_termination_cbs(list(self.container.fsm_states), outcome)
+            self.container.fsm_copy_output_keys(self.parent_ud)
+        return outcome
 
     def _run_states(self) -> Any:
         container = self.container
@@ -516,7 +547,11 @@ class ConcurrentFrame(Frame):
             if label not in self._left_behind:
                 state.recall_preempt()
         elif outcome is SUSPENDED:
+            take_note(state)
             return None
+        elif label in self._making_way and isinstance(state, Container):
+            # One that makes way is suspended; any other outcome is its own.
+            state.fsm_aside = False
         elif label in self._making_way:
             made_way = not state.preempt_requested() or outcome == 'preempted'
             if label not in self._left_behind:
@@ -527,6 +562,7 @@ class ConcurrentFrame(Frame):
             self._told_to_stop.discard(label)
         forget_progress(state)
         self.outcomes[label] = outcome
+        take_note(state)
         return str(outcome)
 
     def _tell_end(self, label: str, outcome: str) -> None:
@@ -569,18 +605,26 @@ class ConcurrentFrame(Frame):
                 branch.state.request_preempt()
             elif self.suspending or container.fsm_urgent(node.priority):
                 self._cut()
-        outcome = _execute(node)
-        with run.condition:
+        return self._end_branch(node, _execute(node))
+
+    def _end_branch(self, node: Node, outcome: Any) -> Any:
+        """Settle what an interrupt's state ended with; None to go on with the states."""
+        container = self.container
+        branch = container.fsm_branches[node.label]
+        with self.run.condition:
             if self.stale:
                 raise LeftBehindError
             self.thread.heeded()
             self.current = TOGETHER
-            pending = branch.state.preempt_requested()
+            take_note(branch.state)
+            gone, self.gone = self.gone is node, None
+            pending = branch.state.preempt_requested() and not gone
             served = not pending or outcome == 'preempted'
             forced, self.forced = self.forced, None
             if forced is not None:
                 outcome = forced[1]
-            branch.state.recall_preempt()
+            if not gone:
+                branch.state.recall_preempt()
             if forced is None and (outcome is SUSPENDED or (self.cut is node and served)):
                 container.fsm_raise(branch)
                 if self.suspending:

@@ -167,11 +167,12 @@ class Container(State):
     def get_active_states(self) -> list[str]:
         """Labels of the children that are running."""
         frame = self.fsm_frame
-        return [] if frame is None else frame.active_labels()
+        return [] if frame is None or frame.ended else frame.active_labels()
 
     def is_running(self) -> bool:
         """Whether the container is executing."""
-        return self.fsm_frame is not None
+        frame = self.fsm_frame
+        return frame is not None and not frame.ended
 
     # Settings.
 
@@ -538,6 +539,7 @@ class Container(State):
                     supervise(run, [thread], wakeup)
                 raise
         finally:
+            self.fsm_frame = None
             control.end(run)
         if thread.error is not None:
             raise thread.error
@@ -549,9 +551,12 @@ class Container(State):
             path = stack[-1].current.path  # type: ignore[union-attr]
         else:
             path = thread.path
+        before = self.fsm_frame
+        if before is not None and not before.ended:
+            raise InvalidStateError(f"'{self.fsm_path}' is running already")
         frame = self.fsm_make_frame(thread, path, parent_ud)
         with _entry_lock:
-            if self.fsm_frame is not None:
+            if self.fsm_frame is not before:
                 raise InvalidStateError(f"'{self.fsm_path}' is running already")
             self.fsm_frame = frame
         # Whoever takes the thread over gives it another stack, and afterwards looks at this one.
@@ -565,11 +570,14 @@ class Container(State):
                     frame.suspending = frame.suspending or self.fsm_aside
                     self.fsm_aside = False
             return frame.execute(history)
-        finally:
-            if stack and stack[-1] is frame:
-                stack.pop()
+        except BaseException:
             if self.fsm_frame is frame:
                 self.fsm_frame = None
+            raise
+        finally:
+            frame.ended = True
+            if stack and stack[-1] is frame:
+                stack.pop()
 
     def request_preempt(self) -> None:
         """Ask the container to stop: the request reaches what runs inside at once."""
@@ -724,6 +732,12 @@ def forget(state: State) -> None:
             forget(child)
         for branch in state.fsm_branches.values():
             forget(branch.state)
+
+
+def take_note(state: State) -> None:
+    """Note that a state has ended, once its parent says so: a container lets its frame go."""
+    if isinstance(state, Container):
+        state.fsm_frame = None
 
 
 def forget_progress(state: State) -> None:

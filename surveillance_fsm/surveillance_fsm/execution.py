@@ -90,6 +90,7 @@ class Node:
         container: Whose state it is.
         label: The state's label in its container.
         state: The state.
+        is_container: The state is one of the engine's containers.
         enter: What runs it; the state's own `execute` as a rule.
         execute: What the loop calls: `enter`, within the state's limits if it has any.
         make_view: Makes a view.
@@ -104,6 +105,7 @@ class Node:
         'container',
         'enter',
         'execute',
+        'is_container',
         'label',
         'limits',
         'priority',
@@ -121,6 +123,7 @@ class Node:
         self.container = container
         self.label = label
         self.state = state
+        self.is_container = hasattr(state, 'fsm_frame')
         self.enter: Callable[[Any], Any] = state.execute
         self.execute: Callable[[Any], Any] = self.enter
         self.view: Remapper = container.fsm_view(self)
@@ -282,6 +285,8 @@ class Frame:
         items: An iterator's items that are left.
         index: How many items an iterator has begun.
         repeat: An iterator's current item has not ended: it is not followed by the next one.
+        ended: The execution is over. The container keeps the frame until its parent has taken note,
+            so that a checkpoint taken in between does not take it for one that has not begun.
     """
 
     # Class attributes: most executions of a container need none of them.
@@ -296,9 +301,12 @@ class Frame:
     items: Any = None
     index = 0
     repeat = False
+    ended = False
 
-    bounds_itself = False
-    """Whether the container itself sees to it that its children heed a preempt in time."""
+    @property
+    def bounds_itself(self) -> bool:
+        """Whether the frame itself sees to it that what runs heeds a preempt in time."""
+        return False
 
     def __init__(
         self,
@@ -426,6 +434,7 @@ class Run:
         chatty: Transitions are worth a line in the log.
         paused: No further state is entered.
         steps: States that may be entered although paused.
+        sleeps_on_clock: Somebody watches time limits, asleep on the machine's clock.
         left_behind: Paths of the states the machine went on without, and the work that hangs.
         threads: The logical threads that are at work.
     """
@@ -447,6 +456,7 @@ class Run:
         self.chatty = log.chatty()
         self.paused = False
         self.steps = 0
+        self.sleeps_on_clock = False
         self.left_behind: list[tuple[str, Work]] = []
         self.threads: list[ExecutionThread] = []
 
@@ -575,10 +585,13 @@ class ExecutionThread:
     def asked(self) -> None:
         """Note that the state that executes was asked to stop; its bound begins to count.
 
-        Nobody is woken for that: whoever watches looks once in every bound (`timeouts.supervise`).
+        As a rule nobody is woken for that: whoever watches looks once in every bound
+        (`timeouts.supervise`).
         """
         if self.asked_at is None:
             self.asked_at = time.monotonic()
+            if self.run.sleeps_on_clock:
+                self.wakeup.set()
 
     def renew_request(self, node: Node) -> None:
         """Take the request of an earlier execution back from a state, but not a present one."""

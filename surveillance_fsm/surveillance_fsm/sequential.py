@@ -11,7 +11,14 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from surveillance_fsm import control, log
-from surveillance_fsm.container import Container, forget, forget_progress, let_go, stop_for_now
+from surveillance_fsm.container import (
+    Container,
+    forget,
+    forget_progress,
+    let_go,
+    stop_for_now,
+    take_note,
+)
 from surveillance_fsm.exceptions import SmachError, describe
 from surveillance_fsm.execution import (
     LOWEST,
@@ -56,6 +63,8 @@ class SequentialFrame(Frame):
 
     container: Container
     current: Node | Exit
+    # Where the shutdown check ended the run.
+    stopped: Node | Exit = SHUTDOWN
 
     # From the beginning to the end.
 
@@ -100,12 +109,16 @@ class SequentialFrame(Frame):
                 end_watch(self.thread, watch)
                 outcome = settle(node, self, watch, outcome)
             self.current = target = node.target(outcome)
+            take_note(node.state)
             return self._finish(self._drive(self._attend(node, outcome, target)))
-        finally:
-            if stack and stack[-1] is self:
-                stack.pop()
+        except BaseException:
             if self.container.fsm_frame is self:
                 self.container.fsm_frame = None
+            raise
+        finally:
+            self.ended = True
+            if stack and stack[-1] is self:
+                stack.pop()
 
     def _drive(self, target: Any) -> Exit:
         """Execute states from `target` on until one leads out of the container."""
@@ -127,12 +140,14 @@ class SequentialFrame(Frame):
             except (KeyError, TypeError):
                 target = node.target(outcome)
             self.current = target
+            if node.is_container:
+                node.state.fsm_frame = None
             if self.attention:
                 told = target = self._attend(node, outcome, target)
                 trace, chatty = run.trace, run.chatty
             elif trace is not None or callbacks or chatty or control.shutdown_check is not None:
                 if control.is_shutdown():
-                    self.current = SHUTDOWN
+                    self.stopped, self.current = target, SHUTDOWN
                     return SHUTDOWN
                 if trace is not None:
                     try:
@@ -234,6 +249,7 @@ class SequentialFrame(Frame):
                 self.saved = (*self.saved, target)
                 target, kind, moved = container.fsm_table[urgent.label], 'interrupt', True
         if control.is_shutdown():
+            self.stopped = target
             return SHUTDOWN, moves
         if moved:
             moves.append(_Move(left, outcome, target, kind))
@@ -266,6 +282,10 @@ class SequentialFrame(Frame):
         self.cut = self.gone = None
         if asked:
             self.preempted = None
+        if cut is left and isinstance(state, Container):
+            # One that makes way is suspended; any other outcome is its own.
+            state.fsm_aside = False
+            cut = None
         if cut is left and outcome is not SUSPENDED and (pending or not asked):
             # With both asked and one still pending, what it served was to make way.
             # Whoever forces the next state's outcome has seen this one end.
@@ -405,7 +425,9 @@ class SequentialFrame(Frame):
 
     def where(self) -> History | None:
         """Where the container would go on if its process ended now."""
-        return self.history(self.current)
+        if self.current is ASIDE:
+            return self.container.fsm_history
+        return self.history(self.stopped if self.current is SHUTDOWN else self.current)
 
     def active_labels(self) -> list[str]:
         """The label of the state that runs; empty when none does."""

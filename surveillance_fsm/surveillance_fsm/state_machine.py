@@ -634,6 +634,11 @@ class IteratorFrame(SequentialFrame):
             data[iterator.items_label] = item
         return True
 
+    def proceed(self, outcome: Any) -> Any:
+        """Go on as if the current item had just ended with `outcome`."""
+        self.repeat = outcome is SUSPENDED
+        return super().proceed(outcome)
+
     def _end_of_loop(self, outcome: Any, target: Node | Exit) -> Node | Exit:
         """End the loop when a preempt came while it would go on.
 

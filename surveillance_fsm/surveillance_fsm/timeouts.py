@@ -208,8 +208,8 @@ def watch_of(frame: Frame) -> Watch | None:
 def supervise(run: Run, threads: Sequence[ExecutionThread], wakeup: Interrupt) -> None:
     """Watch threads until one of them ends or `wakeup` is raised by somebody else.
 
-    A preempt need not wake the watcher: it looks at least once in every bound, so that it always
-    looks before a bound that has just begun is over.
+    A preempt need not wake a watcher that sleeps on no clock: it looks at least once in every
+    bound, so that it always looks before a bound that has just begun is over.
 
     Args:
         run: The execution they belong to.
@@ -222,13 +222,16 @@ def supervise(run: Run, threads: Sequence[ExecutionThread], wakeup: Interrupt) -
         for thread in threads:
             if thread.done:
                 return
+            if thread.watches:
+                # Before the look at what is due: a request that comes after it wakes.
+                run.sleeps_on_clock = True
             quiet = quiet and not thread.watches and thread.asked_at is None
         dues = [] if quiet else [_due(thread) for thread in threads]
     clocked = min((due for due, _ in dues if due is not None), default=None)
     steady = min((due for _, due in dues if due is not None), default=None)
-    left = run.preempt_timeout if steady is None else max(0.0, steady - time.monotonic())
+    left = None if steady is None else max(0.0, steady - time.monotonic())
     if clocked is None:
-        wakeup.wait(left)
+        wakeup.wait(run.preempt_timeout if left is None else left)
     else:
         alarm = threading.Timer(left, wakeup.set) if left is not None else None
         if alarm is not None:

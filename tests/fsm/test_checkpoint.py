@@ -423,3 +423,27 @@ def test_items_that_cannot_be_kept_are_drawn_again():
     checkpoint.restore(again, saved[0])
     assert again.execute() == 'done'
     assert second == [1, 2]
+
+
+def test_a_container_that_has_ended_is_not_begun_again_by_an_early_checkpoint():
+    """A child's callback saves while its brother, which has ended, is not yet noted as such."""
+
+    def build():
+        work = Answer('done')
+        inner = fsm.StateMachine(['done'])
+        with inner:
+            fsm.StateMachine.add('WORK', work)
+        both = fsm.Concurrence(['done'], 'done')
+        with both:
+            fsm.Concurrence.add('INNER', inner)
+        return both, inner, work
+
+    first, inner, _ = build()
+    saved = []
+    # After its last transition, before the concurrence's own thread takes note.
+    inner.register_termination_cb(lambda *_: saved.append(through_json(first)))
+    assert first.execute() == 'done'
+    second, _, work = build()
+    checkpoint.restore(second, saved[0])
+    assert second.execute() == 'done'
+    assert work.runs == 0

@@ -263,6 +263,64 @@ def test_preempts_at_random_moments_in_nested_containers_are_not_lost():
         assert not root.preempt_requested()
 
 
+@pytest.mark.parametrize('depth', [0, 1])
+def test_an_interrupts_state_that_ignores_a_preempt_is_left_behind(depth, caplog):
+    waiter, deaf = Waiter(100.0), Deaf()
+    concurrence = fsm.Concurrence(['done', 'preempted'], 'done')
+    with concurrence:
+        fsm.Concurrence.add('WAIT', waiter)
+    branch = chain(deaf)[0] if depth else deaf
+    concurrence.add_interrupt('CHARGE', branch, priority=1)
+    concurrence.preempt_timeout = 0.05
+    run = Background(concurrence)
+    began(waiter)
+    concurrence.raise_interrupt('CHARGE')
+    began(deaf)
+    concurrence.request_preempt()
+    assert run.result() == 'preempted'
+    assert 'ignored a preempt' in caplog.text
+    assert not concurrence.is_running()
+    deaf.release.set()
+    assert deaf.ended.wait(5.0)
+
+
+class Ending(fsm.State):
+    """Ends when it is told, whatever is asked of it, and says that it has."""
+
+    def __init__(self):
+        super().__init__(['done'])
+        self.begun = threading.Semaphore(0)
+        self.release = threading.Event()
+        self.runs = 0
+
+    def execute(self, ud):
+        self.runs += 1
+        self.begun.release()
+        self.release.wait(20.0)
+        return 'done'
+
+
+@pytest.mark.parametrize('kind', ['sequential', 'concurrent'])
+def test_a_container_that_ends_by_itself_while_an_interrupt_comes_is_not_repeated(kind):
+    ending, charge = Ending(), Answer('done')
+    inner = fsm.StateMachine(['done'])
+    with inner:
+        fsm.StateMachine.add('END', ending)
+    if kind == 'sequential':
+        root = fsm.StateMachine(['done'])
+        root.add_state('INNER', inner)
+    else:
+        root = fsm.Concurrence(['done'], 'done')
+        root.add_state('INNER', inner)
+    root.add_interrupt('CHARGE', charge, priority=1)
+    run = Background(root)
+    began(ending)
+    root.raise_interrupt('CHARGE')
+    ending.release.set()
+    assert run.result() == 'done'
+    assert ending.runs == 1
+
+
 # What callbacks return.
 
 

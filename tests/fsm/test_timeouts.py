@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+
 import pytest
 
 import surveillance_fsm as fsm
@@ -169,3 +171,42 @@ def test_limits_that_cannot_work_are_refused(limits, words):
     with pytest.raises(fsm.InvalidTransitionError, match=words) as caught:
         machine_of(Answer('done'), **limits)
     assert 'ROOT/STATE' in str(caught.value)
+
+
+def test_an_item_that_hangs_is_followed_by_the_next_item():
+    began_with, release = [], threading.Event()
+
+    class Hangs(fsm.State):
+        def __init__(self):
+            super().__init__(['done', 'preempted'], ['item'])
+
+        def execute(self, ud):
+            began_with.append(ud.item)
+            if ud.item == 1:
+                release.wait(20.0)
+            return 'done'
+
+    each = fsm.Iterator(['late'], [], [], it=[0, 1, 2], it_label='item', exhausted_outcome='all')
+    each.preempt_timeout = 5.0
+    with each:
+        fsm.Iterator.set_contained_state(
+            'DO', Hangs(), loop_outcomes=['done', 'timeout'], deadline=0.2
+        )
+    # What hangs ends once the machine has gone on: nobody is let in before.
+    each.register_transition_cb(lambda *_: began_with[-1] == 1 and release.set())
+    assert Background(each).result() == 'all'
+    assert began_with == [0, 1, 2]
+
+
+def test_a_preempt_is_bounded_although_a_time_limit_on_a_clock_that_stands_is_watched():
+    deaf = Deaf()
+    machine = fsm.StateMachine(['done', 'preempted'])
+    machine.set_clock(FakeClock())
+    machine.preempt_timeout = 0.05
+    with machine:
+        fsm.StateMachine.add('DEAF', deaf, timeout=1000.0)
+    run = Background(machine)
+    began(deaf)
+    machine.request_preempt()
+    assert run.result() == 'preempted'
+    deaf.release.set()
