@@ -51,6 +51,7 @@ commands (each has its own --help):
   node NAME [ROS args]      run one node by itself in this terminal
   list                      name the nodes
   params [NODE]             print every parameter's value and where it comes from
+  service                   write a systemd unit that keeps the robot running
   setup                     set up and do no more
   test [pytest args]        run the test suite
   lint                      check format, lint and types
@@ -96,6 +97,12 @@ def _gigabytes(text: str) -> float:
     if not 0.0 <= value < 1e6:
         raise argparse.ArgumentTypeError(f'{text!r} is not a number of gigabytes')
     return value
+
+
+def _megabytes(text: str) -> int:
+    if not text.isdecimal() or not (int(text) == 0 or 100 <= int(text) < 10**7):
+        raise argparse.ArgumentTypeError(f'{text!r} is not a number of megabytes from 100, or 0')
+    return int(text)
 
 
 def _shared_options() -> argparse.ArgumentParser:
@@ -156,7 +163,7 @@ def _shared_options() -> argparse.ArgumentParser:
     return parser
 
 
-def make_parser() -> argparse.ArgumentParser:
+def make_parser(*, help_too: bool = True) -> argparse.ArgumentParser:
     """The parser of the whole command line."""
     package_lines = ''.join(
         f'  {name:<25} {purpose}\n' for name, (_, purpose) in PACKAGE_COMMANDS.items()
@@ -168,6 +175,7 @@ def make_parser() -> argparse.ArgumentParser:
         epilog=_COMMANDS + package_lines,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         parents=[_shared_options()],
+        add_help=help_too,
     )
     parser.add_argument(
         '--for',
@@ -218,6 +226,35 @@ def make_parser() -> argparse.ArgumentParser:
         metavar='HOST:PORT',
         help='where the page is: beyond 127.0.0.1 it needs the token (default: 127.0.0.1:8080)',
     )
+    parser.add_argument(
+        '--resume',
+        nargs='?',
+        const='',
+        metavar='RUN',
+        help='go on with this run (default: the last one), its record, ontology and levels; done '
+        'by itself after a launcher that was killed',
+    )
+    parser.add_argument(
+        '--fresh', action='store_true', help='begin anew also after a launcher that was killed'
+    )
+    parser.add_argument(
+        '--memory',
+        type=_megabytes,
+        default=2048,
+        metavar='MB',
+        help='a node that holds more is started again; 0: any (default: %(default)s)',
+    )
+    parser.add_argument(
+        '--alarm',
+        default='',
+        metavar='COMMAND',
+        help='run this, with one line as its last argument, when the robot needs somebody',
+    )
+    parser.add_argument(
+        '--network',
+        action='store_true',
+        help='hear nodes of other machines, which may then steer the robot (default: this machine)',
+    )
     return parser
 
 
@@ -262,6 +299,7 @@ def _dispatch(argv: list[str]) -> int:
         'node': _node,
         'list': _list,
         'params': _params,
+        'service': _service,
         'setup': _setup,
         'test': _test,
         'lint': _lint,
@@ -280,9 +318,13 @@ def _run(argv: list[str]) -> int:
     options = make_parser().parse_args(argv)
     node_table.select('RANDOM', only=options.only, without=options.without)
     _enter(['run', *argv])
-    from launcher.run import run_mission
+    from launcher.run import resumed, run_mission
 
-    return run_mission(wanted_run(options), CONFIG, RUNS)
+    run, folder = wanted_run(options), None
+    if options.resume is not None:
+        usual = wanted_run(make_parser().parse_args([]))
+        run, folder = resumed(run, usual, RUNS, options.resume)
+    return run_mission(run, CONFIG, RUNS, folder)
 
 
 def wanted_run(options: argparse.Namespace) -> Run:
@@ -294,7 +336,7 @@ def wanted_run(options: argparse.Namespace) -> Run:
     values = {
         renamed.get(name, name): given[name]
         for name in given
-        if name not in ('name', 'rest', 'write')
+        if name not in ('name', 'rest', 'write', 'resume', 'print')
     }
     return Run(**values)
 
@@ -381,6 +423,32 @@ def _params(argv: list[str]) -> int:
     runs.check_assignments(merged, chosen)
     namespace = (run.namespace or '').strip('/')
     parameter_tables.show(merged, chosen, f'/{namespace}' if namespace else '', print)
+    return 0
+
+
+def _service(argv: list[str]) -> int:
+    from launcher import service
+
+    parser = Parser(
+        prog='launch.py service',
+        usage='%(prog)s [--print] [options of run]',
+        description="Writes a unit of the user's systemd that keeps the robot running.",
+        parents=[make_parser(help_too=False)],
+    )
+    parser.add_argument('--print', action='store_true', help='print the unit, write nothing')
+    options = parser.parse_args(argv)
+    words = [word for word in argv if word != '--print']
+    # All nodes at their limit would be more than most machines have.
+    text = service.unit_text(CHECKOUT, words, 4 * options.memory or 8192)
+    if options.print:
+        print(text, end='')
+        return 0
+    path = service.unit_path()
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text, encoding='utf-8')
+    print(f'written: {path}')
+    print(f'start it: systemctl --user daemon-reload && systemctl --user enable --now {path.name}')
+    print('also without a login: loginctl enable-linger')
     return 0
 
 

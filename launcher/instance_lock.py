@@ -1,7 +1,7 @@
 """Which nodes run on this machine, so that a second launch does not start the same ones again.
 
 Two nodes of one name in one ROS domain answer each other's calls. A claim is a locked file in the
-system's temporary folder, so it ends with the process that holds it, however that ends.
+user's runtime folder, so it ends with the process that holds it, however that ends.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def claim(
         nodes: what shall run; of a viewer there may be several, so it is not claimed.
         domain: the ROS domain they run in.
         namespace: the namespace they run in, None for none.
-        folder: where the claims lie; default: in the system's temporary folder.
+        folder: where the claims lie; default: in the user's runtime folder.
 
     Returns:
         Descriptors that hold the claims as long as they are open.
@@ -37,7 +37,7 @@ def claim(
     Raises:
         InstanceLockError: some of them are claimed already; then none is claimed.
     """
-    folder = folder or Path(tempfile.gettempdir(), 'surveillance-nodes')
+    folder = folder or runtime_folder() / 'nodes'
     held: list[int] = []
     taken: list[str] = []
     holder = ''
@@ -70,12 +70,28 @@ def claim(
     )
 
 
+def runtime_folder() -> Path:
+    """Return the user's folder for what lives as long as processes do, made when missing.
+
+    It is below XDG_RUNTIME_DIR, or else in the folder for temporary files, the user's own and
+    closed to others: there nobody can plant a link.
+    """
+    given = os.environ.get('XDG_RUNTIME_DIR', '')
+    if given and os.access(given, os.W_OK):
+        return Path(given, 'surveillance')
+    return Path(tempfile.gettempdir(), f'surveillance-{os.getuid()}')
+
+
 def _open(folder: Path, name: str) -> int | None:
     """The file of a claim; None where it cannot be had, and nothing is claimed then."""
     try:
-        folder.mkdir(exist_ok=True)
-        with contextlib.suppress(OSError):
-            folder.chmod(0o1777)  # for every user of the machine
-        return os.open(folder / name, os.O_RDWR | os.O_CREAT, 0o666)
+        for each in (folder.parent, folder):
+            with contextlib.suppress(FileExistsError):
+                each.mkdir(mode=0o700)
+        if folder.is_symlink() or folder.parent.is_symlink():
+            return None
+        if folder.parent.stat().st_uid != os.getuid() or folder.stat().st_uid != os.getuid():
+            return None
+        return os.open(folder / name, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o600)
     except OSError:
         return None

@@ -8,7 +8,7 @@ import re
 import shutil
 import sys
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import TextIO
@@ -21,6 +21,8 @@ _ESCAPES = re.compile(r'\x1b\[[0-9;?]*[ -/]*[@-~]')
 _SEVERITY_COLOURS = {'WARN': '33', 'ERROR': '31', 'FATAL': '1;31', 'DEBUG': '2'}
 _NODE_COLOURS = ('36', '32', '35', '34', '96', '92', '95', '94')
 LAUNCHER = 'launch'
+LONGEST_LINE = 4000
+"""Characters of a line that are kept."""
 _LEAST_TEXT = 40
 """Columns that text must have beside time and name for long lines to be broken at words."""
 
@@ -53,7 +55,12 @@ class MergedLog:
         if colour is None:
             colour = self._terminal and not os.environ.get('NO_COLOR')
         self._colour = colour
+        self._heard: Callable[[str, str], None] = lambda _name, _text: None
         self._file = path.open('a', encoding='utf-8') if path is not None else None
+
+    def listen(self, heard: Callable[[str, str], None]) -> None:
+        """Have each line of a process told as well: its node and its text."""
+        self._heard = heard
 
     def say(self, text: str) -> None:
         """A line of the launcher's own."""
@@ -68,11 +75,12 @@ class MergedLog:
     def line(self, process: str, raw: str) -> None:
         """A line that `process` printed."""
         # A progress bar redraws its line: only what it ended with belongs into a log.
-        text = raw.rstrip().rsplit('\r', 1)[-1]
+        text = bounded(raw.rstrip().rsplit('\r', 1)[-1])
         if match := _ROS_LINE.match(_ESCAPES.sub('', text)):
             severity, origin, message = match.groups()
             name = origin.rsplit('.', 1)[-1]
             if name in self._names:
+                self._heard(name, message)
                 self._write(name, severity, message)
             else:
                 self._write(process, severity, f'{origin}: {message}')
@@ -137,6 +145,18 @@ class MergedLog:
         except (OSError, ValueError):
             self.broken = True
             _discard(stream)
+
+
+def bounded(text: str) -> str:
+    """Return a line of bounded length in which only colours are left of the control characters."""
+    if len(text) > LONGEST_LINE:
+        text = f'{text[:LONGEST_LINE]} ... ({len(text) - LONGEST_LINE} characters left out)'
+    if text.isprintable():
+        return text
+    return ''.join(
+        each if each.isprintable() or each == '\x1b' else each.encode('unicode_escape').decode()
+        for each in text
+    )
 
 
 def _discard(stream: TextIO) -> None:

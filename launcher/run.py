@@ -9,14 +9,16 @@ import contextlib
 import os
 import re
 import secrets
+import shlex
 import shutil
+import subprocess
 import sys
-import time
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
+from typing import Any
 
-from launcher import node_table
+from launcher import node_table, run_folder
 from launcher.instance_lock import claim
 from launcher.log_merge import ROS_FORMAT, MergedLog
 from launcher.supervisor import Program, Supervisor
@@ -49,6 +51,8 @@ COMPOSED_SHARE = 3
 MEMORY = 2048
 """Megabytes that a node may hold, unless the command line says otherwise."""
 BEHAVIOUR_NODE = 'robot_behavior'
+HELP = 'waiting for help: '
+"""What the behaviour says when it needs somebody."""
 _NAMESPACE = re.compile(r'/?[A-Za-z]\w*(/[A-Za-z]\w*)*\Z', re.ASCII)
 MAX_DOMAIN = 101
 """The highest ROS domain whose ports lie below those that Linux gives to clients."""
@@ -80,6 +84,7 @@ class Run:
         web_address: where, as HOST:PORT, None for the page's own choice.
         memory: megabytes that a node may hold before it is started again; 0: any.
         alarm: a command that is run, with one line as its argument, when somebody is needed.
+        fresh: do not go on with a run whose launcher was killed.
         network: whether nodes of other machines are heard.
     """
 
@@ -103,6 +108,7 @@ class Run:
     memory: int = MEMORY
     alarm: str = ''
     network: bool = False
+    fresh: bool = False
 
     def check(self) -> None:
         """Looks at everything that can be wrong before a process is started.
@@ -359,6 +365,13 @@ def node_environ(run: Run, logs: Path | None = None) -> dict[str, str]:
     # Shared memory that a killed process leaves behind hides later nodes of the same domain.
     environ.setdefault('FASTDDS_BUILTIN_TRANSPORTS', 'UDPv4')
     environ.setdefault('FASTRTPS_DEFAULT_PROFILES_FILE', str(DISCOVERY))
+    # One robot's nodes are one machine's, unless somebody says otherwise.
+    if run.network:
+        environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'SUBNET'
+    else:
+        environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+    for name in ('NOTIFY_SOCKET', 'WATCHDOG_USEC', 'WATCHDOG_PID'):
+        environ.pop(name, None)  # of the launcher alone
     if logs is not None:
         environ['PYTHONUNBUFFERED'] = '1'
         environ['PYTHONIOENCODING'] = 'utf-8'
@@ -377,28 +390,94 @@ def command(nodes: Sequence[node_table.Node], arguments: Sequence[str], parent: 
     return [sys.executable, '-P', str(CHILD), str(parent), targets, *arguments]
 
 
-def make_folder(runs: Path) -> Path:
-    """A new folder for what the run leaves behind: its log, its parameters, its record."""
-    stamp = time.strftime('%Y%m%d-%H%M%S')
-    for suffix in ('', *(f'-{number}' for number in range(2, 100))):
-        folder = runs / (stamp + suffix)
+def options_of(run: Run) -> dict[str, Any]:
+    """Return what a run is asked for, as JSON holds it."""
+    options: dict[str, Any] = {}
+    for name, value in vars(run).items():
+        sequence = isinstance(value, list | tuple)
+        options[name] = (
+            str(value) if isinstance(value, Path) else list(value) if sequence else value
+        )
+    return options
+
+
+def run_from(options: Mapping[str, Any]) -> Run:
+    """Return the run of options that `options_of` gave.
+
+    Raises:
+        RunError: They are not of a run.
+    """
+    known = {field.name for field in fields(Run)}
+    try:
+        values = {name: options[name] for name in options if name in known}
+        for name in ('place', 'parameters'):
+            values[name] = Path(values[name]) if values.get(name) else None
+        return Run(**values)
+    except TypeError as error:
+        raise RunError(f'--resume: {error}') from None
+
+
+def resumed(run: Run, usual: Run, runs: Path, name: str) -> tuple[Run, Path]:
+    """Return the run to go on with and its folder.
+
+    Args:
+        run: What the command line asks for now; it goes before what the run was asked for.
+        usual: What a command line without options asks for.
+        runs: The folder of the runs.
+        name: Of the run; empty: the last one.
+
+    Raises:
+        RunFolderError: There is no such run.
+    """
+    if run.record not in (None, NOT_RECORDED):
+        runs = Path(run.record)
+    found = run_folder.find(runs, name)
+    given = {name: value for name, value in vars(run).items() if value != getattr(usual, name)}
+    return replace(run_from(found.options), **given), found.folder
+
+
+def _chosen_folder(run: Run, runs: Path, resume: Path | None) -> tuple[Path, str]:
+    """The folder to work in, and what there is to say about it."""
+    if resume is not None:
+        return resume, f'going on with {_short(resume)}'
+    found = run_folder.latest(runs) if not run.fresh else None
+    if found is not None and not found.ended and not found.running:
+        same = {**found.options, 'seconds': None} == {**options_of(run), 'seconds': None}
+        if same:
+            how = 'whose launcher was killed; --fresh begins anew'
+            return found.folder, f'going on with {_short(found.folder)}, {how}'
+    return run_folder.make_folder(runs), ''
+
+
+def alarm_caller(alarm: str, log: MergedLog) -> Callable[[str], None]:
+    """What calls somebody: runs the command of the user's choice with one line as its argument."""
+
+    def call(text: str) -> None:
+        if not alarm:
+            return
         try:
-            folder.mkdir(parents=True)
-        except FileExistsError:
-            continue
-        except OSError as error:
-            raise RunError(f'{folder}: cannot be made: {error.strerror}') from None
-        return folder
-    raise RunError(f'{folder}: a hundred runs began in this second')
+            subprocess.Popen(
+                [*shlex.split(alarm), text],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+                start_new_session=True,
+            )
+        except (OSError, ValueError) as error:
+            log.error(f'--alarm {alarm}: {error}')
+
+    return call
 
 
-def run_mission(run: Run, config: Path, runs: Path) -> int:
+def run_mission(run: Run, config: Path, runs: Path, resume: Path | None = None) -> int:
     """Starts the nodes, supervises them until the end, prints the summary; returns the exit code.
 
     Args:
         run: what to run.
         config: the folder with the parameter files.
         runs: where the run gets a folder of its own for its log, parameters and record.
+        resume: the folder of the run to go on with; None: a new one, or that of a launcher of the
+            same options that was killed.
 
     Raises:
         RunError, node_table.SelectionError, InstanceLockError: what was asked for cannot be run.
@@ -410,7 +489,11 @@ def run_mission(run: Run, config: Path, runs: Path) -> int:
     observers = run.observers()
     check_assignments(merged, (*nodes, *observers))
     claims = claim(nodes, ros_domain(run), run.namespace)
-    folder = make_folder(Path(run.record) if run.record not in (None, NOT_RECORDED) else runs)
+    if run.record not in (None, NOT_RECORDED):
+        runs = Path(run.record)
+    folder, how = _chosen_folder(run, runs, resume)
+    deleted = run_folder.prune(runs, run.keep * 1e9)
+    state = run_folder.RunState(folder, options_of(run))
     merged = configuration(config, run, folder)
     files = write_parameters(folder / 'parameters', run, merged, (*nodes, *observers))
     environ = node_environ(run, folder / 'ros')
@@ -455,8 +538,16 @@ def run_mission(run: Run, config: Path, runs: Path) -> int:
         f'place {place.name}, '
         f'ROS domain {ros_domain(run)}, files in {_short(folder)}'
     )
+    if how:
+        log.say(how)
+    for old in deleted:
+        log.say(f'deleted {_short(old)}: the runs take more than --keep {run.keep:g} GB')
+    if run.network:
+        log.say('nodes of other machines are heard: see docs/security.md')
     log.say(f'watch it in a second terminal: {watch_command(run)}')
-    supervisor = Supervisor(programs, log)
+    call = alarm_caller(run.alarm, log)
+    log.listen(lambda name, text: call(text) if name == BEHAVIOUR_NODE and HELP in text else None)
+    supervisor = Supervisor(programs, log, on_trouble=call)
     console = None
     if any(node.name == node_table.CONSOLE for node in nodes):
         from launcher.console import OperatorConsole
@@ -474,6 +565,7 @@ def run_mission(run: Run, config: Path, runs: Path) -> int:
     for line in what_to_look_at(folder):
         log.plain(line)
     log.close()
+    state.end()
     for descriptor in claims:
         os.close(descriptor)
     return code

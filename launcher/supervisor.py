@@ -19,6 +19,7 @@ from dataclasses import dataclass, field
 
 from launcher.log_merge import MergedLog
 from launcher.process_watch import BEAT, FINISHED, Heartbeats, look_at, shown
+from launcher.service import notify
 
 PAUSES = (0.1, 0.5, 1.0, 2.0, 4.0, 8.0, 15.0, 30.0)
 """Seconds before the first, second, ... restart in a row; the last one is kept."""
@@ -176,6 +177,7 @@ class Supervisor:
         """
         end = None if seconds is None else time.monotonic() + seconds
         with self._signals():
+            notify('READY=1')
             self._to_start = list(self.children.values())
             self._start_next()
             while self._to_start or any(
@@ -353,6 +355,7 @@ class Supervisor:
         """Ends what hangs or holds too much memory; it is started again as after a death."""
         if now < self._look_at:
             return
+        notify('WATCHDOG=1')
         late = now - self._look_at
         self._look_at = now + LOOK_PERIOD
         for child in self.children.values():

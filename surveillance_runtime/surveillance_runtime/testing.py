@@ -7,6 +7,7 @@ it ends with the process however that ends.
 from __future__ import annotations
 
 import fcntl
+import os
 import tempfile
 from pathlib import Path
 from typing import IO
@@ -23,10 +24,13 @@ def claim_domain() -> int:
     Raises:
         RuntimeError: All are claimed.
     """
-    folder = Path(tempfile.gettempdir()) / 'surveillance-domains'
-    folder.mkdir(mode=0o777, exist_ok=True)
+    folder = Path(tempfile.gettempdir(), f'surveillance-domains-{os.getuid()}')
+    folder.mkdir(mode=0o700, exist_ok=True)
+    if folder.is_symlink() or folder.stat().st_uid != os.getuid():
+        raise RuntimeError(f'{folder}: belongs to somebody else')
     for domain in range(1, LAST_DOMAIN + 1):
-        lock = (folder / str(domain)).open('w')
+        flags = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW
+        lock = open(os.open(folder / str(domain), flags, 0o600), 'w')  # noqa: SIM115 - held
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:

@@ -7,7 +7,7 @@ import signal
 
 import pytest
 
-from launcher.instance_lock import InstanceLockError, claim
+from launcher.instance_lock import InstanceLockError, claim, runtime_folder
 from launcher.node_table import select
 from launcher.run import Run, RunError, ros_domain
 
@@ -61,3 +61,29 @@ def test_a_second_launch_says_that_the_first_is_there(start, tmp_path, ros_domai
     (complaint,) = second.lines
     assert f'already running in ROS domain {ros_domain} (process {first.process.pid})' in complaint
     assert first.end(signal.SIGINT)[0] == 0
+
+
+def test_planted_links_are_not_followed(tmp_path):
+    target = tmp_path / 'precious'
+    target.write_text('precious')
+    folder = tmp_path / 'nodes'
+    folder.mkdir()
+    for node in RANDOM:
+        (folder / f'7..{node.name}').symlink_to(target)
+        (folder / f'7.{node.name}').symlink_to(target)
+    claim(RANDOM, '7', None, folder)
+    assert target.read_text() == 'precious'
+    (tmp_path / 'linked').symlink_to(folder)
+    assert claim(RANDOM, '8', None, tmp_path / 'linked') == []
+
+
+def test_the_claims_lie_in_the_users_own_folder(tmp_path, monkeypatch):
+    monkeypatch.setenv('XDG_RUNTIME_DIR', str(tmp_path))
+    assert runtime_folder() == tmp_path / 'surveillance'
+    held = claim(RANDOM, '7', None)
+    assert held
+    assert (tmp_path / 'surveillance').stat().st_mode & 0o077 == 0
+    monkeypatch.delenv('XDG_RUNTIME_DIR')
+    assert str(os.getuid()) in runtime_folder().name
+    for descriptor in held:
+        os.close(descriptor)

@@ -1,28 +1,37 @@
 from __future__ import annotations
 
+import io
+import json
 import os
+import threading
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 import yaml
 
 from launcher.cli import CONFIG, make_parser, wanted_run
+from launcher.log_merge import MergedLog
 from launcher.node_table import DEFAULT_MODE
 from launcher.run import (
     Run,
     RunError,
+    alarm_caller,
     check_assignments,
     command,
     configuration,
-    make_folder,
     node_environ,
+    options_of,
     parameter_files,
+    resumed,
     ros_arguments,
+    run_from,
     summary,
     watch_command,
     with_mode_of,
     write_parameters,
 )
+from launcher.run_folder import RunState, make_folder
 from surveillance_behaviour.mission.mission_log import MissionRecord
 
 
@@ -166,22 +175,48 @@ def test_the_behaviour_is_last_in_one_process_so_that_it_stops_first():
     assert targets[-1].startswith('robot_behavior=')
 
 
+def test_discovery_is_the_machines_own_unless_asked_for(monkeypatch):
+    monkeypatch.delenv('ROS_AUTOMATIC_DISCOVERY_RANGE', raising=False)
+    assert node_environ(Run())['ROS_AUTOMATIC_DISCOVERY_RANGE'] == 'LOCALHOST'
+    assert node_environ(Run(network=True))['ROS_AUTOMATIC_DISCOVERY_RANGE'] == 'SUBNET'
+    monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'OFF')
+    assert node_environ(Run())['ROS_AUTOMATIC_DISCOVERY_RANGE'] == 'OFF'
+
+
+def test_options_of_a_run_survive_its_launcher(tmp_path):
+    run = Run(mode='RANDOM', place=tmp_path / 'p.yaml', assignments=['a:=1'], only=['reasoner'])
+    stored = json.loads(json.dumps(options_of(run)))
+    assert run_from(stored) == replace(run, without=[])
+    with pytest.raises(RunError, match='--resume'):
+        run_from({'mode': 'RANDOM', 'place': None, 'seconds': None} | {'place': 7})
+
+
+def test_a_resumed_run_keeps_what_is_not_given_anew(tmp_path):
+    folder = make_folder(tmp_path)
+    RunState(folder, options_of(Run(mode='RANDOM', namespace='robot1'))).end()
+    run, found = resumed(Run(namespace='robot2'), Run(), tmp_path, '')
+    assert (run.mode, run.namespace, found) == ('RANDOM', 'robot2', folder)
+
+
+def test_an_alarm_gets_one_line_as_its_last_argument(tmp_path):
+    out = tmp_path / 'said'
+    script = tmp_path / 'alarm.sh'
+    script.write_text(f'printf "%s|" "$@" > {out}.new; mv {out}.new {out}\n')
+    log = MergedLog(io.StringIO(), ['a'])
+    alarm_caller(f'sh {script} first', log)('waiting for help: a door is closed')
+    for _ in range(200):
+        if out.exists():
+            break
+        threading.Event().wait(0.05)
+    assert out.read_text() == 'first|waiting for help: a door is closed|'
+
+
 def test_a_domain_and_quiet_transports_reach_the_nodes(tmp_path, monkeypatch):
     monkeypatch.delenv('FASTDDS_BUILTIN_TRANSPORTS', raising=False)
     environ = node_environ(Run(domain=7), tmp_path)
     assert environ['ROS_DOMAIN_ID'] == '7'
     assert environ['FASTDDS_BUILTIN_TRANSPORTS'] == 'UDPv4'
     assert node_environ(Run()).get('ROS_DOMAIN_ID') == os.environ.get('ROS_DOMAIN_ID')
-
-
-def test_each_run_has_a_folder_of_its_own(tmp_path):
-    assert make_folder(tmp_path) != make_folder(tmp_path)
-
-
-def test_runs_where_nothing_can_be_written(tmp_path):
-    (tmp_path / 'runs').write_text('a file')
-    with pytest.raises(RunError, match='cannot be made'):
-        make_folder(tmp_path / 'runs')
 
 
 def test_a_summary_is_given_also_without_a_record(tmp_path):

@@ -1,0 +1,179 @@
+"""The folder of a run: what it was asked for, whether it ended, and which old ones are kept.
+
+`run.json` holds the options of the run and is locked as long as its launcher lives. So a launcher
+finds the run of one that was killed, and goes on in its folder: the record, the ontology's store
+and the levels of the nodes are there.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import json
+import os
+import shutil
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+STATE = 'run.json'
+
+
+class RunFolderError(ValueError):
+    """A folder that cannot be made or gone on with: one line that says why."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """A run that was begun.
+
+    Attributes:
+        folder: Its folder.
+        options: What it was asked for.
+        ended: Whether its launcher came to its end.
+        running: Whether its launcher still runs.
+    """
+
+    folder: Path
+    options: Mapping[str, Any]
+    ended: bool
+    running: bool
+
+
+class RunState:
+    """Holds a folder's `run.json` for the launcher that works in it.
+
+    Args:
+        folder: The run's folder.
+        options: What the run is asked for, as JSON can hold it.
+
+    Raises:
+        RunFolderError: Another launcher works in the folder.
+    """
+
+    def __init__(self, folder: Path, options: Mapping[str, Any]) -> None:
+        self._options = dict(options)
+        flags = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW
+        self._descriptor = os.open(folder / STATE, flags, 0o644)
+        try:
+            fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            os.close(self._descriptor)
+            raise RunFolderError(f'{folder}: this run is still going on') from None
+        self._write(ended=False)
+
+    def end(self) -> None:
+        """Note that the launcher came to its end, and let go of the folder."""
+        with contextlib.suppress(OSError):  # on a full disk the next launcher goes on with it
+            self._write(ended=True)
+        os.close(self._descriptor)
+
+    def _write(self, *, ended: bool) -> None:
+        text = json.dumps({'options': self._options, 'ended': ended}, indent=1) + '\n'
+        os.pwrite(self._descriptor, text.encode(), 0)
+        os.ftruncate(self._descriptor, len(text.encode()))
+
+
+def make_folder(runs: Path) -> Path:
+    """Make a new folder for what a run leaves behind.
+
+    Raises:
+        RunFolderError: It cannot be made.
+    """
+    stamp = time.strftime('%Y%m%d-%H%M%S')
+    for suffix in ('', *(f'-{number}' for number in range(2, 100))):
+        folder = runs / (stamp + suffix)
+        try:
+            folder.mkdir(parents=True)
+        except FileExistsError:
+            continue
+        except OSError as error:
+            raise RunFolderError(f'{folder}: cannot be made: {error.strerror}') from None
+        return folder
+    raise RunFolderError(f'{folder}: a hundred runs began in this second')
+
+
+def look_into(folder: Path) -> Found | None:
+    """Return what a folder says of its run, None where it holds none."""
+    try:
+        descriptor = os.open(folder / STATE, os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW)
+    except OSError:
+        return None
+    try:
+        stored = json.loads(os.read(descriptor, 1_000_000))
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            running = False
+        except OSError:
+            running = True
+        return Found(folder, dict(stored['options']), bool(stored['ended']), running)
+    except (ValueError, KeyError, TypeError):
+        return None
+    finally:
+        os.close(descriptor)
+
+
+def latest(runs: Path) -> Found | None:
+    """Return the run that began last, None where there is none."""
+    found = (look_into(folder) for folder in sorted(_folders(runs), reverse=True))
+    return next((each for each in found if each is not None), None)
+
+
+def find(runs: Path, name: str) -> Found:
+    """Return the run of a name (or path), or the one that began last where the name is empty.
+
+    Raises:
+        RunFolderError: There is none, or it is still going on.
+    """
+    if name:
+        folder = Path(name) if Path(name).is_dir() else runs / name
+        found = look_into(folder)
+    else:
+        folder, found = runs, latest(runs)
+    if found is None:
+        expected = 'the name of a folder there' if name else 'a run that can be gone on with'
+        raise RunFolderError(f'--resume: no run in {folder}: expected {expected}')
+    if found.running:
+        raise RunFolderError(f'--resume: {found.folder}: this run is still going on')
+    return found
+
+
+def prune(runs: Path, most: float) -> list[Path]:
+    """Delete the oldest runs until the rest takes at most so many bytes.
+
+    The last one, those that still go on, and folders that are not of this form stay.
+
+    Returns:
+        The deleted folders.
+    """
+    known = [folder for folder in sorted(_folders(runs)) if look_into(folder) is not None]
+    sizes = {folder: _size(folder) for folder in known}
+    total, deleted = sum(sizes.values()), []
+    for folder in known[:-1]:
+        if total <= most:
+            break
+        found = look_into(folder)
+        if found is None or found.running:
+            continue
+        shutil.rmtree(folder, ignore_errors=True)
+        deleted.append(folder)
+        total -= sizes[folder]
+    return deleted
+
+
+def _folders(runs: Path) -> list[Path]:
+    try:
+        return [each for each in runs.iterdir() if each.is_dir() and not each.is_symlink()]
+    except OSError:
+        return []
+
+
+def _size(folder: Path) -> int:
+    total = 0
+    for place, _, names in os.walk(folder):
+        for name in names:
+            with contextlib.suppress(OSError):
+                total += os.lstat(os.path.join(place, name)).st_blocks * 512
+    return total

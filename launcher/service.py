@@ -1,0 +1,68 @@
+"""The robot as a service of the user's systemd, and what it is told while it runs."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shlex
+import socket
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+UNIT = 'surveillance.service'
+_TEXT = """\
+# Written by: python3 launch.py service
+[Unit]
+Description=Surveillance robot
+StartLimitIntervalSec=0
+
+[Service]
+Type=notify
+NotifyAccess=main
+ExecStart={command}
+WorkingDirectory={folder}
+WatchdogSec=30
+Restart=always
+RestartSec=5
+# A configuration that cannot work does not get better by itself.
+RestartPreventExitStatus=2
+SuccessExitStatus=130
+KillMode=mixed
+TimeoutStartSec=15min
+TimeoutStopSec=20
+MemoryMax={memory}M
+
+[Install]
+WantedBy=default.target
+"""
+
+
+def unit_text(checkout: Path, arguments: Sequence[str], memory: int) -> str:
+    """Return a unit that runs `launch.py` with these arguments.
+
+    Args:
+        checkout: The folder of `launch.py`.
+        arguments: Of the command `run`.
+        memory: Megabytes that the whole service may hold.
+    """
+    words = [sys.executable, str(checkout / 'launch.py'), 'run', *arguments]
+    # systemd reads % as a specifier and $ as a variable.
+    command = shlex.join(words).replace('%', '%%').replace('$', '$$')
+    folder = str(checkout).replace('%', '%%')
+    return _TEXT.format(command=command, folder=folder, memory=memory)
+
+
+def unit_path() -> Path:
+    """Return where the user's own units lie."""
+    home = os.environ.get('XDG_CONFIG_HOME') or os.path.expanduser('~/.config')
+    return Path(home, 'systemd', 'user', UNIT)
+
+
+def notify(text: str) -> None:
+    """Tell systemd something, such as `READY=1`; nothing happens where it does not listen."""
+    address = os.environ.get('NOTIFY_SOCKET', '')
+    if address[:1] not in ('/', '@'):
+        return
+    with contextlib.suppress(OSError), socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sender:
+        sender.sendto(text.encode(), address.replace('@', '\0', 1))

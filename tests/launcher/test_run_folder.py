@@ -1,0 +1,113 @@
+"""Folders of runs: found again after a launcher that was killed, and kept to a size."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+
+import pytest
+
+from launcher.run_folder import (
+    STATE,
+    RunFolderError,
+    RunState,
+    find,
+    latest,
+    look_into,
+    make_folder,
+    prune,
+)
+from tests.launcher.conftest import ROOT
+
+HOLD = (
+    'import sys, signal; from pathlib import Path; from launcher.run_folder import RunState\n'
+    'state = RunState(Path(sys.argv[1]), {"mode": "RANDOM"}); print("held", flush=True)\n'
+    'signal.pause()'
+)
+
+
+def begun(runs, name, size=0, *, ended=True):
+    folder = runs / name
+    folder.mkdir()
+    (folder / 'data').write_bytes(b'x' * size)
+    state = RunState(folder, {'mode': name})
+    if ended:
+        state.end()
+    return folder
+
+
+def test_each_run_has_a_folder_of_its_own(tmp_path):
+    assert make_folder(tmp_path) != make_folder(tmp_path)
+
+
+def test_runs_where_nothing_can_be_written(tmp_path):
+    (tmp_path / 'runs').write_text('a file')
+    with pytest.raises(RunFolderError, match='cannot be made'):
+        make_folder(tmp_path / 'runs')
+
+
+def test_a_run_that_came_to_its_end_says_so(tmp_path):
+    folder = begun(tmp_path, 'one')
+    found = look_into(folder)
+    assert found is not None
+    assert (found.ended, found.running, found.options) == (True, False, {'mode': 'one'})
+
+
+def test_a_killed_launcher_leaves_a_run_that_did_not_end(start, tmp_path):
+    launch = start('-c', HOLD, str(tmp_path), environ={**os.environ, 'PYTHONPATH': str(ROOT)})
+    launch.until('held')
+    found = look_into(tmp_path)
+    assert found is not None
+    assert found.running
+    with pytest.raises(RunFolderError, match='still going on'):
+        RunState(tmp_path, {})
+    launch.end(signal.SIGKILL)
+    found = look_into(tmp_path)
+    assert found is not None
+    assert (found.ended, found.running, found.options) == (False, False, {'mode': 'RANDOM'})
+
+
+def test_the_last_run_is_found_and_others_by_name_or_path(tmp_path):
+    first, second = begun(tmp_path, '20260101-000000'), begun(tmp_path, '20260102-000000')
+    (tmp_path / '20260103-000000').mkdir()  # not of a run
+    found = latest(tmp_path)
+    assert found is not None
+    assert found.folder == second
+    assert find(tmp_path, '').folder == second
+    assert find(tmp_path, first.name).folder == first
+    assert find(tmp_path, str(first)).folder == first
+    for name in ('nothing', '20260103-000000'):
+        with pytest.raises(RunFolderError, match='--resume: no run in'):
+            find(tmp_path, name)
+    with pytest.raises(RunFolderError, match='a run that can be gone on with'):
+        find(tmp_path / 'none', '')
+
+
+@pytest.mark.parametrize('content', ['', '{', '[]', '{"ended": true}', '\x00' * 100])
+def test_a_damaged_state_is_no_run(tmp_path, content):
+    (tmp_path / STATE).write_text(content)
+    assert look_into(tmp_path) is None
+
+
+def test_a_link_in_place_of_the_state_is_not_followed(tmp_path):
+    (tmp_path / 'target').write_text('precious')
+    (tmp_path / STATE).symlink_to(tmp_path / 'target')
+    with pytest.raises(OSError, match='symbolic links'):
+        RunState(tmp_path, {})
+    assert (tmp_path / 'target').read_text() == 'precious'
+
+
+def test_the_oldest_runs_go_first_and_the_last_and_the_running_stay(tmp_path):
+    names = [f'2026010{number}-000000' for number in range(1, 6)]
+    folders = [
+        begun(tmp_path, name, 100_000, ended=number != 1) for number, name in enumerate(names)
+    ]
+    (tmp_path / 'notes').mkdir()
+    assert prune(tmp_path, 10**9) == []
+    deleted = prune(tmp_path, 350_000)
+    assert deleted == [folders[0], folders[2]]
+    assert prune(tmp_path, 0) == [folders[3]]
+    assert folders[4].exists()
+    assert (tmp_path / 'notes').exists()
+    assert sys.executable

@@ -1,0 +1,60 @@
+"""The unit of the user's systemd."""
+
+from __future__ import annotations
+
+import configparser
+import shutil
+import socket
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from launcher.cli import main
+from launcher.service import notify, unit_path, unit_text
+
+
+def test_the_unit_runs_the_command_line_that_was_asked_for():
+    text = unit_text(Path('/home/a b/50%'), ['--mode', 'RANDOM', '--alarm', 'mail $ME'], 4096)
+    parser = configparser.RawConfigParser(strict=False)
+    parser.optionxform = str
+    parser.read_string(text)
+    service = parser['Service']
+    assert service['ExecStart'].endswith(
+        "'/home/a b/50%%/launch.py' run --mode RANDOM --alarm 'mail $$ME'"
+    )
+    assert service['MemoryMax'] == '4096M'
+    assert int(service['WatchdogSec']) >= 10
+    assert service['Restart'] == 'always'
+    assert service['RestartPreventExitStatus'] == '2'
+
+
+@pytest.mark.skipif(shutil.which('systemd-analyze') is None, reason='no systemd here')
+def test_systemd_takes_the_unit(tmp_path):
+    path = tmp_path / 'surveillance.service'
+    path.write_text(unit_text(Path('/'), [], 4096))
+    done = subprocess.run(
+        ['systemd-analyze', 'verify', '--user', str(path)], capture_output=True, text=True
+    )
+    assert 'Unknown' not in done.stderr
+
+
+def test_the_command_writes_it_into_the_users_folder(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv('XDG_CONFIG_HOME', str(tmp_path))
+    assert main(['service', '--mode', 'random']) == 0
+    assert unit_path().read_text().count('run --mode random') == 1
+    assert 'systemctl --user' in capsys.readouterr().out
+    assert main(['service', '--print', '--memory', '5']) == 2
+
+
+def test_systemd_is_told_where_it_listens(tmp_path, monkeypatch):
+    address = str(tmp_path / 'socket')
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listener:
+        listener.bind(address)
+        monkeypatch.setenv('NOTIFY_SOCKET', address)
+        notify('READY=1')
+        assert listener.recv(100) == b'READY=1'
+    monkeypatch.setenv('NOTIFY_SOCKET', str(tmp_path / 'nobody'))
+    notify('READY=1')
+    monkeypatch.delenv('NOTIFY_SOCKET')
+    notify('READY=1')
