@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 from rclpy.callback_groups import ReentrantCallbackGroup
@@ -58,7 +57,7 @@ class OntologyMapBuilder(PatrolNode):
             place,
             lambda: int(self.get_clock().now().nanoseconds // 1_000_000_000),
             self.stopping.is_set,
-            Reports(log.info, log.warn, log.error, partial(self.fail, unusable=True)),
+            Reports(log.info, log.warn, log.error, self._cannot_build),
             self._built.happen,
         )
         self._work = AwaitedWork(self, 1)
@@ -75,6 +74,10 @@ class OntologyMapBuilder(PatrolNode):
         )
         self._serve()
         self._look()
+
+    def _cannot_build(self, reason: str) -> None:
+        """End the node; a new start helps only where the server came back without the ontology."""
+        self.fail(reason, unusable='unknown reference' not in reason)
 
     def _serve(self) -> None:
         group = ReentrantCallbackGroup()
