@@ -123,8 +123,6 @@ class _Chains:
             return
         source = [atom for atom in rest if one in atom.terms]
         target = [atom for atom in rest if one not in atom.terms]
-        if isinstance(one, Constant):
-            source.append(SameAtom((_X, one)))
         self._automaton(source, one, role, target, to, clause.head, clause)
 
     def _automaton(
@@ -159,6 +157,8 @@ class _Chains:
 
         add = self._program.clauses.append
         moved = tuple(_moved(atom, start, _X) for atom in source)
+        if isinstance(start, Constant):
+            moved = (*moved, SameAtom((_X, start)))
         if not moved:
             self._program.uses_thing = True
             moved = (PredicateAtom(self._program.thing, (_X,)),)

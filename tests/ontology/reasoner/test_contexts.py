@@ -213,6 +213,20 @@ def test_chains_run_over_known_and_unknown_individuals() -> None:
     assert kb.instances(C) == {i, j}
 
 
+def test_chains_lead_to_an_individual_that_a_class_names() -> None:
+    kb = reasoned(
+        SubPropertyChainOf((P, Q), R),
+        SubClassOf(ObjectHasValue(R, k), C),
+        SubClassOf(A, some(P, ObjectHasValue(Q, k))),
+        ClassAssertion(A, i),
+        ObjectPropertyAssertion(P, j, m),
+        ObjectPropertyAssertion(Q, m, k),
+    )
+    assert kb.superclasses(A) == {C}
+    assert kb.instances(C) == {i, j}
+    assert kb.object_values(R, i) == {k}
+
+
 def test_there_is_always_some_individual() -> None:
     reasoned(EquivalentClasses((THING, NOTHING)), consistent=False)
     reasoned(SubClassOf(THING, A), SubClassOf(A, ObjectComplementOf(A)), consistent=False)
