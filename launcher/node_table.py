@@ -81,6 +81,12 @@ NODES = (
         console='move',
     ),
     Node(
+        'collision_monitor',
+        'surveillance_controllers',
+        'CollisionMonitor',
+        'lets no command through to the base that the lidar does not allow',
+    ),
+    Node(
         CONSOLE,
         'surveillance_operator',
         'ConsoleNode',

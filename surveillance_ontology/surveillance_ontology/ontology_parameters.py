@@ -95,7 +95,7 @@ _BUILDER = {
     'ontology_uri': Described('IRI of the ontology.'),
     'armor_timeout': Described('Longest wait for an answer of the server, seconds.', 0.1),
     'urgent_at_start': Described(
-        'Places that nobody has visited count as never visited (visitedAt 0), and so as URGENT; '
+        'Places that nobody has visited count as never visited, and so as URGENT; '
         'else as visited when the map was built.'
     ),
 }

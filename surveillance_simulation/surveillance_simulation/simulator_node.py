@@ -71,7 +71,8 @@ class Simulator(PatrolNode):
         except (TextureError, MujocoMissingError) as error:
             raise StartError(f'simulator: {error}') from None
         FaultServices(self, self.robot, self._changing, self._sensors.tell_doors)
-        self.create_subscription(Twist, 'cmd_vel', self._on_command, 1)
+        commands = simulator_parameters.command_topic(self)
+        self.create_subscription(Twist, commands, self._on_command, 1)
         self.create_subscription(
             PoseWithCovarianceStamped, 'amcl_pose', self._on_estimate, STATE_QOS
         )

@@ -116,7 +116,7 @@ def robot_settings(node: PatrolNode, motion: MotionSettings) -> RobotSettings:
         track_place=node.parameter(
             'track_place',
             True,
-            'SIMULATED: keep isIn in the ontology where the robot really is.',
+            'SIMULATED: robot_place follows the robot on its way, not at its end alone.',
             read_only=True,
         ),
         spin=node.parameter(
@@ -125,15 +125,20 @@ def robot_settings(node: PatrolNode, motion: MotionSettings) -> RobotSettings:
             'SIMULATED: motion/controller ends with one turn on the spot.',
             read_only=True,
         ),
-        lidar_mount=_mount(node),
+        lidar_mount=lidar_mount(node),
     )
 
 
-def _mount(node: PatrolNode) -> Pose | None:
+def lidar_mount(node: PatrolNode) -> Pose | None:
+    """Declares where the lidar sits on the robot; None: `tf_static` says it.
+
+    Raises:
+        ParameterError: A value is of the wrong type.
+    """
     given: list[float] = node.parameter(
         'lidar_mount',
         [],
-        'SIMULATED: where the lidar sits on the robot: x, y in metres, yaw in radians; empty: as '
+        'Where the lidar sits on the robot: x, y in metres, yaw in radians; empty: as '
         "tf_static says of the scan's frame.",
         of=float,
         check=lambda values: None if len(values) in (0, 3) else 'three numbers: x, y, yaw',

@@ -1,0 +1,80 @@
+"""Nothing that the lidar does not allow reaches the base, whoever commands it."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from geometry_msgs.msg import Twist
+from sensor_msgs.msg import LaserScan
+
+from surveillance_controllers.collision_monitor_node import (
+    CollisionMonitor,
+    MonitorSettings,
+    allowed,
+)
+from surveillance_controllers.motion.path_following import Velocity
+from surveillance_runtime.qos import SENSOR_QOS
+
+ROBOT = MonitorSettings(radius=0.25, margin=0.05, deceleration=0.8)
+
+
+def wall(x: float) -> np.ndarray:
+    return np.array([(x, y) for y in np.arange(-1.0, 1.01, 0.05)])
+
+
+@pytest.mark.parametrize('way', [1.0, -1.0])
+def test_the_speed_is_what_the_robot_can_brake_from(way: float) -> None:
+    for gap in (0.0, 0.05, 0.2, 0.5):
+        found = allowed(Velocity(way, 0.2), wall(way * (0.3 + gap)), ROBOT)
+        assert abs(found.speed) <= math.sqrt(2 * 0.8 * gap) + 0.1
+        assert found.speed * way >= 0.0
+        if found.speed:
+            assert found.turn / found.speed == pytest.approx(0.2 / way), 'the same arc'
+    free = Velocity(way, 0.2)
+    assert allowed(free, wall(-way * 0.35), ROBOT) == free, 'what is behind does not matter'
+    assert allowed(free, np.zeros((0, 2)), ROBOT) == free
+    assert allowed(Velocity(0.0, 1.0), wall(0.26), ROBOT) == Velocity(0.0, 1.0)
+
+
+def test_a_command_drives_into_nothing() -> None:
+    # Simulated: a command that never changes, a wall, a base that obeys with limited braking.
+    at, speed = 0.0, 0.0
+    for _ in range(400):
+        wanted = allowed(Velocity(1.5, 0.0), wall(3.0 - at), ROBOT).speed
+        speed = min(wanted, speed + 0.08) if wanted > speed else max(wanted, speed - 0.08)
+        at += 0.1 * speed / 2
+    assert 3.0 - at >= 0.25
+
+
+def test_a_foreign_command_is_stopped_before_a_wall_and_without_a_scan(
+    graph: Any, capfd: Any
+) -> None:
+    graph.add(CollisionMonitor)
+    told = graph.listen(Twist, 'cmd_vel_monitored', 1)
+    commands = graph.node.create_publisher(Twist, 'cmd_vel', 1)
+    scans = graph.node.create_publisher(LaserScan, 'scan', SENSOR_QOS)
+    command = Twist()
+    command.linear.x = 0.5
+
+    def passes(gap: float | None) -> Any:
+        if gap is not None:
+            scans.publish(
+                LaserScan(
+                    angle_min=-0.2, angle_increment=0.02, range_max=8.0, ranges=[0.27 + gap] * 21
+                )
+            )
+        commands.publish(command)
+        return told[-1].linear.x if told else None
+
+    graph.until(lambda: passes(3.0) == 0.5)
+    graph.until(lambda: 0.0 <= passes(0.01) < 0.2)
+    graph.until(lambda: passes(3.0) == 0.5)
+    graph.until(lambda: passes(None) == 0.0)
+    assert 'nothing on the topic scan' in capfd.readouterr().err
+    graph.until(lambda: passes(3.0) == 0.5)
+    graph.until(lambda: told[-1].linear.x == 0.0)
+    command.linear.x = math.nan
+    graph.until(lambda: passes(3.0) == 0.0)
