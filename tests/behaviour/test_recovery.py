@@ -1,0 +1,156 @@
+"""What goes wrong with peers, paths, doors and places is got over."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+import surveillance_fsm as fsm
+from surveillance_behaviour.peers.ports import AwayError, PeerError, Point
+
+from .machine_runs import CALLS, Run, visited
+from .scripted_world import POSITIONS, SEVEN_ROOMS, World, fails
+
+
+@pytest.mark.parametrize('times', [2, 20])
+@pytest.mark.parametrize(('name', 'call'), [(m, c) for m, calls in CALLS.items() for c in calls])
+def test_a_peer_that_fails_is_got_over(name: str, call: str, times: int) -> None:
+    world = World(draw=0.4)
+    world.faults = fails(call, times)
+    run = Run(name, world).until(1800.0)
+    assert any('scripted fault' in text for text in world.said)
+    assert visited(world, since=1100.0) == set(SEVEN_ROOMS)
+    assert world.stranded == 0
+    assert run.mission.failure is None
+
+
+@pytest.mark.parametrize(('name', 'call'), [(m, c) for m, calls in CALLS.items() for c in calls])
+def test_a_peer_that_stays_away_is_cried_about_and_waited_for(name: str, call: str) -> None:
+    world = World()
+
+    def begin() -> None:
+        world.faults = fails(call)
+        world.set_level(10.0)
+
+    world.clock.after(100.0, begin)
+    Run(name, world).until(2000.0)
+    if call in ('start', 'wait_until_built', 'set_urgency_threshold'):
+        assert not world.cries, 'asked at the start only'
+        return
+    assert any('scripted fault' in cry for cry in world.cries)
+    assert world.cries.count('') >= 3, 'it goes on trying'
+
+
+def test_a_peer_that_is_away_is_waited_for_at_once(machine: str) -> None:
+    world = World()
+    world.faults = fails('plan', 3, 'no server', AwayError)
+    Run(machine, world).until(60.0)
+    assert len([cry for cry in world.cries if 'no server' in cry]) == 3
+    assert not any('another' in text for text in world.said)
+    assert world.arrivals
+
+
+WRONG_PATHS: list[tuple[list[Point], str]] = [
+    ([], 'the path has no points'),
+    ([(math.nan, 0.0, 0.0)], 'a point that is not finite'),
+    ([(90.0, 90.0, 0.0)], 'from the goal, expected at most 1 m'),
+]
+
+
+@pytest.mark.parametrize(('path', 'words'), WRONG_PATHS)
+def test_a_wrong_path_is_asked_for_again(machine: str, path: list[Point], words: str) -> None:
+    world = World()
+    right = world.plan_path
+    wrong = iter([path] * 2)
+    world.plan_path = lambda start, goal, interrupt: (
+        next(  # type: ignore[method-assign]
+            wrong, None
+        )
+        or ([] if path == [] and next(wrong, None) == [] else right(start, goal, interrupt))
+    )
+    Run(machine, world).until(600.0)
+    assert any(words in text for text in world.said)
+    assert visited(world) == set(SEVEN_ROOMS)
+    assert all(math.isfinite(value) for value in world.at)
+
+
+def test_a_robot_that_stops_short_tries_again(machine: str) -> None:
+    world = World()
+    right = world._drive
+    times = [0]
+
+    def stops_short(path: list[Point], interrupt: fsm.Interrupt) -> Point:
+        times[0] += 1
+        return right(path[:-1] if times[0] % 5 == 0 and len(path) > 2 else path, interrupt)
+
+    world._drive = stops_short  # type: ignore[method-assign, assignment]
+    run = Run(machine, world).until(1800.0)
+    assert any('stopped' in text and 'short' in text for text in world.said)
+    assert visited(world, since=1000.0) == set(SEVEN_ROOMS)
+    assert run.mission.place == world.is_in
+
+
+def test_a_blocked_door_is_gone_around(machine: str) -> None:
+    if machine == 'patrol':
+        pytest.skip('the planner goes round there')
+    world = World()
+    right = world.plan_path
+    blocked = {POSITIONS['E'], POSITIONS['C1']}
+
+    def plan(start: Point, goal: Point, interrupt: fsm.Interrupt) -> list[Point]:
+        if {start, goal} == blocked:
+            raise PeerError('compute_path', 'a closed door is in the way')
+        return right(start, goal, interrupt)
+
+    world.plan_path = plan  # type: ignore[method-assign]
+    Run(machine, world).until(900.0)
+    assert any('trying the way round: E - C2 - C1' in text for text in world.said)
+    assert visited(world) == set(SEVEN_ROOMS)
+    assert not world.cries
+
+
+def test_a_place_that_disappears_is_left_out(machine: str) -> None:
+    world = World()
+
+    def vanish() -> None:
+        del world.rooms['R3']
+        del world.positions['R3']
+
+    world.clock.after(100.0, vanish)
+    Run(machine, world).until(900.0)
+    assert visited(world, since=500.0) == set(SEVEN_ROOMS) - {'R3'}
+
+
+def test_a_closed_door_leaves_the_rest_and_an_opened_one_brings_it_back(machine: str) -> None:
+    world = World()
+    world.clock.after(100.0, lambda: world.closed.add('D4'))
+    world.clock.after(700.0, world.closed.clear)
+    Run(machine, world).until(1500.0)
+    between = {place for time, place in world.arrivals if 150.0 < time < 690.0}
+    assert between == set(SEVEN_ROOMS) - {'R4'}
+    assert 'R4' in visited(world, since=700.0)
+
+
+def test_a_robot_that_is_shut_in_cries_for_help_and_goes_on_when_freed(machine: str) -> None:
+    world = World()
+    world.clock.after(100.0, lambda: world.closed.update(f'D{n}' for n in range(1, 8)))
+    world.clock.after(400.0, world.closed.clear)
+    Run(machine, world).until(1500.0)
+    assert any('nothing can be reached' in cry for cry in world.cries)
+    assert visited(world, since=500.0) == set(SEVEN_ROOMS)
+
+
+def test_an_ontology_that_lost_the_robot_is_waited_for(machine: str) -> None:
+    world = World()
+    right = world.snapshot
+
+    def snapshot(*args: object) -> object:
+        if 100.0 < world.clock.time < 130.0:
+            raise PeerError('armor', 'ontology map has Robot1 in no place')
+        return right(*args)  # type: ignore[arg-type]
+
+    world.snapshot = snapshot  # type: ignore[method-assign, assignment]
+    Run(machine, world).until(600.0)
+    assert any('in no place' in text for text in world.said)
+    assert visited(world, since=200.0) == set(SEVEN_ROOMS)
