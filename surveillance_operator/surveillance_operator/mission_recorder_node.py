@@ -29,7 +29,7 @@ from surveillance_operator.recording.timeline import TimelineWriter
 from surveillance_runtime.node import PatrolNode, StartError
 from surveillance_runtime.process import run_node
 
-DRAIN_PERIOD, SEAL_PERIOD, FEED_PERIOD = 0.2, 0.9, 0.4
+DRAIN_PERIOD, SEAL_PERIOD, FEED_PERIOD = 0.15, 0.6, 0.4
 """Seconds between two looks at all queues, two chunks, and two lines of the time line."""
 PRUNE_PERIOD = 60.0
 QUEUE = 2000

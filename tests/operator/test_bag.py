@@ -103,6 +103,15 @@ def test_a_killed_writer_loses_nothing_that_was_sealed(tmp_path: Path) -> None:
     assert repair(folder) == []
 
 
+def test_a_recorder_that_was_killed_goes_on_in_the_same_folder(tmp_path: Path) -> None:
+    folder = tmp_path / 'recording'
+    killed = write(folder, ['one', 'two'])
+    killed._file.write(b'torn')
+    killed._file.close()  # as the kernel does; nobody writes an index
+    write(folder, ['three']).close()
+    assert read(folder) == ['one', 'two', 'three']
+
+
 def test_the_oldest_files_are_deleted_first(tmp_path: Path) -> None:
     for run in ('1', '2'):
         write(tmp_path / run / bag.NAME, ['word ' * 100] * 4, segment_bytes=10).close()

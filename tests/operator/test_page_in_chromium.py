@@ -82,6 +82,7 @@ class Viewer:
 
     def picture(self, name: str) -> None:
         if PICTURES:
+            self.js('scrollTo(0, 0)')
             self.driver.save_screenshot(str(Path(PICTURES) / name))
 
 

@@ -61,6 +61,10 @@ def test_a_torn_last_line_is_left_out(tmp_path: Path) -> None:
     record(path, 5)
     path.write_bytes(path.read_bytes()[:-4])
     assert Timeline(path).times[-1] == 1003.0
+    record(path, 1)  # a recorder that was started again
+    line = Timeline(path)
+    assert len(line.times) == 5
+    assert line.line(4)[0] == 0.0
 
 
 @pytest.mark.parametrize('content', [None, '', 'no time line\n'])

@@ -1,1 +1,23 @@
 """Recordings of missions: files that Foxglove and `ros2 bag` open, and the time line to replay."""
+
+from surveillance_operator.recording.bag import (
+    BagWriter,
+    RecordingError,
+    TopicType,
+    messages,
+    prune,
+    repair,
+)
+from surveillance_operator.recording.timeline import Timeline, TimelineError, TimelineWriter
+
+__all__ = [
+    'BagWriter',
+    'RecordingError',
+    'Timeline',
+    'TimelineError',
+    'TimelineWriter',
+    'TopicType',
+    'messages',
+    'prune',
+    'repair',
+]

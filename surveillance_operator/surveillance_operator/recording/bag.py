@@ -102,6 +102,7 @@ class BagWriter:
         self._closed: list[_Segment] = []
         try:
             folder.mkdir(parents=True, exist_ok=True)
+            repair(folder)  # what this run's last recorder left when it was killed
             for path in segments(folder):
                 segment, topics = _scan(path)
                 self._closed.append(segment)

@@ -37,6 +37,7 @@ class TimelineWriter:
     """
 
     def __init__(self, path: Path) -> None:
+        _cut_torn_line(path)
         self._file = open(path, 'ab', buffering=0)  # noqa: SIM115 - kept open
         # The lidar's points come ten times a second: they are in the recording itself.
         self._framer = Framer(without=frozenset({'scan'}))
@@ -75,6 +76,15 @@ class TimelineWriter:
         if before is None or snapshot.number != before.number:
             return 'decision' if snapshot.decision is not None else ''
         return ''
+
+
+def _cut_torn_line(path: Path) -> None:
+    """Drop an unfinished last line, so that the next one starts on a line of its own."""
+    if path.exists():
+        content = path.read_bytes()
+        complete = content.rfind(b'\n') + 1
+        if complete != len(content):
+            os.truncate(path, complete)
 
 
 class Timeline:
