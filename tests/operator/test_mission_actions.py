@@ -1,0 +1,124 @@
+"""What a person can do, against scripted and real services."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import pytest
+from rcl_interfaces.srv import SetParameters
+from std_srvs.srv import Trigger
+
+from surveillance_interfaces.srv import GoTo, PlaceObstacle, SetDoor, WhyNot
+from surveillance_ontology.armor_server_node import ArmorServer
+from surveillance_ontology.ontology_map_builder_node import OntologyMapBuilder
+from surveillance_operator.mission_actions import ActionError, MissionActions, NoAnswerError
+from surveillance_runtime.node import PatrolNode
+
+PLACE = {
+    'map.A': ['D'],
+    'map.B': ['D'],
+    'room_positions.A': [1.0, 1.0],
+    'room_positions.B': [5.0, 1.0],
+    'robot_room': 'A',
+    'recharge_rooms': ['A'],
+}
+
+
+@pytest.fixture
+def actions(graph: Any) -> MissionActions:
+    return MissionActions(graph.add(PatrolNode, name='hands'), timeout=5.0)
+
+
+def serve(graph: Any, kind: Any, name: str, **answer: Any) -> list[Any]:
+    requests: list[Any] = []
+
+    def on_request(request: Any, response: Any) -> Any:
+        requests.append(request)
+        for field, value in answer.items():
+            setattr(response, field, value)
+        return response
+
+    graph.node.create_service(kind, name, on_request)
+    return requests
+
+
+def test_a_door_of_a_simulation_is_moved_and_else_told_to_the_map(
+    graph: Any, actions: MissionActions
+) -> None:
+    told = serve(graph, SetDoor, 'ontology_map/set_door', success=True, message='known')
+    graph.until(lambda: actions._callers['ontology_map/set_door'].is_ready())
+    assert actions.set_door('D1', False) == 'known'
+    moved = serve(graph, SetDoor, 'simulation/set_door', success=True, message='moved')
+    graph.until(lambda: actions._callers['simulation/set_door'].is_ready())
+    assert actions.set_door('D1', True) == 'moved'
+    assert (told[0].door, told[0].open, moved[0].open) == ('D1', False, True)
+
+
+def test_a_refusal_is_said_in_the_words_of_the_node(graph: Any, actions: MissionActions) -> None:
+    serve(graph, GoTo, 'go_to', success=False, message='no place is called R9')
+    serve(graph, WhyNot, 'why_not', success=True, message='R3 can wait', premises=['URGENT(R3)'])
+    serve(graph, Trigger, 'robot_behavior/fsm/pause', success=True)
+    with pytest.raises(ActionError, match='no place is called R9'):
+        actions.go_to('R9')
+    assert actions.why_not('R3') == ('R3 can wait', ['URGENT(R3)'])
+    assert actions.machine('pause') == 'state machine: paused'
+
+
+def test_a_parameter_is_set_or_the_reason_told(graph: Any, actions: MissionActions) -> None:
+    from rcl_interfaces.msg import SetParametersResult
+
+    results = [SetParametersResult(successful=True)]
+    asked = serve(graph, SetParameters, 'robot_behavior/set_parameters', results=results)
+    assert actions.set_threshold(90) == 'urgency_threshold is 90 s'
+    assert asked[0].parameters[0].value.integer_value == 90
+    results[0] = SetParametersResult(successful=False, reason='expected one of tour')
+    with pytest.raises(ActionError, match='expected one of tour'):
+        actions.set_policy('fast')
+
+
+@pytest.mark.parametrize(
+    ('call', 'words'),
+    [
+        (lambda a: a.set_door('D 1', True), "name 'D 1': expected letters"),
+        (lambda a: a.place_obstacle('box', 'x', 0, 1), "'x': expected a finite number"),
+        (lambda a: a.place_obstacle('box', float('nan'), 0, 1), 'expected a finite number'),
+        (lambda a: a.set_threshold(1.5), 'expected whole seconds'),
+        (lambda a: a.machine('stop'), 'expected pause, step or resume'),
+        (lambda a: a.move_arm('up'), 'expected left, home, right, back or stop'),
+        (lambda a: a.command('simulator', 'x'), 'expected one of battery_controller'),
+        (lambda a: a.explain('URGENT'), 'expected CLASS'),
+    ],
+)
+def test_what_cannot_be_asked_for_is_refused_before_it_is_asked(
+    call: Any, words: str, actions: MissionActions
+) -> None:
+    with pytest.raises(ActionError, match=words):
+        call(actions)
+
+
+def test_a_service_that_is_not_there_is_said_at_once(actions: MissionActions) -> None:
+    with pytest.raises(NoAnswerError, match='simulation/remove_obstacle: no server'):
+        actions.remove_obstacle('box')
+
+
+def test_facts_and_their_proofs_come_from_the_ontology(graph: Any, actions: MissionActions) -> None:
+    graph.add(ArmorServer)
+    graph.add(OntologyMapBuilder, parameters=PLACE)
+    graph.until(lambda: actions._callers['ontology_map/reference_name'].is_ready())
+    facts = dict(actions.facts('A'))
+    assert facts['hasDoor(A, D)'] is True
+    assert facts['connectedTo(A, B)'] is False
+    (depth, first), *premises = actions.explain('connectedTo(A, B)')
+    assert depth == 0
+    assert 'connectedTo' in first
+    assert {depth for depth, _ in premises} >= {1}
+    with pytest.raises(ActionError, match='does not hold'):
+        actions.explain('connectedTo(A, A)')
+
+
+def test_several_people_may_act_at_once(graph: Any, actions: MissionActions) -> None:
+    serve(graph, PlaceObstacle, 'simulation/place_obstacle', success=True, message='there')
+    with ThreadPoolExecutor(4) as pool:
+        answers = pool.map(lambda n: actions.place_obstacle(f'box{n}', n, 0, 0.3), range(12))
+    assert list(answers) == ['there'] * 12
