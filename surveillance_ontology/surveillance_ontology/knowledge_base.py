@@ -160,10 +160,8 @@ def justify(
     """
     fixed = list(assumed)
 
-    def follows(chosen: Iterable[Axiom]) -> bool:
-        kb = KnowledgeBase('', [*fixed, *chosen])
-        consistent = kb.reason()
-        return not consistent if goal is None else consistent and kb.holds(goal)
+    def enough(chosen: Iterable[Axiom]) -> bool:
+        return follows((*fixed, *chosen), goal)
 
     declared = [axiom for axiom in schema if isinstance(axiom, Declaration)]
     used = list(dict.fromkeys(axiom for axiom in likely if axiom not in fixed))
@@ -171,12 +169,19 @@ def justify(
     choices = (used, list(dict.fromkeys([*used, *schema])), list(dict.fromkeys(axioms)))
     for choice in choices:
         candidates = [a for a in choice if not isinstance(a, Declaration | Annotation)]
-        if follows(candidates):
+        if enough(candidates):
             fixed = list(assumed)
-            if not follows(candidates):
+            if not enough(candidates):
                 candidates = [*declared, *candidates]
-            return tuple(_fewest(candidates, follows))
+            return tuple(_fewest(candidates, enough))
     return ()
+
+
+def follows(axioms: Iterable[Axiom], goal: Axiom | None) -> bool:
+    """Whether a fact, or with None a contradiction, follows from axioms."""
+    kb = KnowledgeBase('', axioms)
+    consistent = kb.reason()
+    return not consistent if goal is None else consistent and kb.holds(goal)
 
 
 def _fewest(candidates: list[Axiom], follows: Callable[[Iterable[Axiom]], bool]) -> list[Axiom]:
@@ -502,6 +507,8 @@ class KnowledgeBase:
             if isinstance(fact.sub, str) and isinstance(fact.sup, str):
                 return fact.sup in (fact.sub, THING, *self.superclasses(fact.sub))
             return False
+        if isinstance(fact, ClassAssertion) and fact.cls == THING:
+            return self.is_known('individual', fact.individual)
         return engine.understands(fact) and engine.holds(fact)
 
     def explain(self, fact: Axiom) -> Explanation | None:
@@ -518,14 +525,28 @@ class KnowledgeBase:
         found = None
         if not isinstance(fact, SubClassOf):
             found = Reasons(engine, self._schema_axioms).of_fact(fact)
-        return found or self._listed(axiom_text(fact), self.justification(fact))
+        if found is None:
+            return self._listed(axiom_text(fact), self.justification(fact))
+        return self._complete(found, fact)
 
     def explain_inconsistency(self) -> Explanation | None:
         """Why the ontology contradicts itself; None where the last `reason` found it does not."""
         if self._engine is None or self._consistent:
             return None
         found = Reasons(self._engine, self._schema_axioms).of_inconsistency()
-        return found or self._listed('the ontology is inconsistent', self.justification(None))
+        if found is None:
+            return self._listed('the ontology is inconsistent', self.justification(None))
+        return self._complete(found, None)
+
+    def _complete(self, found: Explanation, goal: Axiom | None) -> Explanation:
+        """The explanation with the axioms that its steps use without saying so."""
+        sources = found.sources()
+        schema = [axiom for axiom in self._told.axioms if not is_assertion(axiom)]
+        declared = (axiom for axiom in schema if isinstance(axiom, Declaration))
+        if follows((*declared, *sources), goal):
+            return found
+        needed = justify(self._told.axioms, goal, sources, schema)
+        return replace(found, background=tuple(a for a in needed if a not in sources))
 
     def justification(self, fact: Axiom | None) -> tuple[Axiom, ...]:
         """The fewest asserted axioms to which a fact is owed: without any of them it would not

@@ -58,6 +58,7 @@ class Mapping(NodeReader):
         super().__init__(graph)
         self.axioms: dict[Axiom, None] = {}
         self._added: list[Axiom] = []
+        self._used: set[str] = set()
         for subject, properties in self._nodes.items():
             self._subject(subject, properties)
 
@@ -247,6 +248,11 @@ class Mapping(NodeReader):
         return self._kinds.get(prop) == {'annotation_property'}
 
     def _same(self, subject: str, value: str) -> None:
+        if not self._used:
+            self._used = {name for properties in self._nodes.values() for name in properties}
+        for name in (subject, value):
+            if name in self._used:
+                self._report(subject, f'owl:sameAs says nothing of {local_name(name)} as property')
         self._add(ax.SameIndividual(frozenset((subject, value))))
 
     def _different(self, subject: str, value: str) -> None:

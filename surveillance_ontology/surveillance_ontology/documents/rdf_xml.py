@@ -86,9 +86,13 @@ def resolve(base: str, reference: str) -> str:
         raise RdfSyntaxError(f'IRI {reference!r} with base {stem!r}: {error}') from None
 
 
+_TAG = re.compile(rb'<(?:[^"\'>]|"[^"]*"|\'[^\']*\')*>')
+
+
 class _Reader:
-    def __init__(self, base: str) -> None:
+    def __init__(self, base: str, data: bytes) -> None:
         self.graph = Graph()
+        self.data = data
         self.stack = [_Frame('root', base=base)]
         self.blank = 0
         self.ids: set[str] = set()
@@ -159,6 +163,8 @@ class _Reader:
         if len(self.stack) > _MAX_DEPTH:
             raise self.fail(f'elements nest deeper than {_MAX_DEPTH}')
         if parent.kind == 'xml':
+            literal = next(frame for frame in reversed(self.stack) if frame.predicate)
+            literal.items = ['markup']
             self.stack.append(_Frame('xml'))
             return
         base, language = parent.base, parent.language
@@ -247,6 +253,8 @@ class _Reader:
             frame.subject, frame.predicate = blank, ''
         elif parse_type is not None:
             frame.kind, frame.datatype = 'xml', RDF + 'XMLLiteral'
+            tag = _TAG.match(self.data, self.parser.CurrentByteIndex)
+            frame.counter = tag.end() if tag else self.parser.CurrentByteIndex
         elif resource is not None:
             frame.kind, frame.object = 'empty', self.resolve(base, resource)
         elif node_id is not None:
@@ -288,7 +296,11 @@ class _Reader:
                 head = cell
             self.emit(frame.subject, frame.predicate, head, frame.reified)
         elif frame.kind == 'xml' and frame.predicate:
-            value = Literal(''.join(frame.text), frame.datatype)
+            text = ''.join(frame.text)
+            if frame.items:  # With elements inside, the literal is what is written.
+                inside = self.data[frame.counter : self.parser.CurrentByteIndex]
+                text = inside.decode('utf-8', 'replace')
+            value = Literal(text, frame.datatype)
             self.emit(frame.subject, frame.predicate, value, frame.reified)
 
 
@@ -307,7 +319,7 @@ def parse_rdf_xml(data: bytes, base: str) -> Graph:
         RdfSyntaxError: With line and column, for anything that is not RDF/XML or would expand
             entities.
     """
-    reader = _Reader(base)
+    reader = _Reader(base, data)
     try:
         reader.parser.Parse(data, True)
     except expat.ExpatError as error:

@@ -30,6 +30,7 @@ class Explanation:
         reason: A calculation that replaces the listing of premises in the sentence, '' where none
             is needed.
         axioms: The asserted axioms of this step: the assertion itself, or what was applied.
+        background: Axioms that the derivation rests on besides those that its steps name.
     """
 
     fact_text: str
@@ -38,10 +39,11 @@ class Explanation:
     premises: tuple[Explanation, ...] = ()
     reason: str = ''
     axioms: tuple[Axiom, ...] = ()
+    background: tuple[Axiom, ...] = ()
 
     def sources(self) -> tuple[Axiom, ...]:
         """Every asserted axiom of the derivation, without repeats."""
-        found = dict.fromkeys(self.axioms)
+        found = dict.fromkeys((*self.axioms, *self.background))
         for premise in self.premises:
             found.update(dict.fromkeys(premise.sources()))
         return tuple(found)
@@ -56,6 +58,8 @@ class Explanation:
         yield f'{"  " * depth}{self.fact_text}{detail}  [{note}]'
         for premise in self.premises:
             yield from premise._lines(depth + 1)
+        for axiom in self.background:
+            yield f'{"  " * (depth + 1)}{axiom_text(axiom)}  [asserted]'
 
     def sentence(self) -> str:
         """The fact and its immediate reason in one sentence without a full stop."""

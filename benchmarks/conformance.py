@@ -1,0 +1,245 @@
+"""How the reasoner takes ontologies that nobody here wrote.
+
+    python benchmarks/conformance.py FOLDER [--quick] [--seconds 20] [--java]
+
+FOLDER holds OWL 2 test cases of the W3C as JSON (a list of records with `name`, `kinds`, `premise`,
+`conclusion` and `non_conclusion`, the documents as RDF/XML) and ontologies in any format that
+`read_ontology` reads; subfolders too. Each is read and reasoned over in a process of its own.
+One table tells what became of the cases, one what became of the ontologies. `named` are cases whose
+answer is missing and whose axioms are reported in `unsupported`; `silent` ones are missing without
+a word. With --java HermiT and Pellet (the copies that owlready2 brings) judge the consistency of
+the same documents.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT))
+
+from benchmarks.java_reasoner import KINDS, JavaFailed, JavaReasoner, absent  # noqa: E402
+from surveillance_ontology import (  # noqa: E402
+    KnowledgeBase,
+    OntologyFileError,
+    read_ontology,
+    write_ontology,
+)
+from surveillance_ontology.owl.axioms import (  # noqa: E402
+    Annotation,
+    Axiom,
+    ClassAssertion,
+    DataPropertyAssertion,
+    Declaration,
+    DifferentIndividuals,
+    ObjectPropertyAssertion,
+    SameIndividual,
+    SubClassOf,
+)
+
+BASE = 'http://example.org/'
+ENDINGS = ('.owl', '.rdf', '.ttl', '.ofn', '.owx', '.nt')
+QUICK = 40
+ASKABLE = (ClassAssertion, ObjectPropertyAssertion, DataPropertyAssertion, SameIndividual)
+
+
+@dataclass
+class Result:
+    """What became of one document; `detail` says what is missing or went wrong."""
+
+    name: str
+    outcome: str
+    detail: str = ''
+    axioms: int = 0
+    seconds: float = 0.0
+    unsupported: int = 0
+
+
+def askable(axiom: Axiom) -> bool:
+    """Whether `holds` can be asked for an axiom: a fact about named individuals or classes."""
+    if isinstance(axiom, SubClassOf):
+        return isinstance(axiom.sub, str) and isinstance(axiom.sup, str)
+    if isinstance(axiom, ClassAssertion) and not isinstance(axiom.cls, str):
+        return False
+    return isinstance(axiom, (*ASKABLE, DifferentIndividuals)) and '_:' not in repr(axiom)
+
+
+def reasoned(source: bytes | Path) -> tuple[KnowledgeBase, bool, list[str], float]:
+    """The document reasoned over: (knowledge, consistent, unsupported, seconds)."""
+    document = read_ontology(source, BASE)
+    kb = KnowledgeBase(document.iri or BASE, document.axioms)
+    start = time.perf_counter()
+    consistent = kb.reason()
+    return (
+        kb,
+        consistent,
+        [*document.unsupported, *kb.unsupported],
+        time.perf_counter() - start,
+    )
+
+
+def judge_case(case: dict[str, Any]) -> list[Result]:
+    """One result for the consistency and one for each entailment that a case tests."""
+    name, kinds = case['name'], case['kinds']
+    kb, consistent, unsupported, _ = reasoned(case['premise'].encode())
+    missing = 'named' if unsupported else 'silent miss'
+    results = []
+    if 'InconsistencyTest' in kinds:
+        results.append(Result(name, missing if consistent else 'right', 'no contradiction found'))
+    elif not consistent:
+        why = kb.explain_inconsistency()
+        results.append(Result(name, 'false inconsistency', why.sentence() if why else ''))
+    elif 'ConsistencyTest' in kinds:
+        results.append(Result(name, 'right'))
+    for kind, field in (
+        ('PositiveEntailmentTest', 'conclusion'),
+        ('NegativeEntailmentTest', 'non_conclusion'),
+    ):
+        if kind not in kinds or not consistent or not case.get(field):
+            continue
+        axioms = read_ontology(case[field].encode(), BASE).axioms
+        stated = [a for a in axioms if not isinstance(a, Declaration | Annotation)]
+        asked = [axiom for axiom in stated if askable(axiom)]
+        lacking = [axiom for axiom in asked if not kb.holds(axiom)]
+        if kind == 'NegativeEntailmentTest':
+            if stated and len(asked) == len(stated):
+                results.append(Result(name, 'right' if lacking else 'unsound', field))
+        elif lacking:
+            results.append(Result(name, missing, f'not derived: {lacking[0]}'))
+        else:
+            results.append(Result(name, 'right' if len(asked) == len(stated) else 'not asked'))
+    return results
+
+
+def work(path: Path, place: int) -> list[Result]:
+    """The results of one case, or of one ontology where `place` is negative."""
+    name = path.name
+    try:
+        if place >= 0:
+            case = json.loads(path.read_text())[place]
+            name = case['name']
+            return judge_case(case)
+        kb, consistent, unsupported, seconds = reasoned(path)
+        outcome = 'loaded' if consistent else 'inconsistent'
+        return [Result(name, outcome, '', len(kb), seconds, len(unsupported))]
+    except OntologyFileError as error:
+        return [Result(name, 'refused', error.message)]
+    except Exception as error:
+        return [Result(name, 'crash', f'{type(error).__name__}: {error}')]
+
+
+def apart(path: Path, place: int, limit: float) -> list[Result]:
+    """`work` in a process of its own, ended after `limit` seconds."""
+    command = [sys.executable, __file__, str(path), '--one', str(place)]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=limit, check=False)
+    except subprocess.TimeoutExpired:
+        return [Result(f'{path.name} {place}', 'no answer', f'within {limit:g} s')]
+    if done.returncode:
+        return [Result(f'{path.name} {place}', 'crash', done.stderr.strip()[-200:])]
+    return [Result(**record) for record in json.loads(done.stdout)]
+
+
+def cases_in(folder: Path, most: int | None) -> Iterator[tuple[Path, int]]:
+    """Every test case, spread evenly where there are more than `most`."""
+    for path in sorted(folder.rglob('*.json')):
+        records = json.loads(path.read_text())
+        if isinstance(records, list) and all('premise' in record for record in records):
+            step = 1 if most is None else max(1, len(records) // most)
+            yield from ((path, place) for place in range(0, len(records), step))
+
+
+def ontologies_in(folder: Path) -> list[Path]:
+    return sorted(path for path in folder.rglob('*') if path.suffix in ENDINGS)
+
+
+def run_cases(places: list[tuple[Path, int]], limit: float) -> None:
+    """Runs the test cases and prints what became of them."""
+    counts: Counter[str] = Counter()
+    wrong: list[Result] = []
+    for path, place in places:
+        for result in apart(path, place, limit):
+            counts[result.outcome] += 1
+            if result.outcome not in ('right', 'not asked', 'named'):
+                wrong.append(result)
+    print(f'{len(places)} test cases')
+    for outcome in ('right', 'named', 'silent miss', 'false inconsistency', 'unsound'):
+        print(f'  {outcome:20} {counts.pop(outcome, 0):5}')
+    for outcome in ('crash', 'refused', 'no answer', 'not asked'):
+        print(f'  {outcome:20} {counts.pop(outcome, 0):5}')
+    for result in wrong:
+        print(f'  {result.outcome}: {result.name}: {result.detail[:150]}')
+    print()
+
+
+def verdicts(path: Path, java: list[str], limit: float) -> dict[str, str]:
+    """What the Java reasoners say of an ontology's consistency."""
+    found = {}
+    with tempfile.TemporaryDirectory() as folder:
+        copy = Path(folder) / 'ontology.owl'
+        try:
+            write_ontology(read_ontology(path, BASE).axioms, BASE, copy)
+        except (ValueError, OSError) as error:
+            return dict.fromkeys(java, str(error)[:40])
+        for kind in java:
+            with JavaReasoner(kind, timeout=limit) as reasoner:
+                try:
+                    found[kind] = reasoner.ask('load', str(copy))
+                except JavaFailed as error:
+                    found[kind] = str(error)[:40]
+    return found
+
+
+def run_ontologies(paths: list[Path], limit: float, java: list[str]) -> None:
+    if not paths:
+        return
+    head = f'{"ontology":26} {"axioms":>7} {"reason":>9} {"outcome":14} {"named":>6}'
+    print(head + ''.join(f'  {kind}' for kind in java))
+    for path in paths:
+        (result,) = apart(path, -1, limit)
+        line = f'{path.name:26} {result.axioms:7} {result.seconds:8.2f}s {result.outcome:14}'
+        said = verdicts(path, java, limit)
+        line += f' {result.unsupported:6}' + ''.join(f'  {said[kind]}' for kind in java)
+        print(line + (f'  {result.detail[:90]}' if result.detail else ''))
+
+
+def main() -> None:
+    """Reads the arguments and prints the tables."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument('folder', type=Path, help='where the ontologies and test cases are')
+    parser.add_argument('--quick', action='store_true', help=f'about {QUICK} of the test cases')
+    parser.add_argument('--seconds', type=float, default=20.0, help='longest time for a document')
+    parser.add_argument('--java', action='store_true', help='HermiT and Pellet as judges')
+    parser.add_argument('--one', type=int, help=argparse.SUPPRESS)
+    arguments = parser.parse_args()
+    if arguments.one is not None:
+        print(json.dumps([asdict(result) for result in work(arguments.folder, arguments.one)]))
+        return
+    if not arguments.folder.is_dir():
+        parser.error(f'{arguments.folder} is not a folder')
+    java: list[str] = []
+    if arguments.java and not absent():
+        java = list(KINDS)
+    elif arguments.java:
+        print(f'without Java reasoners: {absent()}')
+    places = list(cases_in(arguments.folder, QUICK if arguments.quick else None))
+    paths = ontologies_in(arguments.folder)
+    if not places and not paths:
+        parser.error(f'{arguments.folder} holds no test cases and no ontologies')
+    if places:
+        run_cases(places, arguments.seconds)
+    run_ontologies(paths, arguments.seconds, java)
+
+
+if __name__ == '__main__':
+    main()
