@@ -85,6 +85,7 @@ class Container(State):
         fsm_raised: Interrupts that have been raised and have not begun.
         fsm_aside: The container was asked to be put aside in the moment before it began.
         fsm_table: The nodes of states and interrupts by label, as they were last made.
+        fsm_data: The dictionary behind the userdata, as it was then.
     """
 
     together = False
@@ -95,6 +96,7 @@ class Container(State):
     fsm_raised: tuple[Branch, ...] = ()
     fsm_aside = False
     fsm_table: Mapping[str, Node] = {}
+    fsm_data: dict[str, Any]
     _table_made_for: tuple[int, dict[str, Any], Clock, str] | None = None
     _control: Control | None = None
     _preempt_timeout: float | None = DEFAULT_PREEMPT_TIMEOUT
@@ -104,6 +106,7 @@ class Container(State):
         'fsm_raised',
         'fsm_aside',
         'fsm_table',
+        'fsm_data',
         '_table_made_for',
         '_control',
     }
@@ -274,7 +277,7 @@ class Container(State):
         """Take the input keys over from the parent's userdata."""
         if parent_ud is None or not self._input_keys:
             return
-        data = raw(self.userdata)
+        data = self.fsm_data
         if isinstance(parent_ud, Remapper):
             missing = parent_ud.fsm_copy_to(data, self._input_keys)
         else:
@@ -291,7 +294,7 @@ class Container(State):
         """Hand the output keys over to the parent's userdata."""
         if parent_ud is None or not self._output_keys:
             return
-        data = raw(self.userdata)
+        data = self.fsm_data
         if isinstance(parent_ud, Remapper):
             missing = parent_ud.fsm_take_from(data, self._output_keys)
         else:
@@ -424,6 +427,8 @@ class Container(State):
     def fsm_node(self, label: str, state: State, priority: float = LOWEST) -> Node:
         """Make the node of one state; its targets are left to the container's kind."""
         node = Node(self, label, state, priority)
+        if isinstance(state, Container) and state.is_entered_directly():
+            node.enter = node.execute = state.fsm_enter
         clock = self.fsm_clock
         if isinstance(state, State) and state.fsm_clock is not clock:
             state.fsm_clock = clock
@@ -459,7 +464,7 @@ class Container(State):
             or made_for[3] != path
         ):
             self.check_consistency()
-            self.fsm_path, self.fsm_clock = path, clock
+            self.fsm_path, self.fsm_clock, self.fsm_data = path, clock, data
             # A registration that comes meanwhile must not be taken for one that came before.
             version = structure_version.number
             self.fsm_table = self._with_branches(self.fsm_make_table())
@@ -512,6 +517,15 @@ class Container(State):
         if thread is not None and thread.executes_next(self, here.stack):
             return self._enter(thread, here.stack, parent_ud)
         return self._execute_as_root(parent_ud)
+
+    def is_entered_directly(self) -> bool:
+        """Whether nobody has put code of his own around `execute`."""
+        return type(self).execute is Container.execute and 'execute' not in self.__dict__
+
+    def fsm_enter(self, parent_ud: Any) -> Any:
+        """Run as the state that the engine executes next on this thread; see `execute`."""
+        here = this_thread
+        return self._enter(here.thread, here.stack, parent_ud)
 
     def _execute_as_root(self, parent_ud: Any) -> Any:
         """Begin a run of its own, and watch it to its end."""

@@ -1,6 +1,6 @@
 """The execution of a container in which one state runs at a time: the loop over its states.
 
-Most transitions need only the loop, `SequentialFrame._drive`. It looks at one flag after each
+Most transitions need only the loop, `SequentialFrame._run_from`. It looks at one flag after each
 state. When something beside the next state wants to be looked at (`attention`), `_attend` passes
 preempts on, lets interrupts cut in and resumes from them, forces outcomes, and stands still while
 the machine is paused.
@@ -96,7 +96,7 @@ class SequentialFrame(Frame):
             target = self._attend(None, None, target)
         elif run.trace is not None:
             self._tell(_Move(None, None, target, 'start'))
-        return self._finish(self._drive(target))
+        return self._run_from(target)
 
     def proceed(self, outcome: Any) -> Any:
         """Go on as if the current state had just returned `outcome`, and run to the end."""
@@ -110,7 +110,7 @@ class SequentialFrame(Frame):
                 outcome = settle(node, self, watch, outcome)
             self.current = target = node.target(outcome)
             take_note(node.state)
-            return self._finish(self._drive(self._attend(node, outcome, target)))
+            return self._run_from(self._attend(node, outcome, target))
         except BaseException:
             if self.container.fsm_frame is self:
                 self.container.fsm_frame = None
@@ -120,10 +120,10 @@ class SequentialFrame(Frame):
             if stack and stack[-1] is self:
                 stack.pop()
 
-    def _drive(self, target: Any) -> Exit:
-        """Execute states from `target` on until one leads out of the container."""
+    def _run_from(self, target: Any) -> Any:
+        """Execute states from `target` on until one leads out of the container; the outcome."""
         container, run = self.container, self.run
-        data, now = raw(container.userdata), run.now
+        data, now = container.fsm_data, run.now
         trace, callbacks, chatty = run.trace, container.fsm_transition_cbs, run.chatty
         told: Node | Exit = target
         node: Any = None
@@ -147,8 +147,9 @@ class SequentialFrame(Frame):
                 trace, chatty = run.trace, run.chatty
             elif trace is not None or callbacks or chatty or control.shutdown_check is not None:
                 if control.is_shutdown():
-                    self.stopped, self.current = target, SHUTDOWN
-                    return SHUTDOWN
+                    self.stopped = target
+                    self.current = told = target = SHUTDOWN
+                    break
                 if trace is not None:
                     try:
                         trace((node, outcome, now(), data.copy() if data else NO_USERDATA))
@@ -160,13 +161,9 @@ class SequentialFrame(Frame):
                     container.call_transition_cbs()
         if target is not told and container.fsm_termination_cbs:
             container.call_termination_cbs([node.label], target.label)
-        end: Exit = target
-        return end
-
-    def _finish(self, target: Exit) -> Any:
         if target is ASIDE:
             return SUSPENDED
-        self.container.fsm_copy_output_keys(self.parent_ud)
+        container.fsm_copy_output_keys(self.parent_ud)
         return None if target is SHUTDOWN else target.label
 
     # Between two states.

@@ -17,6 +17,8 @@ from surveillance_fsm.ros import (
     ActionServerWrapper,
     ClockWait,
     ConditionState,
+    GoalCaller,
+    GoalServer,
     IntrospectionClient,
     IntrospectionServer,
     MonitorState,
@@ -111,6 +113,40 @@ def test_a_cancelled_goal_of_a_plain_node_preempts_its_machine(graph, node):
     began(waiter, timeout=20.0)
     client.request_preempt()
     assert run.result() == 'preempted'
+
+
+class Slow:
+    """An action client's handle that dawdles after it has sent, until the answer has come."""
+
+    def __init__(self, handle):
+        self._handle = handle
+
+    def __getattr__(self, name):
+        found = getattr(self._handle, name)
+        if not name.startswith('send_'):
+            return found
+
+        def send(*arguments):
+            number = found(*arguments)
+            threading.Event().wait(0.2)
+            return number
+
+        return send
+
+    def __enter__(self):
+        return self._handle.__enter__()
+
+    def __exit__(self, *error):
+        return self._handle.__exit__(*error)
+
+
+def test_an_answer_that_comes_before_the_question_was_noted_is_not_lost(graph, node):
+    GoalServer(node, FollowPath, 'follow_path', lambda goal, run: FollowPath.Result())
+    caller = GoalCaller(graph.node, FollowPath, 'follow_path')
+    graph.until(caller.is_ready)
+    caller._client._client_handle = Slow(caller._client._client_handle)
+    end = caller.run(FollowPath.Goal(), accept_timeout=5.0, result_timeout=5.0)
+    assert end.status == 'succeeded'
 
 
 @pytest.mark.parametrize('rate', [0, -1, float('inf'), float('nan'), '20'])

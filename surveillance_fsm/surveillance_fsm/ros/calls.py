@@ -251,6 +251,37 @@ _STATUS = {
 }
 
 
+class _ActionClient(ActionClient):  # type: ignore[misc]
+    """An action client that takes no answer before it has noted what it asked.
+
+    rclpy 7.1 sends a request and notes it afterwards. An answer that the executor takes in between
+    is dropped as unexpected, and its future is never done.
+    """
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        self._asking = threading.RLock()
+        super().__init__(*args, **kwargs)
+
+    def send_goal_async(self, *args: Any, **kwargs: Any) -> Future:
+        """Send a goal, see rclpy."""
+        with self._asking:
+            return super().send_goal_async(*args, **kwargs)
+
+    def _get_result_async(self, goal_handle: Any) -> Future:
+        with self._asking:
+            return super()._get_result_async(goal_handle)
+
+    def _cancel_goal_async(self, goal_handle: Any) -> Future:
+        with self._asking:
+            return super()._cancel_goal_async(goal_handle)
+
+    async def execute(self, taken_data: Any) -> None:
+        """Take answers in, see rclpy."""
+        with self._asking:
+            pass
+        await super().execute(taken_data)
+
+
 class GoalCaller:
     """Sends goals to one action server, one at a time.
 
@@ -269,7 +300,7 @@ class GoalCaller:
     ) -> None:
         self._node = node
         group = ReentrantCallbackGroup()
-        self._client = ActionClient(
+        self._client = _ActionClient(
             node, action_type, name, callback_group=group, **ACTION_CLIENT_QOS
         )
         own(node, self._client)
