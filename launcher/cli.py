@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import io
+import json
 import os
 import signal
 import sys
@@ -41,6 +42,9 @@ PACKAGE_COMMANDS = {
         'check the state machines and draw them',
     ),
 }
+
+PACKAGE_HELP = CHECKOUT / 'launcher' / 'package_help.json'
+"""What each of them says to --help: it is said at once, and without a set-up."""
 
 _DESCRIPTION = """\
 Patrols, with every node as a process of its own, until Ctrl-C; or does what COMMAND says. What the
@@ -405,7 +409,7 @@ def _params(argv: list[str]) -> int:
     )
     parser.add_argument('name', nargs='?', metavar='NODE', help='of this node alone')
     parser.add_argument(
-        '--write', action='store_true', help='write the schema and docs/parameters.md anew'
+        '--write', action='store_true', help='write the schema, docs/parameters.md and helps anew'
     )
     options = parser.parse_args(argv)
     chosen = [node_table.find(options.name)] if options.name else list(node_table.NODES)
@@ -489,6 +493,9 @@ def _lint(argv: list[str]) -> int:
 
 
 def _package_command(name: str, argv: list[str]) -> int:
+    if argv in (['-h'], ['--help']) and PACKAGE_HELP.exists():
+        print(json.loads(PACKAGE_HELP.read_text(encoding='utf-8')).get(name, ''), end='')
+        return 0
     _enter([name, *argv])
     import importlib
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import shutil
 import subprocess
 import sys
 
-from launcher.parameter_tables import as_markdown
+from launcher.cli import PACKAGE_HELP
+from launcher.parameter_tables import as_markdown, package_helps
 from surveillance_runtime.configuration import SCHEMA, read_schema
 from tests.launcher.conftest import ROOT
 
@@ -39,3 +41,20 @@ def test_params_prints_each_value_with_its_source():
     assert lines['execution_mode'].endswith('"RANDOM"  (--mode RANDOM)')
     assert 'config/parameters.yaml:' in lines['random_battery_time']
     assert lines['console'].rstrip().endswith(')')
+
+
+def test_the_helps_of_the_packages_commands_are_theirs():
+    hint = 'write them anew: python3 launch.py params --write'
+    assert json.loads(PACKAGE_HELP.read_text()) == package_helps(), hint
+
+
+def test_every_help_is_said_soon_and_needs_no_set_up(tmp_path):
+    # A copy of the launcher alone: without an environment and without the packages.
+    shutil.copytree(ROOT / 'launcher', tmp_path / 'launcher')
+    shutil.copyfile(ROOT / 'launch.py', tmp_path / 'launch.py')
+    for command in ('', 'run', 'node', 'list', 'params', 'service', 'setup', 'test', 'lint', 'map'):
+        words = [sys.executable, '-S', 'launch.py', *command.split(), '--help']
+        done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, timeout=20)
+        assert (done.returncode, done.stderr) == (0, '')
+        assert 'usage:' in done.stdout
+    assert not (tmp_path / '.venv').exists()
