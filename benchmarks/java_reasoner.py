@@ -13,7 +13,7 @@ SOURCE = Path(__file__).parent / 'java' / 'ResidentReasoner.java'
 KINDS = ('pellet', 'hermit')
 
 
-class JavaFailed(Exception):
+class JavaReasonerError(Exception):
     """The reasoner refused, failed, or took too long; the text is one line."""
 
 
@@ -44,7 +44,7 @@ class JavaReasoner:
         timeout: Longest wait for one answer, seconds.
 
     Raises:
-        JavaFailed: From every method, when the JVM fails or does not answer in time.
+        JavaReasonerError: From every method, when the JVM fails or does not answer in time.
     """
 
     def __init__(self, kind: str, memory: int = 2000, timeout: float = 60.0) -> None:
@@ -67,14 +67,14 @@ class JavaReasoner:
             process.stdin.write('\t'.join(words) + '\n')
             process.stdin.flush()
         except BrokenPipeError:
-            raise JavaFailed('the JVM ended') from None
+            raise JavaReasonerError('the JVM ended') from None
         ready, _, _ = select.select([process.stdout], [], [], self._timeout)
         if not ready:
             self.close()
-            raise JavaFailed(f'no answer within {self._timeout:g} s')
+            raise JavaReasonerError(f'no answer within {self._timeout:g} s')
         answer = process.stdout.readline().strip()
         if not answer or answer.startswith('error'):
-            raise JavaFailed(answer.removeprefix('error ') or 'the JVM ended')
+            raise JavaReasonerError(answer.removeprefix('error ') or 'the JVM ended')
         return answer
 
     def close(self) -> None:

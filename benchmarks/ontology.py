@@ -30,7 +30,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
-from benchmarks.java_reasoner import KINDS, JavaFailed, JavaReasoner, absent  # noqa: E402
+from benchmarks.java_reasoner import KINDS, JavaReasoner, JavaReasonerError, absent  # noqa: E402
 from surveillance_ontology.documents.reading import read_ontology  # noqa: E402
 from surveillance_ontology.documents.writing import write_ontology  # noqa: E402
 from surveillance_ontology.knowledge_base import KnowledgeBase  # noqa: E402
@@ -275,7 +275,7 @@ def java_rows(figures: list[Figures], quick: bool) -> list[list[str]]:
                 break
             try:
                 reason, query = measure_java(kind, places, 40 if quick else visits)
-            except JavaFailed as error:
+            except JavaReasonerError as error:
                 rows.append([title, 'refuses', '', str(error).rpartition(': ')[2]])
                 break
             ratio = (reason + query) / ours[places].visit

@@ -265,10 +265,10 @@ def make_parser(*, help_too: bool = True) -> argparse.ArgumentParser:
 def main(argv: Sequence[str]) -> int:
     """Runs one command and returns its exit code."""
     # A set-up that is told to end has to take its compilers along.
-    for number in (signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, signal.default_int_handler)
     _make_streams_safe()
     try:
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            signal.signal(number, signal.default_int_handler)
         return _dispatch(list(argv))
     except (system.MissingError, SetupError, ValueError) as error:
         print(f'launch.py: {error}', file=sys.stderr)
@@ -281,6 +281,7 @@ def main(argv: Sequence[str]) -> int:
         print(f'launch.py: {what}{error.strerror or error}', file=sys.stderr)
         return EXIT_BAD_INPUT
     except KeyboardInterrupt:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # one is enough
         ready = Environment(CHECKOUT).ready()
         more = '' if ready else '; the next start goes on with the set-up'
         print(f'\nlaunch.py: interrupted{more}', file=sys.stderr)
@@ -381,6 +382,7 @@ def _node(argv: list[str]) -> int:
         for descriptor in claim([node], runs.ros_domain(run), run.namespace):
             os.set_inheritable(descriptor, True)
     words = runs.command([node], arguments, 0)
+    _hold_stop_signals_back()
     os.execve(words[0], words, runs.node_environ(run))
 
 
@@ -521,9 +523,17 @@ def _enter(argv: list[str], extras: Sequence[str] = ()) -> None:
     if environment is None:
         return
     environment.prepare()
+    for line in environment.drop_missing_middleware(os.environ):
+        print(f'launch.py: {line}', file=sys.stderr)
     if not environment.active():
         words = [str(environment.python), str(CHECKOUT / 'launch.py'), *argv]
+        _hold_stop_signals_back()
         os.execve(words[0], words, clean_environ())
+
+
+def _hold_stop_signals_back() -> None:
+    """Keep Ctrl-C until the next program can take it: Python itself would print a traceback."""
+    signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
 
 
 def _exec(words: list[str]) -> None:

@@ -13,7 +13,7 @@ import signal
 import subprocess
 import sys
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, MutableMapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -89,6 +89,25 @@ class Environment:
         with self._alone() as lock:
             if not self.ready():  # another launch may have done it in the meantime
                 self._set_up(lock)
+
+    def drop_missing_middleware(self, environ: MutableMapping[str, str]) -> list[str]:
+        """Take a middleware that is not installed out of an environment; rcl would exit with 102.
+
+        Nodes of different middlewares of DDS hear each other, so going on is worth a line each.
+
+        Returns:
+            What there is to say.
+        """
+        lines = []
+        for name in ('RMW_IMPLEMENTATION', 'RCL_ASSERT_RMW_ID_MATCHES'):
+            asked = environ.get(name, '')
+            if asked and not (self.venv / 'lib' / f'lib{Path(asked).name}.so').exists():
+                del environ[name]
+                lines.append(
+                    f'environment variable {name}: {asked} is not installed in .venv, '
+                    'going on with its own middleware, rmw_fastrtps_cpp'
+                )
+        return lines
 
     def _extras(self, journal: Journal) -> list[str]:
         return sorted({*journal.extras, *self._wanted_extras})

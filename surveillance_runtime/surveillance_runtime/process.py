@@ -8,6 +8,7 @@ running goal can be cancelled), and only then takes ROS down.
 from __future__ import annotations
 
 import contextlib
+import inspect
 import os
 import signal
 import sys
@@ -29,7 +30,6 @@ from rclpy.signals import SignalHandlerOptions
 from threadpoolctl import threadpool_limits
 
 from surveillance_runtime.configuration import RosArguments, argument_layer, split_arguments
-from surveillance_runtime.middleware import check_middleware
 from surveillance_runtime.node import (
     JOIN_SECONDS,
     PatrolNode,
@@ -72,7 +72,6 @@ def run_nodes(
     try:
         arguments = split_arguments(argv[1:])
         arguments.configuration()  # the files are there, and of the right form
-        check_middleware()
         words = [argv[0], *arguments.rest]
         rclpy.init(args=words, signal_handler_options=SignalHandlerOptions.NO)
     except Exception as error:
@@ -193,6 +192,8 @@ class _Ending:
         # Set by hand: background jobs of a shell inherit an ignored SIGINT.
         for number in STOP_SIGNALS:
             signal.signal(number, lambda _number, _frame: None)
+        # The launcher's command `node` held them back while Python started.
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, STOP_SIGNALS)
 
     def come(self) -> None:
         """End the wait; from any thread."""
@@ -270,7 +271,19 @@ class ExecutorThread:
         self.executor.create_task(lambda: None)
         if self._thread is not None:
             self._thread.join(JOIN_SECONDS)
+        _close_tasks(self.executor)
         self.executor.shutdown(timeout_sec=JOIN_SECONDS)
+
+
+def _close_tasks(executor: SingleThreadedExecutor) -> None:
+    """Close coroutines that never got their turn: Python would warn that they were not awaited.
+
+    rclpy offers no way to cancel what waits in an executor.
+    """
+    for task, *_ in list(getattr(executor, '_tasks', ())):
+        handler = getattr(task, '_handler', None)
+        if inspect.iscoroutine(handler):
+            handler.close()
 
 
 def _node_of(error: BaseException) -> Node | None:

@@ -80,7 +80,7 @@ def test_outcomes_and_keys_that_are_no_list_of_strings_are_refused(wrong):
         fsm.cb_interface(outcomes=wrong)(print)
 
 
-class Unspeakable(Exception):
+class UnspeakableError(Exception):
     def __str__(self):
         raise RuntimeError('not today')
 
@@ -95,8 +95,8 @@ class Unshowable:
 def test_an_error_that_cannot_be_shown_is_still_told_where_it_came_from():
     root = fsm.StateMachine(['done'])
     with root:
-        fsm.StateMachine.add('BAD', Answer(Unspeakable(), outcomes=['done']))
-    with pytest.raises(fsm.InvalidUserCodeError, match=r'StateMachine/BAD.*Unspeakable'):
+        fsm.StateMachine.add('BAD', Answer(UnspeakableError(), outcomes=['done']))
+    with pytest.raises(fsm.InvalidUserCodeError, match=r'StateMachine/BAD.*UnspeakableError'):
         root.execute()
 
 

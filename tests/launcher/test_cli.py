@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 
@@ -73,3 +74,59 @@ def test_the_options_of_a_run():
     assert options.seconds == 2.5
     assert options.without == ['armor_server', 'reasoner']
     assert options.composed
+
+
+def test_a_middleware_that_is_not_installed_is_said_in_one_line_and_does_without():
+    words = [sys.executable, 'launch.py', 'node', 'armor_server', '-p', 'store:=none']
+    words += ['--ros-args', '-p', 'nonsense:=1']
+    environ = {**os.environ, 'RMW_IMPLEMENTATION': 'rmw_cyclonedds_cpp'}
+    done = subprocess.run(words, cwd=ROOT, env=environ, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 2
+    first, second = done.stderr.splitlines()
+    assert 'RMW_IMPLEMENTATION: rmw_cyclonedds_cpp is not installed' in first
+    assert "unknown parameter 'nonsense'" in second
+
+
+@pytest.mark.parametrize(
+    'environ',
+    [
+        {'LANG': 'C', 'LC_ALL': 'C'},
+        {'LC_ALL': 'xx_XX.ISO-8859-1'},
+        {'HOME': '/nonexistent'},
+        {'HOME': ''},
+        {'TMPDIR': '/nonexistent'},
+        {'XDG_RUNTIME_DIR': '/nonexistent'},
+        {'XDG_RUNTIME_DIR': 'relative'},
+        {'TERM': 'dumb', 'COLUMNS': '0'},
+        {'COLUMNS': 'wide', 'LINES': '-1'},
+        {'http_proxy': 'http://127.0.0.1:9', 'https_proxy': 'nonsense'},
+        {'PYTHONPATH': '/nonexistent', 'PYTHONHOME': ''},
+        {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'NONSENSE'},
+        {'ROS_LOCALHOST_ONLY': '1'},
+        {'RMW_IMPLEMENTATION': '../../x'},
+        {'ROS_DOMAIN_ID': ''},
+        {'NOTIFY_SOCKET': '/nonexistent'},
+    ],
+)
+def test_a_hostile_environment_works_or_costs_one_line(environ):
+    program = 'import sys; from launcher.cli import main; sys.exit(main(sys.argv[1:]))'
+    words = [sys.executable, '-c', program, 'params', 'reasoner', '-p', 'urgency_threshold:=77']
+    given = {**os.environ, 'PYTHONPATH': str(ROOT)} | environ
+    if 'PYTHONPATH' in environ:
+        words[1:3] = ['launch.py']
+    done = subprocess.run(words, cwd=ROOT, env=given, capture_output=True, text=True, timeout=60)
+    assert 'Traceback' not in done.stderr
+    assert done.stderr.count('\n') <= 1
+    if done.returncode == 0:
+        assert 'urgency_threshold' in done.stdout
+    else:
+        assert done.returncode == 2
+
+
+@pytest.mark.parametrize('domain', ['200', '-1', 'x', '1e3'])
+def test_a_domain_of_the_environment_that_is_none_costs_one_line(domain):
+    words = [sys.executable, 'launch.py', 'node', 'reasoner']
+    given = {**os.environ, 'ROS_DOMAIN_ID': domain}
+    done = subprocess.run(words, cwd=ROOT, env=given, capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stderr.count('\n')) == (2, 1)
+    assert f'ROS_DOMAIN_ID: got {domain!r}' in done.stderr

@@ -24,3 +24,28 @@ def test_nodes_compute_on_one_thread_whatever_was_imported_before() -> None:
         [sys.executable, '-c', PROGRAM], capture_output=True, text=True, timeout=60
     )
     assert "{'blas': 1" in done.stdout, done
+
+
+LEFT_BEHIND = """
+import warnings
+warnings.simplefilter('error')
+import rclpy
+from surveillance_runtime.process import ExecutorThread
+
+async def ask():
+    raise AssertionError('its turn never comes')
+
+context = rclpy.Context()
+rclpy.init(context=context)
+spinner = ExecutorThread(context)
+spinner.executor.create_task(ask)
+spinner.stop()
+rclpy.shutdown(context=context)
+"""
+
+
+def test_a_coroutine_that_never_had_its_turn_is_closed_without_a_warning() -> None:
+    done = subprocess.run(
+        [sys.executable, '-c', LEFT_BEHIND], capture_output=True, text=True, timeout=60
+    )
+    assert (done.returncode, done.stderr) == (0, '')

@@ -1,0 +1,41 @@
+"""Ctrl-C at any moment of a command: no traceback, no warning, nothing left behind."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+
+import pytest
+
+from tests.launcher.conftest import ROOT, gone
+
+MOMENTS = [0.0, 0.03, 0.06, 0.1, 0.15, 0.2, 0.3, 0.45, 0.7, 1.1]
+
+
+@pytest.mark.parametrize('moment', MOMENTS)
+@pytest.mark.parametrize(
+    'command', ['node armor_server --domain 66', 'params', 'map config/office.yaml']
+)
+def test_ctrl_c_leaves_no_traceback(command, moment, tmp_path):
+    words = [sys.executable, str(ROOT / 'launch.py'), *command.split()]
+    words += ['-o', str(tmp_path / 'x.png')] if command.startswith('map') else []
+    with subprocess.Popen(
+        words,
+        cwd=ROOT,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        start_new_session=True,
+    ) as process:
+        threading.Event().wait(moment)
+        for _ in range(2):
+            os.killpg(process.pid, signal.SIGINT)
+        output, _ = process.communicate(timeout=20)
+    # Before Python has read launch.py it says what it says itself.
+    early = 'launch.py' not in output and 'site' in output
+    assert early or 'Traceback' not in output, output
+    assert 'never awaited' not in output
+    assert gone([process.pid], 0)
