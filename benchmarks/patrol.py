@@ -1,6 +1,6 @@
 """How long places go unvisited under each policy, beside the bound that no robot can beat.
 
-Every policy patrols every map for 24 simulated hours with fixed seeds. The robot drives 1 m/s and
+Every policy patrols every map for 24 simulated hours with fixed seeds. The robot drives 0.6 m/s and
 spends 2 s in each place it enters; all places count as just visited at the start.
 
 - longest: the longest time any place went unvisited, from visit to visit
@@ -51,7 +51,7 @@ from surveillance_behaviour.policy.simulation import (  # noqa: E402
 from surveillance_runtime.place import read_place  # noqa: E402
 
 DAY = 86400.0
-SPEED, DWELL = 1.0, 2.0
+SPEED, DWELL = 0.6, 2.0
 SEED = 1
 URGENCY = 7.0
 """Threshold of the seeds' ontology, seconds."""

@@ -13,6 +13,7 @@ from rclpy.task import Future
 from std_srvs.srv import Empty
 
 from surveillance_interfaces.msg import Decision, FsmTransition, MissionStatus
+from surveillance_interfaces.srv import GoTo, WhyNot
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import STATE_QOS
 
@@ -204,3 +205,34 @@ def test_a_machine_that_breaks_is_started_again_and_does_not_cry_on(
     assert cries.count(True) < len(cries) / 2
     assert not cries[-1]
     assert len(robot.visited(since=60.0)) > 2
+
+
+def test_an_operator_asks_why_not_and_sends_the_robot_to_a_place(robot: Robot, graph: Any) -> None:
+    asked = graph.node.create_client(WhyNot, 'why_not')
+    sent = graph.node.create_client(GoTo, 'go_to')
+    robot.configure('battery_controller', random_battery_time=[5000.0, 6000.0])
+    robot.begin()
+    robot.until(20.0)
+    graph.until(lambda: asked.service_is_ready() and sent.service_is_ready())
+
+    def answer(client: Any, request: Any) -> Any:
+        future = client.call_async(request)
+        graph.until(future.done)
+        return future.result()
+
+    told = answer(asked, WhyNot.Request(place='R4'))
+    assert told.success
+    assert told.message
+    wrong = answer(sent, GoTo.Request(place='R44'))
+    assert not wrong.success
+    assert 'the nearest name is R4' in wrong.message
+    mission = robot.nodes['robot_behavior'].mission
+    taken = {mission.place, mission.heading_to}
+    place = next(room for room in ('R4', 'R3', 'R2') if room not in taken)
+    assert answer(sent, GoTo.Request(place=place)).success
+    robot.until(120.0)
+    assert (place, 'request') in robot.decisions()
+    assert place in robot.visited(since=20.0)
+    home = answer(sent, GoTo.Request())
+    assert home.success
+    assert 'E' in home.message
