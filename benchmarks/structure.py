@@ -165,8 +165,8 @@ def spelling(trees: dict[str, ast.Module]) -> list[str]:
 
 
 def writers(modules: dict[str, Path]) -> list[str]:
-    """The modules that write isIn with a directive of ADD, REMOVE or REPLACE."""
-    change = re.compile(r"(?:ADD|REMOVE|REPLACE)[^'\n]*OBJECTPROP[^\n]*\n?[^\n]*isIn")
+    """The modules that write isIn with a directive of ADD, REMOVE, REPLACE or SET."""
+    change = re.compile(r"(?:ADD|REMOVE|REPLACE|SET)[^'\n]*OBJECTPROP[^\n]*\n?[^\n]*isIn")
     return [name for name, path in modules.items() if change.search(path.read_text('utf-8'))]
 
 
