@@ -1,25 +1,31 @@
-"""How many markers are found, how exactly and how fast, beside OpenCV's detector with its defaults.
+"""How many markers are found, how exactly and how fast, beside OpenCV's detectors and AprilTag 3.
 
-    python benchmarks/perception.py [--quick] [--picture FILE]
+    python benchmarks/perception.py [--quick] [--photos FOLDER] [--fuzz N] [--picture FILE]
 
-Both detectors get the same rendered images: 640x480 pixels, 60 degrees field of view, markers of
-0.20 m from DICT_5X5_100, a lens blur of 0.8 pixels and a noise of 2 grey levels. Seven ids are on
-the known list; what OpenCV finds is held against the same list. Times are processor time of one
-thread. `--picture` draws recall over distance and angle for both.
+All detectors get the same images: rendered ones of 640x480 pixels, 60 degrees field of view,
+markers of 0.20 m from DICT_5X5_100, a lens blur of 0.8 pixels and a noise of 2 grey levels, under
+lights from even to hard shadows; natural images without any marker; and real photographs where there are
+some (`--photos`, or the environment variable MARKER_PHOTOS: a folder with `markers.json`). Seven
+ids are on the known list; what others find is held against the same list. Times are processor time
+of one thread. `--fuzz` sends that many damaged messages through the conversions and the detector.
+`--picture` draws recall over distance and angle.
 """
 
 # ruff: noqa: E402 - the number of threads must be set before numpy is imported
 from __future__ import annotations
 
 import argparse
+import json
 import math
 import os
+import resource
 import sys
 import time
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 for variable in ('OPENBLAS_NUM_THREADS', 'OMP_NUM_THREADS'):
     os.environ.setdefault(variable, '1')
@@ -31,11 +37,14 @@ import numpy.typing as npt
 from surveillance_perception.detection.camera_model import CameraModel
 from surveillance_perception.detection.detector import DetectorSettings, MarkerDetector
 from surveillance_perception.detection.dictionaries import dictionary_named
+from surveillance_perception.detection.preprocessing import grey_of
 from surveillance_perception.testing.marker_scene import (
     BACKDROPS,
     Degradation,
+    Glare,
     ImageArray,
     Panel,
+    Shadow,
     backdrop_of,
     corners_in_image,
     image_of,
@@ -67,24 +76,45 @@ Found = list[tuple[int, npt.NDArray[np.float64]]]
 Detect = Callable[[ImageArray], Found]
 
 
-def opencv_defaults() -> Detect:
+def opencv_defaults(dictionary: cv2.aruco.Dictionary = DICTIONARY) -> Detect:
     """OpenCV's detector as it comes."""
-    detector = cv2.aruco.ArucoDetector(DICTIONARY)
-
-    def detect(image: ImageArray) -> Found:
-        corners, ids, _ = detector.detectMarkers(image)
-        if ids is None:
-            return []
-        # (N, 1) in OpenCV 4, (N,) in OpenCV 5
-        pairs = zip(np.ravel(ids).tolist(), corners, strict=True)
-        return [(marker_id, outline.reshape(4, 2)) for marker_id, outline in pairs]
-
-    return detect
+    detector = cv2.aruco.ArucoDetector(dictionary)
+    return lambda image: _found(detector.detectMarkers(image))
 
 
-def this_project(known: frozenset[int] | None = KNOWN) -> Detect:
+def _found(answer: tuple[Sequence[npt.NDArray[np.float32]], Any, Any]) -> Found:
+    corners, ids, _ = answer
+    if ids is None:
+        return []
+    # (N, 1) in OpenCV 4, (N,) in OpenCV 5
+    pairs = zip(np.ravel(ids).tolist(), corners, strict=True)
+    return [(marker_id, outline.reshape(4, 2).astype(float)) for marker_id, outline in pairs]
+
+
+def opencv_ladder(dictionary: cv2.aruco.Dictionary = DICTIONARY) -> Detect:
+    """OpenCV's detector with many thresholds and refined corners."""
+    parameters = cv2.aruco.DetectorParameters()
+    parameters.adaptiveThreshWinSizeMin, parameters.adaptiveThreshWinSizeMax = 3, 53
+    parameters.adaptiveThreshWinSizeStep = 4
+    parameters.minMarkerPerimeterRate = 0.01
+    parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
+    detector = cv2.aruco.ArucoDetector(dictionary, parameters)
+    return lambda image: _found(detector.detectMarkers(image))
+
+
+def apriltag3() -> Detect | None:
+    """AprilTag 3 for the family tag36h11; None where pupil-apriltags is not installed."""
+    try:
+        from pupil_apriltags import Detector
+    except ImportError:
+        return None
+    detector = Detector(families='tag36h11', nthreads=1, quad_decimate=1.0)
+    return lambda image: [(each.tag_id, each.corners) for each in detector.detect(grey_of(image))]
+
+
+def this_project(known: frozenset[int] | None = KNOWN, dictionary: str = 'DICT_5X5_100') -> Detect:
     """The detector of surveillance_perception."""
-    detector = MarkerDetector(DetectorSettings(known_ids=known))
+    detector = MarkerDetector(DetectorSettings(dictionary, known))
     return lambda image: [(each.marker_id, each.corners) for each in detector.detect(image)]
 
 
@@ -92,7 +122,7 @@ def this_project(known: frozenset[int] | None = KNOWN) -> Detect:
 class Tally:
     """What one detector did with some images."""
 
-    pictures: int = 0
+    images: int = 0
     found: int = 0
     shown: int = 0
     wrong_known: int = 0
@@ -194,6 +224,186 @@ def degraded(detectors: dict[str, Detect], samples: int) -> dict[str, Tallies]:
     return result
 
 
+LIGHTS = (
+    'hard shadow',
+    'soft shadow',
+    'deep shadow',
+    'glare',
+    'vignette',
+    'thin margin',
+    'dark wall',
+    'curled paper',
+    'rolling shutter',
+    'motion and noise',
+    'JPEG 15',
+    'all together',
+)
+
+
+def under_light(light: str, index: int) -> tuple[ImageArray, Panel]:
+    """A known marker at 1.2 to 3 m, up to 40 degrees, under one of `LIGHTS`."""
+    generator = np.random.default_rng([4, LIGHTS.index(light), index])
+    shown = replace(
+        panel(generator.uniform(1.2, 3.0), generator.uniform(0, 40), generator),
+        offset=tuple(generator.uniform(-120, 120, 2).tolist()),
+    )
+    side = shown.size * float(CAMERA.matrix[0, 0]) / shown.distance
+    middle = np.array(shown.offset) + CAMERA.matrix[:2, 2]
+    spot = tuple((middle + generator.uniform(-0.3, 0.3, 2) * side).tolist())
+    direction = float(generator.uniform(0, 2 * math.pi))
+    look, ground = SHARP, indoors(generator)
+    if light.endswith('shadow'):
+        brightness, softness = (0.3 if light.startswith('deep') else 0.5), 0.0
+        softness = 4.0 if light.startswith('soft') else 0.0
+        look = replace(SHARP, shadows=(Shadow(spot, direction, brightness, softness),))
+    elif light == 'glare':
+        look = replace(SHARP, glares=(Glare(spot, 10.0),))
+    elif light == 'vignette':
+        look = replace(SHARP, vignette=0.8, light=0.6)
+    elif light == 'thin margin':
+        shown, ground = replace(shown, margin=float(generator.uniform(0.15, 0.3))), 'dark'
+    elif light == 'dark wall':
+        shown, ground = replace(shown, margin=float(generator.uniform(0.5, 1.0))), 'dark'
+    elif light == 'curled paper':
+        shown = replace(shown, curl=float(generator.uniform(0.6, 1.2)))
+    elif light == 'rolling shutter':
+        look = replace(SHARP, shutter=float(generator.uniform(-60, 60)))
+    elif light == 'motion and noise':
+        look = replace(SHARP, motion=4.0, direction=direction, noise=8.0)
+    elif light == 'JPEG 15':
+        look = replace(SHARP, jpeg=15)
+    else:
+        shadow = Shadow(spot, direction, 0.6, 2.0)
+        look = replace(SHARP, shadows=(shadow,), vignette=0.4, motion=3.0, noise=5.0, jpeg=40)
+    return scene([shown], ground, look, generator), shown
+
+
+def print_lights(samples: int) -> None:
+    """Recall of each detector under each light, and wrong ids."""
+    detectors = {'OpenCV': opencv_defaults(), 'ladder': opencv_ladder(), 'here': this_project()}
+    rows = []
+    for light in LIGHTS:
+        found, wrong = dict.fromkeys(detectors, 0), dict.fromkeys(detectors, 0)
+        for index in range(samples):
+            image, shown = under_light(light, index)
+            for name, detect in detectors.items():
+                ids = [marker_id for marker_id, _ in detect(image)]
+                found[name] += shown.marker_id in ids
+                wrong[name] += sum(each != shown.marker_id for each in ids)
+        rows.append(
+            [light, *(f'{found[name] / samples:.2f} ({wrong[name]})' for name in detectors)]
+        )
+    print_table(['recall (wrong ids) under', *detectors], rows)
+
+
+def print_photos(folder: Path | None) -> None:
+    """Markers found in real photographs."""
+    if folder is None or not (folder / 'markers.json').exists():
+        print('no photographs: name their folder with --photos or MARKER_PHOTOS\n')
+        return
+    entries = json.loads((folder / 'markers.json').read_text())
+    names = ('OpenCV', 'ladder', 'AprilTag 3', 'here')
+    totals = {name: [0, 0, 0, 0.0] for name in names}
+    detectors: dict[tuple[str, str], Detect | None] = {}
+    for entry in entries:
+        image = cv2.imread(str(folder / entry['file']))
+        kind = entry['dictionary']
+        for name in names:
+            if (name, kind) not in detectors:
+                detectors[name, kind] = _photo_detector(name, kind)
+            detect = detectors[name, kind]
+            if detect is None:
+                continue
+            start = time.thread_time()
+            seen = detect(image)
+            totals[name][3] += time.thread_time() - start
+            totals[name][1] += len(entry['markers'])
+            left = list(entry['markers'])
+            for marker_id, corners in seen:
+                middle = corners.mean(axis=0)
+                reach = max(8.0, float(np.linalg.norm(corners - middle, axis=1).mean()))
+                hits = [
+                    each
+                    for each in left
+                    if each['id'] == marker_id and math.dist(each['centre'], middle) < reach
+                ]
+                if hits:
+                    left.remove(hits[0])
+                totals[name][0 if hits else 2] += 1
+    print_table(
+        [f'{len(entries)} photographs', 'found', 'of', 'not on the list', 'ms in all'],
+        [
+            [name, str(found), str(shown), str(other), f'{1e3 * seconds:.0f}']
+            for name, (found, shown, other, seconds) in totals.items()
+            if shown
+        ],
+    )
+
+
+def _photo_detector(name: str, kind: str) -> Detect | None:
+    if name == 'AprilTag 3':
+        return apriltag3() if kind == 'DICT_APRILTAG_36h11' else None
+    if name == 'here':
+        return this_project(None, kind)
+    make = opencv_defaults if name == 'OpenCV' else opencv_ladder
+    return make(dictionary_named(kind))
+
+
+def natural_images(count: int) -> Iterator[ImageArray]:
+    """Photographs of scikit-image and, where it is installed, scikit-learn: parts, rescaled."""
+    import skimage.data
+
+    sources = [
+        image
+        for path in sorted(Path(skimage.data.__file__).parent.iterdir())
+        if path.suffix in ('.png', '.jpg')
+        and (image := cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)) is not None
+        and min(image.shape) > 60
+    ]
+    try:
+        from sklearn.datasets import load_sample_images
+
+        sources += [cv2.cvtColor(each, cv2.COLOR_RGB2GRAY) for each in load_sample_images().images]
+    except ImportError:
+        pass
+    generator = np.random.default_rng(5)
+    for index in range(count):
+        image = sources[index % len(sources)]
+        if index >= len(sources):
+            scale = float(generator.uniform(0.4, 2.5))
+            image = np.rot90(cv2.resize(image, None, fx=scale, fy=scale), index % 4)
+        height, width = min(image.shape[0], 480), min(image.shape[1], 640)
+        top = int(generator.integers(image.shape[0] - height + 1))
+        left = int(generator.integers(image.shape[1] - width + 1))
+        yield np.ascontiguousarray(image[top : top + height, left : left + width])
+
+
+def print_natural(count: int) -> None:
+    """Ids seen in natural images that hold none, and the time for one."""
+    detectors = {'OpenCV': opencv_defaults(), 'ladder': opencv_ladder(), 'here': this_project(None)}
+    wrong, seconds = dict.fromkeys(detectors, 0), dict.fromkeys(detectors, 0.0)
+    for image in natural_images(count):
+        for name, detect in detectors.items():
+            start = time.thread_time()
+            wrong[name] += len(detect(image))
+            seconds[name] += time.thread_time() - start
+    print_table(
+        [f'{count} natural images', 'wrong ids', 'ms an image'],
+        [[name, str(wrong[name]), f'{1e3 * seconds[name] / count:.1f}'] for name in detectors],
+    )
+
+
+def print_fuzz(count: int) -> None:
+    """Send damaged messages through conversions and detector; whatever escapes ends the program."""
+    from surveillance_perception.testing.damaged_messages import damaged, taken
+
+    generator = np.random.default_rng(6)
+    detector = MarkerDetector()
+    good = sum(taken(damaged(generator), detector) for _ in range(count))
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    print(f'{count} damaged messages: {good} taken, the others refused; peak {peak:.0f} MB\n')
+
+
 def without_markers(count: int) -> Iterator[tuple[str, ImageArray]]:
     """Images without a marker of the dictionary: textures, and markers of other dictionaries."""
     kinds = [*BACKDROPS, 'other dictionaries']
@@ -283,15 +493,23 @@ def print_recall(title: str, groups: dict[str, Tallies]) -> None:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or '').splitlines()[0])
     parser.add_argument('--quick', action='store_true', help='fewer images, under 50 s')
     parser.add_argument('--picture', type=Path, help='draw recall over distance and angle')
+    parser.add_argument('--photos', type=Path, default=os.environ.get('MARKER_PHOTOS'))
+    parser.add_argument('--fuzz', type=int, metavar='N', help='damaged messages, and nothing else')
     options = parser.parse_args(argv)
     cv2.setNumThreads(1)
+    if options.fuzz is not None:
+        print_fuzz(options.fuzz)
+        return 0
     detectors = {'OpenCV': opencv_defaults(), 'here': this_project()}
-    samples, degraded_samples, empty = (2, 1, 90) if options.quick else (12, 5, 1008)
+    samples, degraded_samples, empty = (1, 1, 45) if options.quick else (12, 5, 10_000)
     print(f'OpenCV {cv2.__version__}, {samples} images a cell\n')
 
+    print_lights(3 if options.quick else 60)
+    print_photos(options.photos)
+    print_natural(40 if options.quick else 1500)
     cells = grid(detectors, samples)
     for name in detectors:
         rows = [

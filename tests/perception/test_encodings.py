@@ -93,6 +93,11 @@ def test_last_row_may_lack_its_padding():
     assert (image_of_pixels('mono8', 6, 4, 8, data, max_pixels=LIMIT) == GREY).all()
 
 
+def test_one_row_with_a_huge_step_takes_no_memory():
+    data = GREY[0].tobytes()
+    assert (image_of_pixels('mono8', 6, 1, 2**32 - 1, data, max_pixels=LIMIT) == GREY[:1]).all()
+
+
 def test_unknown_encoding_is_quoted_in_one_line():
     with pytest.raises(ImageError) as error:
         read('mono8\n[ERROR] [armor]: forged\x1b[2J' + 'x' * 1000, GREY)

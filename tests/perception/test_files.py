@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import resource
 from pathlib import Path
 
 import cv2
@@ -96,6 +97,15 @@ def test_detect_never_writes_over_an_image_it_was_given(tmp_path, capsys, image)
     given = other.read_bytes()
     assert main([str(room), str(other)]) == 0
     assert other.read_bytes() == given
+
+
+def test_png_whose_length_was_damaged_is_refused_before_memory_is_taken(image):
+    data = bytearray(cv2.imencode('.png', image)[1].tobytes())
+    data[data.index(b'IDAT') - 4] = 0x70
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    with pytest.raises(ImageError, match='no whole PNG'):
+        decode_image(bytes(data), 'image')
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 100_000
 
 
 @pytest.mark.parametrize('path', ['/dev/zero', '/dev'])

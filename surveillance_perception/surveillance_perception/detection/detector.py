@@ -119,7 +119,7 @@ class MarkerDetector:
 
     Attributes:
         settings: What to look for.
-        left_out: Candidates of the last image that `max_candidates` left unread.
+        left_out: Candidates of the last image that were left unread, to bound the work.
     """
 
     settings: DetectorSettings = field(default_factory=DetectorSettings)
@@ -154,6 +154,7 @@ class MarkerDetector:
             raise ValueError(f'OpenCV cannot work on this image: {reason}') from error
 
     def _detect(self, image: npt.NDArray[np.uint8], expected: Sequence[Array]) -> list[Detection]:
+        self.left_out = 0
         prepared = prepare(image)
         pyramid = ImagePyramid(prepared.grey)
         quads = self._candidates(prepared, pyramid)

@@ -125,10 +125,9 @@ def image_of_pixels(
     expected = step * (rows - 1) + row
     if len(data) < expected:
         raise ImageError(f'image of {size} pixels has {len(data)} bytes, expected {expected}')
-    values = np.frombuffer(data, np.uint8, min(len(data), step * rows))
-    if len(values) < step * rows:
-        values = np.pad(values, (0, step * rows - len(values)))
-    used = values.reshape(rows, step)[:height, :row]
+    whole = np.frombuffer(data, np.uint8, step * (rows - 1)).reshape(rows - 1, step)
+    last = np.frombuffer(data, np.uint8, row, step * (rows - 1))
+    used = np.concatenate([whole[:, :row], last[None]])[:height]
     pixels = _eight_bits(used, big_endian) if how.wide else used
     if how.channels > 1:
         pixels = pixels.reshape(height, width, how.channels)

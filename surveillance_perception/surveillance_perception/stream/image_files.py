@@ -10,6 +10,10 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+# what OpenCV cannot decode is said once, by an ImageError
+_set_level = cv2.setLogLevel if hasattr(cv2, 'setLogLevel') else cv2.utils.logging.setLogLevel
+_set_level(0)
+
 ImageArray = npt.NDArray[np.uint8]
 
 IMAGE_SUFFIXES = ('.png', '.jpg', '.jpeg', '.bmp', '.pgm', '.ppm', '.tif', '.tiff', '.webp')
@@ -21,6 +25,7 @@ MAX_PIXELS = 100_000_000
 MAX_BYTES = 500_000_000
 """The largest image file that is read."""
 
+_PNG = b'\x89PNG\r\n\x1a\n'
 _FORMATS = ('PNG', 'JPEG', 'BMP', 'WEBP', 'TIFF', 'PPM')
 
 
@@ -44,6 +49,7 @@ def decode_image(data: bytes, what: str, max_pixels: int = MAX_PIXELS) -> ImageA
     if not data:
         raise ImageError(f'{what} is empty, expected an encoded image')
     _check_size(_size_in_header(data, what, max_pixels), what, max_pixels)
+    _check_chunks(data, what)
     try:
         image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
     except cv2.error as error:
@@ -87,6 +93,18 @@ def _size_in_header(data: bytes, what: str, max_pixels: int) -> tuple[int, int]:
     except Exception as error:
         # whatever Pillow raises on junk: OSError, SyntaxError, struct.error, EOFError, ...
         raise ImageError(f'{what} is no image that OpenCV can decode') from error
+
+
+def _check_chunks(data: bytes, what: str) -> None:
+    """Look at the lengths in a PNG first: OpenCV allocates what a damaged one says, up to 2 GB."""
+    if not data.startswith(_PNG):
+        return
+    at = len(_PNG)
+    while at + 8 <= len(data):
+        length = int.from_bytes(data[at : at + 4], 'big')
+        if length > len(data) - at - 12:
+            raise ImageError(f'{what} is no whole PNG: a part of {length} bytes is cut off')
+        at += 12 + length
 
 
 def _check_size(size: tuple[int, int], what: str, max_pixels: int) -> None:
