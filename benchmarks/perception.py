@@ -4,7 +4,8 @@
 
 All detectors get the same images: rendered ones of 640x480 pixels, 60 degrees field of view,
 markers of 0.20 m from DICT_5X5_100, a lens blur of 0.8 pixels and a noise of 2 grey levels, under
-lights from even to hard shadows; natural images without any marker; and real photographs where there are
+lights from even to hard shadows; natural images without any marker; and real photographs where
+there are
 some (`--photos`, or the environment variable MARKER_PHOTOS: a folder with `markers.json`). Seven
 ids are on the known list; what others find is held against the same list. Times are processor time
 of one thread. `--fuzz` sends that many damaged messages through the conversions and the detector.

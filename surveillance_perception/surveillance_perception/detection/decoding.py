@@ -22,9 +22,9 @@ from surveillance_perception.detection.template_fit import (
     TemplateFit,
 )
 
-_ROUGH_ITERATIONS = 6
-_FINE_ITERATIONS = 4
-_HYPOTHESES = 3
+_ROUGH_ITERATIONS = 5
+_FINE_ITERATIONS = 3
+_HYPOTHESES = 2
 _RIVALS = 6
 _ROUGH_BORDER, _ROUGH_BORDER_EVEN = 0.6, 0.4
 _NARROW_CELL = 2.5
