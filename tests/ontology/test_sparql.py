@@ -243,6 +243,8 @@ def test_a_graph_that_is_kept_up_to_date_is_the_one_that_a_new_process_gets(
                 lambda h=here: change.remove_ind_from_class(h, 'ODD'),
                 lambda h=here, t=there: change.add_objectprop_to_ind('isIn', h, t),
                 lambda h=here, s=step: change.remove_ind(h) if s % 10 == 9 else None,
+                lambda v=value: change.add_class(f'CLASS_{v}'),
+                lambda v=value: change.remove_class(f'CLASS_{v}'),
                 lambda: client.utils.sync_buffered_reasoner(),
             ]
         )()

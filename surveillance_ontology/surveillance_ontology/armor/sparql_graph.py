@@ -23,11 +23,12 @@ from surveillance_ontology.owl.axioms import (
     SubClassOf,
 )
 from surveillance_ontology.owl.entities import entities_of
+from surveillance_ontology.owl.vocabulary import THING
 
 KEPT = 5000
 """Facts that changed and are kept; a process whose graph is older gets the whole one."""
 
-Fact = ClassAssertion | ObjectPropertyAssertion | DataPropertyAssertion
+Fact = ClassAssertion | ObjectPropertyAssertion | DataPropertyAssertion | SubClassOf
 
 
 @dataclass(frozen=True)
@@ -99,8 +100,10 @@ class GraphChanges:
             del self._logs[name]
             return
         log.sequence += 1
-        for axiom, _ in (*changes.added, *changes.removed):
-            if not _is_plain(axiom) or len(log.touched) >= KEPT:
+        axioms = [axiom for axiom, _ in (*changes.added, *changes.removed)]
+        taken_away = any(isinstance(axiom, SubClassOf) for axiom, _ in changes.removed)
+        for axiom in axioms:
+            if taken_away or not _is_plain(axiom) or len(log.touched) >= KEPT:
                 log.oldest = log.sequence
                 log.touched.clear()
                 return
@@ -143,13 +146,15 @@ def _is_plain(axiom: Axiom) -> bool:
     if isinstance(axiom, ObjectPropertyAssertion):
         names = (axiom.prop, axiom.subject, axiom.object)
         return all(isinstance(name, str) and not name.startswith('_:') for name in names)
+    if isinstance(axiom, SubClassOf):
+        return axiom.sup == THING and isinstance(axiom.sub, str)
     return isinstance(axiom, DataPropertyAssertion) and not axiom.subject.startswith('_:')
 
 
 def _holds(kb: KnowledgeBase, fact: Fact, derived: bool) -> bool:
     if fact in kb:
         return True
-    if not derived:
+    if not derived or isinstance(fact, SubClassOf):
         return False
     if isinstance(fact, ClassAssertion):
         return fact.cls in kb.types(fact.individual)
@@ -174,4 +179,6 @@ def _hierarchy(axioms: list[Axiom], ref: Reference) -> list[Axiom]:
         for kind, iri in entities_of(axiom)
         if kind == 'class'
     }
+    # Always: a class that is told to be below it is then no more than one triple.
+    classes.add(THING)
     return [SubClassOf(sub, cls) for cls in sorted(classes) for sub in ref.kb.subclasses(cls)]
