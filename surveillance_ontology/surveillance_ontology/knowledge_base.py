@@ -545,7 +545,7 @@ class KnowledgeBase:
         declared = (axiom for axiom in schema if isinstance(axiom, Declaration))
         if follows((*declared, *sources), goal):
             return found
-        needed = justify(self._told.axioms, goal, sources, schema)
+        needed = justify((), goal, sources, schema)
         return replace(found, background=tuple(a for a in needed if a not in sources))
 
     def justification(self, fact: Axiom | None) -> tuple[Axiom, ...]:

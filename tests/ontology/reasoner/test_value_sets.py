@@ -1,0 +1,86 @@
+"""The algebra of data ranges, against tests of single values."""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+
+from surveillance_ontology.owl.expressions import (
+    DataComplementOf,
+    DataIntersectionOf,
+    DataOneOf,
+    DataRange,
+    DatatypeRestriction,
+    DataUnionOf,
+    Literal,
+)
+from surveillance_ontology.owl.vocabulary import OWL, XSD
+from surveillance_ontology.reasoner.datatypes import range_test, value_of
+from surveillance_ontology.reasoner.value_sets import ValueSet, value_set
+
+LITERALS = [
+    *(Literal(str(number), XSD + 'integer') for number in range(-2, 5)),
+    Literal('1.5', XSD + 'decimal'),
+    Literal('1/3', OWL + 'rational'),
+    *(Literal(text) for text in ('a', 'b c', '1x')),
+    Literal('true', XSD + 'boolean'),
+    *(Literal(text, XSD + 'float') for text in ('1.0', 'NaN', '-0')),
+    Literal('2020-01-01T00:00:00Z', XSD + 'dateTime'),
+]
+TYPES = ('integer', 'decimal', 'byte', 'string', 'boolean', 'float', 'NCName', 'token', 'dateTime')
+FACETS = ('minInclusive', 'maxExclusive', 'maxInclusive', 'minExclusive')
+
+
+def drawn(rng: random.Random, depth: int) -> DataRange:
+    choice = rng.randrange(7 if depth else 3)
+    if choice == 0:
+        return XSD + rng.choice(TYPES)
+    if choice == 1:
+        return DataOneOf(tuple(rng.sample(LITERALS, rng.randrange(1, 4))))
+    if choice == 2:
+        bound = Literal(str(rng.randrange(-2, 4)), XSD + 'integer')
+        kind = XSD + rng.choice(('integer', 'decimal'))
+        return DatatypeRestriction(kind, ((XSD + rng.choice(FACETS), bound),))
+    if choice == 3:
+        return DataComplementOf(drawn(rng, depth - 1))
+    kind = DataUnionOf if choice == 6 else DataIntersectionOf
+    return kind((drawn(rng, depth - 1), drawn(rng, depth - 1)))
+
+
+def values_of(data_range: DataRange) -> ValueSet:
+    found = value_set(data_range)
+    assert found is not None
+    return found
+
+
+def test_sets_agree_with_single_values() -> None:
+    rng = random.Random(5)
+    values = [value_of(literal) for literal in LITERALS]
+    for _ in range(3000):
+        one, other = drawn(rng, 3), drawn(rng, 3)
+        first, second = values_of(one), values_of(other)
+        test, other_test = range_test(one), range_test(other)
+        assert test is not None
+        assert other_test is not None
+        mine = {value for value in values if test(value)}
+        theirs = {value for value in values if other_test(value)}
+        assert mine == {value for value in values if first.contains(value)}
+        assert first.size >= len(mine)
+        assert not (first.within(second) and mine - theirs)
+
+
+@pytest.mark.parametrize(
+    ('data_range', 'size'),
+    [
+        (XSD + 'byte', 256),
+        (XSD + 'boolean', 2),
+        (DataComplementOf(DataComplementOf(XSD + 'boolean')), 2),
+        (DataOneOf((Literal('1', XSD + 'int'), Literal('1.0', XSD + 'decimal'))), 1),
+        (DataIntersectionOf((XSD + 'integer', XSD + 'string')), 0),
+        (DataIntersectionOf((XSD + 'integer', DataComplementOf(XSD + 'decimal'))), 0),
+        (DataIntersectionOf((XSD + 'NCName', DataComplementOf(XSD + 'token'))), 0),
+    ],
+)
+def test_sizes(data_range: DataRange, size: int) -> None:
+    assert values_of(data_range).size == size
