@@ -99,3 +99,23 @@ def test_a_server_that_comes_back_empty_is_told_what_was_and_nothing_else(
     )
     (is_in,) = armor.query.objectprop_b2_ind('isIn', 'Robot1')
     assert is_in in {place.place for place in places}
+
+
+def test_a_mission_outlives_an_ontology_that_contradicts_itself(
+    robot: Robot, graph: Any, capfd: pytest.CaptureFixture[str]
+) -> None:
+    armor = ArmorClient(graph.node, 'stranger', 'surveillance')
+
+    def clash() -> None:
+        armor.manipulation.add_ind_to_class('R4', 'DOOR')
+        assert not armor.utils.sync_buffered_reasoner()
+
+    robot.configure('battery_controller', random_battery_time=[5000.0, 6000.0])
+    robot.begin()
+    robot.time.at(70.0, clash)
+    robot.until(150.0)
+    assert robot.visited(since=75.0), 'the mission goes on'
+    assert armor.utils.sync_buffered_reasoner(), 'consistent'
+    told = [line for line in capfd.readouterr().err.splitlines() if 'contradicts itself' in line]
+    assert len(told) == 1
+    assert 'R4 is DOOR' in told[0]
