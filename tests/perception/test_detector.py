@@ -251,3 +251,9 @@ def test_thin_margin_on_a_dark_wall_is_enough():
     for margin in (0.2, 0.3, 1.0):
         image = seen([Panel(14, 2.0, 0.2, margin=margin)], backdrop='dark')
         assert set(found(DETECTOR.detect(image))) == {14}
+
+
+@pytest.mark.parametrize('backdrop', ['letters', 'leaves', 'bricks', 'boards'])
+def test_busy_textures_show_no_marker(backdrop):
+    for seed in range(5):
+        assert not DETECTOR.detect(seen([], backdrop=backdrop, seed=seed))

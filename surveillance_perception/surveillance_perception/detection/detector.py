@@ -47,6 +47,7 @@ _COVER = 0.7
 _CLEAR, _CLEAR_KNOWN = 1.8, 1.3
 _WRONG = 0.2
 _WRONG_BORDER = 0.3
+_CONTRADICTED = 0.6
 _RIGHT_BORDER = 3
 _RIGHT_LEAD = 1.6
 _FEW_SPARE_BITS = 12.0
@@ -233,6 +234,8 @@ class MarkerDetector:
             | ((readings.wrong <= min(1, codes.correction)) & (readings.inner_lead > lead * strict))
         )
         clear = readings.lead > np.where(lead < settings.unknown_lead, _CLEAR_KNOWN, _CLEAR) * lead
+        # votes of cells a pixel wide are weak, but nearly all of them are not wrong by chance
+        clear &= readings.wrong_border <= _CONTRADICTED * 4 * (codes.side - 1)
         accepted = (correlated & (plausible | clear)) | (plausible & right) | glared
         confidence = readings.correlation * (1.0 - 1.0 / np.maximum(readings.lead, 1.0))
         chosen = np.flatnonzero(accepted)
