@@ -19,8 +19,17 @@ from launcher.instance_lock import claim
 if TYPE_CHECKING:
     from launcher.run import Run
 
+
+def runs_folder(checkout: Path = CHECKOUT) -> Path:
+    """Where runs leave what they write: in the checkout, or the user's own of a read-only one."""
+    if os.access(checkout, os.W_OK):
+        return checkout / 'runs'
+    state = os.environ.get('XDG_STATE_HOME') or os.path.expanduser('~/.local/state')
+    return Path(state, 'surveillance', 'runs')
+
+
 CONFIG = CHECKOUT / 'config'
-RUNS = CHECKOUT / 'runs'
+RUNS = runs_folder()
 EXIT_BAD_INPUT = 2
 DEFAULT_KEEP = 20.0
 EXIT_INTERRUPTED = 130

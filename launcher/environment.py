@@ -9,12 +9,13 @@ from __future__ import annotations
 import fcntl
 import os
 import selectors
+import shutil
 import signal
 import subprocess
 import sys
 from collections import deque
 from collections.abc import Callable, Iterator, MutableMapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from launcher import system
@@ -32,6 +33,8 @@ PACKAGES = (
     'surveillance_simulation',
     'surveillance_operator',
 )
+SPACE = 900_000_000
+"""Bytes that the environment takes, with what is needed meanwhile."""
 VENV_STEP = 'virtual environment in .venv'
 PACKAGES_STEP = 'Python packages, ROS 2 Jazzy among them'
 INTERFACES_STEP = 'messages, services and actions'
@@ -130,7 +133,14 @@ class Environment:
             steps.append((PACKAGES_STEP, lambda run: self._install_packages(run, needed)))
         if journal.interfaces != wanted.interfaces or journal.working == INTERFACES_STEP:
             steps.append((INTERFACES_STEP, self._install_interfaces))
+        if fresh and (free := shutil.disk_usage(self.checkout).free) < SPACE:
+            raise SetupError(
+                f'{self.venv}: the set-up needs {SPACE // 10**6} MB, {free // 10**6} MB are free '
+                f'on the disk of {self.checkout}'
+            )
         print(f'Setting up {self.checkout.name}: once, and again after a change of dependencies.')
+        if fresh:
+            print(f'It takes {SPACE // 10**6} MB of disk and about two minutes on two processors.')
         for number, (title, work) in enumerate(steps, 1):
             if title != VENV_STEP:
                 journal.working = title
@@ -244,11 +254,15 @@ class _Runner:
                 raise SetupError(self._failure(list(output)))
 
     def _failure(self, output: list[str]) -> str:
-        if self._log.parent.is_dir():
+        with suppress(OSError):  # the disk may be full
             self._log.write_text('\n'.join(output) + '\n', encoding='utf-8')
         errors = [line.strip() for line in output if line.lower().lstrip().startswith('error')]
         reason = (errors or [line.strip() for line in output if line.strip()] or ['no output'])[-1]
-        if any(word in line for line in output for word in ('NewConnectionError', 'resolve')):
+        if any('CERTIFICATE_VERIFY_FAILED' in line or 'SSLError' in line for line in output):
+            reason = 'the package index was not trusted (TLS certificate): is a proxy in between?'
+        elif any('No space left' in line or 'Errno 28' in line for line in output):
+            reason = f'no space left for {self._log.parent}, which takes {SPACE // 10**6} MB'
+        elif any(word in line for line in output for word in ('NewConnectionError', 'resolve')):
             reason += ' (is this machine online?)'
         return f'the set-up stopped: {reason} (more in {self._log}); the next start goes on'
 

@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from launcher.cli import main, make_parser
+from launcher.cli import main, make_parser, runs_folder
 from launcher.node_table import NODES
 from tests.launcher.conftest import ROOT
 
@@ -130,3 +130,10 @@ def test_a_domain_of_the_environment_that_is_none_costs_one_line(domain):
     done = subprocess.run(words, cwd=ROOT, env=given, capture_output=True, text=True, timeout=60)
     assert (done.returncode, done.stderr.count('\n')) == (2, 1)
     assert f'ROS_DOMAIN_ID: got {domain!r}' in done.stderr
+
+
+def test_the_runs_of_a_read_only_checkout_lie_in_the_users_folder(tmp_path, monkeypatch):
+    assert runs_folder(tmp_path) == tmp_path / 'runs'
+    monkeypatch.setattr(os, 'access', lambda _path, _mode: False)
+    monkeypatch.setenv('XDG_STATE_HOME', '/state')
+    assert str(runs_folder(tmp_path)) == '/state/surveillance/runs'
