@@ -17,7 +17,7 @@ from collections.abc import Sequence
 
 from surveillance_behaviour.policy.graph import PatrolGraph
 
-STATES = 200_000
+STATES = 60_000
 """How many states the search may visit for one limit."""
 FIRST_WAITS = 2.0
 """How long a place may wait for its first visit, in limits or thresholds."""
