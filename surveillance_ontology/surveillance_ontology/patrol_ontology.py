@@ -36,8 +36,16 @@ ROBOT = 'Robot1'
 """The robot's name where nobody gives another one."""
 NEVER = 0
 """The time of visit of a place that nobody has visited yet, seconds."""
+PLACES = 'LOCATION(?)'
+"""The places, as a pattern of facts for a query or a subscription."""
+URGENT_PLACES = 'URGENT(?)'
+"""The places that are due for a visit."""
+VISITS = 'visitedAt(?, ?)'
+"""When each place was visited last, seconds."""
+CONNECTIONS = 'connectedTo(?, ?)'
+"""Which places have a door in common."""
 DOORS = 'hasDoor(?, ?)'
-"""The facts, for a subscription, that change with the map and its closed doors."""
+"""Which doors a place has: what changes with the map and its closed doors."""
 CHUNK = 2000
 """Directives in one batch while a map is built."""
 RETRY_PERIOD = 0.05
@@ -455,6 +463,21 @@ class PatrolOntology:
                     )
             answers += found
         return answers
+
+
+def facts_of(place: str) -> tuple[str, ...]:
+    """Return the patterns of what can hold of a place, those that change most often first."""
+    return (
+        f'URGENT({place})',
+        f'ROOM({place})',
+        f'CORRIDOR({place})',
+        f'LOCATION({place})',
+        f'isIn(?, {place})',
+        f'canReach(?, {place})',
+        f'visitedAt({place}, ?)',
+        f'hasDoor({place}, ?)',
+        f'connectedTo({place}, ?)',
+    )
 
 
 def _names(answer: DirectiveResponse) -> tuple[str, ...]:

@@ -35,22 +35,11 @@ from surveillance_ontology.armor_client import (
     ArmorServiceCallError,
     ArmorServiceInternalError,
 )
+from surveillance_ontology.patrol_ontology import facts_of
 from surveillance_operator.mission_feed import BEHAVIOUR, CONTROLLERS
 from surveillance_runtime.calls import CallError, ServiceCaller
 from surveillance_runtime.node import PatrolNode
 
-PLACE_FACTS = (
-    'URGENT({0})',
-    'ROOM({0})',
-    'CORRIDOR({0})',
-    'LOCATION({0})',
-    'isIn(?, {0})',
-    'canReach(?, {0})',
-    'visitedAt({0}, ?)',
-    'hasDoor({0}, ?)',
-    'connectedTo({0}, ?)',
-)
-"""What the ontology knows of a place, most interesting first."""
 _NAME = re.compile(r'[A-Za-z]\w{0,63}\Z', re.ASCII)
 
 
@@ -186,8 +175,7 @@ class MissionActions:
         """Return what the ontology knows of a place: facts, and whether each is asserted."""
         name = _name(place)
         found: list[tuple[str, bool]] = []
-        for pattern in PLACE_FACTS:
-            query = pattern.format(name)
+        for query in facts_of(name):
             every, asserted = self._ask(partial(_facts_like, query))
             found += [(str(fact), fact in asserted) for fact in every]
         return found

@@ -45,6 +45,7 @@ from surveillance_interfaces.msg import (
 from surveillance_interfaces.srv import ReferenceName, RoomPosition
 from surveillance_ontology.armor.facts import ShortFact
 from surveillance_ontology.armor_client import ArmorClient, FactSubscription, value_in
+from surveillance_ontology.patrol_ontology import CONNECTIONS, PLACES, URGENT_PLACES, VISITS
 from surveillance_operator import conversions
 from surveillance_operator.polled_subscription import PolledSubscription
 from surveillance_operator.snapshot import NO_POINTS, Change, Pose, Snapshot, follow
@@ -470,10 +471,10 @@ class _Facts:
             return
         self._armor = ArmorClient(self._node, self._node.get_name(), name, timeout=TIMEOUT)
         for pattern, callback in (
-            ('LOCATION(?)', self._on_place),
-            ('URGENT(?)', self._on_urgent),
-            ('visitedAt(?, ?)', self._on_visit),
-            ('connectedTo(?, ?)', self._on_link),
+            (PLACES, self._on_place),
+            (URGENT_PLACES, self._on_urgent),
+            (VISITS, self._on_visit),
+            (CONNECTIONS, self._on_link),
         ):
             FactSubscription(self._node, self._armor, pattern, callback)
 

@@ -168,7 +168,7 @@ def _object_properties(ref: Reference, ind: str) -> DirectiveResponse:
     'QUERY EXPLAIN',
     text('fact'),
     native=False,
-    summary='Why a fact holds, written as `URGENT(R3)`, `canReach(Robot1, R1)` or '
+    summary='Why a fact holds, written as `URGENT(R3)`, `connectedTo(R1, C1)` or '
     '`owl:sameAs(a, b)`: first an English sentence, then the derivation as a tree.',
 )
 def _explain(ref: Reference, fact: str) -> DirectiveResponse:
@@ -206,7 +206,7 @@ def _unsupported(ref: Reference) -> DirectiveResponse:
     text('pattern'),
     flag('asserted', 'false'),
     native=False,
-    summary='Facts that match a pattern, `URGENT(?)`, `canReach(Robot1, ?)`, `visitedAt(?, ?)`: '
+    summary='Facts that match a pattern, `URGENT(?)`, `connectedTo(R1, ?)`, `hasDoor(?, ?)`: '
     'asserted and derived ones, or with the second argument the asserted ones only.',
 )
 def _facts(ref: Reference, pattern: str, asserted: bool) -> DirectiveResponse:
