@@ -21,6 +21,7 @@ from pathlib import Path
 from launcher import system
 from launcher.fingerprint import INTERFACES, Journal, current, requirements
 from launcher.progress import Step
+from launcher.system import SetupError
 
 CHECKOUT = Path(__file__).resolve().parent.parent
 PACKAGES = (
@@ -42,10 +43,6 @@ PATH_FILE = 'surveillance_checkout.pth'
 # What makes an interpreter of one ROS unfit to start one of another.
 _FOREIGN_ROS = ('PYTHONPATH', 'PYTHONHOME', 'AMENT_PREFIX_PATH', 'CMAKE_PREFIX_PATH', 'ROS_DISTRO')
 _BOOTSTRAP = '_ROS_WHEELS_BOOTSTRAP_COMPLETE'
-
-
-class SetupError(RuntimeError):
-    """The set-up did not go through; the message says where and why."""
 
 
 class Environment:
@@ -75,18 +72,17 @@ class Environment:
         """Brings the environment up to date; does nothing when it is.
 
         Raises:
-            MissingError: the machine lacks something that only its owner can give.
-            SetupError: a step failed.
+            SetupError: a step failed, or the machine lacks something that only its owner can give.
         """
         if self.ready():
             return
         machine = system.Machine.here()
         if reason := machine.why_no_wheels():
-            raise system.MissingError(system.no_wheels_advice(reason, self.checkout))
+            raise system.SetupError(system.no_wheels_advice(reason, self.checkout))
         if missing := system.missing_packages():
             system.install_packages(missing)
             if still := system.missing_packages():
-                raise system.MissingError(f'still missing after installing: {" ".join(still)}')
+                raise system.SetupError(f'still missing after installing: {" ".join(still)}')
         if note := system.note_of_unused_ros(self.checkout):
             print(note, flush=True)
         with self._alone() as lock:

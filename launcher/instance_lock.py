@@ -13,11 +13,7 @@ import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 
-from launcher.node_table import RUN_NODES, Node
-
-
-class InstanceLockError(ValueError):
-    """Somebody else runs these nodes: one line that says who and where."""
+from launcher.node_table import RUN_NODES, Node, RunError
 
 
 def claim(
@@ -35,7 +31,7 @@ def claim(
         Descriptors that hold the claims as long as they are open.
 
     Raises:
-        InstanceLockError: some of them are claimed already; then none is claimed.
+        RunError: some of them are claimed already; then none is claimed.
     """
     folder = folder or runtime_folder() / 'nodes'
     held: list[int] = []
@@ -64,7 +60,7 @@ def claim(
         os.close(descriptor)
     who = f' (process {holder})' if holder else ''
     where = f'ROS domain {domain}' + (f', namespace {namespace}' if namespace else '')
-    raise InstanceLockError(
+    raise RunError(
         f'already running in {where}{who}: {", ".join(taken)}; '
         'expected another --domain or --namespace, or --without these'
     )

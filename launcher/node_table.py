@@ -12,8 +12,8 @@ LOG_LEVELS = ('debug', 'info', 'warn', 'error', 'fatal')
 CONSOLE = 'console'
 
 
-class SelectionError(ValueError):
-    """A node name on the command line that the graph does not have."""
+class RunError(ValueError):
+    """What was asked for cannot be run: one line that says why."""
 
 
 @dataclass(frozen=True)
@@ -185,14 +185,12 @@ def find(name: str) -> Node:
     """The node called `name`.
 
     Raises:
-        SelectionError: there is no such node.
+        RunError: there is no such node.
     """
     try:
         return BY_NAME[name]
     except KeyError:
-        raise SelectionError(
-            f'unknown node {name!r}: expected one of {", ".join(BY_NAME)}'
-        ) from None
+        raise RunError(f'unknown node {name!r}: expected one of {", ".join(BY_NAME)}') from None
 
 
 def select(
@@ -210,7 +208,7 @@ def select(
         without: nodes to leave out, because they run elsewhere.
 
     Raises:
-        SelectionError: an unknown name, or nothing is left to start.
+        RunError: an unknown name, or nothing is left to start.
     """
     wanted = {find(name).name for name in only}
     left_out = {find(name).name for name in without}
@@ -222,5 +220,5 @@ def select(
             wanted.add('simulator')
     chosen = tuple(node for node in NODES if node.name in wanted - left_out)
     if not chosen:
-        raise SelectionError('no node is left to start: check --only and --without')
+        raise RunError('no node is left to start: check --only and --without')
     return chosen

@@ -21,6 +21,7 @@ from typing import Any
 from launcher import node_table, run_folder
 from launcher.instance_lock import claim
 from launcher.log_merge import ROS_FORMAT, MergedLog
+from launcher.node_table import RunError
 from launcher.supervisor import Program, Supervisor
 from surveillance_behaviour.mission import mission_log
 from surveillance_runtime.configuration import (
@@ -56,10 +57,6 @@ HELP = 'waiting for help: '
 _NAMESPACE = re.compile(r'/?[A-Za-z]\w*(/[A-Za-z]\w*)*\Z', re.ASCII)
 MAX_DOMAIN = 101
 """The highest ROS domain whose ports lie below those that Linux gives to clients."""
-
-
-class RunError(ValueError):
-    """What was asked for cannot be run: one line that says why."""
 
 
 @dataclass(frozen=True)
@@ -427,7 +424,7 @@ def resumed(run: Run, usual: Run, runs: Path, name: str) -> tuple[Run, Path]:
         name: Of the run; empty: the last one.
 
     Raises:
-        RunFolderError: There is no such run.
+        RunError: There is no such run.
     """
     if run.record not in (None, NOT_RECORDED):
         runs = Path(run.record)
@@ -480,7 +477,7 @@ def run_mission(run: Run, config: Path, runs: Path, resume: Path | None = None) 
             same options that was killed.
 
     Raises:
-        RunError, node_table.SelectionError, InstanceLockError: what was asked for cannot be run.
+        RunError: what was asked for cannot be run.
     """
     run.check()
     merged = configuration(config, run)  # before anything is written
@@ -573,11 +570,11 @@ def run_mission(run: Run, config: Path, runs: Path, resume: Path | None = None) 
 
 def what_to_look_at(folder: Path) -> list[str]:
     """Write the report of a run; return where it is, and how to replay the run."""
-    from surveillance_operator.recording import timeline
-    from surveillance_operator.report import ReportError, write_report
+    from surveillance_operator.recording import RecordingError, timeline
+    from surveillance_operator.report import write_report
 
     lines = []
-    with contextlib.suppress(ReportError):  # nothing was visited: the summary says so
+    with contextlib.suppress(RecordingError):  # nothing was visited: the summary says so
         lines.append(f'report: {_short(write_report(folder))}')
     if (folder / timeline.NAME).exists():
         lines.append(f'replay: python3 launch.py replay {_short(folder)}')

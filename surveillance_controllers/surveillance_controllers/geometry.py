@@ -36,6 +36,11 @@ def relative(first: Pose, second: Pose) -> Pose:
 Points = NDArray[np.float64]
 
 
+def point_of(pose: Pose) -> Points:
+    """Return the point of a pose, shape (3,), metres; z is 0."""
+    return np.array([pose[0], pose[1], 0.0])
+
+
 def distances_along(path: ArrayLike) -> Points:
     """The way from the first point to each point, shape (n,), metres; the first is 0."""
     steps = np.linalg.norm(np.diff(np.asarray(path, dtype=float), axis=0), axis=1)

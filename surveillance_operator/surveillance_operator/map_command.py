@@ -11,6 +11,7 @@ from typing import NoReturn
 
 from surveillance_behaviour.mission import mission_log
 from surveillance_behaviour.policy.graph import PatrolGraph
+from surveillance_operator.recording.bag import RecordingError
 from surveillance_runtime.place import Place, read_place_file
 from surveillance_runtime.place.floor_plan import FloorPlan
 from surveillance_runtime.place.picture import Run, draw_place
@@ -64,14 +65,14 @@ def run_of(events: Sequence[mission_log.Event], place: Place, source: str) -> Ru
     """Return what a mission's record adds to the picture of its place.
 
     Raises:
-        CommandError: The record is of another place, or empty.
+        RecordingError: The record is of another place, or empty.
     """
     summary = mission_log.summarize(events)
     if not summary.visits:
-        raise CommandError(f'{source}: nothing was recorded')
+        raise RecordingError(f'{source}: nothing was recorded')
     unknown = sorted(set(summary.visits) - set(place.rooms))
     if unknown:
-        raise CommandError(
+        raise RecordingError(
             f"{source}: visits '{unknown[0]}', which the place does not have; "
             f'expected the record of a run through {", ".join(place.rooms)}'
         )
@@ -149,7 +150,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Check a place, draw it, and say what was found; the exit code is 2 for bad input."""
     try:
         lines = _draw(_parse(sys.argv[1:] if argv is None else argv))
-    except (CommandError, YamlFileError, TextureError, mission_log.RecordError) as error:
+    except (
+        CommandError,
+        YamlFileError,
+        TextureError,
+        RecordingError,
+        mission_log.RecordError,
+    ) as error:
         print(f'map: {error}', file=sys.stderr)
         return EXIT_BAD_INPUT
     print('\n'.join(lines))

@@ -11,8 +11,9 @@ from typing import Any
 from surveillance_operator.page.hub import Hub
 from surveillance_operator.page.server import Action, Page, PageError
 from surveillance_operator.recording import timeline
-from surveillance_operator.recording.runs import RunError, find_run, run_parser
-from surveillance_operator.recording.timeline import MARKS, Timeline, TimelineError
+from surveillance_operator.recording.bag import RecordingError
+from surveillance_operator.recording.runs import find_run, run_parser
+from surveillance_operator.recording.timeline import MARKS, Timeline
 
 EXIT_BAD_INPUT = 2
 
@@ -144,7 +145,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         line = Timeline(folder / timeline.NAME)
         player = Player(line, hub)
         page = Page(hub, questions={}, actions=player.actions(), port=options.port, replay=True)
-    except (RunError, TimelineError, PageError) as error:
+    except (RecordingError, PageError) as error:
         print(f'replay: {error}', file=sys.stderr)
         return EXIT_BAD_INPUT
     thread = threading.Thread(target=player.run, name='replay', daemon=True)

@@ -12,10 +12,11 @@ from pathlib import Path
 
 from surveillance_behaviour.mission import mission_log
 from surveillance_behaviour.mission.mission_log import Event
-from surveillance_operator.map_command import CommandError, facts, graph_over_doors, run_of
+from surveillance_operator.map_command import facts, graph_over_doors, run_of
 from surveillance_operator.recording import bag, timeline
-from surveillance_operator.recording.runs import PLACE, RECORD, RunError, find_run, run_parser
-from surveillance_operator.recording.timeline import Timeline, TimelineError
+from surveillance_operator.recording.bag import RecordingError
+from surveillance_operator.recording.runs import PLACE, RECORD, find_run, run_parser
+from surveillance_operator.recording.timeline import Timeline
 from surveillance_runtime.place import read_place_file
 from surveillance_runtime.place.floor_plan import FloorPlan
 from surveillance_runtime.place.picture import Run, draw_place
@@ -36,20 +37,16 @@ stroke-width:.15px}.late{font-weight:700}svg{width:100%;height:2rem;display:bloc
 @media(max-width:40rem){th.w,td.w{display:none}}"""
 
 
-class ReportError(ValueError):
-    """No report can be made; the message is one line."""
-
-
 def write_report(folder: Path) -> Path:
     """Write the report of a run into its folder; return its path.
 
     Raises:
-        ReportError: The run has no record, or it cannot be read.
+        RecordingError: The run has no record, or it cannot be read.
     """
     try:
         events = mission_log.read(folder / RECORD)
         if not any(event.name == 'visit' for event in events):
-            raise ReportError(f'{folder / RECORD}: no visit was recorded')
+            raise RecordingError(f'{folder / RECORD}: no visit was recorded')
         plan = _plan(folder)
         run = run_of(events, plan.place, str(folder / RECORD)) if plan is not None else None
         drawn = _map(plan, run) if plan is not None and run is not None else ''
@@ -57,10 +54,10 @@ def write_report(folder: Path) -> Path:
         bound = graph_over_doors(plan).tour.bound / speed if plan is not None and speed else None
         path = folder / NAME
         path.write_text(_page(folder, events, drawn, bound), encoding='utf-8')
-    except (mission_log.RecordError, YamlFileError, CommandError) as error:
-        raise ReportError(str(error)) from None
+    except (mission_log.RecordError, YamlFileError) as error:
+        raise RecordingError(str(error)) from None
     except OSError as error:
-        raise ReportError(f'{folder}: {error.strerror or error}') from None
+        raise RecordingError(f'{folder}: {error.strerror or error}') from None
     return path
 
 
@@ -68,7 +65,7 @@ def draw_picture(folder: Path) -> Path | None:
     """Draw the way driven as a picture beside the report; None without a place.
 
     Raises:
-        ReportError: As for `write_report`.
+        RecordingError: As for `write_report`.
     """
     try:
         plan = _plan(folder)
@@ -77,10 +74,10 @@ def draw_picture(folder: Path) -> Path | None:
         run = run_of(mission_log.read(folder / RECORD), plan.place, str(folder / RECORD))
         path = folder / PICTURE
         draw_place(plan, 'The way driven', facts(plan), run).save(path)
-    except (mission_log.RecordError, YamlFileError, CommandError) as error:
-        raise ReportError(str(error)) from None
+    except (mission_log.RecordError, YamlFileError) as error:
+        raise RecordingError(str(error)) from None
     except OSError as error:
-        raise ReportError(f'{folder}: {error.strerror or error}') from None
+        raise RecordingError(f'{folder}: {error.strerror or error}') from None
     return path
 
 
@@ -132,7 +129,7 @@ def _fastest(events: Sequence[Event]) -> float:
 def _threshold(folder: Path) -> float | None:
     try:
         line = Timeline(folder / timeline.NAME)
-    except TimelineError:
+    except RecordingError:
         return None
     _, _, parts = line.at(math.inf)
     line.close()
@@ -252,7 +249,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(write_report(folder))
         if (picture := draw_picture(folder)) is not None:
             print(picture)
-    except (RunError, ReportError) as error:
+    except RecordingError as error:
         print(f'report: {error}', file=sys.stderr)
         return EXIT_BAD_INPUT
     return 0

@@ -14,11 +14,11 @@ from trajectory_msgs.msg import JointTrajectory
 
 from surveillance_interfaces.action import ScanSurroundings
 from surveillance_interfaces.srv import MarkerRoutine, PointCamera
-from surveillance_perception.arm.driver import ArmDriver, ArmMotionError
+from surveillance_perception.arm.driver import ArmDriver
 from surveillance_perception.arm.kinematics import UnreachableError, in_base, look_at
 from surveillance_perception.arm.parameters import arm_settings
 from surveillance_perception.arm.scan import scan
-from surveillance_perception.arm.trajectory import TrajectoryError
+from surveillance_perception.arm.trajectory import ArmMotionError
 from surveillance_perception.arm.view_coverage import View
 from surveillance_perception.conversions import (
     base_pose_from_ros,
@@ -41,7 +41,7 @@ _POSES = {
     MarkerRoutine.Request.RIGHT: 'right',
     MarkerRoutine.Request.BACK: 'back',
 }
-_FAILURES = (ArmMotionError, TrajectoryError, UnreachableError, ValueError)
+_FAILURES = (ArmMotionError, UnreachableError, ValueError)
 
 
 class ArmController(PatrolNode):

@@ -16,7 +16,8 @@ from surveillance_controllers.motion.obstacle_memory import ObstacleMemory
 from surveillance_controllers.motion.path_following import Velocity
 from surveillance_controllers.motion.place_regions import PlaceRegions, door_segment
 from surveillance_controllers.planning.door_watch import DoorWatch
-from surveillance_controllers.planning.route_planning import NoRouteError, route
+from surveillance_controllers.planning.grid_planning import NoPathError
+from surveillance_controllers.planning.route_planning import route
 
 
 @pytest.fixture
@@ -180,7 +181,7 @@ def test_the_shortest_route_over_open_doors_is_taken() -> None:
 def test_without_a_route_the_closed_doors_are_named(
     closed: list[str], goal: str, text: str
 ) -> None:
-    with pytest.raises(NoRouteError) as caught:
+    with pytest.raises(NoPathError) as caught:
         route(DOORS, closed, 'R1', goal, POINTS)
     assert str(caught.value) == text
 

@@ -19,7 +19,7 @@ from surveillance_operator.page.hub import Hub
 from surveillance_operator.page.server import Page
 from surveillance_operator.recording.timeline import Timeline
 from surveillance_operator.replay import Player
-from surveillance_operator.report import ReportError, draw_picture, write_report
+from surveillance_operator.report import RecordingError, draw_picture, write_report
 from tests.operator.test_timeline import record
 
 ROOT = Path(__file__).parents[2]
@@ -133,7 +133,7 @@ def test_the_commands_find_runs_and_say_what_is_wrong(
 
 def test_a_run_without_a_visit_has_no_report(run: Path) -> None:
     (run / 'mission.jsonl').write_text('')
-    with pytest.raises(ReportError, match='no visit was recorded'):
+    with pytest.raises(RecordingError, match='no visit was recorded'):
         write_report(run)
 
 

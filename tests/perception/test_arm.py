@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from surveillance_perception.arm.driver import ArmDriver, ArmMotionError
+from surveillance_perception.arm.driver import ArmDriver
 from surveillance_perception.arm.kinematics import (
     AIM_TOLERANCE,
     UnreachableError,
@@ -18,8 +18,8 @@ from surveillance_perception.arm.kinematics import (
     look_at,
 )
 from surveillance_perception.arm.trajectory import (
+    ArmMotionError,
     ArmState,
-    TrajectoryError,
     motion_to,
     motion_to_rest,
 )
@@ -100,7 +100,7 @@ def test_stop_in_the_middle_is_smooth():
 
 @pytest.mark.parametrize('goal', [[9.0, 0, 0, 0, 0], [0.0, 0.0], [math.nan] * 5])
 def test_goal_outside_the_limits_is_refused(goal):
-    with pytest.raises(TrajectoryError):
+    with pytest.raises(ArmMotionError):
         motion_to(ARM, ArmState.resting(HOME), np.array(goal))
 
 

@@ -18,7 +18,8 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import LaserScan, PointCloud2
 
 from surveillance_controllers import conversions
-from surveillance_controllers.geometry import Points, Pose, composed, relative
+from surveillance_controllers.geometry import Points, Pose, composed, point_of, relative
+from surveillance_controllers.motion.arrival import MotionFailedError
 from surveillance_controllers.motion.driving import Drive, Spin, State
 from surveillance_controllers.motion.localisation import Scan
 from surveillance_controllers.motion.navigator import Navigator
@@ -45,10 +46,6 @@ try:
     from tf2_msgs.msg import TFMessage
 except ImportError:
     TFMessage = None
-
-
-class RobotSilentError(Exception):
-    """What the robot's sensors must give does not come; the text names the topic."""
 
 
 class RobotBase:
@@ -134,7 +131,7 @@ class RobotBase:
             Where the robot is then.
 
         Raises:
-            RobotSilentError: The sensors gave nothing for too long.
+            MotionFailedError: The sensors gave nothing for too long.
         """
         with self._carrying_out(drive, interrupt):
             while not drive.state.ended and not interrupt.is_set():
@@ -158,7 +155,7 @@ class RobotBase:
         """Turns once on the spot; blocks.
 
         Raises:
-            RobotSilentError: The sensors gave nothing for too long.
+            MotionFailedError: The sensors gave nothing for too long.
         """
         with self._carrying_out(spin, interrupt):
             while not spin.done and not interrupt.is_set():
@@ -188,8 +185,9 @@ class RobotBase:
                 return None
             if self._steps == before:
                 topic = self._navigator.missing or 'scan'
-                raise RobotSilentError(
-                    f'nothing came on the topic {topic} for {self._sensor_timeout:g} s'
+                raise MotionFailedError(
+                    f'nothing came on the topic {topic} for {self._sensor_timeout:g} s',
+                    None if self.pose is None else point_of(self.pose),
                 )
             return self._navigator.pose
 

@@ -8,10 +8,10 @@ from collections.abc import Callable
 import numpy as np
 
 from surveillance_controllers import conversions
-from surveillance_controllers.geometry import Points, Pose
+from surveillance_controllers.geometry import Points, Pose, point_of
 from surveillance_controllers.map_knowledge import KnowledgeError, MapKnowledge
 from surveillance_controllers.motion.arrival import MotionFailedError
-from surveillance_controllers.motion.base_interface import RobotBase, RobotSilentError
+from surveillance_controllers.motion.base_interface import RobotBase
 from surveillance_controllers.motion.driving import Drive, Spin, State
 from surveillance_controllers.motion.navigator import Navigator
 from surveillance_controllers.motion.place_recording import RETRY_PERIOD, PlaceRecorder
@@ -74,15 +74,12 @@ class NavigationMotion:
             nonlocal told
             if not 0 <= run.now() - told < self._settings.feedback_period:
                 told = run.now()
-                report(_point(pose))
+                report(point_of(pose))
 
         def another_path(pose: Pose) -> Points:
-            return self._ask_planner(_point(pose), goal, run)
+            return self._ask_planner(point_of(pose), goal, run)
 
-        try:
-            end = _point(self._base.drive(drive, run.interrupt, on_step, another_path))
-        except RobotSilentError as error:
-            raise MotionFailedError(str(error), self._here()) from error
+        end = point_of(self._base.drive(drive, run.interrupt, on_step, another_path))
         if drive.state is State.FAILED:
             raise MotionFailedError(drive.reason, end)
         report(end)
@@ -112,14 +109,7 @@ class NavigationMotion:
             MotionFailedError: The robot's sensors are silent.
         """
         if self._settings.spin:
-            try:
-                self._base.spin(Spin(), run.interrupt)
-            except RobotSilentError as error:
-                raise MotionFailedError(str(error), self._here()) from error
-
-    def _here(self) -> Points | None:
-        pose = self._base.pose
-        return None if pose is None else _point(pose)
+            self._base.spin(Spin(), run.interrupt)
 
     def _follow_map(self) -> None:
         """Takes the places that come and go: they change what the robot's place can be."""
@@ -155,7 +145,3 @@ class NavigationMotion:
         if end.status != 'succeeded':
             raise NoPathError('the planner finds no other path')
         return conversions.array_from_points(end.result.path)[:, :2]
-
-
-def _point(pose: Pose) -> Points:
-    return np.array([pose[0], pose[1], 0.0])

@@ -22,7 +22,7 @@ from surveillance_controllers.planning.grid_planning import (
     NoPathError,
     PlanningParameters,
 )
-from surveillance_controllers.planning.route_planning import NoRouteError, route
+from surveillance_controllers.planning.route_planning import route
 from surveillance_runtime.action_server import GoalAbortedError, GoalRun
 from surveillance_runtime.conversions import points_from_cloud
 from surveillance_runtime.node import PatrolNode
@@ -140,7 +140,7 @@ class NavigationPlanning:
         rooms_of = self._doors.rooms_of(run.interrupt)
         try:
             doors = route(rooms_of, self._doors.closed(rooms_of), place, target, positions)
-        except NoRouteError as error:
+        except NoPathError as error:
             raise GoalAbortedError(str(error)) from error
         self._node.get_logger().info(
             f'{place} to {target}: through {", ".join(doors) or "no door"}'

@@ -13,9 +13,7 @@ import networkx as nx
 import numpy as np
 from numpy.typing import ArrayLike
 
-
-class NoRouteError(Exception):
-    """No open doors lead there; the text names the closed doors that would."""
+from surveillance_controllers.planning.grid_planning import NoPathError
 
 
 def route(
@@ -35,7 +33,7 @@ def route(
         positions: A point in each place, metres; the way through a place is measured by them.
 
     Raises:
-        NoRouteError: There is no route over open doors.
+        NoPathError: No open doors lead there; the text names the closed doors that would.
     """
     graph = nx.Graph()
     graph.add_nodes_from([start, goal])
@@ -50,7 +48,7 @@ def route(
     try:
         places = nx.shortest_path(graph, start, goal, weight='length')
     except nx.NetworkXNoPath:
-        raise NoRouteError(_why(blocked, closed, start, goal)) from None
+        raise NoPathError(_why(blocked, closed, start, goal)) from None
     return [graph[first][second]['door'] for first, second in pairwise(places)]
 
 

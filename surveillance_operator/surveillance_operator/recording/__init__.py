@@ -8,13 +8,12 @@ from surveillance_operator.recording.bag import (
     prune,
     repair,
 )
-from surveillance_operator.recording.timeline import Timeline, TimelineError, TimelineWriter
+from surveillance_operator.recording.timeline import Timeline, TimelineWriter
 
 __all__ = [
     'BagWriter',
     'RecordingError',
     'Timeline',
-    'TimelineError',
     'TimelineWriter',
     'TopicType',
     'messages',

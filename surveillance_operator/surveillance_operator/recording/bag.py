@@ -35,7 +35,7 @@ INFINITE = {'sec': 9223372036, 'nsec': 854775807}
 
 
 class RecordingError(ValueError):
-    """A recording cannot be written or read; the message is one line that names the file."""
+    """A recording cannot be written or read, or there is none; one line that says which."""
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from surveillance_operator.recording import timeline
+from surveillance_operator.recording.bag import RecordingError
 
 EXIT_BAD_INPUT = 2
 LAST = 'last'
@@ -14,26 +15,22 @@ RECORD = 'mission.jsonl'
 PLACE = 'place.yaml'
 
 
-class RunError(ValueError):
-    """There is no such run; the message is one line."""
-
-
 def find_run(name: str, runs: Path) -> Path:
     """Return the folder of a run: a path, a name below `runs`, or `last`.
 
     Raises:
-        RunError: There is none.
+        RecordingError: There is none.
     """
     known = sorted(path.name for path in runs.glob('*') if is_run(path))
     if name == LAST:
         if not known:
-            raise RunError(f'no run in {runs} yet')
+            raise RecordingError(f'no run in {runs} yet')
         return runs / known[-1]
     for folder in (Path(name), runs / name, Path(name).parent):
         if is_run(folder):
             return folder
     newest = f', e.g. {known[-1]}, or {LAST}' if known else ''
-    raise RunError(f'{name}: expected the folder of a run below {runs}{newest}')
+    raise RecordingError(f'{name}: expected the folder of a run below {runs}{newest}')
 
 
 def is_run(folder: Path) -> bool:

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from surveillance_operator.frames import Framer, Parts
+from surveillance_operator.recording.bag import RecordingError
 from surveillance_operator.snapshot import Snapshot
 
 NAME = 'timeline.jsonl'
@@ -23,10 +24,6 @@ WHOLE_PERIOD = 60.0
 _HEAD = re.compile(rb'\{"t":([\d.]+),"k":([01]),"e":"(\w*)"')
 MARKS = ('decision', 'failure', 'recharge')
 """What a replay can jump to."""
-
-
-class TimelineError(ValueError):
-    """A time line cannot be read; the message is one line that names the file."""
 
 
 class TimelineWriter:
@@ -98,7 +95,7 @@ class Timeline:
         marks: Times by what happened, one of `MARKS`.
 
     Raises:
-        TimelineError: There is no such file, or nothing in it.
+        RecordingError: There is no such file, or nothing in it.
     """
 
     def __init__(self, path: Path) -> None:
@@ -109,7 +106,7 @@ class Timeline:
         try:
             self._file = open(path, 'rb')  # noqa: SIM115 - kept open
         except OSError as error:
-            raise TimelineError(f'{path}: {error.strerror}') from None
+            raise RecordingError(f'{path}: {error.strerror}') from None
         offset = 0
         for line in self._file:
             match = _HEAD.match(line)
@@ -124,7 +121,7 @@ class Timeline:
                 self._offsets.append(offset)
             offset += len(line)
         if not self._wholes:
-            raise TimelineError(f'{path}: holds nothing to replay')
+            raise RecordingError(f'{path}: holds nothing to replay')
 
     def at(self, time: float) -> tuple[int, float, Parts]:
         """Return the number of the line that holds at a time, the mission's time, and all parts."""

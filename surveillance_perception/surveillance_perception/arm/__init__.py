@@ -1,12 +1,12 @@
 """The arm that carries the camera: where it looks, how it moves, and scans of all around."""
 
-from surveillance_perception.arm.driver import ArmDriver, ArmMotionError
+from surveillance_perception.arm.driver import ArmDriver
 from surveillance_perception.arm.kinematics import Aim, UnreachableError, look_at
 from surveillance_perception.arm.scan import ScanOutcome, ScanPlan, scan
 from surveillance_perception.arm.trajectory import (
+    ArmMotionError,
     ArmState,
     ArmTrajectory,
-    TrajectoryError,
     motion_to,
 )
 from surveillance_perception.arm.view_coverage import View, coverage, views_covering
@@ -19,7 +19,6 @@ __all__ = [
     'ArmTrajectory',
     'ScanOutcome',
     'ScanPlan',
-    'TrajectoryError',
     'UnreachableError',
     'View',
     'coverage',

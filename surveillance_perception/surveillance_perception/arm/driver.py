@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from surveillance_perception.arm.trajectory import (
+    ArmMotionError,
     ArmState,
     ArmTrajectory,
     motion_to,
@@ -21,10 +22,6 @@ PATIENCE = 5.0
 
 REST_SPEED = 0.01
 """Speed of every joint below which the arm rests, rad/s."""
-
-
-class ArmMotionError(Exception):
-    """A motion did not reach its goal; the message is one line."""
 
 
 class ArmDriver:
@@ -111,8 +108,8 @@ class ArmDriver:
                 after a change.
 
         Raises:
-            ArmMotionError: The arm does not report or get there, or another motion took over.
-            TrajectoryError: The goal is outside the limits.
+            ArmMotionError: The goal is outside the limits, the arm does not report or get there, or
+                another motion took over.
         """
         with self._changed:
             self._turn += 1

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from surveillance_perception.arm.driver import ArmDriver, ArmMotionError
+from surveillance_perception.arm.driver import ArmDriver
 from surveillance_perception.arm.kinematics import UnreachableError, direction_of, look_at
-from surveillance_perception.arm.trajectory import TrajectoryError
+from surveillance_perception.arm.trajectory import ArmMotionError
 from surveillance_perception.arm.view_coverage import View, coverage, views_covering
 from surveillance_runtime.robot_arm import Array
 
@@ -92,7 +92,7 @@ def scan(
         tell(index, view, False)
         try:
             driver.move(positions, ended)
-        except (ArmMotionError, TrajectoryError) as error:
+        except ArmMotionError as error:
             outcome.failure = f'view {index + 1} of {len(plan.views)}: {error}'
             break
         tell(index, view, True)

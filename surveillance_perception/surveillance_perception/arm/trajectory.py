@@ -13,8 +13,8 @@ SAMPLE_PERIOD = 0.05
 """Seconds between the points of a trajectory."""
 
 
-class TrajectoryError(ValueError):
-    """No motion within the limits leads there; the message is one line."""
+class ArmMotionError(Exception):
+    """A motion cannot reach its goal, or did not; the message is one line."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,14 +73,14 @@ def motion_to(arm: Arm, start: ArmState, goal: Array) -> ArmTrajectory:
     """The fastest motion to joint positions within the limits of the joints.
 
     Raises:
-        TrajectoryError: The goal is outside the joints' limits.
+        ArmMotionError: The goal is outside the joints' limits.
     """
     goal = np.asarray(goal, dtype=float)
     if goal.shape != (len(arm.joints),) or not np.isfinite(goal).all():
-        raise TrajectoryError(f'a goal must be {len(arm.joints)} finite joint positions')
+        raise ArmMotionError(f'a goal must be {len(arm.joints)} finite joint positions')
     for joint, value in zip(arm.joints, goal.tolist(), strict=True):
         if not joint.lower - 1e-9 <= value <= joint.upper + 1e-9:
-            raise TrajectoryError(
+            raise ArmMotionError(
                 f'{joint.name} cannot reach {value:.3f} rad, '
                 f'expected {joint.lower:g} to {joint.upper:g}'
             )
@@ -119,7 +119,7 @@ def _solve(request: ruckig.InputParameter, start: ArmState) -> ArmTrajectory:
     trajectory = ruckig.Trajectory(joints)
     result = ruckig.Ruckig(joints).calculate(request, trajectory)
     if result not in (ruckig.Result.Working, ruckig.Result.Finished):
-        raise TrajectoryError(f'no motion from {start.positions.round(3).tolist()}: {result.name}')
+        raise ArmMotionError(f'no motion from {start.positions.round(3).tolist()}: {result.name}')
     # also a motion to where the arm is takes its time: its points must follow one another
     duration = max(float(trajectory.duration), SAMPLE_PERIOD)
     count = max(2, int(np.ceil(duration / SAMPLE_PERIOD)) + 1)
