@@ -8,6 +8,8 @@ On the way to the dock it is known already and ends nothing.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import surveillance_fsm as fsm
@@ -31,18 +33,7 @@ from surveillance_behaviour.peers.ports import Point, Routine
 BATTERY_LOW = 'battery_low'
 
 
-class RoutineState(MissionState):
-    """A state that talks to the peers of the behaviour `patrol`."""
-
-    @property
-    def routine(self) -> Routine:
-        """The peers."""
-        routine = self.mission.ports.routine
-        assert routine is not None
-        return routine
-
-
-class Initial(RoutineState):
+class Initial(MissionState):
     """Has the robot look around and build its ontology."""
 
     task = 'starting'
@@ -51,13 +42,13 @@ class Initial(RoutineState):
         super().__init__(mission, ['start'])
 
     def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
-        self.routine.start(interrupt)
+        routine_of(self.mission).start(interrupt)
         self.mission.ports.ontology.wait_until_built(interrupt)
         self.mission.begin(interrupt)
         return 'start'
 
 
-class Reasoning(RoutineState):
+class Reasoning(MissionState):
     """Asks for the next place, unless the battery has to be charged first."""
 
     task = 'reasoning'
@@ -77,18 +68,22 @@ class Reasoning(RoutineState):
         return BATTERY_LOW
 
 
-class MovingState(RoutineState):
-    """A half of a move; whether a low battery ends it depends on where it goes.
+class MoveStep(MissionState):
+    """One of the two steps of a move; whether a low battery ends it depends on where it goes.
 
     Args:
         mission: The mission's memory and ports.
-        outcome: The outcome of a half that is done.
+        task: What the step does, for messages.
+        step: The step itself; gets the mission, the userdata and what interrupts it.
+        outcome: The outcome of a step that is done.
         heeds_battery: Whether a low battery ends it.
     """
 
     def __init__(
         self,
         mission: Mission,
+        task: str,
+        step: Callable[[Mission, Any, fsm.Interrupt], None],
         outcome: str,
         heeds_battery: bool,
         input_keys: tuple[str, ...],
@@ -96,18 +91,16 @@ class MovingState(RoutineState):
     ) -> None:
         outcomes = [outcome, BATTERY_LOW] if heeds_battery else [outcome]
         super().__init__(mission, outcomes, input_keys, output_keys)
+        self.task = task
+        self._step = step
         self._outcome = outcome
         self._heeds_battery = heeds_battery
 
     def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
         battery = self.mission.battery
         with battery.interrupting(interrupt, lambda: self._heeds_battery and battery.low) as either:
-            self.move(ud, either)
+            self._step(self.mission, ud, either)
         return self._outcome
-
-    def move(self, ud: Any, interrupt: fsm.Interrupt) -> None:
-        """The half itself."""
-        raise NotImplementedError
 
     def interrupted(self, ud: Any) -> str:
         level = self.mission.battery.level_text()
@@ -118,36 +111,21 @@ class MovingState(RoutineState):
         return str(ud.target)
 
 
-class Pointing(MovingState):
-    """Asks for the via points to the target."""
-
-    task = 'pointing'
-
-    def __init__(self, mission: Mission, heeds_battery: bool) -> None:
-        super().__init__(mission, 'pointed', heeds_battery, ('target',), ('via_points',))
-
-    def move(self, ud: Any, interrupt: fsm.Interrupt) -> None:
-        mission = self.mission
-        via_points = self.routine.plan(ud.target, interrupt)
-        goal = mission.ports.places.position(ud.target, interrupt)
-        check_path(via_points, goal, mission.settings.goal_tolerance, 'motion/planner')
-        ud.via_points = via_points
+def plan_path(mission: Mission, ud: Any, interrupt: fsm.Interrupt) -> None:
+    """Ask for the via points to the target."""
+    via_points = routine_of(mission).plan(ud.target, interrupt)
+    goal = mission.ports.places.position(ud.target, interrupt)
+    check_path(via_points, goal, mission.settings.goal_tolerance, 'motion/planner')
+    ud.via_points = via_points
 
 
-class Controlling(MovingState):
-    """Drives through the via points; the motion controller notes the visit."""
-
-    task = 'controlling'
-
-    def __init__(self, mission: Mission, heeds_battery: bool) -> None:
-        super().__init__(mission, 'reached', heeds_battery, ('target', 'via_points'))
-
-    def move(self, ud: Any, interrupt: fsm.Interrupt) -> None:
-        distance = drive(self, ud.target, ud.via_points, interrupt)
-        self.mission.arrived(ud.target, distance, ud.via_points)
+def follow_path(mission: Mission, ud: Any, interrupt: fsm.Interrupt) -> None:
+    """Drive through the via points; the motion controller notes the visit."""
+    distance = drive(mission, ud.target, ud.via_points, interrupt)
+    mission.arrived(ud.target, distance, ud.via_points)
 
 
-class GoBack(RoutineState):
+class GoBack(MissionState):
     """Goes back to the last place the robot is known to have been in."""
 
     task = 'going back'
@@ -157,29 +135,35 @@ class GoBack(RoutineState):
 
     def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
         place = self.mission.place
-        via_points = self.routine.plan(place, interrupt)
-        self.mission.came_back(drive(self, place, via_points, interrupt))
+        via_points = routine_of(self.mission).plan(place, interrupt)
+        self.mission.came_back(drive(self.mission, place, via_points, interrupt))
         return 'returned'
 
 
+def routine_of(mission: Mission) -> Routine:
+    """Return the peers of the behaviour `patrol`."""
+    routine = mission.ports.routine
+    assert routine is not None
+    return routine
+
+
 def drive(
-    state: RoutineState, target: str, via_points: list[Point], interrupt: fsm.Interrupt
+    mission: Mission, target: str, via_points: list[Point], interrupt: fsm.Interrupt
 ) -> float:
-    """Drives through the points and makes sure that it ends in ``target``; metres driven.
+    """Drive through the points and make sure that it ends in ``target``; metres driven.
 
     Raises:
         PeerError: It does not.
     """
-    mission, peer = state.mission, 'motion/controller'
     check_path(via_points, None, 0.0, 'motion/planner')
     mission.departs()
-    end = state.routine.control(via_points, interrupt)
-    check_arrival(end, via_points[-1], mission.settings.arrival_tolerance, peer)
+    end = routine_of(mission).control(via_points, interrupt)
+    check_arrival(end, via_points[-1], mission.settings.arrival_tolerance, 'motion/controller')
     mission.make_sure_of(target, interrupt)
     return path_length(via_points)
 
 
-class Recharge(RoutineState):
+class Recharge(MissionState):
     """Charges the battery if the robot is at the dock, else chooses the dock to go to."""
 
     task = 'recharging'
@@ -207,7 +191,7 @@ class Recharge(RoutineState):
             interrupt,
             stall_seconds=settings.charge_stall_seconds,
             settle_seconds=settings.settle_seconds,
-            recharge=self.routine.recharge,
+            recharge=routine_of(self.mission).recharge,
         )
         mission.charged(mission.now() - began)
         return 'battery_full'
@@ -221,9 +205,14 @@ def moving(mission: Mission, *, heeds_battery: bool) -> fsm.StateMachine:
     low = [BATTERY_LOW] if heeds_battery else []
     machine = fsm.StateMachine(['reached', FAILED, PREEMPTED, *low], input_keys=['target'])
     leave = {outcome: outcome for outcome in (FAILED, *low)}
+    step = partial(MoveStep, mission, heeds_battery=heeds_battery)
+    pointing = step(
+        'pointing', plan_path, 'pointed', input_keys=('target',), output_keys=('via_points',)
+    )
+    controlling = step('controlling', follow_path, 'reached', input_keys=('target', 'via_points'))
     with machine:
-        add('Pointing', Pointing(mission, heeds_battery), {'pointed': 'Controlling', **leave})
-        add('Controlling', Controlling(mission, heeds_battery), {'reached': 'reached', **leave})
+        add('Pointing', pointing, {'pointed': 'Controlling', **leave})
+        add('Controlling', controlling, {'reached': 'reached', **leave})
     return machine
 
 

@@ -132,79 +132,69 @@ class ChooseNextRoom(MissionState):
         return 'chosen'
 
 
-class Move(MissionState):
-    """Plans a path to a place and follows it."""
-
-    def __init__(self, mission: Mission, outcome: str, input_keys: tuple[str, ...] = ()) -> None:
-        super().__init__(mission, [outcome], input_keys)
-        self._outcome = outcome
-
-    def move(self, place: str, interrupt: fsm.Interrupt) -> str:
-        """Move the robot to a place.
-
-        Raises:
-            PeerError: It did not get there.
-        """
-        path = self._drive(self.mission.place, place, interrupt)
-        self.mission.arrived(place, path_length(path), path)
-        return self._outcome
-
-    def _drive(self, before: str, place: str, interrupt: fsm.Interrupt) -> list[Point]:
-        mission = self.mission
-        motion = mission.ports.motion
-        assert motion is not None
-        goal = mission.ports.places.position(place, interrupt)
-        start = motion.last_position() or mission.ports.places.position(before, interrupt)
-        path: list[Point] = []
-        for stop in self._stops(before, place, goal, interrupt):
-            leg = motion.plan(path[-1] if path else start, stop, interrupt)
-            check_path(leg, stop, mission.settings.goal_tolerance, 'compute_path')
-            path.extend(leg if not path else leg[1:])
-        mission.departs()
-        end = motion.follow(path, interrupt)
-        check_arrival(end, path[-1], mission.settings.arrival_tolerance, 'follow_path')
-        mission.make_sure_of(place, interrupt)
-        return path
-
-    def _stops(self, before: str, place: str, goal: Point, interrupt: fsm.Interrupt) -> list[Point]:
-        """The goal, at the last try after the places of a way round if the map has one."""
-        mission = self.mission
-        if mission.recovery.tries(place) < max(1, mission.settings.recovery.path_tries - 1):
-            return [goal]
-        way = mission.ports.decisions.route_round(before, place)
-        if not way:
-            return [goal]
-        mission.say(f'trying the way round: {" - ".join((before, *way))}')
-        return [*(mission.ports.places.position(room, interrupt) for room in way[:-1]), goal]
-
-
-class MoveToNextRoom(Move):
+class MoveToNextRoom(MissionState):
     """Moves to the next room."""
 
     task = 'moving'
 
     def __init__(self, mission: Mission) -> None:
-        super().__init__(mission, 'moved', ('next_room',))
+        super().__init__(mission, ['moved'], ['next_room'])
 
     def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
-        return self.move(ud.next_room, interrupt)
+        path = drive(self.mission, ud.next_room, interrupt)
+        self.mission.arrived(ud.next_room, path_length(path), path)
+        return 'moved'
 
     def goal(self, ud: Any) -> str | None:
         return str(ud.next_room)
 
 
-class ReturnToLastPlace(Move):
+class ReturnToLastPlace(MissionState):
     """Goes back to the last place the robot is known to have been in."""
 
     task = 'going back'
 
     def __init__(self, mission: Mission) -> None:
-        super().__init__(mission, 'returned')
+        super().__init__(mission, ['returned'])
 
     def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
         mission = self.mission
-        mission.came_back(path_length(self._drive(mission.place, mission.place, interrupt)))
+        mission.came_back(path_length(drive(mission, mission.place, interrupt)))
         return 'returned'
+
+
+def drive(mission: Mission, place: str, interrupt: fsm.Interrupt) -> list[Point]:
+    """Plan a path to a place and follow it; return the path.
+
+    Raises:
+        PeerError: The robot did not get there.
+    """
+    motion, before = mission.ports.motion, mission.place
+    assert motion is not None
+    goal = mission.ports.places.position(place, interrupt)
+    start = motion.last_position() or mission.ports.places.position(before, interrupt)
+    path: list[Point] = []
+    for stop in _stops(mission, place, goal, interrupt):
+        leg = motion.plan(path[-1] if path else start, stop, interrupt)
+        check_path(leg, stop, mission.settings.goal_tolerance, 'compute_path')
+        path.extend(leg if not path else leg[1:])
+    mission.departs()
+    end = motion.follow(path, interrupt)
+    check_arrival(end, path[-1], mission.settings.arrival_tolerance, 'follow_path')
+    mission.make_sure_of(place, interrupt)
+    return path
+
+
+def _stops(mission: Mission, place: str, goal: Point, interrupt: fsm.Interrupt) -> list[Point]:
+    """Return the goal, at the last try after the places of a way round if the map has one."""
+    before = mission.place
+    if mission.recovery.tries(place) < max(1, mission.settings.recovery.path_tries - 1):
+        return [goal]
+    way = mission.ports.decisions.route_round(before, place)
+    if not way:
+        return [goal]
+    mission.say(f'trying the way round: {" - ".join((before, *way))}')
+    return [*(mission.ports.places.position(room, interrupt) for room in way[:-1]), goal]
 
 
 def surveillance_machine(mission: Mission) -> fsm.StateMachine:
