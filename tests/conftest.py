@@ -18,6 +18,25 @@ _domain = claim_domain()
 os.environ['ROS_DOMAIN_ID'] = str(_domain)
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark each test by what it needs: nothing (unit), ROS nodes (nodes), a whole mission."""
+    for item in items:
+        folder = item.path.relative_to(item.config.rootpath).parts[1]
+        fixtures = set(getattr(item, 'fixturenames', ()))
+        if folder == 'mission' or fixtures & MISSION_FIXTURES:
+            item.add_marker(pytest.mark.mission)
+        elif fixtures & NODE_FIXTURES:
+            item.add_marker(pytest.mark.nodes)
+        else:
+            item.add_marker(pytest.mark.unit)
+
+
+NODE_FIXTURES = {'graph', 'ros_domain'}
+"""Fixtures with ROS nodes in the test's own process."""
+MISSION_FIXTURES = {'robot', 'launch', 'started', 'mission', 'page', 'viewer'}
+"""Fixtures with a whole mission, in this process or as `launch.py` starts it."""
+
+
 @pytest.fixture(scope='session')
 def ros_domain() -> int:
     """The ROS domain of this test process, also in its environment."""
