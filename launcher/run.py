@@ -524,7 +524,8 @@ def run_mission(run: Run, config: Path, runs: Path, resume: Path | None = None) 
         if members := [node for node in observers if node.name in together]:
             own = [files[node.name] for node in members]
             words = command(members, ros_arguments(own, run), os.getpid())
-            programs.append(Program(members[0].name, words, environ, says_up=True))
+            observer = Program(members[0].name, words, environ, says_up=True, watched=True)
+            programs.append(replace(observer, memory=run.memory * 2**20))
     names = [
         *(node.name for node in (*nodes, *observers)),
         *([COMPOSED] if run.composed else []),

@@ -231,6 +231,9 @@ class FactSubscription:
         self._resynchronise()
 
     def _resynchronise(self) -> None:
+        stopping = getattr(self._node, 'stopping', None)
+        if stopping is not None and stopping.is_set():
+            return  # The server's leaving is news, too, and nobody would await the answer.
         if self._asking:
             self._ask_again = True
             return
