@@ -346,7 +346,7 @@ class Campaign:
         ).items():
             known = last.get(place)
             if known is None:
-                if self.watcher.truth and seconds > self.watcher.truth[0][0] + CLOSE_IN_TIME:
+                if seconds > 0 and not self._was_there(place, seconds):
                     self.results.invented.append(f'{place} at {seconds} s stands in the ontology')
             elif seconds > known + 10.0 and not self._was_there(place, seconds):
                 self.results.invented.append(
