@@ -5,6 +5,8 @@ python examples/04_plan_on_a_grid.py
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 
 from surveillance_controllers.geometry import Points, length
@@ -43,7 +45,7 @@ def grid_of(text: str) -> GridMap:
 def show(grid: GridMap, path: Points) -> None:
     """Print the map with the path as dots."""
     signs = np.where(grid.occupied, '#', ' ')
-    fine = [np.linspace(first, last, 20) for first, last in zip(path[:-1], path[1:], strict=True)]
+    fine = [np.linspace(first, last, 20) for first, last in itertools.pairwise(path)]
     for row, column in grid.cells_of(np.concatenate(fine)):
         signs[row, column] = '.'
     print('\n'.join(''.join(row) for row in signs[::-1]))
