@@ -203,7 +203,12 @@ def _best(world: World, rule: str, allowed: Sequence[str], scores: Scores, polic
     else:
         choice = f'{best} of {len(allowed)} {_kind(rule)} places within reach, by {policy}'
     if rule == URGENT:
-        choice += f' (unvisited {world.unvisited(best):.1f} s, threshold {world.threshold:g} s)'
+        wait = (
+            f'unvisited {world.unvisited(best):.1f} s'
+            if best in world.visited_at
+            else 'not visited yet'
+        )
+        choice += f' ({wait}, threshold {world.threshold:g} s)'
     return Decision(
         time=world.now,
         from_place=world.place,
@@ -298,7 +303,7 @@ def why_not(place: str, world: World, battery: Battery, settings: DecisionSettin
         return WhyNot(
             f'{place} is not {decision.rule}, and {_listed(decision.scores)} '
             f'{"is" if len(decision.scores) == 1 else "are"}; '
-            f'{place} went unvisited for {world.unvisited(place):.1f} s, the threshold is '
+            f'{place} {world.wait_in_words(place)}, the threshold is '
             f'{world.threshold:g} s; {instead}',
             premises,
         )

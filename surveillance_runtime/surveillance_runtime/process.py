@@ -14,6 +14,7 @@ import signal
 import sys
 import threading
 import traceback
+import warnings
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -67,6 +68,8 @@ def run_nodes(
 ) -> int:
     """Run several nodes in this process on one executor; otherwise as `run_node`."""
     use_one_thread_for_matrices()
+    # A client that was killed, or is not fully discovered, gets no answer and asks again.
+    warnings.filterwarnings('ignore', 'failed to send response', RuntimeWarning)
     ending = _Ending()
     argv = [sys.argv[0], *(sys.argv[1:] if args is None else args)]
     try:

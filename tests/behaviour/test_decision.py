@@ -77,6 +77,12 @@ def test_a_decision_carries_its_reason_in_words_and_numbers() -> None:
     assert decision.scores == {'R1': 80.0, 'R2': 90.0}
 
 
+def test_a_place_that_nobody_visited_yet_has_no_invented_wait() -> None:
+    decision = decide(world(visited_at={}), Battery(), DecisionSettings(policy='oldest'))
+    assert '(not visited yet, threshold 60 s)' in decision.reason
+    assert decision.reason.endswith('it has not been visited yet')
+
+
 def test_charging_comes_first_and_goes_to_the_nearest_station() -> None:
     settings = DecisionSettings(recharge_rooms=('R4', 'E'))
     decision = decide(world(requested='R3'), Battery(12.0), settings)

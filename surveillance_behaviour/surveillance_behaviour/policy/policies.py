@@ -66,7 +66,7 @@ def oldest(world: World, allowed: Sequence[str]) -> Scores:
     scores = {}
     for place in allowed:
         seconds = world.unvisited(place)
-        scores[place] = Score(seconds, place, f'it went unvisited for {seconds:.1f} s')
+        scores[place] = Score(seconds, place, f'it {world.wait_in_words(place)}')
     return scores
 
 
@@ -102,7 +102,7 @@ def tour(world: World, allowed: Sequence[str]) -> Scores:
         place: Score(
             -plan.cost(world, place, target),
             name,
-            f'{_heads_for(place, name)}, which went unvisited for {world.unvisited(name):.1f} s; '
+            f'{_heads_for(place, name)}, which {world.wait_in_words(name)}; '
             f'this round leaves no place longer than {plan.worth.longest:.1f} s',
         )
         for place in allowed

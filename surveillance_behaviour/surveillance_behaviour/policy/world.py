@@ -70,6 +70,12 @@ class World:
         """Return the seconds since ``place`` was visited."""
         return self.now - self.visited_at.get(place, self.since)
 
+    def wait_in_words(self, place: str) -> str:
+        """Return how long ``place`` went unvisited, as the end of a clause."""
+        if place not in self.visited_at:
+            return 'has not been visited yet'
+        return f'went unvisited for {self.unvisited(place):.1f} s'
+
     @cached_property
     def idleness(self) -> NDArray[np.float64]:
         """Seconds since each place of the graph was visited, shape (n,), in the graph's order."""
