@@ -13,8 +13,8 @@ from surveillance_behaviour.mission import mission_log
 from surveillance_behaviour.policy.graph import PatrolGraph
 from surveillance_operator.recording.bag import RecordingError
 from surveillance_runtime.place import Place, read_place_file
+from surveillance_runtime.place.drawing import Run, draw_place
 from surveillance_runtime.place.floor_plan import FloorPlan
-from surveillance_runtime.place.picture import Run, draw_place
 from surveillance_runtime.yaml_file import YamlFileError
 from surveillance_simulation.world.textures import TextureError, marker_panel
 

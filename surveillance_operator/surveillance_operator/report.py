@@ -18,8 +18,8 @@ from surveillance_operator.recording.bag import RecordingError
 from surveillance_operator.recording.runs import PLACE, RECORD, find_run, run_parser
 from surveillance_operator.recording.timeline import Timeline
 from surveillance_runtime.place import read_place_file
+from surveillance_runtime.place.drawing import Run, draw_place
 from surveillance_runtime.place.floor_plan import FloorPlan
-from surveillance_runtime.place.picture import Run, draw_place
 from surveillance_runtime.yaml_file import YamlFileError
 
 EXIT_BAD_INPUT = 2

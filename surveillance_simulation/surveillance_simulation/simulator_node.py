@@ -42,7 +42,7 @@ _UNDER_WAY = (
 
 
 class Simulator(PatrolNode):
-    """Moves the robot on in time, obeys its commands and publishes what its sensors measure.
+    """Steps the robot in time, carries out its commands and publishes its sensors' measurements.
 
     Attributes:
         robot: The robot in its world, for whoever runs the node in their own process.

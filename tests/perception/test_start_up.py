@@ -1,4 +1,4 @@
-"""The second seed's start as a whole: from pixels over markers to an ontology."""
+"""The start of the behaviour patrol as a whole: from pixels over markers to an ontology."""
 
 from __future__ import annotations
 

@@ -120,7 +120,7 @@ def test_nothing_can_be_patrolled_while_the_robots_place_is_unknown():
     assert 'no marker tells of the place where the robot is' in report.sentences()
 
 
-class Eyes:
+class ScriptedCamera:
     """Shows given ids at each pose and scan."""
 
     def __init__(self, survey, by_pose, by_scan=(), seconds=3.0):
@@ -145,39 +145,41 @@ class Eyes:
         self.did.append('home')
 
 
-def look(eyes, deadline=30.0):
+def look(camera, deadline=30.0):
     said = []
     looking = InitialScan(deadline=deadline, dwell=0.5)
-    report = looking.run(eyes, eyes.survey.report, lambda: eyes.time, said.append, lambda: False)
+    report = looking.run(
+        camera, camera.survey.report, lambda: camera.time, said.append, lambda: False
+    )
     return report, said
 
 
 def test_looking_ends_as_soon_as_all_is_found():
-    eyes = Eyes(Survey('E'), {1: range(11, 15), 2: range(15, 18)})
-    report, said = look(eyes)
+    camera = ScriptedCamera(Survey('E'), {1: range(11, 15), 2: range(15, 18)})
+    report, said = look(camera)
     assert report.complete
-    assert eyes.did == [1, 2, 'home']
+    assert camera.did == [1, 2, 'home']
     assert said == []
 
 
 def test_looking_goes_on_closer_for_what_is_missing():
-    eyes = Eyes(Survey('E'), {1: range(11, 17)}, by_scan=[(), (17,)])
-    report, said = look(eyes)
+    camera = ScriptedCamera(Survey('E'), {1: range(11, 17)}, by_scan=[(), (17,)])
+    report, said = look(camera)
     assert report.complete
-    assert eyes.did == [1, 2, 3, 4, ('scan', 0.12, 0.3, 0.5), ('scan', 0.24, 0.45, 1.0), 'home']
+    assert camera.did == [1, 2, 3, 4, ('scan', 0.12, 0.3, 0.5), ('scan', 0.24, 0.45, 1.0), 'home']
     assert said[0] == 'looking on: no marker tells of R4, to which D4 leads'
 
 
 def test_after_the_deadline_what_was_found_has_to_do():
-    eyes = Eyes(Survey('E'), {1: range(11, 17)})
-    report, _ = look(eyes)
+    camera = ScriptedCamera(Survey('E'), {1: range(11, 17)})
+    report, _ = look(camera)
     assert rooms(report) == ['C1', 'C2', 'E', 'R1', 'R2', 'R3']
     assert set(report.missing) == {'R4'}
-    assert eyes.time < 40.0
+    assert camera.time < 40.0
 
 
 def test_without_anything_to_patrol_looking_does_not_end_at_the_deadline():
-    eyes = Eyes(Survey('E'), {}, by_scan=[(), (), (), (), (), (), (), (11, 12)])
-    report, said = look(eyes, deadline=10.0)
+    camera = ScriptedCamera(Survey('E'), {}, by_scan=[(), (), (), (), (), (), (), (11, 12)])
+    report, said = look(camera, deadline=10.0)
     assert rooms(report) == ['C1', 'E']
     assert said.count('nothing to patrol was found yet; looking on') == 1

@@ -18,7 +18,7 @@ FAILED = 'failed'
 
 
 class MissionState(fsm.State):
-    """A state that talks to peers: it ends with ``failed`` when one of them lets it down.
+    """A state that talks to peers: it ends with ``failed`` when one of them fails.
 
     Args:
         mission: The mission's memory and ports.
@@ -43,7 +43,7 @@ class MissionState(fsm.State):
         self.mission = mission
 
     def execute(self, ud: Any) -> str | None:
-        """Works until done, failed or preempted."""
+        """Work until done, failed or preempted."""
         if self.preempt_requested():
             return self._preempted()
         try:
@@ -116,7 +116,7 @@ class WaitForHelp(fsm.State):
         self.mission = mission
 
     def execute(self, ud: Any) -> str:
-        """Waits for one pause."""
+        """Wait for one pause."""
         mission = self.mission
         failure = mission.failure
         reason = 'nothing works' if failure is None else f'{failure.what} failed: {failure.reason}'
@@ -138,7 +138,7 @@ def add(
     transitions: Mapping[str, str],
     remapping: Mapping[str, str] | None = None,
 ) -> None:
-    """Adds a state to the open machine; ``preempted`` leaves the machine unless bound."""
+    """Add a state to the open machine; ``preempted`` leaves the machine unless bound."""
     bound: dict[str, str | None] = {PREEMPTED: PREEMPTED}
     bound.update(transitions)
     fsm.StateMachine.add(label, state, bound, remapping)
@@ -150,7 +150,7 @@ def path_length(path: list[Point]) -> float:
 
 
 def check_path(path: list[Point], goal: Point | None, tolerance: float, peer: str) -> None:
-    """Refuses a path that leads nowhere, or elsewhere.
+    """Refuse a path that leads nowhere, or elsewhere.
 
     Raises:
         PeerError: It is empty, not finite, or ends too far from ``goal``.
@@ -168,7 +168,7 @@ def check_path(path: list[Point], goal: Point | None, tolerance: float, peer: st
 
 
 def check_arrival(end: Point, goal: Point, tolerance: float, peer: str) -> None:
-    """Refuses an arrival that is none.
+    """Refuse an arrival that is none.
 
     Raises:
         PeerError: The robot stopped too far from ``goal``.

@@ -92,7 +92,7 @@ class Drive:
 
     Args:
         path: Points of shape (n, 2), n of at least 1, metres, map frame.
-        robot: The robot's limits and habits.
+        robot: The robot's limits and tracking settings.
         recovery: When and how the drive recovers.
 
     Attributes:

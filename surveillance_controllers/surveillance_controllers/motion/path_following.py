@@ -22,7 +22,7 @@ from surveillance_controllers.geometry import Points, Pose, angle_between
 
 @dataclass(frozen=True)
 class DriveParameters:
-    """The robot's limits and habits.
+    """The robot's limits and tracking settings.
 
     Attributes:
         radius: Radius of the robot, metres.
@@ -96,7 +96,7 @@ class PathFollower:
 
     Args:
         path: Points of shape (n, 2), n of at least 1, metres.
-        parameters: The robot's limits and habits.
+        parameters: The robot's limits and tracking settings.
     """
 
     def __init__(self, path: ArrayLike, parameters: DriveParameters | None = None) -> None:

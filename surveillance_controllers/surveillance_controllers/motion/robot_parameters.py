@@ -1,4 +1,4 @@
-"""The parameters of the SIMULATED mode: the place's geometry, and the robot's size and habits."""
+"""The parameters of the SIMULATED mode: the place's geometry, and the robot's size and limits."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ class NoPathError(Exception):
 
 @dataclass(frozen=True)
 class PlanningParameters:
-    """How close to obstacles a path may run, and how much it shuns them.
+    """How close to obstacles a path may run, and how much it avoids them.
 
     Attributes:
         radius: Radius of the robot, metres.
@@ -81,7 +81,7 @@ class GridPlanner:
 
     Args:
         grid: The map.
-        parameters: The robot's size and habits.
+        parameters: The robot's size, margins and costs.
     """
 
     grid: GridMap

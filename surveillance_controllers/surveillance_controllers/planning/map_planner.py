@@ -35,7 +35,7 @@ class MapPlanner:
 
     Args:
         node: The planner's node.
-        parameters: The robot's size and habits.
+        parameters: The robot's size, margins and costs.
         doors: Which doors there are, and which are closed.
     """
 

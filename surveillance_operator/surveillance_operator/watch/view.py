@@ -384,7 +384,7 @@ class _Chosen:
     ended: bool = False
 
     def press(self, key: str, seen: Snapshot) -> None:
-        """Obey a key; one that means nothing changes nothing."""
+        """Handle a key; one without a meaning changes nothing."""
         if key == 'q':
             self.ended = True
         elif key == 'p':

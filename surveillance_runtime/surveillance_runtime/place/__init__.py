@@ -3,7 +3,7 @@
 `Place` is what the nodes share: rooms, the doors that join them, a point in each. `FloorPlan` adds
 what the place's file says of walls, doors and markers, and `Regions` which room a point lies in.
 `read_place_file` reads and checks a file; `python -m surveillance_runtime.place.generation` writes
-regular ones; `surveillance_runtime.place.picture` draws them.
+regular ones; `surveillance_runtime.place.drawing` draws them.
 """
 
 from surveillance_runtime.place.floor_plan import FloorPlan as FloorPlan

@@ -15,8 +15,12 @@ from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.place import occupancy_grid
 from surveillance_runtime.qos import STATE_QOS
 from surveillance_simulation import conversions, simulator_parameters
-from surveillance_simulation.feeds.tf_feed import TfFeed
 from surveillance_simulation.robot.robot import Robot
+
+try:
+    from tf2_msgs.msg import TFMessage
+except ImportError:  # the wheels on PyPI hold no tf2_msgs; an installed ROS 2 does
+    TFMessage = None
 
 SENSOR_DEPTH = 5
 """Sensors offer reliable delivery, so that subscribers of either kind are served (REP-2003)."""
@@ -37,7 +41,7 @@ class SensorFeed:
         self._collisions = node.create_publisher(UInt32, 'collisions', STATE_QOS)
         self._doors = node.create_publisher(DoorStates, 'door_states', STATE_QOS)
         self._map = node.create_publisher(OccupancyGrid, 'map', STATE_QOS)
-        self._tf = TfFeed(node)
+        self._tf = None if TFMessage is None else node.create_publisher(TFMessage, 'tf', 10)
         self._told_collisions = -1
         resolution = simulator_parameters.map_resolution(node)
         grid = occupancy_grid.draw(robot.world.plan, resolution)
@@ -60,7 +64,9 @@ class SensorFeed:
                 base.odometry, base.speed, base.turn_speed, 'odom', 'base_link', stamp
             )
         )
-        self._tf.tick(base.odometry, stamp)
+        if self._tf is not None:
+            transform = conversions.transform_to_ros(base.odometry, 'odom', 'base_link', stamp)
+            self._tf.publish(TFMessage(transforms=[transform]))
         if self._scan.get_subscription_count():
             ranges = self._robot.scan()
             self._scan.publish(

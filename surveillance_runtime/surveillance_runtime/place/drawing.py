@@ -1,4 +1,4 @@
-"""A place as a picture: its rooms, walls, doors, markers and graph, and a run through it.
+"""Drawing of a place: its rooms, walls, doors, markers and graph, and a run through it.
 
 The picture is drawn from the floor plan alone; what a run added (the driven ways, how long each
 place waited) comes as `Run`.

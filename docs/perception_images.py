@@ -1,6 +1,6 @@
-"""Draws the pictures of docs/perception.md anew.
+"""Draw the images of docs/perception.md again.
 
-    python docs/perception_pictures.py
+    python docs/perception_images.py
 
 `markers_seen.jpg` comes from the topic aruco_detector/annotated while the simulated robot's arm
 goes through its poses; `hard_markers.png` shows what the benchmark asks for, enlarged.

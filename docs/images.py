@@ -1,7 +1,7 @@
-"""Draws the pictures of the documentation anew: the places, a run, a run as `launch.py watch` shows
+"""Draw the images of the documentation again: the places, a run, a run as `launch.py watch` shows
 it, and what the camera sees.
 
-    python docs/pictures.py
+    python docs/images.py
 
 The camera's pictures come from the topic camera/rgb/image_raw of a running simulator.
 """
