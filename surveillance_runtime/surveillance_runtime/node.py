@@ -91,6 +91,7 @@ class PatrolNode(Node):  # type: ignore[misc]
         self._specs: dict[str, ParameterSpec] = {}
         self._on_change: dict[str, Callable[[Any], None]] = {}
         self._threads: list[threading.Thread] = []
+        self._spawning = threading.Lock()
         self._owned: list[Destroyable] = []
         self._overrides_given: dict[str, Setting] = {}
         if _given is not None and 'parameter_overrides' not in node_options:
@@ -283,9 +284,10 @@ class PatrolNode(Node):  # type: ignore[misc]
                 self.fail(f'{type(error).__name__}: {error}')
 
         thread = threading.Thread(target=body, name=name or work.__name__, daemon=True)
-        self._threads = [t for t in self._threads if t.is_alive()]
-        self._threads.append(thread)
-        thread.start()
+        # In one step: a thread that is known and not started yet cannot be joined by a stop.
+        with self._spawning:
+            thread.start()
+            self._threads = [*(t for t in self._threads if t.is_alive()), thread]
         return thread
 
     def own(self, entity: Destroyable) -> None:
@@ -324,7 +326,9 @@ class PatrolNode(Node):  # type: ignore[misc]
             return
         self.stopping.set()
         self.on_stop()
-        for thread in self._threads:
+        with self._spawning:
+            threads = list(self._threads)
+        for thread in threads:
             if thread is not threading.current_thread():
                 thread.join(JOIN_SECONDS)
                 if thread.is_alive():

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import threading
+from typing import Any
 
 import pytest
 from rclpy.parameter import Parameter
@@ -217,3 +218,38 @@ def test_process_with_a_parameter_given_twice_says_where(tmp_path):
     assert run.returncode == 2
     complaint = f"parameter file {path}:4: duplicate key 'level', first given in line 3"
     assert run.stderr == f'cannot start: {complaint}\n'
+
+
+def test_a_stop_waits_for_a_thread_that_is_just_being_started(
+    graph: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    node = graph.add(PatrolNode, name='spawner')
+    starting, go = threading.Event(), threading.Event()
+    start = threading.Thread.start
+
+    def slow_start(thread: threading.Thread) -> None:
+        if thread.name == 'late':
+            starting.set()
+            assert go.wait(10.0)
+        start(thread)
+
+    failed: list[BaseException] = []
+
+    def stop() -> None:
+        try:
+            node.stop()
+        except RuntimeError as error:
+            failed.append(error)
+
+    monkeypatch.setattr(threading.Thread, 'start', slow_start)
+    spawner = threading.Thread(target=lambda: node.spawn(node.stopping.wait, 'late'))
+    spawner.start()
+    assert starting.wait(10.0)
+    stopper = threading.Thread(target=stop)
+    stopper.start()
+    assert node.stopping.wait(10.0)
+    stopper.join(0.2)
+    go.set()
+    spawner.join(10.0)
+    stopper.join(10.0)
+    assert not failed
