@@ -18,6 +18,9 @@ from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.waiting import ClockWait
 
+MARGIN = 1e-6
+"""By how much a wait is announced longer than it is, seconds: more than stamps are rounded by."""
+
 
 class MissionClock:
     """The mission's clock, in seconds of ROS time.
@@ -38,7 +41,8 @@ class MissionClock:
 
     def sleep(self, seconds: float, interrupt: fsm.Interrupt) -> bool:
         """Wait; return False when the interrupt ended it early."""
-        self._announce(self.now() + seconds)
+        # A little later than it waits: time that stops a nanosecond early would wake nobody.
+        self._announce(self.now() + seconds + MARGIN)
         return self._wait.sleep(seconds, interrupt)
 
     def wait_for_event(self) -> None:
