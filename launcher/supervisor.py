@@ -27,6 +27,8 @@ START_WITHIN = 1.5
 """Seconds after which a process that did not say that it is up no longer holds the next one up."""
 UP = 'LAUNCH_UP'
 """The environment variable with the descriptor that a process closes to say that it is up."""
+RESTARTS = 'LAUNCH_RESTARTS'
+"""The environment variable with how often a process has been started again."""
 MEMORY = 'LAUNCH_MEMORY'
 """The environment variable with the bytes of data that a process may map."""
 STEADY_AFTER = 20.0
@@ -78,6 +80,7 @@ class Child:
     program: Program
     process: subprocess.Popen[bytes] | None = None
     started: float = 0.0
+    starts: int = 0
     restart_at: float | None = None
     deaths: int = 0
     told_to_stop: bool = False
@@ -206,6 +209,7 @@ class Supervisor:
             process = self._spawn(child, {UP: up, BEAT: beat})
         child.process = process
         child.started = time.monotonic()
+        child.starts += 1
         assert process.stdout is not None
         os.set_blocking(process.stdout.fileno(), False)
         if process.stdin is not None:
@@ -263,7 +267,7 @@ class Supervisor:
             os.close(writer)
 
     def _spawn(self, child: Child, given: Mapping[str, int | None]) -> subprocess.Popen[bytes]:
-        environ = dict(child.program.environ)
+        environ = {**child.program.environ, RESTARTS: str(child.starts)}
         descriptors = [descriptor for descriptor in given.values() if descriptor is not None]
         for name, descriptor in given.items():
             if descriptor is not None:

@@ -1,8 +1,8 @@
 """The node `mission_markers`: a mission as RViz, Foxglove and rqt show it.
 
 Topics: `place_markers` (MarkerArray: places coloured by how long they wait, doors), `driven_path`
-(Path), `robot_description` (URDF, latched) and `/diagnostics` (each node: up, started again, how
-long it takes to answer). The planned path is on `plan`, by planner_controller.
+(Path), `robot_description` (URDF, latched) and, on `/diagnostics`, the nodes that no longer report
+there themselves. The planned path is on `plan`, by planner_controller.
 """
 
 from __future__ import annotations
@@ -11,26 +11,23 @@ import time
 from collections.abc import Sequence
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import Point, PoseStamped
 from nav_msgs.msg import Path
-from rcl_interfaces.srv import GetParameterTypes
 from std_msgs.msg import ColorRGBA, String
 from visualization_msgs.msg import Marker, MarkerArray
 
+from surveillance_operator.conversions import MOST_NAMES
 from surveillance_operator.mission_feed import MissionFeed
 from surveillance_operator.robot_description import urdf
 from surveillance_operator.snapshot import Snapshot
-from surveillance_runtime.calls import CallError, ServiceCaller
+from surveillance_runtime.diagnostics import STALE_AFTER, TOPIC
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
 
 PERIOD = 1.0
 """Seconds between two messages."""
-SLOW_MS = 500.0
-"""From this on an answer is a warning, milliseconds."""
-HARDWARE = 'surveillance_robot'
 FRESH, LATE = (0.81, 0.89, 0.97), (0.88, 0.48, 0.12)
 """Colours of a place that was just visited, and of one over its threshold."""
 
@@ -47,64 +44,46 @@ class MissionMarkers(PatrolNode):
         super().__init__('mission_markers', **node_options)
         self._markers = self.create_publisher(MarkerArray, 'place_markers', STATE_QOS)
         self._driven = self.create_publisher(Path, 'driven_path', STATE_QOS)
-        self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
+        self._diagnostics = self.create_publisher(DiagnosticArray, TOPIC, 10)
+        self._reports: dict[str, tuple[float, str]] = {}
+        self.create_subscription(DiagnosticArray, TOPIC, self._on_diagnostics, 100)
         description = self.create_publisher(String, 'robot_description', STATE_QOS)
         description.publish(String(data=urdf()))
         if TFMessage is None:
             self.get_logger().info('tf2_msgs is not installed: nothing is published on tf')
-        self._callers: dict[str, ServiceCaller] = {}
-        self._latencies: dict[str, float | None] = {}
         self._feed = MissionFeed(self, PERIOD)
         self.spawn(self._work, 'markers')
 
     def _work(self) -> None:
-        number = 0
         while not self.stopping.wait(PERIOD):
             snapshot = self._feed.see()
             self._markers.publish(markers_of(snapshot, self.get_clock().now().to_msg()))
             self._driven.publish(path_of(snapshot, self.get_clock().now().to_msg()))
-            names = sorted(snapshot.nodes)
-            if names:
-                self._probe(names[number % len(names)])
-                number += 1
-            self._diagnostics.publish(self._health(snapshot))
+            if silent := self._silent(snapshot):
+                message = DiagnosticArray(status=silent)
+                message.header.stamp = self.get_clock().now().to_msg()
+                self._diagnostics.publish(message)
 
-    def _probe(self, name: str) -> None:
-        """Measure how long a node takes to answer; one node a second."""
-        caller = self._callers.get(name)
-        if caller is None:
-            service = f'{name}/get_parameter_types'
-            caller = self._callers[name] = ServiceCaller(self, GetParameterTypes, service)
-        began = time.monotonic()
-        try:
-            request = GetParameterTypes.Request(names=['use_sim_time'])
-            caller.call(request, 2.0, self.stopping)
-            self._latencies[name] = 1000.0 * (time.monotonic() - began)
-        except CallError:
-            self._latencies[name] = None
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        now = time.monotonic()
+        for status in message.status[:MOST_NAMES]:
+            known = status.name in self._reports or len(self._reports) < MOST_NAMES
+            if known and status.level != DiagnosticStatus.STALE:
+                self._reports[status.name] = now, status.hardware_id
 
-    def _health(self, snapshot: Snapshot) -> DiagnosticArray:
-        message = DiagnosticArray()
-        message.header.stamp = self.get_clock().now().to_msg()
-        for name in sorted({*snapshot.nodes, *snapshot.ended}):
-            message.status.append(self._status(name, snapshot))
-        return message
-
-    def _status(self, name: str, snapshot: Snapshot) -> DiagnosticStatus:
-        status = DiagnosticStatus(name=name, hardware_id=HARDWARE)
-        restarts = snapshot.restarts.get(name, 0)
-        latency = self._latencies.get(name)
-        status.level, status.message = DiagnosticStatus.OK, 'up'
-        if name not in snapshot.nodes:
-            status.level, status.message = DiagnosticStatus.ERROR, 'ended'
-        elif name in self._latencies and latency is None:
-            status.level, status.message = DiagnosticStatus.STALE, 'does not answer'
-        elif latency is not None and latency > SLOW_MS:
-            status.level, status.message = DiagnosticStatus.WARN, f'answers in {latency:.0f} ms'
-        status.values.append(KeyValue(key='restarts', value=str(restarts)))
-        if latency is not None:
-            status.values.append(KeyValue(key='answers_in_ms', value=f'{latency:.1f}'))
-        return status
+    def _silent(self, snapshot: Snapshot) -> list[DiagnosticStatus]:
+        """Return a status for each node that reported and does not any more."""
+        late = time.monotonic() - STALE_AFTER
+        return [
+            DiagnosticStatus(
+                level=DiagnosticStatus.STALE,
+                name=name,
+                message='has ended' if name in snapshot.ended else 'does not report',
+                hardware_id=hardware,
+            )
+            for name, (at, hardware) in sorted(self._reports.items())
+            if at < late
+        ]
 
 
 def markers_of(snapshot: Snapshot, stamp: Any) -> MarkerArray:

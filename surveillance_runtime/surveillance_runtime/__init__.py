@@ -4,6 +4,7 @@ What others may use, by module:
 
 - `node`: `PatrolNode`, the base class with checked parameters and threads that end with it;
   `StartError`. `process`: `run_node`, `run_nodes`, `ExecutorThread`.
+- `diagnostics`: `Health`, what a node says of itself on `/diagnostics`.
 - `parameters`: `Described` and `declare_fields`, a table of parameters beside its record;
   `ParameterError`. `configuration`: files, place and arguments merged and checked, without ROS.
 - `calls`: `ServiceCaller` and `GoalCaller`, calls that always end, and their errors.

@@ -35,6 +35,7 @@ from rclpy.service import Service
 from rclpy.subscription import Subscription
 
 from surveillance_runtime.configuration import RosArguments, Setting, read_schema
+from surveillance_runtime.diagnostics import Health
 from surveillance_runtime.logging import CleanLogger, clean
 from surveillance_runtime.parameters import Check, ParameterError, ParameterSpec, element_type
 from surveillance_runtime.qos import CLIENT_QOS, SERVICE_QOS
@@ -80,6 +81,7 @@ class PatrolNode(Node):  # type: ignore[misc]
         failure: Why the node cannot go on, once `fail` was called.
         unusable: Whether that is its configuration.
         finished: Whether the node ended on purpose.
+        health: What the node says of itself on `/diagnostics`.
     """
 
     def __init__(self, name: str, **node_options: Any) -> None:
@@ -88,6 +90,7 @@ class PatrolNode(Node):  # type: ignore[misc]
         self.failure: str | None = None
         self.unusable = False
         self.finished = False
+        self.health = Health()
         self._specs: dict[str, ParameterSpec] = {}
         self._on_change: dict[str, Callable[[Any], None]] = {}
         self._threads: list[threading.Thread] = []
@@ -356,7 +359,10 @@ def report_exception(error: BaseException, node: Node, what: str) -> None:
     """Say in one line that a callback failed; its message is lost, the node goes on."""
     frames = traceback.extract_tb(error.__traceback__)
     place = f' ({os.path.basename(frames[-1].filename)}:{frames[-1].lineno})' if frames else ''
-    node.get_logger().error(f'{what}: {type(error).__name__}: {error}{place}; the message is lost')
+    text = f'{what}: {type(error).__name__}: {error}{place}'
+    node.get_logger().error(f'{text}; the message is lost')
+    if isinstance(node, PatrolNode):
+        node.health.lose_message(clean(text))
 
 
 def _refusal(response: Any, request: Any, error: Exception) -> Any:

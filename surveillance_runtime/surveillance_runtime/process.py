@@ -13,6 +13,7 @@ import os
 import signal
 import sys
 import threading
+import time
 import traceback
 import warnings
 from collections.abc import Callable, Sequence
@@ -31,6 +32,7 @@ from rclpy.signals import SignalHandlerOptions
 from threadpoolctl import threadpool_limits
 
 from surveillance_runtime.configuration import RosArguments, argument_layer, split_arguments
+from surveillance_runtime.diagnostics import DiagnosticsThread
 from surveillance_runtime.node import (
     JOIN_SECONDS,
     PatrolNode,
@@ -83,6 +85,7 @@ def run_nodes(
     give_arguments(arguments)
     nodes: list[PatrolNode] = []
     spinner = ExecutorThread()
+    diagnostics = None
     code = 0
     try:
         for factory in factories:
@@ -91,6 +94,7 @@ def run_nodes(
             nodes[-1].ended.subscribe(ending.come)
         check_taken(arguments, nodes)
         heartbeat = Heartbeat(nodes)
+        diagnostics = DiagnosticsThread(nodes, heartbeat.take_lateness)
         for node in nodes:
             node.get_logger().info('ready')
         spinner.start(on_end=ending.come)
@@ -106,6 +110,8 @@ def run_nodes(
         give_arguments(None)
         for node in reversed(nodes):
             node.stop()
+        if diagnostics is not None:
+            diagnostics.stop()
         spinner.stop()
         for node in reversed(nodes):
             node.destroy_node()
@@ -149,7 +155,7 @@ def check_taken(arguments: RosArguments, nodes: Sequence[PatrolNode]) -> None:
 
 
 class Heartbeat:
-    """Tells the launcher that the executor goes round, where it asked to be told.
+    """Notes that the executor goes round, and tells the launcher where it asked to be told.
 
     Args:
         nodes: The nodes of the process; a timer of the first one beats.
@@ -160,15 +166,25 @@ class Heartbeat:
         self._pipe = int(given) if given is not None else None
         if self._pipe is not None:
             os.set_blocking(self._pipe, False)
-            nodes[0].create_timer(
-                BEAT_PERIOD,
-                self._beat,
-                callback_group=ReentrantCallbackGroup(),
-                clock=Clock(clock_type=ClockType.STEADY_TIME),
-            )
+        self._last = time.monotonic()
+        self._late = 0.0
+        nodes[0].create_timer(
+            BEAT_PERIOD,
+            self._beat,
+            callback_group=ReentrantCallbackGroup(),
+            clock=Clock(clock_type=ClockType.STEADY_TIME),
+        )
 
     def _beat(self) -> None:
+        now = time.monotonic()
+        self._late = max(self._late, now - self._last - BEAT_PERIOD)
+        self._last = now
         self._write(b'.')
+
+    def take_lateness(self) -> float:
+        """Return by how much a beat came late at most since this was asked last, seconds."""
+        late, self._late = self._late, 0.0
+        return max(0.0, late, time.monotonic() - self._last - BEAT_PERIOD)
 
     def say_finished(self) -> None:
         """Say that the process ends on purpose, and is not to be started again."""

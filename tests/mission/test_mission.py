@@ -198,12 +198,19 @@ def test_a_machine_that_breaks_is_started_again_and_does_not_cry_on(
         return right(*arguments)
 
     monkeypatch.setattr(places, 'position', position)
+    health = robot.nodes['robot_behavior'].health
+    errors, note_error = [], health.error
+    monkeypatch.setattr(
+        health, 'error', lambda *said: (errors.append(said[1]), note_error(*said))[1]
+    )
     robot.until(120.0)
     assert broken.is_set()
     cries = [message.waiting_for_help for message in status]
     assert any('a mistake' in message.text for message in status)
     assert cries.count(True) < len(cries) / 2
     assert not cries[-1]
+    assert [each for each in errors if 'a mistake' in each]
+    assert health.findings() == []
     assert len(robot.visited(since=60.0)) > 2
 
 

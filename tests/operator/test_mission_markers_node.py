@@ -11,11 +11,10 @@ import numpy as np
 import pytest
 import yaml
 from builtin_interfaces.msg import Time
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from std_msgs.msg import String
 
-from surveillance_interfaces.msg import MissionStatus
-from surveillance_operator import mission_feed, mission_markers_node
+from surveillance_operator import mission_markers_node
 from surveillance_operator.mission_markers_node import (
     FRESH,
     LATE,
@@ -69,25 +68,29 @@ def test_the_description_has_the_joints_of_joint_states() -> None:
     assert len(joined) == len(set(joined))
 
 
-def test_every_node_is_diagnosed(graph: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(mission_feed, 'LOOK_PERIOD', 0.05)
+def test_a_node_that_reports_no_more_is_stale(graph: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(mission_markers_node, 'PERIOD', 0.05)
-    publisher = graph.node.create_publisher(MissionStatus, 'mission_status', STATE_QOS)
-    publisher.publish(MissionStatus(state='MOVE'))
+    monkeypatch.setattr(mission_markers_node, 'STALE_AFTER', 0.5)
+    node_speaks = graph.node.create_publisher(DiagnosticArray, '/diagnostics', 10)
+    status = DiagnosticStatus(name='planner', hardware_id='robot7', message='up')
     heard = graph.listen(DiagnosticArray, '/diagnostics')
     described = graph.listen(String, 'robot_description', STATE_QOS)
-    graph.add(MissionMarkers)
-    reports = graph.until(
+    markers = graph.add(MissionMarkers)
+    listeners = len([heard, markers, 'its feed'])
+    graph.until(lambda: node_speaks.get_subscription_count() == listeners)
+    node_speaks.publish(DiagnosticArray(status=[status]))
+    stale = graph.until(
         lambda: [
             status
             for message in heard
             for status in message.status
-            if status.name == 'test' and len(status.values) == 2
+            if status.level == DiagnosticStatus.STALE
         ]
     )
-    assert reports[0].hardware_id == 'surveillance_robot'
-    assert reports[0].level == b'\0'
-    assert {value.key for value in reports[0].values} == {'restarts', 'answers_in_ms'}
+    assert (stale[0].name, stale[0].hardware_id) == ('planner', 'robot7')
+    assert stale[0].message == 'does not report'
+    node_speaks.publish(DiagnosticArray(status=[status]))
+    graph.until(lambda: heard[-1].status[0].level == DiagnosticStatus.OK)
     assert described[0].data.startswith('<?xml')
 
 

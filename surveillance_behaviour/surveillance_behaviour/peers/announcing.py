@@ -134,6 +134,9 @@ class RosAnnouncer:
         self._text = f'waiting for help: {reason}' if reason else 'trying again'
         if reason:
             self._node.get_logger().error(self._text)
+            self._node.health.error('help', self._text)
+        else:
+            self._node.health.clear('help')
         self._publish()
 
     def _publish(self) -> None:
