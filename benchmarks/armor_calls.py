@@ -192,9 +192,9 @@ def through_ros(rounds: int) -> list[Row]:
     import rclpy
     from std_srvs.srv import Trigger
 
+    from surveillance_fsm.ros import ServiceCaller
     from surveillance_interfaces.srv import ReferenceName
     from surveillance_ontology.armor_client import ArmorClient
-    from surveillance_runtime.calls import ServiceCaller
     from surveillance_runtime.node import PatrolNode
     from surveillance_runtime.process import ExecutorThread
     from surveillance_runtime.testing import claim_domain

@@ -26,6 +26,7 @@ from geometry_msgs.msg import PoseStamped
 from sensor_msgs.msg import BatteryState
 from whole_stack import ROOT, Stack
 
+from surveillance_fsm.ros import ServiceCaller
 from surveillance_interfaces.msg import FactChanges
 from surveillance_interfaces.srv import (
     DrainBattery,
@@ -36,7 +37,6 @@ from surveillance_interfaces.srv import (
     SlipOdometry,
 )
 from surveillance_ontology.armor_client import CHANGES_QOS, CHANGES_TOPIC
-from surveillance_runtime.calls import ServiceCaller
 from surveillance_runtime.conversions import seconds_of
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 

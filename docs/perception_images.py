@@ -22,6 +22,7 @@ import yaml
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import Image
 
+from surveillance_fsm.ros import ServiceCaller
 from surveillance_interfaces.srv import MarkerRoutine, PointCamera
 from surveillance_perception.arm_controller_node import ArmController
 from surveillance_perception.aruco_detector_node import ArucoDetector
@@ -36,7 +37,6 @@ from surveillance_perception.testing.marker_scene import (
     backdrop_of,
     image_of,
 )
-from surveillance_runtime.calls import ServiceCaller
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import ExecutorThread
 from surveillance_runtime.qos import SENSOR_QOS

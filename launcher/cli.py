@@ -279,7 +279,7 @@ def main(argv: Sequence[str]) -> int:
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             signal.signal(number, signal.default_int_handler)
         return _dispatch(list(argv))
-    except (system.SetupError, ValueError) as error:
+    except ValueError as error:
         print(f'launch.py: {error}', file=sys.stderr)
         return EXIT_BAD_INPUT
     except BrokenPipeError:  # as when the output goes to `head`
@@ -519,7 +519,7 @@ def _environment(extras: Sequence[str]) -> Environment | None:
     if system.sourced_ros():
         if system.sourced_workspace():
             return None
-        raise system.SetupError(
+        raise system.LaunchError(
             'ROS 2 Jazzy is active in this shell, but this workspace is not built. Build it:\n'
             f'{system.colcon_advice(CHECKOUT)}\nor use a shell without ROS.'
         )

@@ -21,7 +21,7 @@ from pathlib import Path
 from launcher import system
 from launcher.fingerprint import INTERFACES, Journal, current, requirements
 from launcher.progress import Step
-from launcher.system import SetupError
+from launcher.system import LaunchError
 
 CHECKOUT = Path(__file__).resolve().parent.parent
 PACKAGES = (
@@ -72,17 +72,17 @@ class Environment:
         """Brings the environment up to date; does nothing when it is.
 
         Raises:
-            SetupError: a step failed, or the machine lacks something that only its owner can give.
+            LaunchError: a step failed, or the machine lacks something that only its owner can give.
         """
         if self.ready():
             return
         machine = system.Machine.here()
         if reason := machine.why_no_wheels():
-            raise system.SetupError(system.no_wheels_advice(reason, self.checkout))
+            raise system.LaunchError(system.no_wheels_advice(reason, self.checkout))
         if missing := system.missing_packages():
             system.install_packages(missing)
             if still := system.missing_packages():
-                raise system.SetupError(f'still missing after installing: {" ".join(still)}')
+                raise system.LaunchError(f'still missing after installing: {" ".join(still)}')
         if note := system.note_of_unused_ros(self.checkout):
             print(note, flush=True)
         with self._alone() as lock:
@@ -130,7 +130,7 @@ class Environment:
         if journal.interfaces != wanted.interfaces or journal.working == INTERFACES_STEP:
             steps.append((INTERFACES_STEP, self._install_interfaces))
         if fresh and (free := shutil.disk_usage(self.checkout).free) < SPACE:
-            raise SetupError(
+            raise LaunchError(
                 f'{self.venv}: the set-up needs {SPACE // 10**6} MB, {free // 10**6} MB are free '
                 f'on the disk of {self.checkout}'
             )
@@ -247,7 +247,7 @@ class _Runner:
                 process.wait()
                 raise
             if code != 0:
-                raise SetupError(self._failure(list(output)))
+                raise LaunchError(self._failure(list(output)))
 
     def _failure(self, output: list[str]) -> str:
         with suppress(OSError):  # the disk may be full

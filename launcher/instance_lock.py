@@ -13,7 +13,8 @@ import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 
-from launcher.node_table import RUN_NODES, Node, RunError
+from launcher.node_table import RUN_NODES, Node
+from launcher.system import LaunchError
 
 
 def claim(
@@ -31,7 +32,7 @@ def claim(
         Descriptors that hold the claims as long as they are open.
 
     Raises:
-        RunError: some of them are claimed already; then none is claimed.
+        LaunchError: some of them are claimed already; then none is claimed.
     """
     folder = folder or runtime_folder() / 'nodes'
     held: list[int] = []
@@ -60,7 +61,7 @@ def claim(
         os.close(descriptor)
     who = f' (process {holder})' if holder else ''
     where = f'ROS domain {domain}' + (f', namespace {namespace}' if namespace else '')
-    raise RunError(
+    raise LaunchError(
         f'already running in {where}{who}: {", ".join(taken)}; '
         'expected another --domain or --namespace, or --without these'
     )

@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from launcher.system import LaunchError
+
 MODES = ('SIMULATED', 'RANDOM', 'MANUAL')
 DEFAULT_MODE = 'SIMULATED'
 BEHAVIOURS = ('surveillance', 'patrol')
 LOG_LEVELS = ('debug', 'info', 'warn', 'error', 'fatal')
 CONSOLE = 'console'
-
-
-class RunError(ValueError):
-    """What was asked for cannot be run: one line that says why."""
 
 
 @dataclass(frozen=True)
@@ -185,12 +183,12 @@ def find(name: str) -> Node:
     """The node called `name`.
 
     Raises:
-        RunError: there is no such node.
+        LaunchError: there is no such node.
     """
     try:
         return BY_NAME[name]
     except KeyError:
-        raise RunError(f'unknown node {name!r}: expected one of {", ".join(BY_NAME)}') from None
+        raise LaunchError(f'unknown node {name!r}: expected one of {", ".join(BY_NAME)}') from None
 
 
 def select(
@@ -208,7 +206,7 @@ def select(
         without: nodes to leave out, because they run elsewhere.
 
     Raises:
-        RunError: an unknown name, or nothing is left to start.
+        LaunchError: an unknown name, or nothing is left to start.
     """
     wanted = {find(name).name for name in only}
     left_out = {find(name).name for name in without}
@@ -220,5 +218,5 @@ def select(
             wanted.add('simulator')
     chosen = tuple(node for node in NODES if node.name in wanted - left_out)
     if not chosen:
-        raise RunError('no node is left to start: check --only and --without')
+        raise LaunchError('no node is left to start: check --only and --without')
     return chosen

@@ -21,12 +21,11 @@ from typing import Any
 from launcher import node_table, run_folder
 from launcher.instance_lock import claim
 from launcher.log_merge import ROS_FORMAT, MergedLog
-from launcher.node_table import RunError
 from launcher.supervisor import Program, Supervisor
+from launcher.system import LaunchError
 from surveillance_behaviour.mission import mission_log
 from surveillance_runtime.configuration import (
     Configuration,
-    ConfigurationError,
     Entry,
     Layer,
     RosArguments,
@@ -35,6 +34,7 @@ from surveillance_runtime.configuration import (
     file_layer,
     resolved_text,
 )
+from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.place import read_place_file
 from surveillance_runtime.yaml_file import YamlFileError
 
@@ -111,28 +111,28 @@ class Run:
         """Looks at everything that can be wrong before a process is started.
 
         Raises:
-            RunError: a value cannot be used.
+            LaunchError: a value cannot be used.
         """
         if self.namespace is not None and not _NAMESPACE.match(self.namespace):
-            raise RunError(
+            raise LaunchError(
                 f'--namespace {self.namespace!r}: expected letters, digits and _ like robot1'
             )
         if self.domain is not None and not 0 <= self.domain <= MAX_DOMAIN:
-            raise RunError(f'--domain {self.domain}: expected a number from 0 to {MAX_DOMAIN}')
+            raise LaunchError(f'--domain {self.domain}: expected a number from 0 to {MAX_DOMAIN}')
         if self.place is not None:
             try:
                 read_place_file(self.place)
             except YamlFileError as error:
-                raise RunError(f'--map {error}') from None
+                raise LaunchError(f'--map {error}') from None
         if self.parameters is not None:
             try:
                 Configuration((file_layer(self.parameters),)).check()
-            except (YamlFileError, ConfigurationError) as error:
-                raise RunError(f'--params {error}') from None
+            except (YamlFileError, ParameterError) as error:
+                raise LaunchError(f'--params {error}') from None
         if self.web_address is not None:
             _, _, port = self.web_address.rpartition(':')
             if not port.isdecimal() or int(port) > 65535:
-                raise RunError(
+                raise LaunchError(
                     f'--web-address {self.web_address!r}: expected HOST:PORT like 0.0.0.0:8080'
                 )
 
@@ -175,7 +175,7 @@ def configuration(
         more: Further arguments in ROS's own form.
 
     Raises:
-        RunError: One line about the first entry that is wrong.
+        LaunchError: One line about the first entry that is wrong.
     """
     try:
         merged = _merged(config, run, folder, more)
@@ -183,9 +183,9 @@ def configuration(
         merged.place('simulator', full_name(run, 'simulator'))
         _check_behaviour(merged, run)
     except YamlFileError as error:
-        raise RunError(f'parameter file {error}') from None
-    except ConfigurationError as error:
-        raise RunError(str(error)) from None
+        raise LaunchError(f'parameter file {error}') from None
+    except ParameterError as error:
+        raise LaunchError(str(error)) from None
     return merged
 
 
@@ -238,7 +238,7 @@ def _option_entries(run: Run, folder: Path | None) -> Iterator[Entry]:
 def _check_behaviour(merged: Configuration, run: Run) -> None:
     given = merged.resolve(BEHAVIOUR_NODE, full_name(run, BEHAVIOUR_NODE)).get('behaviour')
     if given is not None and given.value != run.behaviour:
-        raise RunError(
+        raise LaunchError(
             f'{given.origin}: behaviour {given.value}, but the run is one of {run.behaviour}: '
             f'expected --behaviour {given.value}, which starts its nodes too'
         )
@@ -248,7 +248,7 @@ def check_assignments(merged: Configuration, nodes: Sequence[node_table.Node]) -
     """Make sure that each `-p` is for a node that is started.
 
     Raises:
-        RunError: One would be ignored.
+        LaunchError: One would be ignored.
     """
     for entry in merged.layers[-1].entries:
         takers = [
@@ -259,7 +259,7 @@ def check_assignments(merged: Configuration, nodes: Sequence[node_table.Node]) -
         ]
         if not takers:
             names = ', '.join(node.name for node in nodes)
-            raise RunError(f'{entry.origin}: no node that is started takes it: {names}')
+            raise LaunchError(f'{entry.origin}: no node that is started takes it: {names}')
 
 
 def with_mode_of(run: Run, merged: Configuration) -> Run:
@@ -302,7 +302,7 @@ def write_parameters(
     """Write one file for each node with all its parameters and where each came from.
 
     Raises:
-        RunError: A file cannot be written.
+        LaunchError: A file cannot be written.
     """
     files = {}
     for node in nodes:
@@ -313,7 +313,7 @@ def write_parameters(
             name = full_name(run, node.name)
             path.write_text(resolved_text(name, merged.resolve(node.name, name)), 'utf-8')
         except OSError as error:
-            raise RunError(f'{path}: cannot be written: {error.strerror}') from None
+            raise LaunchError(f'{path}: cannot be written: {error.strerror}') from None
         files[node.name] = path
     return files
 
@@ -341,13 +341,13 @@ def ros_domain(run: Run) -> str:
     """The ROS domain of a run: as asked for, else as the environment says.
 
     Raises:
-        RunError: what the environment says is no domain.
+        LaunchError: what the environment says is no domain.
     """
     if run.domain is not None:
         return str(run.domain)
     given = os.environ.get('ROS_DOMAIN_ID') or '0'
     if not given.isdecimal() or int(given) > MAX_DOMAIN:
-        raise RunError(
+        raise LaunchError(
             f'environment variable ROS_DOMAIN_ID: got {given!r}, '
             f'expected a number from 0 to {MAX_DOMAIN}'
         )
@@ -402,7 +402,7 @@ def run_from(options: Mapping[str, Any]) -> Run:
     """Return the run of options that `options_of` gave.
 
     Raises:
-        RunError: They are not of a run.
+        LaunchError: They are not of a run.
     """
     known = {field.name for field in fields(Run)}
     try:
@@ -411,7 +411,7 @@ def run_from(options: Mapping[str, Any]) -> Run:
             values[name] = Path(values[name]) if values.get(name) else None
         return Run(**values)
     except TypeError as error:
-        raise RunError(f'--resume: {error}') from None
+        raise LaunchError(f'--resume: {error}') from None
 
 
 def resumed(run: Run, usual: Run, runs: Path, name: str) -> tuple[Run, Path]:
@@ -424,7 +424,7 @@ def resumed(run: Run, usual: Run, runs: Path, name: str) -> tuple[Run, Path]:
         name: Of the run; empty: the last one.
 
     Raises:
-        RunError: There is no such run.
+        LaunchError: There is no such run.
     """
     if run.record not in (None, NOT_RECORDED):
         runs = Path(run.record)
@@ -477,7 +477,7 @@ def run_mission(run: Run, config: Path, runs: Path, resume: Path | None = None) 
             same options that was killed.
 
     Raises:
-        RunError: what was asked for cannot be run.
+        LaunchError: what was asked for cannot be run.
     """
     run.check()
     merged = configuration(config, run)  # before anything is written
@@ -598,7 +598,7 @@ def summary(record: Path) -> str:
         return 'Mission: nothing was recorded.'
     try:
         return str(mission_log.summarize(mission_log.read(record)))
-    except mission_log.RecordError as error:
+    except mission_log.MissionLogError as error:
         return f'Mission: {error}'
 
 

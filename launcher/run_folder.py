@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from launcher.node_table import RunError
+from launcher.system import LaunchError
 
 STATE = 'run.json'
 
@@ -48,7 +48,7 @@ class RunState:
         options: What the run is asked for, as JSON can hold it.
 
     Raises:
-        RunError: Another launcher works in the folder.
+        LaunchError: Another launcher works in the folder.
     """
 
     def __init__(self, folder: Path, options: Mapping[str, Any]) -> None:
@@ -59,7 +59,7 @@ class RunState:
             fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
             os.close(self._descriptor)
-            raise RunError(f'{folder}: this run is still going on') from None
+            raise LaunchError(f'{folder}: this run is still going on') from None
         self._write(ended=False)
 
     def end(self) -> None:
@@ -78,7 +78,7 @@ def make_folder(runs: Path) -> Path:
     """Make a new folder for what a run leaves behind.
 
     Raises:
-        RunError: It cannot be made.
+        LaunchError: It cannot be made.
     """
     stamp = time.strftime('%Y%m%d-%H%M%S')
     for suffix in ('', *(f'-{number}' for number in range(2, 100))):
@@ -88,9 +88,9 @@ def make_folder(runs: Path) -> Path:
         except FileExistsError:
             continue
         except OSError as error:
-            raise RunError(f'{folder}: cannot be made: {error.strerror}') from None
+            raise LaunchError(f'{folder}: cannot be made: {error.strerror}') from None
         return folder
-    raise RunError(f'{folder}: a hundred runs began in this second')
+    raise LaunchError(f'{folder}: a hundred runs began in this second')
 
 
 def look_into(folder: Path) -> Found | None:
@@ -123,7 +123,7 @@ def find(runs: Path, name: str) -> Found:
     """Return the run of a name (or path), or the one that began last where the name is empty.
 
     Raises:
-        RunError: There is none, or it is still going on.
+        LaunchError: There is none, or it is still going on.
     """
     if name:
         folder = Path(name) if Path(name).is_dir() else runs / name
@@ -132,9 +132,9 @@ def find(runs: Path, name: str) -> Found:
         folder, found = runs, latest(runs)
     if found is None:
         expected = 'the name of a folder there' if name else 'a run that can be gone on with'
-        raise RunError(f'--resume: no run in {folder}: expected {expected}')
+        raise LaunchError(f'--resume: no run in {folder}: expected {expected}')
     if found.running:
-        raise RunError(f'--resume: {found.folder}: this run is still going on')
+        raise LaunchError(f'--resume: {found.folder}: this run is still going on')
     return found
 
 

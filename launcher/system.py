@@ -27,8 +27,8 @@ COLCON_STEPS = """\
   ros2 launch surveillance_behaviour surveillance.launch.py"""
 
 
-class SetupError(RuntimeError):
-    """The set-up did not go through; the message says where and why, and what would mend it."""
+class LaunchError(ValueError):
+    """What was asked for cannot be done; the message says why, and what would mend it."""
 
 
 @dataclass(frozen=True)
@@ -126,17 +126,17 @@ def install_packages(packages: Sequence[str]) -> None:
     """Installs Debian packages with apt, where that needs no password.
 
     Raises:
-        SetupError: there is no apt, no right to use it, or it failed.
+        LaunchError: there is no apt, no right to use it, or it failed.
     """
     names = ' '.join(packages)
     if shutil.which('apt-get') is None:
-        raise SetupError(
+        raise LaunchError(
             f'this machine lacks what Debian calls {names}: install them with its package manager '
             '(a C++ compiler, the headers of Python, its venv module), then start again'
         )
     prefix = _privilege()
     if prefix is None:
-        raise SetupError(
+        raise LaunchError(
             'a few system packages are missing. Type this, then start again:\n'
             f'  sudo apt-get install -y {names}'
         )
@@ -156,7 +156,7 @@ def install_packages(packages: Sequence[str]) -> None:
         # A repository that does not answer is no reason to stop: the packages may come from others.
         if done.returncode != 0 and command[0] == 'install':
             tail = '\n'.join(done.stdout.strip().splitlines()[-4:])
-            raise SetupError(
+            raise LaunchError(
                 f'apt-get could not install {names}:\n{tail}\nInstall them, then start again:\n'
                 f'  sudo apt-get install -y {names}'
             )

@@ -106,7 +106,7 @@ def check(files: list[str]) -> None:
     """Look at all parameters and the place before a node starts, as `launch.py` does.
 
     Raises:
-        ConfigurationError, YamlFileError: One line about the first thing that is wrong.
+        ParameterError, YamlFileError: One line about the first thing that is wrong.
     """
     read_place_file(files[1])
     merged = Configuration(tuple(file_layer(path) for path in files))

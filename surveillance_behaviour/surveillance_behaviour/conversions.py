@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -15,10 +16,8 @@ from surveillance_interfaces.msg import Decision as DecisionMessage
 from surveillance_interfaces.msg import OntologyMap, OntologyPlace, RoomConnection
 from surveillance_runtime.conversions import seconds_of
 
-
-def nanoseconds_of(stamp: Any) -> int:
-    """Return a stamp as nanoseconds since the clock's start."""
-    return int(stamp.sec) * 10**9 + int(stamp.nanosec)
+MOST_CANDIDATES = 10_000
+"""Of a decision; more are refused."""
 
 
 def point_from(message: PointMessage) -> Point:
@@ -59,7 +58,25 @@ def decision_message(decision: Decision, sequence: int, stamp: Any) -> DecisionM
 
 
 def decision_from(message: DecisionMessage) -> Decision:
-    """A decision as it was published."""
+    """Return a decision with the score of each candidate.
+
+    Raises:
+        ValueError: The scores are not as many as the candidates, one is not a number, or there are
+            more than any map has places.
+    """
+    if len(message.candidates) > MOST_CANDIDATES:
+        raise ValueError(
+            f'{len(message.candidates)} candidates: expected at most {MOST_CANDIDATES}'
+        )
+    if len(message.candidates) != len(message.scores):
+        raise ValueError(
+            f'{len(message.scores)} scores came for {len(message.candidates)} candidates'
+        )
+    scores = {
+        name: float(score) for name, score in zip(message.candidates, message.scores, strict=True)
+    }
+    if wrong := [name for name, score in scores.items() if math.isnan(score)]:
+        raise ValueError(f'the score of {wrong[0]} is not a number')
     return Decision(
         time=seconds_of(message.stamp),
         from_place=message.from_place,
@@ -68,7 +85,7 @@ def decision_from(message: DecisionMessage) -> Decision:
         rule=message.rule,
         policy=message.policy,
         reason=message.reason,
-        scores=dict(zip(message.candidates, message.scores, strict=True)),
+        scores=scores,
     )
 
 

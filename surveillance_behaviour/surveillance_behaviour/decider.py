@@ -16,7 +16,6 @@ from surveillance_behaviour.decision import (
     RECHARGE,
     DecisionSettings,
     NowhereToGoError,
-    UnknownPlaceNameError,
     WhyNot,
     decide,
     known_place,
@@ -222,16 +221,16 @@ class Decider:
             What will be done.
 
         Raises:
-            UnknownPlaceNameError: There is no such place.
+            ValueError: There is no such place.
         """
         world = self.model.world
         if world is None:
-            raise UnknownPlaceNameError('the map is not known yet')
+            raise ValueError('the map is not known yet')
         if not place:
             here = replace(world, place=self.model.place or world.place)
             within = stations_within_reach(here, self.settings.recharge_rooms)
             if not within:
-                raise UnknownPlaceNameError('no charging place can be reached')
+                raise ValueError('no charging place can be reached')
             place = min(within, key=lambda station: within[station])
         known_place(place, world.graph.places)
         if place == self.model.place and self._leg is None:
@@ -249,7 +248,7 @@ class Decider:
         """Tell why the robot would not go to ``place`` now.
 
         Raises:
-            UnknownPlaceNameError: There is no such place.
+            ValueError: There is no such place.
             PeerError: The ontology cannot be asked.
         """
         world = self.look(now, interrupt, avoided)

@@ -254,28 +254,24 @@ class WhyNot:
     premises: tuple[str, ...] = ()
 
 
-class UnknownPlaceNameError(ValueError):
-    """A place was asked for that is not on the map; the message names the nearest known one."""
-
-
 def known_place(place: str, places: Sequence[str]) -> str:
     """Return ``place`` when it is on the map.
 
     Raises:
-        UnknownPlaceNameError: It is not.
+        ValueError: It is not.
     """
     if place in places:
         return place
     near = difflib.get_close_matches(place, places, 1, 0.0)
     hint = f', the nearest name is {near[0]}' if near else ''
-    raise UnknownPlaceNameError(f'there is no place {place!r} on the map{hint}')
+    raise ValueError(f'there is no place {place!r} on the map{hint}')
 
 
 def why_not(place: str, world: World, battery: Battery, settings: DecisionSettings) -> WhyNot:
     """Tell why `decide` would not send the robot to ``place`` now.
 
     Raises:
-        UnknownPlaceNameError: There is no such place.
+        ValueError: There is no such place.
     """
     known_place(place, world.graph.places)
     if place == world.place:

@@ -29,9 +29,9 @@ from surveillance_behaviour.map_from_markers.assembly import (
 from surveillance_behaviour.map_from_markers.camera_scanner import CameraScanner
 from surveillance_behaviour.map_from_markers.initial_scan import InitialScan, Progress
 from surveillance_behaviour.map_from_markers.marker_inquiry import MarkerInquiry
+from surveillance_fsm.ros import CallError, ServiceCaller
 from surveillance_interfaces.msg import OntologyMap
 from surveillance_interfaces.srv import ReferenceName
-from surveillance_runtime.calls import CallError, ServiceCaller
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import Described, declare_fields
 from surveillance_runtime.place.parameters import described_place

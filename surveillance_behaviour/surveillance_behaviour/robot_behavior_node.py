@@ -25,8 +25,8 @@ from surveillance_behaviour.machines import MACHINES
 from surveillance_behaviour.mission.mission import Mission, MissionSettings
 from surveillance_behaviour.mission.mission_log import (
     CutOff,
+    MissionLogError,
     MissionRecord,
-    RecordError,
     cut_off,
     read,
 )
@@ -139,7 +139,7 @@ class RobotBehavior(PatrolNode):
             return None
         try:
             return cut_off(read(path))
-        except RecordError as error:
+        except MissionLogError as error:
             self.get_logger().warn(f'what was begun before is begun anew: {error}')
             return None
 
@@ -182,7 +182,7 @@ def _open_record(path: str) -> MissionRecord | None:
         return None
     try:
         return MissionRecord(path)
-    except RecordError as error:
+    except MissionLogError as error:
         raise StartError(f'parameter record: {error}') from None
 
 

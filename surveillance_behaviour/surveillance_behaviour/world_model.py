@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from surveillance_behaviour.decision import DecisionSettings
-from surveillance_behaviour.mission.mission_log import RecordError, account_of, read
+from surveillance_behaviour.mission.mission_log import MissionLogError, account_of, read
 from surveillance_behaviour.peers.ports import (
     Ontology,
     PeerError,
@@ -69,7 +69,7 @@ class Experience:
         if record and Path(record).is_file():
             try:
                 visits = account_of(read(record)).visits
-            except RecordError as error:
+            except MissionLogError as error:
                 experience.problem = str(error)
                 return experience
             for place, at in visits.items():

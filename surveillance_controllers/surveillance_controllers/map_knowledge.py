@@ -12,6 +12,7 @@ from contextlib import contextmanager
 
 from surveillance_controllers import conversions
 from surveillance_controllers.geometry import Points
+from surveillance_fsm.ros import CallError, ServiceCaller
 from surveillance_interfaces.msg import RobotPlace
 from surveillance_interfaces.srv import ReferenceName, RoomPosition
 from surveillance_ontology.armor_client import (
@@ -21,7 +22,6 @@ from surveillance_ontology.armor_client import (
     FactSubscription,
 )
 from surveillance_ontology.patrol_ontology import DOORS, PatrolOntology
-from surveillance_runtime.calls import CallError, ServiceCaller
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.waiting import Interrupt

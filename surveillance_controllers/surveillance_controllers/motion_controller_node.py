@@ -23,8 +23,8 @@ from surveillance_controllers.map_knowledge import KnowledgeError, MapKnowledge
 from surveillance_controllers.motion.arrival import MotionFailedError, place_reached
 from surveillance_controllers.motion.place_recording import PlaceRecorder
 from surveillance_controllers.stimuli import glide
+from surveillance_fsm.ros import GoalAbortedError, GoalRun, GoalServer
 from surveillance_interfaces.action import Control, FollowPath
-from surveillance_runtime.action_server import GoalAbortedError, GoalRun, GoalServer
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
 

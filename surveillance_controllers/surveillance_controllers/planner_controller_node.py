@@ -21,8 +21,8 @@ from surveillance_controllers.manual import commands
 from surveillance_controllers.manual.commands import PLANNER, ParsedCommand, Point3
 from surveillance_controllers.manual.requests import CommandConsole, RequestQueue
 from surveillance_controllers.map_knowledge import KnowledgeError, MapKnowledge
+from surveillance_fsm.ros import GoalAbortedError, GoalRun, GoalServer
 from surveillance_interfaces.action import ComputePath, Plan
-from surveillance_runtime.action_server import GoalAbortedError, GoalRun, GoalServer
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS

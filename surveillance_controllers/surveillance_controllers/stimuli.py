@@ -52,7 +52,7 @@ def reached(draw: random.Random, goal: Sequence[float], delta: float) -> np.ndar
 
 
 class Pace(Protocol):
-    """Time as a goal's run gives it: `surveillance_runtime.action_server.GoalRun` is one."""
+    """Time as a goal's run gives it: `surveillance_fsm.ros.GoalRun` is one."""
 
     def now(self) -> float:
         """The time in seconds."""

@@ -11,12 +11,13 @@ from surveillance_fsm.concurrence import Concurrence
 from surveillance_fsm.container import Container
 from surveillance_fsm.control import is_shutdown, set_shutdown_check
 from surveillance_fsm.exceptions import (
+    HistoryError,
     InvalidConstructionError,
     InvalidStateError,
     InvalidTransitionError,
     InvalidUserCodeError,
+    MachineFileError,
     MissingKeyError,
-    PreemptIgnoredError,
     SmachError,
 )
 from surveillance_fsm.execution import RESUME
@@ -45,14 +46,15 @@ __all__ = [
     'Clock',
     'Concurrence',
     'Container',
+    'HistoryError',
     'Interrupt',
     'InvalidConstructionError',
     'InvalidStateError',
     'InvalidTransitionError',
     'InvalidUserCodeError',
     'Iterator',
+    'MachineFileError',
     'MissingKeyError',
-    'PreemptIgnoredError',
     'Remapper',
     'Sequence',
     'SmachError',

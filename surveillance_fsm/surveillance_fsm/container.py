@@ -510,7 +510,7 @@ class Container(State):
                 it does not have.
             InvalidUserCodeError: A state raised an exception, or broke the userdata contract.
             InvalidStateError: The container is running already.
-            PreemptIgnoredError: A state ignored a preempt, and no outcome was there to end with.
+            InvalidTransitionError: A state ignored a preempt, and no outcome was there to end with.
         """
         here = this_thread
         thread: ExecutionThread | None = here.thread

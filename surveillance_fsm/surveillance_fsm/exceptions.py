@@ -28,7 +28,10 @@ class InvalidStateError(SmachError):
 
 
 class InvalidTransitionError(SmachError):
-    """An outcome is undeclared, or leads to no state and to no outcome of the container."""
+    """An outcome is undeclared, or leads to no state and to no outcome of the container.
+
+    Also: a state ignored a preempt beyond its bound, and the container has no outcome for that.
+    """
 
 
 class InvalidConstructionError(InvalidStateError):
@@ -43,8 +46,12 @@ class MissingKeyError(InvalidUserCodeError, KeyError):
     """A declared userdata key was read before anything wrote it (a ``KeyError``, as in SMACH)."""
 
 
-class PreemptIgnoredError(SmachError):
-    """A state ignored a preempt beyond its bound and no outcome was there to go on with."""
+class HistoryError(SmachError):
+    """A record or a checkpoint cannot be written or read, or does not fit the machine."""
+
+
+class MachineFileError(SmachError):
+    """A machine cannot be read from data, or written as data; the message names the place."""
 
 
 def describe(error: BaseException) -> str:

@@ -8,7 +8,7 @@ from typing import Any
 
 from surveillance_fsm.concurrence import Concurrence
 from surveillance_fsm.container import Container
-from surveillance_fsm.exceptions import SmachError
+from surveillance_fsm.exceptions import MachineFileError
 from surveillance_fsm.execution import RESUME
 from surveillance_fsm.state import CBState, State
 from surveillance_fsm.state_machine import Iterator as IteratorContainer
@@ -184,15 +184,11 @@ def _spelled(text: str) -> str:
 # As data.
 
 
-class ExportError(SmachError):
-    """A machine cannot be written as data; the message names the state."""
-
-
 def to_yaml(container: Container) -> str:
     """Write a machine as YAML that `machine_file.load_machine` reads; needs PyYAML.
 
     Raises:
-        ExportError: A part of it has no form as data: a callback, a function without a name, a
+        MachineFileError: A part of it has no form as data: a callback, a function without a name, a
             class with arguments that did not come from a file.
     """
     import yaml
@@ -206,7 +202,7 @@ def to_data(container: Container) -> dict[str, Any]:
     """Describe a machine by plain data, as `machine_file.machine_from` takes it.
 
     Raises:
-        ExportError: See `to_yaml`.
+        MachineFileError: See `to_yaml`.
     """
     return {
         'machine': _kind_of(container),
@@ -219,7 +215,7 @@ def _kind_of(container: Container) -> str:
     for kind in (Sequence, StateMachine, Concurrence, IteratorContainer):
         if type(container) is kind:
             return kind.__name__
-    raise ExportError(
+    raise MachineFileError(
         f"'{container.get_name()}' is a {type(container).__name__}: only the engine's own "
         'containers have a form as data'
     )
@@ -260,7 +256,7 @@ def _kind_data(container: Container, path: str) -> dict[str, Any]:
     if isinstance(container, Concurrence):
         policy = container.policy
         if policy.has_callbacks:
-            raise ExportError(f"'{path}' has callbacks, which have no form as data")
+            raise MachineFileError(f"'{path}' has callbacks, which have no form as data")
         data: dict[str, Any] = {'default_outcome': policy.default}
         if policy.outcome_map:
             data['outcome_map'] = policy.outcome_map
@@ -268,7 +264,7 @@ def _kind_data(container: Container, path: str) -> dict[str, Any]:
     if isinstance(container, IteratorContainer):
         items = container.items
         if callable(items) or not isinstance(items, list | tuple | range | str):
-            raise ExportError(f"'{path}' has items that are no list")
+            raise MachineFileError(f"'{path}' has items that are no list")
         return {
             'items': [_plain(f'an item of {path!r}', item) for item in items],
             'item_key': container.items_label,
@@ -334,7 +330,7 @@ def _what(state: State, path: str) -> dict[str, Any]:
 def _name_of(thing: Any, path: str) -> str:
     name = f'{thing.__module__}:{thing.__qualname__}'
     if '<' in name or thing.__module__ == '__main__':
-        raise ExportError(f"'{path}': {name} cannot be imported by that name")
+        raise MachineFileError(f"'{path}': {name} cannot be imported by that name")
     return name
 
 
@@ -345,4 +341,4 @@ def _plain(what: str, value: Any) -> Any:
         return {str(key): _plain(what, item) for key, item in value.items()}
     if value is None or isinstance(value, bool | int | float | str):
         return value
-    raise ExportError(f'{what} is a {type(value).__name__}, which has no form as data')
+    raise MachineFileError(f'{what} is a {type(value).__name__}, which has no form as data')

@@ -25,7 +25,7 @@ from typing import IO, Any, NamedTuple
 
 from surveillance_fsm.clock import WALL_CLOCK, Clock, Interrupt, elapsed_of
 from surveillance_fsm.container import Container
-from surveillance_fsm.exceptions import SmachError, describe, shown
+from surveillance_fsm.exceptions import HistoryError, describe, shown
 from surveillance_fsm.execution import History, RawTransition
 from surveillance_fsm.log import logerr, logwarn
 from surveillance_fsm.state import State
@@ -76,10 +76,6 @@ def unfold(raw: RawTransition) -> Noted:
     left, outcome, time, userdata = raw
     path, source, target, kind = left.step(outcome)
     return Noted(path, source, str(outcome), target, time, userdata, kind)
-
-
-class RecordError(SmachError):
-    """A record cannot be read, or does not fit the machine."""
 
 
 @dataclass(frozen=True)
@@ -268,19 +264,19 @@ def read_record(path: str | Path) -> list[Transition]:
     """Read what a `Recorder` wrote; a last line that was cut off is left out.
 
     Raises:
-        RecordError: The file is not such a record; the message names file and line.
+        HistoryError: The file is not such a record; the message names file and line.
     """
     try:
         lines = Path(path).read_text(encoding='utf-8').split('\n')
     except (OSError, UnicodeDecodeError) as error:
-        raise RecordError(f'{path}: {error}') from error
+        raise HistoryError(f'{path}: {error}') from error
     try:
         header = json.loads(lines[0])
         known = header['format'] == RECORD_FORMAT and header['version'] == RECORD_VERSION
     except (ValueError, KeyError, TypeError):
         known = False
     if not known:
-        raise RecordError(f'{path}:1: not a {RECORD_FORMAT} of version {RECORD_VERSION}')
+        raise HistoryError(f'{path}:1: not a {RECORD_FORMAT} of version {RECORD_VERSION}')
     transitions = []
     for number, line in enumerate(lines[1:], start=2):
         if not line:
@@ -290,7 +286,7 @@ def read_record(path: str | Path) -> list[Transition]:
         except (ValueError, TypeError) as error:
             if number == len(lines):
                 break
-            raise RecordError(f'{path}:{number}: {error}') from error
+            raise HistoryError(f'{path}:{number}: {error}') from error
     return transitions
 
 
@@ -318,7 +314,7 @@ def replay(machine: Container, transitions: Iterable[Transition]) -> Iterator[St
         transitions: The record.
 
     Raises:
-        RecordError: A transition that the machine cannot make.
+        HistoryError: A transition that the machine cannot make.
     """
     root = structure_of(machine)
     containers = {inner.path: inner for inner in root.walk()}
@@ -326,7 +322,9 @@ def replay(machine: Container, transitions: Iterable[Transition]) -> Iterator[St
     for transition in transitions:
         container = containers.get(transition.path)
         if container is None:
-            raise RecordError(f"Transition {transition.sequence}: no container '{transition.path}'")
+            raise HistoryError(
+                f"Transition {transition.sequence}: no container '{transition.path}'"
+            )
         _check_transition(container, transition)
         left = f'{transition.path}/{transition.from_state}'
         if transition.kind == 'exit' or transition.kind == 'ended':
@@ -388,14 +386,14 @@ def _check_transition(container: Structure, transition: Transition) -> None:
     what = f'Transition {transition.sequence} in {container.path!r}'
     states = container.members
     if transition.from_state not in states:
-        raise RecordError(f'{what}: no state {transition.from_state!r}')
+        raise HistoryError(f'{what}: no state {transition.from_state!r}')
     if transition.kind in ('interrupt', 'resume'):
         if transition.to_state not in states:
-            raise RecordError(f'{what}: no state {transition.to_state!r}')
+            raise HistoryError(f'{what}: no state {transition.to_state!r}')
         return
     if transition.kind == 'ended':
         if transition.outcome not in states[transition.from_state].get_registered_outcomes():
-            raise RecordError(
+            raise HistoryError(
                 f'{what}: {transition.from_state!r} has no outcome {transition.outcome!r}'
             )
         return
@@ -411,17 +409,13 @@ def _check_transition(container: Structure, transition: Transition) -> None:
         # An iterator that was preempted, or an interrupt's state that ended where the container
         # was about to end.
         return
-    raise RecordError(
+    raise HistoryError(
         f'{what}: {transition.from_state!r} does not lead to {transition.to_state!r} by '
         f'{transition.outcome!r}'
     )
 
 
 # Checkpoints.
-
-
-class CheckpointError(SmachError):
-    """A checkpoint cannot be written or read, or does not fit the machine."""
 
 
 def capture(machine: Container, leave_out: Iterable[str] = ()) -> dict[str, Any]:
@@ -439,7 +433,7 @@ def capture(machine: Container, leave_out: Iterable[str] = ()) -> dict[str, Any]
         A dictionary that JSON can hold.
 
     Raises:
-        CheckpointError: A value cannot be kept; the message names its key.
+        HistoryError: A value cannot be kept; the message names its key.
     """
     with machine.control.condition:
         return {
@@ -499,20 +493,14 @@ def _kept(
             continue
         try:
             kept[key] = _encoded(value)
-        except _CannotKeepError as error:
-            raise CheckpointError(
-                f"{what} key '{key}' of '{path}' cannot be kept: {error}"
-            ) from None
+        except ValueError as error:
+            raise HistoryError(f"{what} key '{key}' of '{path}' cannot be kept: {error}") from None
         except RecursionError:
-            raise CheckpointError(
+            raise HistoryError(
                 f"{what} key '{key}' of '{path}' cannot be kept: it is nested too deep, or holds "
                 'itself'
             ) from None
     return kept
-
-
-class _CannotKeepError(Exception):
-    """A value has no exact form in a checkpoint."""
 
 
 def _encoded(value: Any) -> Any:
@@ -535,7 +523,7 @@ def _encoded(value: Any) -> Any:
         return {_TAG: kind.__name__, 'is': [_encoded(item) for item in value]}
     if kind is complex:
         return {_TAG: 'complex', 'is': [_encoded(value.real), _encoded(value.imag)]}
-    raise _CannotKeepError(
+    raise ValueError(
         f'{shown(value)[:80]} of type {kind.__module__}.{kind.__qualname__}; plain values can be '
         'kept, or the key left out'
     )
@@ -571,29 +559,29 @@ def restore(machine: Container, checkpoint: dict[str, Any]) -> None:
         checkpoint: What `capture` gave.
 
     Raises:
-        CheckpointError: It is not a checkpoint, or not of this machine; nothing is changed then.
+        HistoryError: It is not a checkpoint, or not of this machine; nothing is changed then.
     """
     path = machine.get_name()
     if machine.is_running():
-        raise CheckpointError(f"'{path}' is running: it cannot take a checkpoint over")
+        raise HistoryError(f"'{path}' is running: it cannot take a checkpoint over")
     if (
         not isinstance(checkpoint, dict)
         or checkpoint.get('format') != CHECKPOINT_FORMAT
         or checkpoint.get('version') != CHECKPOINT_VERSION
     ):
-        raise CheckpointError(f'not a {CHECKPOINT_FORMAT} of version {CHECKPOINT_VERSION}')
+        raise HistoryError(f'not a {CHECKPOINT_FORMAT} of version {CHECKPOINT_VERSION}')
     todo: list[Callable[[], None]] = []
     try:
         _plan(machine, path, checkpoint.get('machine'), todo)
     except RecursionError:
-        raise CheckpointError('damaged: nested too deep') from None
+        raise HistoryError('damaged: nested too deep') from None
     for step in todo:
         step()
 
 
 def _expect(holds: bool, path: str, what: str, value: object) -> None:
     if not holds:
-        raise CheckpointError(f"damaged at '{path}': expected {what}, not {shown(value)[:80]}")
+        raise HistoryError(f"damaged at '{path}': expected {what}, not {shown(value)[:80]}")
 
 
 def _plan(state: State, path: str, entry: Any, todo: list[Callable[[], None]]) -> None:
@@ -604,9 +592,7 @@ def _plan(state: State, path: str, entry: Any, todo: list[Callable[[], None]]) -
     if not isinstance(state, Container):
         for key in ('at', 'states', 'raised', 'userdata'):
             if key in entry:
-                raise CheckpointError(
-                    f"'{path}' is not a container, but the checkpoint has '{key}'"
-                )
+                raise HistoryError(f"'{path}' is not a container, but the checkpoint has '{key}'")
         return
     userdata = _read_values(path, 'userdata', entry.get('userdata', {}))
     children = children_of(state)
@@ -616,7 +602,7 @@ def _plan(state: State, path: str, entry: Any, todo: list[Callable[[], None]]) -
     _expect(isinstance(raised, list), path, 'a list of interrupts', raised)
     for label in raised:
         if not isinstance(label, str) or label not in state.fsm_branches:
-            raise CheckpointError(f"'{path}' has no interrupt {shown(label)}")
+            raise HistoryError(f"'{path}' has no interrupt {shown(label)}")
     branches = tuple(state.fsm_branches[label] for label in raised)
 
     def resume() -> None:
@@ -628,7 +614,7 @@ def _plan(state: State, path: str, entry: Any, todo: list[Callable[[], None]]) -
     _expect(isinstance(states, dict), path, 'an object of states', states)
     for label, inside in states.items():
         if label not in children:
-            raise CheckpointError(
+            raise HistoryError(
                 f"'{path}' has no state '{label}': its states are {sorted(children)}"
             )
         _plan(children[label], f'{path}/{label}', inside, todo)
@@ -641,7 +627,7 @@ def _read_values(path: str, what: str, values: Any) -> dict[str, Any]:
         try:
             read[key] = _decoded(value)
         except (KeyError, TypeError, ValueError, RecursionError) as error:
-            raise CheckpointError(
+            raise HistoryError(
                 f"damaged at '{path}': {what} key '{key}': {describe(error)}"
             ) from None
     return read
@@ -651,7 +637,7 @@ def _read_place(state: Container, path: str, at: Any) -> History:
     """Where a container goes on.
 
     Raises:
-        CheckpointError: It is none of its states.
+        HistoryError: It is none of its states.
     """
     _expect(isinstance(at, dict), path, 'a place as an object', at)
     current, leaving = at.get('current', ''), at.get('leaving', False)
@@ -667,12 +653,12 @@ def _read_place(state: Container, path: str, at: Any) -> History:
     for label, leaves in ((current, leaving), *saved):
         _expect(isinstance(label, str) and type(leaves) is bool, path, 'a place', label)
         if not (state.together or leaves or label in labels):
-            raise CheckpointError(
+            raise HistoryError(
                 f"'{path}' has no state '{label}' to resume in: its states are {sorted(labels)}"
             )
     for label, outcome in outcomes.items():
         if label not in state.fsm_states:
-            raise CheckpointError(f"'{path}' has no state '{label}'")
+            raise HistoryError(f"'{path}' has no state '{label}'")
         _expect(isinstance(outcome, str), f'{path}/{label}', 'an outcome', outcome)
     places = [(label, leaves) for label, leaves in saved]
     return History(current, leaving, places, index, repeat, dict(outcomes))
@@ -684,7 +670,7 @@ def save(machine: Container, path: str | Path, leave_out: Iterable[str] = ()) ->
     When it returns, the checkpoint is on the disk, and outlives a failure of power.
 
     Raises:
-        CheckpointError: A value cannot be kept, see `capture`.
+        HistoryError: A value cannot be kept, see `capture`.
         OSError: The file cannot be written.
     """
     target = Path(path)
@@ -716,15 +702,15 @@ def load(machine: Container, path: str | Path) -> None:
     """Restore a machine from a file that `save` wrote.
 
     Raises:
-        CheckpointError: The file cannot be read, or does not fit the machine.
+        HistoryError: The file cannot be read, or does not fit the machine.
     """
     try:
         text = Path(path).read_bytes().decode('utf-8', 'surrogatepass')
         restore(machine, json.loads(text))
     except RecursionError:
-        raise CheckpointError(f'{path}: damaged: nested too deep') from None
-    except (OSError, ValueError, CheckpointError) as error:
-        raise CheckpointError(f'{path}: {describe(error)}') from error
+        raise HistoryError(f'{path}: damaged: nested too deep') from None
+    except (OSError, ValueError, HistoryError) as error:
+        raise HistoryError(f'{path}: {describe(error)}') from error
 
 
 class Checkpointer:
@@ -756,7 +742,7 @@ class Checkpointer:
                 save(self._machine, self._path, self._leave_out)
         except OSError as error:
             logwarn(f'Checkpoint {self._path} cannot be written: {error.strerror}')
-        except CheckpointError as error:
+        except HistoryError as error:
             logerr(f'Checkpoint {self._path} cannot be written: {error}')
 
     def _ended(self, *_: Any) -> None:

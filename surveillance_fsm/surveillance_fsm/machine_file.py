@@ -41,7 +41,7 @@ from typing import Any, TypeVar
 
 from surveillance_fsm.concurrence import Concurrence
 from surveillance_fsm.container import Container
-from surveillance_fsm.exceptions import SmachError, describe, shown
+from surveillance_fsm.exceptions import MachineFileError, describe, shown
 from surveillance_fsm.state import CBState, State
 from surveillance_fsm.state_machine import Iterator, Sequence, StateMachine
 
@@ -65,10 +65,6 @@ _IN_KIND = {
     'Iterator': {'loop_outcomes', 'break_outcomes', 'final_outcome_map', *_LIMITS},
 }
 _INTERRUPT = {'priority', 'transitions', 'remapping'}
-
-
-class MachineFileError(SmachError):
-    """A machine's file is wrong; the message is one line that names the place in it."""
 
 
 def load_machine(path: str | Path, offered: Mapping[str, Any] | None = None) -> Container:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from surveillance_fsm.clock import Interrupt
-from surveillance_fsm.exceptions import InvalidTransitionError, PreemptIgnoredError
+from surveillance_fsm.exceptions import InvalidTransitionError
 from surveillance_fsm.execution import SUSPENDED, ExecutionThread, Frame, Node, Run, Work
 from surveillance_fsm.log import logerr, logwarn
 from surveillance_fsm.state import State, this_thread
@@ -328,7 +328,7 @@ def _go_on_past(thread: ExecutionThread) -> None:
         if ending in outcomes:
             take_over(thread, -1, None, ending, reason, culprit)
             return
-    error = PreemptIgnoredError(
+    error = InvalidTransitionError(
         f"State '{culprit}' {reason}, and no container around it can "
         f"end with 'preempted' or 'aborted'"
     )

@@ -53,11 +53,7 @@ RETRY_PERIOD = 0.05
 
 
 class OntologyNotReadyError(Exception):
-    """The ontology does not know (yet) what was asked for; the text is one clause."""
-
-
-class InconsistentOntologyError(OntologyNotReadyError):
-    """The ontology contradicts itself."""
+    """The ontology does not know (yet) what was asked for, or contradicts itself; one clause."""
 
 
 class Waiting(Protocol):
@@ -376,7 +372,7 @@ class PatrolOntology:
             if asked == self._places and not forgotten:
                 break
         if not is_in.is_consistent:
-            raise InconsistentOntologyError(f'ontology {self.reference} is inconsistent')
+            raise OntologyNotReadyError(f'ontology {self.reference} is inconsistent')
         where = _names(is_in)
         if len(where) != 1:
             what = f'in {" and ".join(where)}' if where else 'in no place'

@@ -17,8 +17,6 @@ from nav_msgs.msg import Path as PathMessage
 from numpy.typing import NDArray
 from sensor_msgs.msg import LaserScan, PointCloud2
 
-from surveillance_behaviour.policy.world import Decision
-from surveillance_interfaces.msg import Decision as DecisionMessage
 from surveillance_interfaces.msg import (
     DoorStates,
     FsmStructure,
@@ -55,30 +53,6 @@ def status_from(message: MissionStatus) -> Status:
         waiting_for_help=message.waiting_for_help,
         text=message.text,
         avoided=_names(message.avoided, 'avoided'),
-    )
-
-
-def decision_from(message: DecisionMessage) -> Decision:
-    """Return a decision with the score of each candidate.
-
-    Raises:
-        ValueError: The scores are not as many as the candidates, or one is not a number.
-    """
-    names = _names(message.candidates, 'candidates')
-    if len(names) != len(message.scores):
-        raise ValueError(f'{len(message.scores)} scores came for {len(names)} candidates')
-    scores = {name: float(score) for name, score in zip(names, message.scores, strict=True)}
-    if wrong := [name for name, score in scores.items() if math.isnan(score)]:
-        raise ValueError(f'the score of {wrong[0]} is not a number')
-    return Decision(
-        time=seconds_of(message.stamp),
-        from_place=message.from_place,
-        place=message.place,
-        target=message.target,
-        rule=message.rule,
-        policy=message.policy,
-        reason=message.reason,
-        scores=scores,
     )
 
 

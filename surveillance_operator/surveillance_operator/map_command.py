@@ -15,20 +15,17 @@ from surveillance_operator.recording.bag import RecordingError
 from surveillance_runtime.place import Place, read_place_file
 from surveillance_runtime.place.drawing import Run, draw_place
 from surveillance_runtime.place.floor_plan import FloorPlan
-from surveillance_runtime.yaml_file import YamlFileError
-from surveillance_simulation.world.textures import TextureError, marker_panel
+from surveillance_simulation.world.textures import marker_panel
 
 EXIT_BAD_INPUT = 2
 _SUFFIXES = ('.png', '.jpg', '.jpeg', '.webp')
 
 
-class CommandError(Exception):
-    """What was asked for cannot be done; the message is one line."""
-
-
 class _Parser(argparse.ArgumentParser):
+    """Raises where argparse would end the process."""
+
     def error(self, message: str) -> NoReturn:
-        raise CommandError(f'{message} (see {self.prog} --help)')
+        raise ValueError(f'{message} (see {self.prog} --help)')
 
 
 def graph_over_doors(plan: FloorPlan) -> PatrolGraph:
@@ -130,7 +127,7 @@ def _draw(options: argparse.Namespace) -> list[str]:
         marker_panel(plan.marker_dictionary, marker.id, 'whole')
     output: Path = options.output or Path(options.place.stem + '.png')
     if output.suffix.lower() not in _SUFFIXES:
-        raise CommandError(f'{output}: expected a picture, one of *{", *".join(_SUFFIXES)}')
+        raise ValueError(f'{output}: expected a picture, one of *{", *".join(_SUFFIXES)}')
     run = None
     lines = [f'{options.place}: {facts(plan)}']
     if options.record:
@@ -142,7 +139,7 @@ def _draw(options: argparse.Namespace) -> list[str]:
     try:
         picture.save(output)
     except OSError as error:
-        raise CommandError(f'{output}: {error.strerror or error}') from None
+        raise ValueError(f'{output}: {error.strerror or error}') from None
     return [*lines, f'drawn: {output}']
 
 
@@ -150,13 +147,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Check a place, draw it, and say what was found; the exit code is 2 for bad input."""
     try:
         lines = _draw(_parse(sys.argv[1:] if argv is None else argv))
-    except (
-        CommandError,
-        YamlFileError,
-        TextureError,
-        RecordingError,
-        mission_log.RecordError,
-    ) as error:
+    except ValueError as error:
         print(f'map: {error}', file=sys.stderr)
         return EXIT_BAD_INPUT
     print('\n'.join(lines))

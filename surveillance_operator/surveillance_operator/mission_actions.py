@@ -16,6 +16,7 @@ from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
 from std_srvs.srv import Trigger
 
+from surveillance_fsm.ros import CallError, ServiceCaller
 from surveillance_interfaces.srv import (
     AddRoom,
     ConsoleCommand,
@@ -37,7 +38,6 @@ from surveillance_ontology.armor_client import (
 )
 from surveillance_ontology.patrol_ontology import facts_of
 from surveillance_operator.mission_feed import BEHAVIOUR, CONTROLLERS
-from surveillance_runtime.calls import CallError, ServiceCaller
 from surveillance_runtime.node import PatrolNode
 
 _NAME = re.compile(r'[A-Za-z]\w{0,63}\Z', re.ASCII)

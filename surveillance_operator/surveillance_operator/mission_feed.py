@@ -32,6 +32,8 @@ from rosgraph_msgs.msg import Clock as ClockMessage
 from sensor_msgs.msg import LaserScan, PointCloud2
 from std_msgs.msg import Bool, String, UInt8
 
+from surveillance_behaviour.conversions import decision_from
+from surveillance_fsm.ros import CallError, ServiceCaller
 from surveillance_interfaces.action import Control, FollowPath, ScanSurroundings
 from surveillance_interfaces.msg import (
     Decision,
@@ -49,7 +51,6 @@ from surveillance_ontology.patrol_ontology import CONNECTIONS, PLACES, URGENT_PL
 from surveillance_operator import conversions
 from surveillance_operator.polled_subscription import PolledSubscription
 from surveillance_operator.snapshot import NO_POINTS, Change, Pose, Snapshot, follow
-from surveillance_runtime.calls import CallError, ServiceCaller
 from surveillance_runtime.conversions import seconds_of
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
@@ -328,7 +329,7 @@ TOPICS: tuple[Topic, ...] = (
         'decision',
         Decision,
         STATE_QOS,
-        lambda m, _: {'decision': conversions.decision_from(m), 'number': m.sequence},
+        lambda m, _: {'decision': decision_from(m), 'number': m.sequence},
     ),
     Topic(
         'battery_level',

@@ -12,7 +12,7 @@ from surveillance_operator.mission_actions import MissionActions
 from surveillance_operator.mission_feed import MissionFeed
 from surveillance_operator.page.camera import Camera
 from surveillance_operator.page.hub import Hub
-from surveillance_operator.page.server import Action, Page, PageError
+from surveillance_operator.page.server import Action, Page
 from surveillance_operator.snapshot import Change, Snapshot
 from surveillance_runtime.node import PatrolNode, StartError
 from surveillance_runtime.process import run_node
@@ -51,7 +51,7 @@ class MissionPage(PatrolNode):
                 port=port,
                 token=token,
             )
-        except PageError as error:
+        except OSError as error:
             raise StartError(str(error)) from error
         self._feed = MissionFeed(self, self._period, self._on_news, streams=True)
         self._hub.show(self._feed.snapshot)

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from surveillance_operator.page.hub import Hub
-from surveillance_operator.page.server import Action, Page, PageError
+from surveillance_operator.page.server import Action, Page
 from surveillance_operator.recording import timeline
 from surveillance_operator.recording.bag import RecordingError
 from surveillance_operator.recording.runs import find_run, run_parser
@@ -145,7 +145,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         line = Timeline(folder / timeline.NAME)
         player = Player(line, hub)
         page = Page(hub, questions={}, actions=player.actions(), port=options.port, replay=True)
-    except (RecordingError, PageError) as error:
+    except (RecordingError, OSError) as error:
         print(f'replay: {error}', file=sys.stderr)
         return EXIT_BAD_INPUT
     thread = threading.Thread(target=player.run, name='replay', daemon=True)

@@ -54,7 +54,7 @@ def write_report(folder: Path) -> Path:
         bound = graph_over_doors(plan).tour.bound / speed if plan is not None and speed else None
         path = folder / NAME
         path.write_text(_page(folder, events, drawn, bound), encoding='utf-8')
-    except (mission_log.RecordError, YamlFileError) as error:
+    except (mission_log.MissionLogError, YamlFileError) as error:
         raise RecordingError(str(error)) from None
     except OSError as error:
         raise RecordingError(f'{folder}: {error.strerror or error}') from None
@@ -74,7 +74,7 @@ def draw_picture(folder: Path) -> Path | None:
         run = run_of(mission_log.read(folder / RECORD), plan.place, str(folder / RECORD))
         path = folder / PICTURE
         draw_place(plan, 'The way driven', facts(plan), run).save(path)
-    except (mission_log.RecordError, YamlFileError) as error:
+    except (mission_log.MissionLogError, YamlFileError) as error:
         raise RecordingError(str(error)) from None
     except OSError as error:
         raise RecordingError(f'{folder}: {error.strerror or error}') from None

@@ -12,6 +12,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
 from trajectory_msgs.msg import JointTrajectory
 
+from surveillance_fsm.ros import GoalAbortedError, GoalRun, GoalServer
 from surveillance_interfaces.action import ScanSurroundings
 from surveillance_interfaces.srv import MarkerRoutine, PointCamera
 from surveillance_perception.arm.driver import ArmDriver
@@ -27,7 +28,6 @@ from surveillance_perception.conversions import (
     scan_result_to_ros,
     trajectory_to_ros,
 )
-from surveillance_runtime.action_server import GoalAbortedError, GoalRun, GoalServer
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS

@@ -55,10 +55,6 @@ _FLAGS = re.compile(r'--(enable|disable)-(rosout|stdout|external-lib)-logs\Z')
 _RENAME = re.compile(r'(?:(?P<node>[^:=]+):)?__(?P<what>ns|node|name):=(?P<to>.+)\Z')
 
 
-class ConfigurationError(ParameterError):
-    """An entry that no node can take; the message is one line that begins with its source."""
-
-
 @dataclass(frozen=True)
 class Entry:
     """One parameter as one source gives it.
@@ -230,18 +226,18 @@ def argument_layer(assignments: Iterable[str]) -> Layer:
     """Read arguments `[NODE:]NAME:=VALUE`, as `-p` has them.
 
     Raises:
-        ConfigurationError: One is not of this form, or its value is not YAML.
+        ParameterError: One is not of this form, or its value is not YAML.
     """
     entries = []
     for text in assignments:
         match = _ASSIGNMENT.match(text)
         if match is None or not match['name'].strip():
-            raise ConfigurationError(f'-p {_short(text)}: expected NAME:=VALUE or NODE:NAME:=VALUE')
+            raise ParameterError(f'-p {_short(text)}: expected NAME:=VALUE or NODE:NAME:=VALUE')
         pattern = '/**' if match['node'] is None else match['node']
         try:
             value = _argument_value(match['value'])
         except (yaml.YAMLError, ValueError, RecursionError):
-            raise ConfigurationError(
+            raise ParameterError(
                 f'-p {_short(text)}: the value is not valid YAML; quote it'
             ) from None
         entries.append(Entry(pattern, match['name'], value, f'-p {_short(text)}'))
@@ -278,7 +274,7 @@ class Configuration:
             nodes: Names of the nodes that there are; None for those of the schema.
 
         Raises:
-            ConfigurationError: The first entry that is wrong.
+            ParameterError: The first entry that is wrong.
         """
         for layer in self.layers:
             for entry in layer.entries:
@@ -290,7 +286,7 @@ class Configuration:
         if not everyone and last not in nodes:
             if self.schema.keys() & {last}:
                 return  # a node that this run does not start
-            raise ConfigurationError(
+            raise ParameterError(
                 f"{entry.origin}: no node is called '{entry.pattern}', "
                 f'expected /** or {nearest(last, self.schema)}'
             )
@@ -303,7 +299,7 @@ class Configuration:
             whose = '' if everyone else f' of {last}'
             owners = [node for node in self.schema if self._schema_of(node).takes(entry.name)]
             hint = f' (one of {", ".join(owners)})' if owners and not everyone else ''
-            raise ConfigurationError(
+            raise ParameterError(
                 f"{entry.origin}: unknown parameter '{_short(entry.name)}'{whose}{hint}, "
                 f'expected {nearest(entry.name, sorted(known))}'
             )
@@ -318,7 +314,7 @@ class Configuration:
             full_name: Its name in the graph, with its namespace; default: `/node`.
 
         Raises:
-            ConfigurationError: A value is of the wrong type or out of range.
+            ParameterError: A value is of the wrong type or out of range.
         """
         schema = self._schema_of(node)
         full_name = full_name or f'/{node}'
@@ -337,7 +333,7 @@ class Configuration:
         """Return the place that is configured, with all its checks; None where there is none.
 
         Raises:
-            ConfigurationError: What is described is no sound place.
+            ParameterError: What is described is no sound place.
         """
         if 'map' not in self._schema_of(node).prefixes:
             return None  # it knows no rooms
@@ -364,7 +360,7 @@ class Configuration:
                 radius = settings.get('robot_radius', Setting(ROBOT_RADIUS, '')).value
                 check_passable(plan, float(radius))
         except PlaceError as error:
-            raise ConfigurationError(f'{self._origin(settings, error)}: {error}') from None
+            raise ParameterError(f'{self._origin(settings, error)}: {error}') from None
         return place
 
     def _origin(self, settings: Mapping[str, Setting], error: PlaceError) -> str:
@@ -387,7 +383,7 @@ class Configuration:
 
     def _accepted(self, node: str, entry: Entry) -> Any:
         if entry.value is None:
-            raise ConfigurationError(f'{entry.origin}: parameter {entry.name}: expected a value')
+            raise ParameterError(f'{entry.origin}: parameter {entry.name}: expected a value')
         _check_plain(entry)
         spec = self._schema_of(node).spec(entry.name)
         if spec is None:
@@ -395,7 +391,7 @@ class Configuration:
         try:
             return spec.accept(entry.value)
         except ParameterError as error:
-            raise ConfigurationError(f'{entry.origin}: {error}') from None
+            raise ParameterError(f'{entry.origin}: {error}') from None
 
 
 def _check_plain(entry: Entry) -> None:
@@ -405,7 +401,7 @@ def _check_plain(entry: Entry) -> None:
     if kinds == {int, float}:
         kinds = {float}
     if len(kinds) > 1 or not kinds <= {bool, int, float, str}:
-        raise ConfigurationError(
+        raise ParameterError(
             f'{entry.origin}: parameter {entry.name}: got {_short(str(value))}, expected true, '
             'false, a number, a text, or a list of one of these'
         )
@@ -465,12 +461,12 @@ class RosArguments:
         """Return the parameters that the arguments give: any `-p` wins over every file.
 
         Raises:
-            ConfigurationError: One of them cannot be used.
+            ParameterError: One of them cannot be used.
         """
         try:
             layers = [file_layer(path) for path in self.files]
         except YamlFileError as error:
-            raise ConfigurationError(f'parameter file {error}') from None
+            raise ParameterError(f'parameter file {error}') from None
         return Configuration((*layers, argument_layer(self.assignments)))
 
     def full_name(self, node: str) -> str:
@@ -491,7 +487,7 @@ def split_arguments(words: Sequence[str]) -> RosArguments:
     """Take parameters out of a command line with `--ros-args` sections.
 
     Raises:
-        ConfigurationError: An option lacks its value, or a word is none that ROS knows.
+        ParameterError: An option lacks its value, or a word is none that ROS knows.
     """
     rest: list[str] = []
     files: list[str] = []
@@ -503,9 +499,7 @@ def split_arguments(words: Sequence[str]) -> RosArguments:
         at += 1
         if not inside or word == '--':
             if not inside and word not in ('--ros-args', '--'):
-                raise ConfigurationError(
-                    f'unknown argument {_short(word)}: expected --ros-args first'
-                )
+                raise ParameterError(f'unknown argument {_short(word)}: expected --ros-args first')
             inside = word == '--ros-args'
             rest.append(word)
             continue
@@ -513,7 +507,7 @@ def split_arguments(words: Sequence[str]) -> RosArguments:
             continue
         needs = word in ('-p', '--param', '--params-file') or word in _VALUED
         if needs and at >= len(words):
-            raise ConfigurationError(f'{word}: expected a value after it')
+            raise ParameterError(f'{word}: expected a value after it')
         if word in ('-p', '--param'):
             assignments.append(words[at])
         elif word == '--params-file':
@@ -524,7 +518,7 @@ def split_arguments(words: Sequence[str]) -> RosArguments:
             rest.append(word)
         else:
             known = ('-p', '--params-file', '-r', '--log-level', '--ros-args')
-            raise ConfigurationError(
+            raise ParameterError(
                 f'unknown argument {_short(word)} after --ros-args: expected {nearest(word, known)}'
             )
         at += needs

@@ -24,14 +24,11 @@ from surveillance_runtime.place import PlaceError
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
 from surveillance_simulation import conversions, simulator_parameters
-from surveillance_simulation.camera.mujoco_rendering import MujocoMissingError
 from surveillance_simulation.clock_rate import DRIVING, PLANNING, ClockRate
 from surveillance_simulation.feeds.camera_feed import CameraFeed
 from surveillance_simulation.feeds.fault_services import FaultServices
 from surveillance_simulation.feeds.sensor_feed import SensorFeed
-from surveillance_simulation.robot.arm_motion import TrajectoryError
 from surveillance_simulation.robot.robot import Robot
-from surveillance_simulation.world.textures import TextureError
 from surveillance_simulation.world.world import World
 
 _UNDER_WAY = (
@@ -68,7 +65,7 @@ class Simulator(PatrolNode):
         self._sensors = SensorFeed(self, self.robot, drives_clock=self._drives_clock)
         try:
             self._camera = CameraFeed(self, self.robot, seed, self._changing, self._stamp)
-        except (TextureError, MujocoMissingError) as error:
+        except (PlaceError, ImportError) as error:
             raise StartError(f'simulator: {error}') from None
         FaultServices(self, self.robot, self._changing, self._sensors.tell_doors)
         commands = simulator_parameters.command_topic(self)
@@ -162,7 +159,7 @@ class Simulator(PatrolNode):
         try:
             with self._changing:
                 self.robot.arm.follow(names, points, self.robot.time)
-        except TrajectoryError as error:
+        except ValueError as error:
             self.get_logger().error(f'arm/joint_trajectory: {error}')
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 from builtin_interfaces.msg import Time
 from hypothesis import given, settings
@@ -10,6 +12,7 @@ from sensor_msgs.msg import BatteryState
 
 from surveillance_behaviour import conversions
 from surveillance_behaviour.policy.world import Decision
+from surveillance_interfaces.msg import Decision as DecisionMessage
 
 numbers = st.floats(allow_nan=False, allow_infinity=False)
 names = st.text('ABCR0123456789_', min_size=1, max_size=6)
@@ -31,6 +34,19 @@ def test_decisions_come_back(
     message = conversions.decision_message(decision, 3, Time(sec=12, nanosec=500_000_000))
     assert message.sequence == 3
     assert conversions.decision_from(message) == decision
+
+
+@pytest.mark.parametrize(
+    ('message', 'words'),
+    [
+        (DecisionMessage(candidates=['A'], scores=[]), '0 scores came for 1 candidates'),
+        (DecisionMessage(candidates=['A'], scores=[math.nan]), 'score of A is not a number'),
+        (DecisionMessage(candidates=['A'] * 10_001), '10001 candidates: expected at most 10000'),
+    ],
+)
+def test_a_decision_that_cannot_be_used_is_refused(message: DecisionMessage, words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        conversions.decision_from(message)
 
 
 def test_a_point_without_height_lies_on_the_floor() -> None:

@@ -10,9 +10,9 @@ from geometry_msgs.msg import Point
 from std_msgs.msg import String
 
 from surveillance_controllers.planner_controller_node import PlannerController
+from surveillance_fsm.ros import CallInterruptedError, GoalCaller, ServiceCaller
 from surveillance_interfaces.action import ComputePath
 from surveillance_interfaces.srv import ConsoleCommand
-from surveillance_runtime.calls import CallInterruptedError, GoalCaller, ServiceCaller
 from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.waiting import Interrupt
 

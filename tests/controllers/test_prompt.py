@@ -22,9 +22,9 @@ from surveillance_controllers.manual.commands import BATTERY, Grammar
 from surveillance_controllers.manual.prompt import Console
 from surveillance_controllers.manual.terminal import TerminalLines, WordCompleter
 from surveillance_controllers.planner_controller_node import PlannerController
+from surveillance_fsm.ros import GoalCaller
 from surveillance_interfaces.action import ComputePath
 from surveillance_operator.console_node import ConsoleNode
-from surveillance_runtime.calls import GoalCaller
 from surveillance_runtime.qos import STATE_QOS
 
 

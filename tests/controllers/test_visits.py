@@ -11,6 +11,7 @@ from std_msgs.msg import String
 
 from surveillance_controllers.motion_controller_node import MotionController
 from surveillance_controllers.planner_controller_node import PlannerController
+from surveillance_fsm.ros import GoalCaller, ServiceCaller
 from surveillance_interfaces.action import Control, Plan
 from surveillance_interfaces.msg import RobotPlace
 from surveillance_interfaces.srv import ConsoleCommand, ReferenceName
@@ -18,7 +19,6 @@ from surveillance_ontology.armor_client import ArmorClient
 from surveillance_ontology.armor_server_node import ArmorServer
 from surveillance_ontology.ontology_map_builder_node import OntologyMapBuilder
 from surveillance_ontology.patrol_ontology import PatrolOntology
-from surveillance_runtime.calls import GoalCaller, ServiceCaller
 from surveillance_runtime.qos import STATE_QOS
 
 

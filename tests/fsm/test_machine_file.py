@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import surveillance_fsm as fsm
-from surveillance_fsm.export import ExportError, to_ascii, to_data, to_yaml
+from surveillance_fsm.export import to_ascii, to_data, to_yaml
 from surveillance_fsm.machine_file import MachineFileError, load_machine, machine_from, parse
 from surveillance_fsm.verify import verify
 
@@ -158,9 +158,9 @@ def test_what_has_no_form_as_data_is_named():
     machine = fsm.StateMachine(['done'])
     with machine:
         fsm.StateMachine.add('A', fsm.CBState(lambda ud: 'done', outcomes=['done']))
-    with pytest.raises(ExportError, match='StateMachine/A'):
+    with pytest.raises(MachineFileError, match='StateMachine/A'):
         to_yaml(machine)
     machine = fsm.StateMachine(['done'])
     machine.userdata.robot = object()
-    with pytest.raises(ExportError, match='robot'):
+    with pytest.raises(MachineFileError, match='robot'):
         to_yaml(machine)

@@ -195,7 +195,7 @@ def test_a_culprit_that_nothing_can_end_for_is_an_error():
     run = Background(root)
     began(deaf)
     root.request_preempt()
-    with pytest.raises(fsm.PreemptIgnoredError, match='ROOT/DEAF'):
+    with pytest.raises(fsm.InvalidTransitionError, match='ROOT/DEAF'):
         run.result()
     assert not root.is_running()
     deaf.release.set()

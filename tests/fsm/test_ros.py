@@ -19,13 +19,14 @@ import surveillance_fsm as fsm
 from surveillance_fsm.ros import (
     ActionServerWrapper,
     ConditionState,
+    GoalAbortedError,
+    GoalServer,
     MonitorState,
     ServiceState,
     SimpleActionState,
     set_preempt_handler,
 )
 from surveillance_interfaces.action import FollowPath
-from surveillance_runtime.action_server import GoalAbortedError, GoalServer
 from surveillance_runtime.node import PatrolNode
 
 from .states import Answer, Background, Waiter, began

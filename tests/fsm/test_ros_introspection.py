@@ -10,11 +10,10 @@ from std_srvs.srv import Trigger
 
 import surveillance_fsm as fsm
 from surveillance_fsm.history import Transition
-from surveillance_fsm.ros import IntrospectionServer
+from surveillance_fsm.ros import IntrospectionServer, ServiceCaller
 from surveillance_fsm.ros.conversions import transition_from, transition_message
 from surveillance_interfaces.msg import FsmStatus, FsmStructure, FsmTransition
 from surveillance_interfaces.srv import ForceOutcome, SetInitialState
-from surveillance_runtime.calls import ServiceCaller
 
 from .states import Answer, Background, Waiter, began
 

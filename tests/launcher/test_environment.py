@@ -55,11 +55,11 @@ test = []
 PREPARE = """
 import sys
 from pathlib import Path
-from launcher.environment import Environment, SetupError
+from launcher.environment import Environment, LaunchError
 environment = Environment(Path(sys.argv[1]))
 try:
     environment.prepare()
-except SetupError as error:
+except LaunchError as error:
     sys.exit(str(error))
 print('ready', environment.ready())
 """

@@ -9,14 +9,15 @@ import pytest
 
 from launcher.instance_lock import claim, runtime_folder
 from launcher.node_table import select
-from launcher.run import Run, RunError, ros_domain
+from launcher.run import Run, ros_domain
+from launcher.system import LaunchError
 
 RANDOM = select('RANDOM')
 
 
 def test_the_same_nodes_are_claimed_once_and_again_after_that(tmp_path):
     held = claim(RANDOM, '7', None, tmp_path)
-    with pytest.raises(RunError) as caught:
+    with pytest.raises(LaunchError) as caught:
         claim(select('RANDOM', only=['armor_server', 'simulator']), '7', None, tmp_path)
     message = str(caught.value)
     assert message.startswith(f'already running in ROS domain 7 (process {os.getpid()}): armor_')
@@ -32,7 +33,7 @@ def test_other_domains_and_namespaces_are_free(tmp_path):
     assert claim(RANDOM, '7', None, tmp_path)
     assert claim(RANDOM, '8', None, tmp_path)
     assert claim(RANDOM, '7', '/robot2', tmp_path)
-    with pytest.raises(RunError, match='namespace robot2'):
+    with pytest.raises(LaunchError, match='namespace robot2'):
         claim(RANDOM, '7', 'robot2', tmp_path)
 
 
@@ -44,7 +45,9 @@ def test_where_nothing_can_be_written_nothing_is_claimed(tmp_path):
 @pytest.mark.parametrize('given', ['x', '-1', '102', '1.5'])
 def test_a_domain_of_the_environment_that_is_none_is_named(monkeypatch, given):
     monkeypatch.setenv('ROS_DOMAIN_ID', given)
-    with pytest.raises(RunError, match=f"ROS_DOMAIN_ID: got '{given}', expected a number from 0"):
+    with pytest.raises(
+        LaunchError, match=f"ROS_DOMAIN_ID: got '{given}', expected a number from 0"
+    ):
         ros_domain(Run())
     assert ros_domain(Run(domain=3)) == '3'
 

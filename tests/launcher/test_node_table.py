@@ -2,7 +2,8 @@ from __future__ import annotations
 
 import pytest
 
-from launcher.node_table import DEFAULT_MODE, MODES, NODES, RunError, find, select
+from launcher.node_table import DEFAULT_MODE, MODES, NODES, find, select
+from launcher.system import LaunchError
 from tests.launcher.conftest import ROOT
 
 SEED = {
@@ -52,15 +53,15 @@ def test_only_and_without():
         'video_source',
     ]
     assert set(names('RANDOM', without=['motion_controller'])) == SEED - {'motion_controller'}
-    with pytest.raises(RunError, match='no node is left'):
+    with pytest.raises(LaunchError, match='no node is left'):
         select('RANDOM', only=['armor_server'], without=['armor_server'])
 
 
 @pytest.mark.parametrize('options', [{'only': ['armour']}, {'without': ['armour']}])
 def test_an_unknown_name_is_told_with_the_known_ones(options):
-    with pytest.raises(RunError, match=r"unknown node 'armour'.*armor_server"):
+    with pytest.raises(LaunchError, match=r"unknown node 'armour'.*armor_server"):
         select('RANDOM', **options)
-    with pytest.raises(RunError, match="'x'"):
+    with pytest.raises(LaunchError, match="'x'"):
         find('x')
 
 

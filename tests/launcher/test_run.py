@@ -14,8 +14,8 @@ from launcher.cli import CONFIG, make_parser, wanted_run
 from launcher.log_merge import MergedLog
 from launcher.node_table import DEFAULT_MODE
 from launcher.run import (
+    LaunchError,
     Run,
-    RunError,
     alarm_caller,
     check_assignments,
     command,
@@ -36,7 +36,7 @@ from surveillance_behaviour.mission.mission_log import MissionRecord
 
 
 def error_of(run: Run) -> str:
-    with pytest.raises(RunError) as caught:
+    with pytest.raises(LaunchError) as caught:
         run.check()
     message = str(caught.value)
     assert '\n' not in message
@@ -127,13 +127,13 @@ def test_a_mode_that_the_file_gives_to_all_controllers_is_the_modes_of_the_run(t
 def test_another_behaviour_in_a_file_is_refused_as_its_nodes_would_be_missing(tmp_path):
     file = tmp_path / 'own.yaml'
     file.write_text('robot_behavior: {ros__parameters: {behaviour: patrol}}')
-    with pytest.raises(RunError, match=r'own.yaml:1: behaviour patrol.*--behaviour patrol'):
+    with pytest.raises(LaunchError, match=r'own.yaml:1: behaviour patrol.*--behaviour patrol'):
         configuration(CONFIG, Run(parameters=file))
 
 
 def test_an_assignment_that_no_started_node_takes_is_refused():
     run = Run(mode='RANDOM', assignments=('lidar.rays:=90',))
-    with pytest.raises(RunError, match=r'-p lidar.rays:=90: no node that is started takes it'):
+    with pytest.raises(LaunchError, match=r'-p lidar.rays:=90: no node that is started takes it'):
         check_assignments(configuration(CONFIG, run), run.nodes())
 
 
@@ -146,7 +146,7 @@ def test_the_default_mode_stands_in_the_first_file_and_for_all_nodes():
 def test_a_run_folder_on_a_full_disk_is_named(tmp_path):
     (tmp_path / 'armor_server.yaml').symlink_to('/dev/full')
     run = Run()
-    with pytest.raises(RunError, match=r'armor_server.yaml: cannot be written: No space left'):
+    with pytest.raises(LaunchError, match=r'armor_server.yaml: cannot be written: No space left'):
         write_parameters(tmp_path, run, configuration(CONFIG, run), run.nodes())
 
 
@@ -187,7 +187,7 @@ def test_options_of_a_run_survive_its_launcher(tmp_path):
     run = Run(mode='RANDOM', place=tmp_path / 'p.yaml', assignments=['a:=1'], only=['reasoner'])
     stored = json.loads(json.dumps(options_of(run)))
     assert run_from(stored) == replace(run, without=[])
-    with pytest.raises(RunError, match='--resume'):
+    with pytest.raises(LaunchError, match='--resume'):
         run_from({'mode': 'RANDOM', 'place': None, 'seconds': None} | {'place': 7})
 
 

@@ -12,8 +12,8 @@ from geometry_msgs.msg import Point
 
 from surveillance_controllers.map_knowledge import MapKnowledge
 from surveillance_controllers.motion.place_recording import PlaceRecorder
+from surveillance_fsm.ros import GoalAbortedError, GoalRun, GoalServer
 from surveillance_interfaces.action import ComputePath, Control, FollowPath, Plan
-from surveillance_runtime.action_server import GoalAbortedError, GoalRun, GoalServer
 from surveillance_runtime.node import PatrolNode
 
 GOOD = 'good'

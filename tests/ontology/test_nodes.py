@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from rclpy.task import Future
 
+from surveillance_fsm.ros import ServiceCaller
 from surveillance_interfaces.msg import OntologyMap, OntologyPlace, RoomConnection
 from surveillance_interfaces.srv import (
     AddRoom,
@@ -28,7 +29,6 @@ from surveillance_ontology.armor_server_node import ArmorServer
 from surveillance_ontology.conversions import point_to_ros
 from surveillance_ontology.ontology_map_builder_node import OntologyMapBuilder
 from surveillance_ontology.patrol_ontology import PatrolOntology
-from surveillance_runtime.calls import ServiceCaller
 from surveillance_runtime.node import PatrolNode, StartError
 from surveillance_runtime.qos import STATE_QOS
 

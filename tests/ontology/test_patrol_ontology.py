@@ -16,7 +16,6 @@ from surveillance_ontology.armor.client import (
 )
 from surveillance_ontology.armor.service import ArmorService
 from surveillance_ontology.patrol_ontology import (
-    InconsistentOntologyError,
     OntologyNotReadyError,
     PatrolOntology,
 )
@@ -165,7 +164,7 @@ def test_a_snapshot_waits_for_the_place_that_is_on_its_way(ontology: PatrolOntol
 def test_what_clashes_is_named(ontology: PatrolOntology, armor: ArmorClient) -> None:
     assert ontology.contradiction() == ''
     armor.manipulation.add_ind_to_class('R1', 'DOOR')
-    with pytest.raises(InconsistentOntologyError, match='ontology map is inconsistent'):
+    with pytest.raises(OntologyNotReadyError, match='ontology map is inconsistent'):
         ontology.snapshot(110.0, RULES)
     assert 'R1 is LOCATION and R1 is DOOR' in ontology.contradiction()
 

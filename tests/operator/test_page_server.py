@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import pytest
 
 from surveillance_operator.page.hub import Hub
-from surveillance_operator.page.server import Page, PageError
+from surveillance_operator.page.server import Page
 from surveillance_operator.snapshot import Snapshot
 
 done: list[object] = []
@@ -165,5 +165,5 @@ def test_a_viewer_gets_everything_and_then_what_changed(page: Page) -> None:
 
 
 def test_an_address_that_is_taken_is_one_line(page: Page) -> None:
-    with pytest.raises(PageError, match=f'127.0.0.1:{page.port}: Address already in use'):
+    with pytest.raises(OSError, match=f'127.0.0.1:{page.port}: Address already in use'):
         Page(Hub(), questions={}, actions={}, port=page.port)

@@ -11,11 +11,11 @@ from std_msgs.msg import Int32
 from std_srvs.srv import Empty
 
 from surveillance_behaviour.initial_state_node import InitialState
+from surveillance_fsm.ros import GoalServer
 from surveillance_interfaces.action import ScanSurroundings
 from surveillance_interfaces.msg import OntologyMap
 from surveillance_interfaces.srv import MarkerRoutine, ReferenceName
 from surveillance_perception.marker_server_node import MarkerServer
-from surveillance_runtime.action_server import GoalServer
 from surveillance_runtime.node import PatrolNode, StartError
 from surveillance_runtime.qos import STATE_QOS
 

@@ -16,6 +16,7 @@ from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState
 from std_msgs.msg import Bool, Header, Int32
 from trajectory_msgs.msg import JointTrajectory
 
+from surveillance_fsm.ros import CallInterruptedError, GoalCaller, ServiceCaller
 from surveillance_interfaces.action import ScanSurroundings
 from surveillance_interfaces.msg import MarkerDetectionArray
 from surveillance_interfaces.srv import MarkerRoutine, PointCamera, RoomInformation
@@ -32,7 +33,6 @@ from surveillance_perception.testing.marker_scene import (
     image_of,
 )
 from surveillance_perception.video_source_node import VideoSource
-from surveillance_runtime.calls import CallInterruptedError, GoalCaller, ServiceCaller
 from surveillance_runtime.node import StartError
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS

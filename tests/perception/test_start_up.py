@@ -12,6 +12,7 @@ from std_msgs.msg import Int32
 from std_srvs.srv import Empty
 
 from surveillance_behaviour.initial_state_node import InitialState
+from surveillance_fsm.ros import ServiceCaller
 from surveillance_interfaces.msg import OntologyMap
 from surveillance_interfaces.srv import ReferenceName, RoomPosition, SetMarker
 from surveillance_ontology.armor_client import ArmorClient
@@ -20,7 +21,6 @@ from surveillance_ontology.ontology_map_builder_node import OntologyMapBuilder
 from surveillance_perception.arm_controller_node import ArmController
 from surveillance_perception.aruco_detector_node import IDS_QOS, ArucoDetector
 from surveillance_perception.marker_server_node import MarkerServer
-from surveillance_runtime.calls import ServiceCaller
 from surveillance_runtime.qos import STATE_QOS
 from surveillance_simulation.simulator_node import Simulator
 

@@ -12,13 +12,13 @@ from hypothesis import strategies as st
 
 from surveillance_runtime.configuration import (
     Configuration,
-    ConfigurationError,
     argument_layer,
     file_layer,
     read_schema,
     resolved_text,
     split_arguments,
 )
+from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.yaml_file import YamlFileError
 from tests.launcher.conftest import ROOT
 
@@ -104,7 +104,7 @@ def test_a_second_place_replaces_the_first_as_a_whole():
 )
 def test_what_no_node_takes_is_refused_with_file_and_line(tmp_path, text, problem):
     path = written(tmp_path, f'/**:\n  ros__parameters:\n    {text}\n')
-    with pytest.raises(ConfigurationError) as caught:
+    with pytest.raises(ParameterError) as caught:
         merged(file_layer(path))
     assert str(caught.value).startswith(f'{path}:3: ')
     assert problem in str(caught.value)
@@ -113,7 +113,7 @@ def test_what_no_node_takes_is_refused_with_file_and_line(tmp_path, text, proble
 
 def test_a_parameter_of_another_node_names_its_owner(tmp_path):
     path = written(tmp_path, 'reasoner: {ros__parameters: {battery_initial_value: 3}}')
-    with pytest.raises(ConfigurationError, match=r'of reasoner \(one of battery_controller\)'):
+    with pytest.raises(ParameterError, match=r'of reasoner \(one of battery_controller\)'):
         merged(file_layer(path))
 
 
@@ -130,7 +130,7 @@ def test_a_parameter_of_another_node_names_its_owner(tmp_path):
     ],
 )
 def test_a_wrong_argument_costs_one_line(words, problem):
-    with pytest.raises(ConfigurationError) as caught:
+    with pytest.raises(ParameterError) as caught:
         split_arguments(words).configuration()
     assert problem in str(caught.value)
     assert '\n' not in str(caught.value)
@@ -164,12 +164,12 @@ def test_places_that_a_robot_cannot_use_are_refused_with_file_and_line(tmp_path)
     }
     for content, problem in cases.items():
         path = written(tmp_path, content)
-        with pytest.raises(ConfigurationError) as caught:
+        with pytest.raises(ParameterError) as caught:
             merged(file_layer(path)).place('simulator')
         assert problem in str(caught.value)
         assert str(caught.value).startswith(f'{path}:')
     wide = merged(file_layer(CONFIG / 'seven_rooms.yaml'), argument_layer(['robot_radius:=0.6']))
-    with pytest.raises(ConfigurationError, match=r'seven_rooms.yaml:\d+: doors.D1: width 1.2 m'):
+    with pytest.raises(ParameterError, match=r'seven_rooms.yaml:\d+: doors.D1: width 1.2 m'):
         wide.place('simulator')
 
 
@@ -237,7 +237,7 @@ def test_every_value_takes_effect_or_costs_one_line(tmp_path, pattern, name, cho
             path.write_text(yaml.safe_dump(content, allow_unicode=True))
             layer = file_layer(path)
         configuration = merged(layer)
-    except (ConfigurationError, YamlFileError) as error:
+    except (ParameterError, YamlFileError) as error:
         refusal = str(error)
     else:
         refusal = ''

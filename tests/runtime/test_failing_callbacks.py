@@ -12,7 +12,7 @@ from rclpy.qos import QoSProfile
 from std_msgs.msg import Int32
 from std_srvs.srv import Trigger
 
-from surveillance_runtime.calls import ServiceCaller
+from surveillance_fsm.ros import ServiceCaller
 from surveillance_runtime.logging import LONGEST, Allowance, clean
 from surveillance_runtime.node import PatrolNode
 

@@ -10,7 +10,7 @@ import pytest
 
 from surveillance_simulation.camera import mujoco_rendering
 from surveillance_simulation.camera.model import Camera, Conditions, camera_pose, expose
-from surveillance_simulation.camera.mujoco_rendering import MujocoMissingError, MujocoRenderer
+from surveillance_simulation.camera.mujoco_rendering import MujocoRenderer
 from surveillance_simulation.camera.rendering import Renderer
 from surveillance_simulation.world.world import read_world
 
@@ -59,5 +59,5 @@ def test_changes_are_shown_after_refresh() -> None:
 
 def test_without_mujoco_it_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(mujoco_rendering, 'mujoco', None)
-    with pytest.raises(MujocoMissingError, match='pip install mujoco'):
+    with pytest.raises(ImportError, match='pip install mujoco'):
         MujocoRenderer(two_rooms(), Camera.from_field_of_view())

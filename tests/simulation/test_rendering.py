@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
+from surveillance_runtime.place import PlaceError
 from surveillance_runtime.place.floor_plan import Marker
 from surveillance_simulation.camera.model import Camera, Conditions, camera_pose, expose
 from surveillance_simulation.camera.rendering import Renderer, render
@@ -155,7 +156,7 @@ def test_the_same_seed_takes_the_same_picture() -> None:
 def test_a_marker_that_does_not_exist_is_refused(
     dictionary: str, marker_id: int, message: str
 ) -> None:
-    with pytest.raises(textures.TextureError) as caught:
+    with pytest.raises(PlaceError) as caught:
         textures.marker_panel(dictionary, marker_id, 'whole')
     assert str(caught.value).startswith(message)
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from surveillance_fsm.ros import CallError, GoalCaller, ServiceCaller
 from surveillance_interfaces.action import ScanSurroundings
 from surveillance_interfaces.srv import MarkerRoutine
-from surveillance_runtime.calls import CallError, GoalCaller, ServiceCaller
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.settled_frames import SettledFrames
 from surveillance_runtime.waiting import ClockWait, Interrupt

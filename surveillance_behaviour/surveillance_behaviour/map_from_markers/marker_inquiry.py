@@ -8,9 +8,9 @@ from std_msgs.msg import Int32
 
 from surveillance_behaviour.conversions import place_note_from
 from surveillance_behaviour.map_from_markers.assembly import Survey, SurveyReport
+from surveillance_fsm.ros import CallError, ServiceCaller
 from surveillance_interfaces.msg import MarkerDetectionArray
 from surveillance_interfaces.srv import RoomInformation
-from surveillance_runtime.calls import CallError, ServiceCaller
 from surveillance_runtime.node import PatrolNode
 
 _ANSWER_SECONDS = 5.0

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from surveillance_behaviour.charging import BatteryMonitor
 from surveillance_behaviour.decision import DecisionSettings
-from surveillance_behaviour.mission.mission_log import CutOff, MissionRecord, RecordError
+from surveillance_behaviour.mission.mission_log import CutOff, MissionLogError, MissionRecord
 from surveillance_behaviour.mission.recovery import Failure, Recovery, RecoveryLimits
 from surveillance_behaviour.peers.ports import PeerError, Point, Ports
 from surveillance_behaviour.policy.battery_reserve import Battery
@@ -223,7 +223,7 @@ class Mission:
             return
         try:
             self._record.write(event, self.now(), **fields)
-        except RecordError as error:
+        except MissionLogError as error:
             # A full disk is no reason to stop patrolling; once is enough to say so.
             if str(error) != self._record_complaint:
                 self._record_complaint = str(error)

@@ -8,7 +8,6 @@ from typing import Any
 from rclpy.callback_groups import ReentrantCallbackGroup
 
 from surveillance_behaviour.decider import Decider
-from surveillance_behaviour.decision import UnknownPlaceNameError
 from surveillance_behaviour.peers.ports import InterruptedWaitError, PeerError
 from surveillance_fsm import Interrupt
 from surveillance_interfaces.srv import GoTo, WhyNot
@@ -52,7 +51,7 @@ class DecisionServices:
                 told = self._decider.why_not(
                     request.place, self._now(), self._interrupt, self._avoided()
                 )
-            except (UnknownPlaceNameError, PeerError, InterruptedWaitError) as error:
+            except (ValueError, PeerError, InterruptedWaitError) as error:
                 response.success, response.message = False, str(error)
                 return
             response.success, response.message = True, told.sentence
@@ -66,6 +65,6 @@ class DecisionServices:
             response.message = self._decider.request(request.place)
             response.success = True
             self._log.info(response.message)
-        except UnknownPlaceNameError as error:
+        except ValueError as error:
             response.message = str(error)
         return response

@@ -29,19 +29,20 @@ from surveillance_behaviour.peers.ports import (
 )
 from surveillance_behaviour.policy.world import Decision
 from surveillance_fsm import Interrupt
-from surveillance_interfaces.action import ComputePath, Control, FollowPath, Plan
-from surveillance_interfaces.msg import Decision as DecisionMessage
-from surveillance_interfaces.msg import RobotPlace
-from surveillance_interfaces.srv import Reason, ReferenceName, RoomPosition
-from surveillance_ontology.armor_client import RosTransport
-from surveillance_runtime import waiting
-from surveillance_runtime.calls import (
+from surveillance_fsm.ros import (
     CallError,
     CallInterruptedError,
     GoalCaller,
     ServiceCaller,
     UnavailableError,
 )
+from surveillance_interfaces.action import ComputePath, Control, FollowPath, Plan
+from surveillance_interfaces.msg import Decision as DecisionMessage
+from surveillance_interfaces.msg import RobotPlace
+from surveillance_interfaces.srv import Reason, ReferenceName, RoomPosition
+from surveillance_ontology.armor_client import RosTransport
+from surveillance_runtime import waiting
+from surveillance_runtime.conversions import nanoseconds_of
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import STATE_QOS
 
@@ -92,7 +93,7 @@ def ros_ontology(node: PatrolNode, deadlines: Deadlines) -> ArmorKnowledge:
     node.create_subscription(
         RobotPlace,
         'robot_place',
-        lambda told: whereabouts.note(told.place, conversions.nanoseconds_of(told.header.stamp)),
+        lambda told: whereabouts.note(told.place, nanoseconds_of(told.header.stamp)),
         STATE_QOS,
     )
     return ArmorKnowledge(

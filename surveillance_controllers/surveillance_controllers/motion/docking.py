@@ -14,8 +14,7 @@ from geometry_msgs.msg import PoseStamped
 from surveillance_controllers import conversions
 from surveillance_controllers.geometry import Points, Pose
 from surveillance_controllers.motion.arrival import MotionFailedError
-from surveillance_runtime.action_server import GoalRun
-from surveillance_runtime.calls import CallError, GoalCaller
+from surveillance_fsm.ros import CallError, GoalCaller, GoalRun
 from surveillance_runtime.node import PatrolNode, StartError
 
 

@@ -21,8 +21,7 @@ from surveillance_controllers.geometry import Points, equally_spaced
 from surveillance_controllers.map_knowledge import MapKnowledge
 from surveillance_controllers.motion.arrival import MotionFailedError, place_reached
 from surveillance_controllers.motion.place_recording import PlaceRecorder
-from surveillance_runtime.action_server import GoalRun
-from surveillance_runtime.calls import CallError, CallInterruptedError, GoalCaller
+from surveillance_fsm.ros import CallError, CallInterruptedError, GoalCaller, GoalRun
 from surveillance_runtime.node import PatrolNode, StartError
 from surveillance_runtime.qos import STATE_QOS
 

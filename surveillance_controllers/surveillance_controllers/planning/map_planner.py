@@ -23,7 +23,7 @@ from surveillance_controllers.planning.grid_planning import (
     PlanningParameters,
 )
 from surveillance_controllers.planning.route_planning import route
-from surveillance_runtime.action_server import GoalAbortedError, GoalRun
+from surveillance_fsm.ros import GoalAbortedError, GoalRun
 from surveillance_runtime.conversions import points_from_cloud
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import STATE_QOS

@@ -18,10 +18,6 @@ def seconds(duration: Any) -> float | None:
     return float(duration.nanoseconds) / 1e9
 
 
-class ExchangeError(Exception):
-    """A message cannot be made or taken in; one line that says why."""
-
-
 @dataclass
 class UserCallback:
     """A user's callback and what it may touch.
@@ -67,14 +63,14 @@ class UserCallback:
         """Call it with its view of userdata.
 
         Raises:
-            ExchangeError: It raised something.
+            InvalidUserCodeError: It raised something.
         """
         assert self.function is not None
         view = fsm.Remapper(ud, tuple(self.input_keys), tuple(self.output_keys))
         try:
             return self.function(view, *message, *self.args, **dict(self.kwargs or {}))
         except Exception as error:
-            raise ExchangeError(f'{self.name} raised {describe(error)}') from error
+            raise fsm.InvalidUserCodeError(f'{self.name} raised {describe(error)}') from error
 
 
 @dataclass
@@ -119,7 +115,7 @@ class Outgoing:
         """Make the message to send.
 
         Raises:
-            ExchangeError: Userdata lacks something, or holds the wrong thing.
+            InvalidUserCodeError: Userdata lacks something, or holds the wrong thing.
         """
         # A copy: the caller's message is used again by the next execution.
         message = copy.deepcopy(self.message) if self.message is not None else self.message_type()
@@ -132,12 +128,12 @@ class Outgoing:
             for slot in self.slots:
                 setattr(message, slot, ud[slot])
         except (fsm.SmachError, AssertionError, AttributeError, TypeError) as error:
-            raise ExchangeError(f'no {self.kind}: {describe(error)}') from error
+            raise fsm.InvalidUserCodeError(f'no {self.kind}: {describe(error)}') from error
         if self.callback.function is not None:
             made = self.callback.call(ud, message)
             message = message if made is None else made
         if not isinstance(message, self.message_type):
-            raise ExchangeError(
+            raise fsm.InvalidUserCodeError(
                 f'the {self.kind} is a {type(message).__name__}, expected '
                 f'{self.message_type.__name__}'
             )
@@ -178,13 +174,13 @@ class Incoming:
         """Put a message, the last of `message`, into userdata; the callback's outcome, if any.
 
         Raises:
-            ExchangeError: The callback raised, or returned an outcome that is not declared.
+            InvalidUserCodeError: The callback raised, or returned an outcome that is not declared.
         """
         outcome = None
         if self.callback.function is not None:
             outcome = self.callback.call(ud, *message)
             if outcome is not None and outcome not in state.get_registered_outcomes():
-                raise ExchangeError(
+                raise fsm.InvalidUserCodeError(
                     f'{self.callback.name} returned outcome {outcome!r}: the outcomes are '
                     f'{sorted(state.get_registered_outcomes())}'
                 )

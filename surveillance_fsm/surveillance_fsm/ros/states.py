@@ -27,7 +27,6 @@ from surveillance_fsm.ros.calls import (
     ServiceCaller,
 )
 from surveillance_fsm.ros.exchange import (
-    ExchangeError,
     Incoming,
     Outgoing,
     UserCallback,
@@ -154,7 +153,7 @@ class ServiceState(RosState):
         except CallInterruptedError:
             self.service_preempt()
             return 'preempted'
-        except (CallError, ExchangeError) as error:
+        except (CallError, fsm.InvalidUserCodeError) as error:
             fsm.logerr(f"Service '{self._caller.name}': {error}")
             return 'aborted'
 
@@ -279,7 +278,7 @@ class SimpleActionState(RosState):
                 return 'aborted'
             self.service_preempt()
             return 'preempted'
-        except (CallError, ExchangeError) as error:
+        except (CallError, fsm.InvalidUserCodeError) as error:
             fsm.logerr(f"Action '{self._caller.name}': {error}")
             return 'aborted'
         if self.preempt_requested():
@@ -295,7 +294,7 @@ class SimpleActionState(RosState):
         def told(message: Any) -> None:
             try:
                 self._feedback.call(ud, message)
-            except ExchangeError as error:
+            except fsm.InvalidUserCodeError as error:
                 fsm.logerr(f"Action '{self._caller.name}': {error}")
 
         return told

@@ -49,10 +49,6 @@ Action = Callable[[Mapping[str, Any]], Any]
 """Takes the fields of a request; returns what came of it; raises `ValueError` with one line."""
 
 
-class PageError(ValueError):
-    """The page cannot be served; the message is one line."""
-
-
 class Page:
     """What is served.
 
@@ -66,7 +62,7 @@ class Page:
         replay: Whether a recording is shown: then anybody who may look may move in time.
 
     Raises:
-        PageError: The address cannot be used.
+        OSError: The address cannot be used.
     """
 
     def __init__(
@@ -255,5 +251,5 @@ def _bound(host: str, port: int) -> socket.socket:
         bound.listen(64)
     except (OSError, OverflowError) as error:
         reason = getattr(error, 'strerror', None) or error
-        raise PageError(f'the page cannot be served at {host}:{port}: {reason}') from None
+        raise OSError(f'the page cannot be served at {host}:{port}: {reason}') from None
     return bound

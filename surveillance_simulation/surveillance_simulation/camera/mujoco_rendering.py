@@ -32,10 +32,6 @@ except ImportError:
 _PANEL_THICKNESS = 0.004
 
 
-class MujocoMissingError(Exception):
-    """MuJoCo is not installed; the message says how to get it."""
-
-
 class MujocoRenderer:
     """Takes pictures of one world with one camera. All pictures must be taken in one thread."""
 
@@ -43,13 +39,11 @@ class MujocoRenderer:
         """Prepare pictures.
 
         Raises:
-            MujocoMissingError: MuJoCo is not installed.
-            TextureError: A marker's dictionary or id does not exist.
+            ImportError: MuJoCo is not installed.
+            PlaceError: A marker's dictionary or id does not exist.
         """
         if mujoco is None:
-            raise MujocoMissingError(
-                "renderer 'mujoco': expected the package mujoco (pip install mujoco)"
-            )
+            raise ImportError("renderer 'mujoco': expected the package mujoco (pip install mujoco)")
         self._world = world
         self._camera = camera
         self._version = -1

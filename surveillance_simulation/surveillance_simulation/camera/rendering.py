@@ -29,7 +29,7 @@ class Renderer:
         """Prepare pictures, drawn at `supersampling` times the camera's resolution.
 
         Raises:
-            TextureError: A marker's dictionary or id does not exist.
+            PlaceError: A marker's dictionary or id does not exist.
         """
         self._world = world
         self._camera = camera
@@ -50,7 +50,7 @@ class Renderer:
         """Take over what has changed in the world since the last time.
 
         Raises:
-            TextureError: A marker's dictionary or id does not exist.
+            PlaceError: A marker's dictionary or id does not exist.
         """
         if self._version != self._world.version:
             self._faces = faces_of(self._world)

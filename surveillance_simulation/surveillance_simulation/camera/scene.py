@@ -56,7 +56,7 @@ def faces_of(world: World) -> list[Face]:
     """Return every face of a world.
 
     Raises:
-        TextureError: A marker's dictionary or id does not exist.
+        PlaceError: A marker's dictionary or id does not exist.
     """
     plan = world.plan
     faces = list(_floor(plan.bounds))

@@ -46,8 +46,8 @@ class CameraFeed:
             stamp: Returns the present time for the pictures.
 
         Raises:
-            TextureError: A marker's dictionary or id does not exist.
-            MujocoMissingError: MuJoCo is to render and is not installed.
+            PlaceError: A marker's dictionary or id does not exist.
+            ImportError: MuJoCo is to render and is not installed.
         """
         self.conditions = simulator_parameters.conditions(node, self._take_conditions)
         self._robot = robot

@@ -21,7 +21,7 @@ from surveillance_interfaces.srv import (
 from surveillance_runtime.place import PlaceError
 from surveillance_simulation import conversions
 from surveillance_simulation.robot.robot import Robot
-from surveillance_simulation.world.textures import TextureError, marker_panel
+from surveillance_simulation.world.textures import marker_panel
 
 LONGEST_SHIFT = 1000.0
 """The longest push or slip, metres or rad; longer than any place."""
@@ -67,7 +67,7 @@ class FaultServices:
                 with self._changing:
                     response.message = change(request)
                 response.success = True
-            except (PlaceError, TextureError) as error:
+            except PlaceError as error:
                 response.success, response.message = False, str(error)
             self._node.get_logger().info(response.message)
             if response.success:

@@ -18,10 +18,6 @@ from surveillance_runtime.robot_arm import Arm, Array
 _TOLERANCE = 1e-6
 
 
-class TrajectoryError(ValueError):
-    """A trajectory that the arm cannot follow; the message is one line."""
-
-
 @dataclass(frozen=True)
 class TrajectoryPoint:
     """Where the joints are to be at a time.
@@ -61,7 +57,7 @@ class ArmMotion:
             now: Time of the start, seconds.
 
         Raises:
-            TrajectoryError: A joint is unknown or named twice, a point has the wrong number of
+            ValueError: A joint is unknown or named twice, a point has the wrong number of
                 values or one that is not finite or beyond a limit, or the times do not rise.
         """
         self._check(names, points)
@@ -126,28 +122,28 @@ class ArmMotion:
         known = self._arm.names
         for name in names:
             if name not in known:
-                raise TrajectoryError(f"no joint '{name}': expected {', '.join(known)}")
+                raise ValueError(f"no joint '{name}': expected {', '.join(known)}")
         if len(set(names)) != len(names):
-            raise TrajectoryError(f'joint named twice in {", ".join(names)}')
+            raise ValueError(f'joint named twice in {", ".join(names)}')
         reached = -math.inf
         limits = {joint.name: (joint.lower, joint.upper) for joint in self._arm.joints}
         for number, point in enumerate(points, start=1):
             if len(point.positions) != len(names) or len(point.velocities) not in (0, len(names)):
-                raise TrajectoryError(
+                raise ValueError(
                     f'point {number}: {len(point.positions)} positions and '
                     f'{len(point.velocities)} velocities for {len(names)} joints'
                 )
             if not all(map(math.isfinite, (point.time, *point.positions, *point.velocities))):
-                raise TrajectoryError(f'point {number}: expected finite numbers')
+                raise ValueError(f'point {number}: expected finite numbers')
             if point.time < 0 or point.time <= reached:
-                raise TrajectoryError(
+                raise ValueError(
                     f'point {number}: time {point.time:g} s: expected more than the point before'
                 )
             reached = point.time
             for name, position in zip(names, point.positions, strict=True):
                 lower, upper = limits[name]
                 if not lower - _TOLERANCE <= position <= upper + _TOLERANCE:
-                    raise TrajectoryError(
+                    raise ValueError(
                         f'point {number}: {name} at {position:g} rad: '
                         f'expected {lower:g} to {upper:g}'
                     )

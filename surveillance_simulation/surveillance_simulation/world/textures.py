@@ -11,6 +11,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from surveillance_runtime.place import PlaceError
+
 Texture = npt.NDArray[np.uint8]
 
 TILE = 2.0
@@ -21,10 +23,6 @@ _PAPER, _INK = 228, 22
 
 MARGIN_CELLS = 1.5
 """White border around a marker, in cells of its code."""
-
-
-class TextureError(ValueError):
-    """There is no such marker; the message is one line."""
 
 
 @cache
@@ -94,12 +92,12 @@ def marker_panel(dictionary: str, marker_id: int, state: str, cell: int = 24) ->
         cell: Texels per cell of the code.
 
     Raises:
-        TextureError: There is no such dictionary, or no such id in it.
+        PlaceError: There is no such dictionary, or no such id in it.
     """
     known = aruco_dictionary(dictionary)
     if not 0 <= marker_id < len(known.bytesList):
-        raise TextureError(
-            f'marker id {marker_id}: {dictionary} holds ids 0 to {len(known.bytesList) - 1}'
+        raise PlaceError(
+            (), f'marker id {marker_id}: {dictionary} holds ids 0 to {len(known.bytesList) - 1}'
         )
     cells = known.markerSize + 2
     margin = round(MARGIN_CELLS * cell)
@@ -121,12 +119,12 @@ def aruco_dictionary(name: str) -> cv2.aruco.Dictionary:
     """Return OpenCV's dictionary of a name such as DICT_5X5_100.
 
     Raises:
-        TextureError: OpenCV has no such dictionary.
+        PlaceError: OpenCV has no such dictionary.
     """
     number = getattr(cv2.aruco, name, None) if name.startswith('DICT_') else None
     if not isinstance(number, int):
-        raise TextureError(
-            f"marker dictionary '{name}': expected one of OpenCV's, like DICT_5X5_100"
+        raise PlaceError(
+            (), f"marker dictionary '{name}': expected one of OpenCV's, like DICT_5X5_100"
         )
     return cv2.aruco.getPredefinedDictionary(number)
 

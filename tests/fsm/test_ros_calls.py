@@ -9,15 +9,16 @@ from geometry_msgs.msg import Point
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
-from surveillance_interfaces.action import FollowPath
-from surveillance_runtime.action_server import GoalAbortedError, GoalServer
-from surveillance_runtime.calls import (
+from surveillance_fsm.ros import (
     CallInterruptedError,
     CallTimeoutError,
+    GoalAbortedError,
     GoalCaller,
+    GoalServer,
     ServiceCaller,
     UnavailableError,
 )
+from surveillance_interfaces.action import FollowPath
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.waiting import ClockWait, Interrupt
 
