@@ -39,7 +39,14 @@ from surveillance_runtime.place import read_place_file
 from surveillance_runtime.yaml_file import YamlFileError
 
 CHILD = Path(__file__).with_name('child.py')
-DISCOVERY = Path(__file__).with_name('discovery.xml')
+LOCAL_ROS = {
+    # Shared memory that a killed process leaves behind hides later nodes of the same domain.
+    'FASTDDS_BUILTIN_TRANSPORTS': 'UDPv4',
+    'FASTRTPS_DEFAULT_PROFILES_FILE': str(Path(__file__).with_name('discovery.xml')),
+    # One robot's nodes are one machine's, unless somebody says otherwise.
+    'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
+}
+"""How nodes find each other where the environment says nothing else."""
 PLACES = {'surveillance': 'seven_rooms.yaml', 'patrol': 'patrol_world.yaml'}
 RECORD = 'mission.jsonl'
 ONTOLOGIES = 'ontologies'
@@ -359,14 +366,10 @@ def node_environ(run: Run, logs: Path | None = None) -> dict[str, str]:
     environ = dict(os.environ)
     if run.domain is not None:
         environ['ROS_DOMAIN_ID'] = str(run.domain)
-    # Shared memory that a killed process leaves behind hides later nodes of the same domain.
-    environ.setdefault('FASTDDS_BUILTIN_TRANSPORTS', 'UDPv4')
-    environ.setdefault('FASTRTPS_DEFAULT_PROFILES_FILE', str(DISCOVERY))
-    # One robot's nodes are one machine's, unless somebody says otherwise.
+    for name, value in LOCAL_ROS.items():
+        environ.setdefault(name, value)
     if run.network:
         environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'SUBNET'
-    else:
-        environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
     for name in ('NOTIFY_SOCKET', 'WATCHDOG_USEC', 'WATCHDOG_PID'):
         environ.pop(name, None)  # of the launcher alone
     if logs is not None:

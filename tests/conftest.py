@@ -10,12 +10,15 @@ from typing import Any, TypeVar
 
 import pytest
 
+from launcher.run import LOCAL_ROS
 from surveillance_runtime.testing import claim_domain
 
 T = TypeVar('T')
 
 _domain = claim_domain()
 os.environ['ROS_DOMAIN_ID'] = str(_domain)
+for _name, _value in LOCAL_ROS.items():  # a test machine's neighbours are no part of a test
+    os.environ.setdefault(_name, _value)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

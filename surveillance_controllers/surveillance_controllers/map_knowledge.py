@@ -52,6 +52,7 @@ class MapKnowledge:
         self._armor: ArmorClient | None = None
         self._ontology: PatrolOntology | None = None
         self._doors: FactSubscription | None = None
+        self._on_doors: list[Callable[[], None]] = []
         self._known: dict[str, Points] = {}
         self._robot_place = ''
         node.create_subscription(RobotPlace, 'robot_place', self._on_robot_place, STATE_QOS)
@@ -109,7 +110,7 @@ class MapKnowledge:
                     interrupt=self._node.stopping,
                 )
                 self._doors = FactSubscription(
-                    self._node, self._armor, DOORS, lambda _fact, _came: self._notify()
+                    self._node, self._armor, DOORS, lambda _fact, _came: self._doors_changed()
                 )
                 self._ontology = PatrolOntology(self._armor)
             return self._ontology
@@ -119,13 +120,25 @@ class MapKnowledge:
         """Whether the map has been built, so that the ontology can be asked without a long wait."""
         return self._ontology is not None
 
-    def watch(
-        self, pattern: str, interrupt: Interrupt, on_change: Callable[[], None]
-    ) -> FactSubscription:
-        """Keeps the facts that match a pattern as long as the node lives.
+    def watch_doors(self, interrupt: Interrupt, on_change: Callable[[], None]) -> None:
+        """Calls in the executor's thread with each change that `doors` and `places` then show.
 
         Args:
-            pattern: Which facts.
+            interrupt: Ends the wait for the map.
+            on_change: Is called after the change is known here: `doors` has it.
+
+        Raises:
+            KnowledgeError: The map is not built yet.
+        """
+        self.connect(interrupt)
+        self._on_doors.append(on_change)
+
+    def watch_robot_place(
+        self, interrupt: Interrupt, on_change: Callable[[], None]
+    ) -> FactSubscription:
+        """Keeps the ontology's facts of where the robot is as long as the node lives.
+
+        Args:
             interrupt: Ends the wait for the map.
             on_change: Called in the executor's thread with each fact that comes or goes, and when
                 the ontology was loaded or dropped.
@@ -133,7 +146,7 @@ class MapKnowledge:
         Raises:
             KnowledgeError: The map is not built yet.
         """
-        self.connect(interrupt)
+        pattern = self.connect(interrupt).robot_place_facts
         assert self._armor is not None
         return FactSubscription(
             self._node, self._armor, pattern, lambda _fact, _came: on_change(), on_change
@@ -198,6 +211,11 @@ class MapKnowledge:
 
     def _on_robot_place(self, message: RobotPlace) -> None:
         self._robot_place = message.place
+
+    def _doors_changed(self) -> None:
+        self._notify()
+        for on_change in tuple(self._on_doors):
+            on_change()
 
     def _notify(self) -> None:
         with self._changed:

@@ -178,14 +178,17 @@ class MapKeeper:
         """
         if self.place is None:
             return 'there is no map yet'
+        before = self.place
         try:
-            after = change(self.place)
-            self._ontology.change(self.place, after, self._first_visit())
+            # First, as in `extend`: who learns of a new room from the ontology asks for its point.
+            self.place = change(before)
+            self._ontology.change(before, self.place, self._first_visit())
         except PlaceError as error:
+            self.place = before
             return str(error)
         except (ArmorServiceCallError, ArmorServiceInternalError) as error:
+            self.place = before
             return f'the ontology was not changed: {error}'
-        self.place = after
         return ''
 
     def without_room(self, place: Place, name: str) -> Place:

@@ -19,7 +19,6 @@ from surveillance_controllers.motion.robot_parameters import RobotSettings
 from surveillance_controllers.planning.grid_planning import NoPathError
 from surveillance_fsm.ros import CallError, GoalCaller, GoalRun
 from surveillance_interfaces.action import ComputePath
-from surveillance_ontology.patrol_ontology import DOORS
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.waiting import Interrupt
 
@@ -119,7 +118,7 @@ class NavigationMotion:
                 return
             try:
                 if not watched:
-                    self._knowledge.watch(DOORS, stopping, self._news.set)
+                    self._knowledge.watch_doors(stopping, self._news.set)
                     watched = True
                 self._base.set_positions(self._knowledge.places(stopping))
             except KnowledgeError as error:

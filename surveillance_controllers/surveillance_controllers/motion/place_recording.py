@@ -133,8 +133,7 @@ class PlaceRecorder:
         """
         stopping = self._node.stopping
         if self._facts is None:
-            pattern = self._knowledge.connect(stopping).robot_place_facts
-            self._facts = self._knowledge.watch(pattern, stopping, self._news.set)
+            self._facts = self._knowledge.watch_robot_place(stopping, self._news.set)
         self._find_place()
         if self._told is None and self._start is not None:
             self._begin()

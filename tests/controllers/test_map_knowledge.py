@@ -1,0 +1,39 @@
+"""What the controllers know of the map while it changes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from geometry_msgs.msg import Point
+
+from surveillance_controllers.map_knowledge import MapKnowledge
+from surveillance_fsm.ros import ServiceCaller
+from surveillance_interfaces.srv import AddRoom
+from surveillance_ontology.armor_server_node import ArmorServer
+from surveillance_ontology.ontology_map_builder_node import OntologyMapBuilder
+
+
+def test_who_is_told_of_a_new_room_finds_it_with_its_point(
+    graph: Any, seven_rooms: dict[str, Any]
+) -> None:
+    graph.add(ArmorServer)
+    builder = graph.add(OntologyMapBuilder, seven_rooms)
+    knowledge = MapKnowledge(graph.node, 10.0)
+    told: list[tuple[set[str], bool]] = []
+
+    def on_change() -> None:
+        if knowledge.connected:
+            sides = knowledge.doors(graph.node.stopping).values()
+            rooms = set().union(*sides)
+            told.append((rooms, 'ALCOVE' in builder._keeper.place.positions))
+
+    knowledge.watch_doors(graph.node.stopping, on_change)
+    graph.until(lambda: told)
+    told.clear()
+    request = AddRoom.Request(room_name='ALCOVE', position=Point(x=12.5, y=8.0), doors=['D9'])
+    answer = ServiceCaller(graph.node, AddRoom, 'ontology_map/add_room').call(request, 10.0)
+    assert answer.success, answer.message
+    graph.until(lambda: told)
+    rooms, has_point = told[-1]
+    assert 'ALCOVE' in rooms
+    assert has_point
