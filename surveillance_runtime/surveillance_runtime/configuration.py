@@ -42,7 +42,7 @@ _PLACE = frozenset((*PLACE_KEYS, *GEOMETRY_KEYS))
 _TYPES = {'bool': bool, 'int': int, 'float': float, 'str': str}
 _OWN = {  # every rclpy node has these
     'use_sim_time': ParameterSpec('use_sim_time', False),
-    'start_type_description_service': ParameterSpec('start_type_description_service', True),
+    'start_type_description_service': ParameterSpec('start_type_description_service', False),
 }
 _ORIGIN = re.compile(r'#@ (.+)$')
 _ASSIGNMENT = re.compile(r'(?:(?P<node>[^:=]+):)?(?P<name>[^:=]+):=(?P<value>.*)\Z', re.DOTALL)

@@ -1,8 +1,10 @@
 """A node's logger for input of any kind: lines of bounded length, without control characters.
 
 What arrives from the network ends up in log lines. A text with line breaks could write lines that
-look like another node's, a megabyte would fill the disk. Warnings and errors have a rate, too: what
-a peer sends a thousand times a second is said a few times, with a count of the rest.
+look like another node's, a megabyte would fill the disk. Lines have a rate, too: what a peer sends a
+thousand times a second is said a few times, with a count of the rest. Warnings and errors have a
+rate of their own, so that no flood of other lines hides them; what ends a node is always said, and
+whoever asks for debug lines gets all of them.
 """
 
 from __future__ import annotations
@@ -18,11 +20,10 @@ from rclpy.logging import LoggingSeverity
 
 LONGEST = 1000
 """Characters of a line; what is longer loses its middle."""
-WARNINGS_PER_SECOND = 5.0
-"""Warnings and errors of a node for each second, once a burst is used up."""
-LINES_PER_SECOND = 200.0
-"""The same for all lines."""
-_BURST_SECONDS = 4.0
+LINES_PER_SECOND, LINES_AT_ONCE = 8.0, 100.0
+"""Lines of a node for each second in the long run, and after a pause."""
+WARNINGS_PER_SECOND, WARNINGS_AT_ONCE = 2.0, 20.0
+"""The same for its warnings and errors."""
 
 # rclpy tells the throttles of different callers apart by the first frame outside of these files.
 rcutils._internal_callers.append(os.path.realpath(__file__))
@@ -49,18 +50,24 @@ class Allowance:
     Args:
         rate: Lines a second in the long run.
         now: Steady time, seconds.
+        burst: Lines after a pause; default: those of four seconds.
     """
 
-    def __init__(self, rate: float, now: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self,
+        rate: float,
+        now: Callable[[], float] = time.monotonic,
+        burst: float | None = None,
+    ) -> None:
         self._rate = rate
         self._now = now
-        self._left = rate * _BURST_SECONDS
+        self._most = self._left = 4.0 * rate if burst is None else burst
         self._at = now()
 
     def take(self) -> bool:
         """Tell whether one more line may be written, and count it."""
         now = self._now()
-        self._left = min(self._rate * _BURST_SECONDS, self._left + (now - self._at) * self._rate)
+        self._left = min(self._most, self._left + (now - self._at) * self._rate)
         self._at = now
         if self._left < 1.0:
             return False
@@ -74,8 +81,8 @@ class CleanLogger(rcutils.RcutilsLogger):  # type: ignore[misc]
     def __init__(self, name: str) -> None:
         super().__init__(name)
         self._lock = threading.Lock()
-        self._warnings = Allowance(WARNINGS_PER_SECOND)
-        self._lines = Allowance(LINES_PER_SECOND)
+        self._lines = Allowance(LINES_PER_SECOND, burst=LINES_AT_ONCE)
+        self._warnings = Allowance(WARNINGS_PER_SECOND, burst=WARNINGS_AT_ONCE)
         self._left_out = 0
 
     def log(self, message: Any, severity: Any, **options: Any) -> bool:
@@ -83,8 +90,9 @@ class CleanLogger(rcutils.RcutilsLogger):  # type: ignore[misc]
         if not self.is_enabled_for(severity):
             return False
         with self._lock:
-            grave = severity >= LoggingSeverity.WARN and severity < LoggingSeverity.FATAL
-            if (grave and not self._warnings.take()) or not self._lines.take():
+            allowance = self._warnings if severity >= LoggingSeverity.WARN else self._lines
+            limited = LoggingSeverity.DEBUG < severity < LoggingSeverity.FATAL
+            if limited and not allowance.take():
                 self._left_out += 1
                 return False
             left_out, self._left_out = self._left_out, 0

@@ -48,6 +48,9 @@ _EMPTY = {
     str: Parameter.Type.STRING_ARRAY,
 }
 
+_FEWER_SERVICES = (Parameter('start_type_description_service', value=False),)
+"""rcl's service logs what a peer asks for as it came, line breaks too, and no tool needs it."""
+
 JOIN_SECONDS = 2.0
 """How long a stopping node waits for each of its threads, seconds."""
 
@@ -107,6 +110,10 @@ class PatrolNode(Node):  # type: ignore[misc]
                 _override(name, key, setting.value)
                 for key, setting in self._overrides_given.items()
             ]
+        node_options['parameter_overrides'] = [
+            *_FEWER_SERVICES,
+            *(node_options.get('parameter_overrides') or ()),
+        ]
         super().__init__(name, **node_options)
         self._logger = CleanLogger(self.get_logger().name)
         self.add_on_set_parameters_callback(self._check_parameters)

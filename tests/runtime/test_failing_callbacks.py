@@ -91,6 +91,26 @@ def test_warnings_have_a_rate_and_the_rest_is_counted(graph, capfd):
     assert any('lines left out before this one' in line for line in lines)
 
 
+def test_a_flood_of_lines_has_a_rate_and_hides_no_warning(graph, capfd):
+    log = graph.add(PatrolNode, name='flooded').get_logger()
+    for number in range(1000):
+        log.info(f'number {number}')
+    log.warn('the lidar is silent')
+    log.fatal('the end')
+    lines = capfd.readouterr().err.splitlines()
+    assert 50 < sum('number' in line for line in lines) < 200
+    assert any('the lidar is silent' in line for line in lines)
+    assert any('the end' in line for line in lines)
+
+
+def test_no_node_has_the_service_that_logs_requests_as_they_came(graph):
+    node = graph.add(PatrolNode, name='quiet')
+    assert not node.get_parameter('start_type_description_service').value
+    names = [name for name, _ in node.get_service_names_and_types_by_node('quiet', '/')]
+    assert names
+    assert not any('get_type_description' in name for name in names)
+
+
 def test_an_allowance_grows_with_time():
     time = 0.0
     allowance = Allowance(2.0, lambda: time)
