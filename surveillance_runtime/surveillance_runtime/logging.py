@@ -1,8 +1,8 @@
 """A node's logger for input of any kind: lines of bounded length, without control characters.
 
 What arrives from the network ends up in log lines. A text with line breaks could write lines that
-look like another node's, a megabyte would fill the disk. Lines have a rate, too: what a peer sends a
-thousand times a second is said a few times, with a count of the rest. Warnings and errors have a
+look like another node's, a megabyte would fill the disk. Lines have a rate, too: what a peer sends
+a thousand times a second is said a few times, with a count of the rest. Warnings and errors have a
 rate of their own, so that no flood of other lines hides them; what ends a node is always said, and
 whoever asks for debug lines gets all of them.
 """
