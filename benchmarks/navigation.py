@@ -1,6 +1,6 @@
 """Navigation measured: planning beside its peers, one step of control, and the whole stack's speed.
 
-    python benchmarks/navigation.py [--quick] [planning] [control] [stack] [pace]
+    python benchmarks/navigation.py [--quick] [planning] [control] [people] [stack] [pace]
 
 Without a section's name all are run. Every figure stands beside its peer's from the same run.
 """
@@ -18,7 +18,9 @@ import sys
 import tempfile
 import threading
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -33,14 +35,20 @@ from whole_stack import ROOT, Stack, ros_arguments
 
 from launcher import node_table, run
 from surveillance_controllers import geometry
-from surveillance_controllers.motion.driving import Drive
+from surveillance_controllers.motion.driving import Drive, State
 from surveillance_controllers.motion.localisation import Scan
 from surveillance_controllers.motion.navigator import Navigator
+from surveillance_controllers.motion.path_following import Velocity
 from surveillance_controllers.planning.grid_map import GridMap
-from surveillance_controllers.planning.grid_planning import GridPlanner, PlanningParameters
+from surveillance_controllers.planning.grid_planning import (
+    GridPlanner,
+    NoPathError,
+    PlanningParameters,
+)
 from surveillance_runtime.place import generation as place_generation
 from surveillance_runtime.place import occupancy_grid
 from surveillance_simulation.robot.robot import Robot
+from surveillance_simulation.world.people import People, PeopleModel
 from surveillance_simulation.world.world import World, read_world
 
 Mask = npt.NDArray[np.bool_]
@@ -227,6 +235,115 @@ def control(*, quick: bool) -> None:
     )
 
 
+@dataclass
+class Drives:
+    """What came of driving among people."""
+
+    hours: float = 0.0
+    drives: int = 0
+    arrived: int = 0
+    contacts: int = 0
+    recoveries: int = 0
+    metres: float = 0.0
+    failed: Counter[str] = field(default_factory=Counter)
+    steps_ms: list[float] = field(default_factory=list)
+
+
+def among_people(
+    model: PeopleModel, seconds: float, seed: int, place: str = 'office.yaml'
+) -> Drives:
+    """Drive from room to room among people, on the cores alone, for simulated seconds."""
+    world = read_world(ROOT / 'config' / place)
+    rng = np.random.default_rng(seed)
+    people = People(world.plan, model, np.random.default_rng(seed + 1)) if model.count else None
+    robot = Robot(world, rng=rng, people=people)
+    drawn = occupancy_grid.draw(world.plan)
+    grid = GridMap(drawn.cells, drawn.resolution, drawn.origin)
+    planner, navigator = GridPlanner(grid), Navigator()
+    navigator.set_map(grid)
+    navigator.move(robot.base.odometry)
+    angles, rooms = robot.lidar.angles, list(world.plan.place.rooms)
+    result = Drives()
+
+    def another_path(goal: Any) -> Any:
+        assert navigator.pose is not None
+        planner.set_obstacles(navigator.obstacles)
+        return planner.plan(navigator.pose[:2], goal)
+
+    def look() -> None:
+        ranges = robot.scan().astype(float)
+        navigator.move(robot.base.odometry)
+        begun = time.process_time()
+        scan = Scan(angles, ranges, robot.lidar.range_max)
+        velocity = navigator.see(scan, robot.time) or Velocity()
+        result.steps_ms.append((time.process_time() - begun) * 1e3)
+        robot.base.command(velocity.speed, velocity.turn)
+        robot.advance(0.1)
+
+    look()
+    while robot.time < seconds:
+        goal = world.plan.place.positions[rooms[int(rng.integers(len(rooms)))]][:2]
+        try:
+            drive = Drive(another_path(goal))
+        except NoPathError:
+            look()
+            continue
+        navigator.task = drive
+        result.drives += 1
+        while not drive.state.ended and robot.time < seconds:
+            look()
+            if drive.state is State.ASKING:
+                try:
+                    drive.new_path(another_path(goal))
+                except NoPathError as error:
+                    drive.no_path(str(error))
+        navigator.task = None
+        result.recoveries += drive.recoveries
+        if drive.state is State.FAILED:
+            result.failed[drive.reason.split('(')[0]] += 1
+        result.drives -= not drive.state.ended
+        result.arrived += drive.state is State.ARRIVED
+        # As the mission does: it stays for a moment.
+        for _ in range(20):
+            look()
+    result.hours = robot.time / 3600
+    result.contacts, result.metres = robot.base.collisions, robot.base.travelled
+    return result
+
+
+def people(*, quick: bool) -> None:
+    """Drives that arrive, and contacts by the robot's own motion, among people who walk."""
+    seconds = 300.0 if quick else 4 * 3600.0
+    rows = []
+    for name, model in (
+        ('nobody', PeopleModel(0)),
+        ('5 polite at 1.2 m/s', PeopleModel(5, manner='polite')),
+        ('5 pushy at 1.2 m/s', PeopleModel(5, manner='pushy')),
+    ):
+        did = among_people(model, seconds / 4 if model.count == 0 else seconds, seed=1)
+        rows.append(
+            (
+                name,
+                f'{did.hours:.2f}',
+                f'{did.drives}',
+                f'{did.arrived / max(did.drives, 1):.1%}',
+                f'{did.contacts}',
+                f'{did.recoveries}',
+                f'{did.metres:.0f}',
+                f'{np.median(did.steps_ms):.2f}',
+                f'{np.percentile(did.steps_ms, 99):.2f}',
+            )
+        )
+        for reason, count in did.failed.items():
+            print(f'{name}: failed {count}: {reason}')
+    table(
+        'Drives in the office among people, simulated hours on the cores alone; a contact is one '
+        "by the robot's own motion.",
+        ('who', 'hours', 'drives', 'arrived', 'contacts', 'recoveries', 'm', 'step ms', '99 %'),
+        rows,
+    )
+
+
 def stack(*, quick: bool) -> None:
     """Simulated seconds per real second of the whole patrol."""
     seconds = 5.0 if quick else 30.0
@@ -386,6 +503,7 @@ def legs_and_stops(speed: float, seconds: float) -> tuple[list[float], list[floa
 SECTIONS: dict[str, Callable[..., None]] = {
     'planning': planning,
     'control': control,
+    'people': people,
     'stack': stack,
     'pace': pace,
 }

@@ -41,6 +41,12 @@ def point_of(pose: Pose) -> Points:
     return np.array([pose[0], pose[1], 0.0])
 
 
+def in_map(pose: Pose, points: Points) -> Points:
+    """Return points of the robot's frame, shape (n, 2), in the frame of its pose."""
+    cos, sin = math.cos(pose[2]), math.sin(pose[2])
+    return np.asarray(points @ np.array([[cos, sin], [-sin, cos]]) + pose[:2])
+
+
 def distances_along(path: ArrayLike) -> Points:
     """The way from the first point to each point, shape (n,), metres; the first is 0."""
     steps = np.linalg.norm(np.diff(np.asarray(path, dtype=float), axis=0), axis=1)

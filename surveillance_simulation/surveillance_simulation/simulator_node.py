@@ -29,6 +29,7 @@ from surveillance_simulation.feeds.camera_feed import CameraFeed
 from surveillance_simulation.feeds.fault_services import FaultServices
 from surveillance_simulation.feeds.sensor_feed import SensorFeed
 from surveillance_simulation.robot.robot import Robot
+from surveillance_simulation.world.people import People
 from surveillance_simulation.world.world import World
 
 _UNDER_WAY = (
@@ -53,11 +54,13 @@ class Simulator(PatrolNode):
             world = World.from_parameters(simulator_parameters.place(self))
         except PlaceError as error:
             raise StartError(f'simulator: {error}') from None
+        model = simulator_parameters.people(self)
         self.robot = Robot(
             world,
             simulator_parameters.base(self),
             simulator_parameters.lidar(self),
             rng=np.random.default_rng(seed),
+            people=People(world.plan, model, np.random.default_rng(seed)) if model.count else None,
         )
         self._changing = threading.RLock()
         self._drives_clock = rate.speed != 1.0 or bool(self.get_parameter('use_sim_time').value)

@@ -13,6 +13,7 @@ from surveillance_simulation.camera.model import Camera, Conditions
 from surveillance_simulation.clock_rate import ClockRateModel
 from surveillance_simulation.robot.base import BaseModel
 from surveillance_simulation.robot.lidar import LidarModel
+from surveillance_simulation.world.people import MANNERS, PeopleModel
 
 _CLOCK_RATE = {
     'speed': Described(
@@ -48,6 +49,17 @@ _LIDAR = {
     'rays': Described('Rays of a full turn.', 4, 7200),
     'range_max': Described('Greatest distance measured, metres.', 0.5, 200.0),
     'noise': Described('Standard deviation of a distance, metres.', 0.0, 1.0),
+}
+_PEOPLE = {
+    'count': Described('People who walk about.', 0, 100),
+    'speed': Described('How fast they walk, m/s.', 0.1, 3.0),
+    'manner': Described(
+        'polite: they keep 0.6 m from the robot; pushy: 5 cm.',
+        choices=MANNERS,
+    ),
+    'radius': Described('Radius of a person, metres.', 0.05, 1.0),
+    'shortest_rest': Described('Least time a person stays in a room, s.', 0.0, 86_400.0),
+    'longest_rest': Described('Greatest time a person stays in a room, s.', 0.0, 86_400.0),
 }
 _CONDITIONS = {
     'light': Described(
@@ -133,6 +145,11 @@ def base(node: PatrolNode) -> BaseModel:
 def lidar(node: PatrolNode) -> LidarModel:
     """Declare what the lidar can do."""
     return declare_fields(node, LidarModel(), _LIDAR, prefix='lidar.')
+
+
+def people(node: PatrolNode) -> PeopleModel:
+    """Declare who walks about."""
+    return declare_fields(node, PeopleModel(), _PEOPLE, prefix='people.')
 
 
 def camera(node: PatrolNode) -> Camera:

@@ -84,12 +84,27 @@ def test_an_obstacle_on_the_path_makes_the_drive_ask(flat: Any, navigator: Navig
     navigator.task = Drive([[1.0, 1.5], [3.5, 1.5]])
     navigator.see(flat.scan(true), 0.0)
     navigator.obstacles_changed = False
-    navigator.see(flat.scan(true, [(2.6, 1.5, 0.15)]), 1.0)
+    # Whether it moves shows within half a second.
+    for moment in (1.0, 1.3, 1.6):
+        navigator.see(flat.scan(true, [(2.6, 1.5, 0.15)]), moment)
     assert navigator.obstacles_changed
     assert navigator.task.state is State.ASKING
     gaps = np.hypot(*(navigator.obstacles - (2.6, 1.5)).T)
     assert len(gaps) > 3
     assert np.abs(gaps - 0.15).max() < 0.1
+
+
+def test_who_walks_by_is_no_obstacle_until_they_stand(flat: Any, navigator: Navigator) -> None:
+    true = (1.0, 1.5, 0.0)
+    navigator.move(true)
+    for step in range(20):
+        navigator.see(flat.scan(true, [(2.6, 0.5 + 0.1 * step, 0.25)]), 0.1 * step)
+    assert len(navigator.obstacles) == 0
+    for step in range(20, 40):
+        navigator.see(flat.scan(true, [(2.6, 2.5, 0.25)]), 0.1 * step)
+    gaps = np.hypot(*(navigator.obstacles - (2.6, 2.5)).T)
+    assert len(gaps) > 3
+    assert np.abs(gaps - 0.25).max() < 0.1
 
 
 def test_a_closed_door_is_no_obstacle_once_it_is_known(flat: Any, navigator: Navigator) -> None:

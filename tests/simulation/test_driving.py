@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
@@ -15,9 +17,14 @@ from surveillance_controllers.planning.grid_map import GridMap
 from surveillance_controllers.planning.grid_planning import GridPlanner, NoPathError
 from surveillance_runtime.place import occupancy_grid
 from surveillance_simulation.robot.robot import Robot
+from surveillance_simulation.world.people import PeopleModel
 from surveillance_simulation.world.world import World, read_world
 
 from .places import CONFIG
+
+sys.path.insert(0, str(CONFIG.parent / 'benchmarks'))
+
+import navigation
 
 RADIUS = 0.22
 DOORS = ('D1', 'D2', 'D3', 'D4', 'D5', 'D6', 'D7')
@@ -94,3 +101,11 @@ def test_a_drive_stays_in_the_corridor_around_its_path_and_arrives(seed: int) ->
     assert furthest < 0.2
     x, y, _ = world.plan.place.positions[goals[-1]]
     assert np.hypot(robot.base.pose[0] - x, robot.base.pose[1] - y) < 0.2
+
+
+@pytest.mark.parametrize('manner', ['polite', 'pushy'])
+def test_among_people_the_robot_touches_nobody_and_arrives(manner: str) -> None:
+    did = navigation.among_people(PeopleModel(5, manner=manner), 240.0, 2, 'seven_rooms.yaml')
+    assert did.contacts == 0
+    assert did.drives >= 5
+    assert did.arrived >= did.drives - 1

@@ -10,6 +10,7 @@ A drive is told the time with each step and never waits itself.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 
@@ -24,6 +25,8 @@ from surveillance_controllers.motion.path_following import (
     Velocity,
     room_ahead,
 )
+from surveillance_controllers.motion.sampled_planning import SampledPlanner, is_safe
+from surveillance_controllers.motion.tracking import Mover
 
 
 class State(Enum):
@@ -56,11 +59,14 @@ class RecoveryParameters:
         back_up: How far to back up, metres.
         back_speed: How fast, m/s.
         look_ahead: An obstacle on this much of the path ahead makes it ask for another, metres.
-        off_path: Further from the path than this, another one is asked for, metres.
+        off_path: Further from the path than this, another one is asked for, metres; twice as far
+            around somebody who moves.
         fresh_start: After this much progress the list of recoveries starts anew, metres.
-        most_paths: So many other paths are asked for at most without a fresh start.
+        most_paths: After so many other paths without a fresh start, the next recovery is tried.
         stand_lost: A robot that does not know where it is stands this long, seconds,
         look_lost: then looks around for this long before the drive fails, seconds.
+        people_leave: Somebody who moved near the robot within this time may still move on, seconds:
+        people_patience: then the list starts anew, for this long at most, seconds.
     """
 
     patience: float = 0.5
@@ -75,10 +81,15 @@ class RecoveryParameters:
     most_paths: int = 6
     stand_lost: float = 1.0
     look_lost: float = 30.0
+    people_leave: float = 30.0
+    people_patience: float = 60.0
 
 
 _STANDS = 0.004
 """A robot that moves less than this between two steps, metres or rad, stands."""
+
+_MOVER_RIM = 0.15
+"""Points this near to something that moves are its own, metres."""
 
 _RECOVERIES = (
     (State.WAITING, State.ASKING),
@@ -110,6 +121,7 @@ class Drive:
         self._robot = robot or DriveParameters()
         self._recovery = recovery or RecoveryParameters()
         self._follower = PathFollower(path, self._robot)
+        self._local = SampledPlanner(self._robot)
         self.state = State.DRIVING
         self.reason = ''
         self.recoveries = 0
@@ -125,6 +137,8 @@ class Drive:
         self._backed = 0.0
         self._last: Pose | None = None
         self._lost_since: float | None = None
+        self._moved_at = -math.inf
+        self._trouble_since = -math.inf
 
     @property
     def path(self) -> Points:
@@ -136,24 +150,35 @@ class Drive:
         """Way along the present path, metres."""
         return self._follower.progress
 
-    def step(self, now: float, pose: Pose, seen: Points, *, lost: bool = False) -> Velocity:
+    def step(
+        self,
+        now: float,
+        pose: Pose,
+        seen: Points,
+        *,
+        movers: Sequence[Mover] = (),
+        lost: bool = False,
+    ) -> Velocity:
         """Decides the velocity for the next moment.
 
         Args:
             now: The time, seconds.
             pose: Where the robot is, map frame.
             seen: What the lidar sees, robot's frame, shape (n, 2), metres.
+            movers: What moves, robot's frame.
             lost: The pose is not to be trusted; the robot stands still and looks.
         """
         dt = 0.0 if self._now is None else max(0.0, now - self._now)
         self._now = now
         turned, moved = self._motion(pose)
+        if movers:
+            self._moved_at = now
         if not lost:
             self._lost_since = None
         elif not self.state.ended:
             return self._while_lost(now, seen, dt)
         if self.state is State.DRIVING:
-            return self._drive(now, pose, seen, dt)
+            return self._drive(now, pose, seen, movers, dt)
         if self.state is State.STOPPING:
             if (moved <= _STANDS and abs(turned) <= _STANDS) or now - self._since > 3.0:
                 self.state = State.ARRIVED
@@ -213,14 +238,34 @@ class Drive:
             return 0.0, 0.0
         return angle_between(last[2], pose[2]), math.dist(last[:2], pose[:2])
 
-    def _drive(self, now: float, pose: Pose, seen: Points, dt: float) -> Velocity:
+    def _guided(self, pose: Pose, seen: Points, movers: Sequence[Mover], dt: float) -> Guidance:
+        """Follow the path: straight, or around who moves near it."""
+        if not movers:
+            self._local.forget()
+            return self._follower.step(pose, seen, dt)
+        gaps = [np.hypot(seen[:, 0] - each.x, seen[:, 1] - each.y) - each.radius for each in movers]
+        stands = seen[np.min(gaps, axis=0) > _MOVER_RIM]
+
+        def choose(way: Points, last: Velocity) -> Velocity:
+            wanted = self._local.step(way, stands, movers, last, dt)
+            for share in (1.0, 0.7, 0.4, 0.2):
+                slower = Velocity(wanted.speed * share, wanted.turn)
+                if is_safe(slower, movers, self._robot):
+                    return slower
+            return Velocity(0.0, wanted.turn)
+
+        return self._follower.step_with(choose, pose, seen, dt)
+
+    def _drive(
+        self, now: float, pose: Pose, seen: Points, movers: Sequence[Mover], dt: float
+    ) -> Velocity:
         r = self._recovery
-        guidance = self._follower.step(pose, seen, dt)
+        guidance = self._guided(pose, seen, movers, dt)
         if guidance.done:
             self._since = now
             self.state = State.STOPPING
             return guidance.velocity
-        if guidance.off_path > r.off_path:
+        if guidance.off_path > (2 * r.off_path if movers else r.off_path):
             self._ask(now, f'the robot is {guidance.off_path:.2f} m off its path')
             return self._follower.halt(seen, dt)
         if not guidance.blocked:
@@ -261,9 +306,15 @@ class Drive:
 
     def _recover(self, now: float, reason: str) -> None:
         self.reason = reason
-        if self._level >= len(_RECOVERIES):
-            self.state = State.FAILED
-            return
+        r = self._recovery
+        if self._level == 0:
+            self._trouble_since = now
+        elif self._level >= len(_RECOVERIES):
+            among_people = now - self._moved_at <= r.people_leave
+            if not among_people or now - self._trouble_since >= r.people_patience:
+                self.state = State.FAILED
+                return
+            self._level = 1
         self.recoveries += 1
         self._plan = list(_RECOVERIES[self._level])
         self._level += 1
@@ -273,7 +324,8 @@ class Drive:
         self.reason = reason
         self._paths += 1
         if self._paths > self._recovery.most_paths:
-            self.state = State.FAILED
+            self._paths = 0
+            self._recover(now, reason)
             return
         self.recoveries += 1
         self._plan = [State.ASKING]

@@ -7,22 +7,29 @@ ROS; who feeds it takes care that calls do not overlap.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from surveillance_controllers.geometry import Points, Pose
+from surveillance_controllers.geometry import Points, Pose, in_map, relative
 from surveillance_controllers.motion.driving import Drive, Spin
 from surveillance_controllers.motion.localisation import LocalisationParameters, Localiser, Scan
 from surveillance_controllers.motion.obstacle_memory import ObstacleMemory
 from surveillance_controllers.motion.path_following import Velocity
 from surveillance_controllers.motion.place_regions import PlaceRegions, Segment
+from surveillance_controllers.motion.tracking import Mover, Tracker
 from surveillance_controllers.planning.grid_map import GridMap, with_walls
 
 SETTLE_SECONDS = 0.2
 """A place counts once the robot has been in it for this long, so that a doorway does not
 flicker."""
+
+MOVER_REACH = 3.5
+"""Who moves within this distance is driven around, metres."""
+MOVER_GAP = 0.15
+"""Nearer than this to what the map has, a point belongs to nothing that moves, metres."""
 
 
 class Navigator:
@@ -53,6 +60,7 @@ class Navigator:
         self._grid: GridMap | None = None
         self._localiser: Localiser | None = None
         self._memory: ObstacleMemory | None = None
+        self._tracker = Tracker()
         self._regions: PlaceRegions | None = None
         self._odometry: Pose | None = None
         self._believed: Pose | None = None
@@ -139,13 +147,22 @@ class Navigator:
             return None
         if self._localiser is None:
             self._localiser = self._first_localiser(scan, self._odometry)
-        if self._localiser.see(scan, now) and self._localiser.certain:
-            self._remember(scan, now)
+        used = self._localiser.see(scan, now)
+        if self._localiser.certain:
+            self._track(scan, now)
+            if used:
+                self._remember(scan, now)
         if self._localiser.plausible:
             self._settle_place(now)
         pose = self._localiser.pose
         if isinstance(self.task, Drive):
-            return self.task.step(now, pose, scan.points, lost=self._localiser.lost)
+            return self.task.step(
+                now,
+                pose,
+                scan.points,
+                movers=self._movers_near(pose),
+                lost=self._localiser.lost,
+            )
         if isinstance(self.task, Spin):
             return self.task.step(pose[2])
         return None
@@ -162,9 +179,28 @@ class Navigator:
         localiser.move(odometry)
         return localiser
 
+    def _track(self, scan: Scan, now: float) -> None:
+        assert self._localiser is not None
+        assert self._memory is not None
+        pose = self._localiser.pose
+        points = in_map(pose, scan.points)
+        self._tracker.update(pose, points[self._memory.is_unknown(points, MOVER_GAP)], now)
+
+    def _movers_near(self, pose: Pose) -> list[Mover]:
+        """Return what moves within `MOVER_REACH`, in the robot's frame."""
+        near = []
+        for each in self._tracker.movers:
+            x, y, _ = relative(pose, (each.x, each.y, 0.0))
+            if math.hypot(x, y) <= MOVER_REACH:
+                vx, vy, _ = relative((0.0, 0.0, pose[2]), (each.vx, each.vy, 0.0))
+                near.append(Mover(x, y, vx, vy, each.radius))
+        return near
+
     def _remember(self, scan: Scan, now: float) -> None:
         assert self._localiser is not None
-        if self._memory is not None and self._memory.update(self._localiser.pose, scan, now):
+        if self._memory is not None and self._memory.update(
+            self._localiser.pose, scan, now, self._tracker.may_move
+        ):
             self.obstacles_changed = True
             if isinstance(self.task, Drive):
                 self.task.heed(self._memory.points)

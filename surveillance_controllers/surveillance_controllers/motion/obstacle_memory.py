@@ -7,10 +7,12 @@ ray goes through where it was, or when it has not been seen for a long time.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
-from surveillance_controllers.geometry import Points, Pose, composed
+from surveillance_controllers.geometry import Points, Pose, composed, in_map
 from surveillance_controllers.motion.localisation import Scan
 from surveillance_controllers.planning.grid_map import GridMap, distance_to
 
@@ -56,8 +58,26 @@ class ObstacleMemory:
         cells = np.array(sorted(self._seen), dtype=float).reshape(-1, 2)
         return (cells + 0.5) * self._cell
 
-    def update(self, pose: Pose, scan: Scan, now: float) -> bool:
+    def is_unknown(self, points: Points, apart: float) -> NDArray[np.bool_]:
+        """Tell which points, shape (n, 2), lie on the map and further than `apart` metres from
+        what it has."""
+        inside = self._grid.contains(self._grid.cells_of(points))
+        return inside & (self._grid.interpolated(self._known, points) > apart)
+
+    def update(
+        self,
+        pose: Pose,
+        scan: Scan,
+        now: float,
+        may_move: Callable[[Points], NDArray[np.bool_]] | None = None,
+    ) -> bool:
         """Takes a scan made at a pose that is to be trusted.
+
+        Args:
+            pose: Where the robot is.
+            scan: What it sees.
+            now: The scan's time, seconds.
+            may_move: Tells which points are not remembered, for what they belong to may move.
 
         Returns:
             Whether the obstacles changed.
@@ -66,11 +86,10 @@ class ObstacleMemory:
         self._forget(pose, scan, now)
         local = scan.points
         local = local[(local**2).sum(axis=1) <= self._reach**2]
-        cos, sin = math.cos(pose[2]), math.sin(pose[2])
-        points = local @ np.array([[cos, sin], [-sin, cos]]) + pose[:2]
-        inside = self._grid.contains(self._grid.cells_of(points))
-        points = points[inside]
-        new = points[self._grid.interpolated(self._known, points) > self._apart]
+        points = in_map(pose, local)
+        new = points[self.is_unknown(points, self._apart)]
+        if may_move is not None:
+            new = new[~may_move(new)]
         for column, row in np.unique(np.floor(new / self._cell).astype(int), axis=0):
             self._seen[int(column), int(row)] = now
         return set(self._seen) != before

@@ -11,6 +11,7 @@ always can stop before what it sees on its arc.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -124,11 +125,9 @@ class PathFollower:
         p = self.parameters
         position = np.array(pose[:2])
         off_path = self._project(position)
-        to_end = float(np.hypot(*(self.path[-1] - position)))
-        remaining = max(self.length - self.progress, to_end)
-        if to_end <= p.tolerance and self.length - self.progress <= 2 * p.tolerance:
-            self._velocity = Velocity()
-            return Guidance(self._velocity, True, False, self.progress, off_path)
+        remaining = self._remaining(position)
+        if remaining == 0.0:
+            return self._end(off_path)
         target = self._target(position)
         bearing = math.atan2(target[1] - pose[1], target[0] - pose[0])
         side = angle_between(pose[2], bearing)
@@ -162,6 +161,48 @@ class PathFollower:
             speed = self._safely(speed, limited, seen, speed * (late + p.latency))
         return self._guide(speed, limited, blocked, off_path)
 
+    def step_with(
+        self,
+        choose: Callable[[Points, Velocity], Velocity],
+        pose: Pose,
+        seen: Points,
+        dt: float,
+    ) -> Guidance:
+        """Follow the path as somebody else chooses, within the robot's limits.
+
+        Args:
+            choose: Given the way ahead in the robot's frame, shape (n, 2), at equal distances, and
+                the velocity commanded last, returns the velocity to command.
+            pose: Where the robot is, in the path's frame.
+            seen: What the lidar sees, points in the robot's frame, shape (n, 2), metres.
+            dt: Time since the last step, seconds.
+        """
+        p = self.parameters
+        position = np.array(pose[:2])
+        off_path = self._project(position)
+        if self._remaining(position) == 0.0:
+            return self._end(off_path)
+        end = min(self.progress + 2.5, self.length)
+        count = max(2, math.ceil((end - self.progress) / 0.1) + 1)
+        way = geometry.point_at(self.path, np.linspace(self.progress, end, count)) - position
+        cos, sin = math.cos(pose[2]), math.sin(pose[2])
+        wanted = choose(way @ np.array([[cos, -sin], [sin, cos]]), self._velocity)
+        turn = self._ramped(self._velocity.turn, wanted.turn, p.turn_acceleration * dt)
+        speed = self._ramped(self._velocity.speed, wanted.speed, p.acceleration * dt)
+        return self._guide(self._safely(speed, turn, seen), turn, False, off_path)
+
+    def _remaining(self, position: Points) -> float:
+        """Return how far the end is, metres; 0 when it is reached."""
+        p = self.parameters
+        to_end = float(np.hypot(*(self.path[-1] - position)))
+        if to_end <= p.tolerance and self.length - self.progress <= 2 * p.tolerance:
+            return 0.0
+        return max(self.length - self.progress, to_end)
+
+    def _end(self, off_path: float) -> Guidance:
+        self._velocity = Velocity()
+        return Guidance(self._velocity, True, False, self.progress, off_path)
+
     def _safe_speed(self, seen: Points, curvature: float, way: float) -> float:
         """The speed from which the robot stops before what it sees on an arc, m/s.
 
@@ -184,12 +225,17 @@ class PathFollower:
 
     def _safely(self, speed: float, turn: float, seen: Points, way: float = math.inf) -> float:
         """The speed, or less where the robot could not stop on the arc that this turn makes."""
-        if speed <= 0.0:
-            return speed
+        if speed == 0.0:
+            return 0.0
+        if speed < 0.0:
+            # Seen from behind the robot drives forwards, and turns to the other side.
+            return -min(-speed, self._safe_speed(-seen, turn / speed, way))
         return min(speed, self._safe_speed(seen, turn / speed, way))
 
     def is_clear(self, obstacles: Points, reach: float, ahead: float) -> bool:
         """Whether the next part of the path keeps away from obstacles.
+
+        What is within reach already counts only where going on brings it closer.
 
         Args:
             obstacles: Points of shape (n, 2), metres, in the path's frame.
@@ -202,7 +248,7 @@ class PathFollower:
         count = max(2, math.ceil((end - self.progress) / 0.05) + 1)
         way = geometry.point_at(self.path, np.linspace(self.progress, end, count))
         gaps = np.hypot(way[:, :1] - obstacles[:, 0], way[:, 1:] - obstacles[:, 1])
-        return bool((gaps >= reach).all())
+        return bool((gaps >= np.minimum(reach, gaps[0] - 1e-3)).all())
 
     def halt(self, seen: Points, dt: float) -> Velocity:
         """Brakes to a stand, gently unless something is near.

@@ -11,6 +11,7 @@ from surveillance_runtime.robot_arm import ARM, Arm, Array
 from surveillance_simulation.robot.arm_motion import ArmMotion
 from surveillance_simulation.robot.base import Base, BaseModel
 from surveillance_simulation.robot.lidar import LidarModel, scan
+from surveillance_simulation.world.people import People
 from surveillance_simulation.world.world import World
 
 _PHYSICS_STEP = 0.05
@@ -34,6 +35,7 @@ class Robot:
         lidar: LidarModel | None = None,
         arm: Arm = ARM,
         rng: np.random.Generator | None = None,
+        people: People | None = None,
     ) -> None:
         """Put the robot at its start; without `rng` its sensors have no errors."""
         self.world = world
@@ -42,18 +44,23 @@ class Robot:
         self.arm = ArmMotion(arm)
         self.time = 0.0
         self._rng = rng
+        self._people = people
 
     def advance(self, seconds: float) -> None:
         """Move on in time, in steps so short that nothing is driven through."""
         steps = max(1, math.ceil(seconds / _PHYSICS_STEP - 1e-9))
         for _ in range(steps):
+            if self._people is not None:
+                x, y, _ = self.base.pose
+                self._people.step(seconds / steps, (x, y), self.base.model.radius)
+                self.world.move_people(self._people.discs)
             self.base.step(seconds / steps)
         self.time += seconds
 
     @property
     def is_moving(self) -> bool:
-        """Whether the base moves or is told to, or the arm moves."""
-        return self.base.is_moving or self.arm.is_moving(self.time)
+        """Whether the base moves or is told to, the arm moves, or people walk about."""
+        return self.base.is_moving or self.arm.is_moving(self.time) or self._people is not None
 
     def scan(self) -> npt.NDArray[np.float32]:
         """Return the lidar's distances, see `lidar.scan`."""

@@ -69,6 +69,7 @@ class World:
         self.version = 0
         self._closed: set[str] = set()
         self._obstacles: dict[str, Obstacle] = {}
+        self._people: boxes.Array = np.zeros((0, 3))
         self._panels = {name: Panel(marker) for name, marker in plan.markers.items()}
         self._walls = boxes.boxes_around(plan.wall_pieces(), WALL_THICKNESS)
         self.regions = Regions(plan)
@@ -93,7 +94,7 @@ class World:
 
     @property
     def discs(self) -> boxes.Array:
-        """Obstacles (n, 3): centre x, y and radius, metres."""
+        """Obstacles and people (n, 3): centre x, y and radius, metres."""
         return self._discs
 
     @property
@@ -160,6 +161,12 @@ class World:
         del self._obstacles[name]
         self._refresh()
 
+    def move_people(self, discs: boxes.Array) -> None:
+        """Take where the people are now, shape (n, 3): centre x, y and radius, metres."""
+        self._people = discs
+        self._discs = np.concatenate([self._standing, discs])
+        self.version += 1
+
     def set_marker(self, name: str, state: str) -> None:
         """Make a marker whole, break or cover it.
 
@@ -210,10 +217,10 @@ class World:
             [self.plan.doors[name].ends for name in sorted(self._closed)], WALL_THICKNESS
         )
         self._solid = np.concatenate([self._walls, panels])
-        self._discs = np.array(
+        self._standing = np.array(
             [(each.x, each.y, each.radius) for each in self._obstacles.values()], dtype=float
         ).reshape(-1, 3)
-        self.version += 1
+        self.move_people(self._people)
 
     @staticmethod
     def _known(name: str, names: Mapping[str, object], kind: str) -> None:

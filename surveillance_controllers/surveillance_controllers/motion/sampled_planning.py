@@ -1,0 +1,295 @@
+"""A local planner that samples: around what moves, before it, or out of its way.
+
+Model predictive path integral control (Williams et al., "Information theoretic MPC for model-based
+reinforcement learning", ICRA 2017): sequences of velocities are drawn around the last plan, each is
+rolled out through the next seconds, priced, and the plan becomes their mean, weighted by their
+prices. Prices know the path, what stands (the scan) and what moves (at constant velocity). What
+counts against a sequence is to move near somebody, not to stand near: a robot that can do nothing
+better stands still.
+
+Everything is in the robot's frame at the moment of planning.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from surveillance_controllers.geometry import Points
+from surveillance_controllers.motion.path_following import DriveParameters, Velocity
+from surveillance_controllers.motion.tracking import Mover
+
+Floats = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class SamplingParameters:
+    """How the planner samples and prices.
+
+    Attributes:
+        samples: Sequences drawn in each step.
+        steps: Moments of a sequence.
+        step: Time between two of them, seconds.
+        reverse: Top speed backwards, m/s.
+        speed_spread: Standard deviation of the speeds drawn, m/s.
+        turn_spread: Of the turning speeds, rad/s.
+        temperature: Sequences dearer than the best by much more than this do not count.
+        reach: Nothing further away than this is looked at, metres.
+        cell: Of the grid of distances to what stands, metres.
+        gap: Wanted between the robot and what moves, metres;
+        gap_growth: it grows with the time ahead, m/s.
+    """
+
+    samples: int = 300
+    steps: int = 20
+    step: float = 0.15
+    reverse: float = 0.3
+    speed_spread: float = 0.3
+    turn_spread: float = 0.6
+    temperature: float = 0.3
+    reach: float = 3.2
+    cell: float = 0.05
+    gap: float = 0.15
+    gap_growth: float = 0.08
+
+
+class SampledPlanner:
+    """Plans a robot's next seconds again and again.
+
+    Args:
+        robot: The robot's limits.
+        parameters: How it samples.
+        seed: Of what is drawn.
+    """
+
+    def __init__(
+        self,
+        robot: DriveParameters,
+        parameters: SamplingParameters | None = None,
+        seed: int = 0,
+    ) -> None:
+        self._robot = robot
+        self._parameters = p = parameters or SamplingParameters()
+        self._rng = np.random.default_rng(seed)
+        self._plan: Floats = np.zeros((p.steps, 2), np.float32)
+        self._ahead = (np.arange(p.steps) + 1.0) * p.step
+        # Noise is drawn at a few moments and linear between them: the sequences are smooth.
+        knots = np.linspace(0, p.steps - 1, 5)
+        self._blend = np.stack(
+            [np.interp(np.arange(p.steps), knots, row) for row in np.eye(5)], axis=1
+        ).astype(np.float32)
+
+        self._manoeuvres = self._known_manoeuvres()
+
+    def _known_manoeuvres(self) -> Floats:
+        """Return what chance alone seldom draws: stand, back off, swerve; (n, steps, 2)."""
+        p, top = self._parameters, self._robot.speed
+        known = [np.full((p.steps, 2), 0.0)]
+        known += [np.tile([-p.reverse, turn], (p.steps, 1)) for turn in (0.0, 0.5, -0.5)]
+        sides = np.repeat(
+            [1.0, -1.0, 0.0], [p.steps // 3, p.steps // 3, p.steps - p.steps // 3 * 2]
+        )
+        for speed in (top, top / 2):
+            for turn in (0.6, 1.0, -0.6, -1.0):
+                known.append(np.stack([np.full(p.steps, speed), turn * sides], axis=1))
+        return np.array(known, np.float32)
+
+    def forget(self) -> None:
+        """Begin from nothing, as after a time without planning."""
+        self._plan[:] = 0.0
+
+    def step(
+        self,
+        path: Points,
+        stands: Points,
+        movers: Sequence[Mover],
+        velocity: Velocity,
+        dt: float,
+    ) -> Velocity:
+        """Return the velocity for the next moment.
+
+        Args:
+            path: The way ahead at equal distances, shape (n, 2), n of at least 2, metres.
+            stands: What the lidar sees of what does not move, shape (m, 2), metres.
+            movers: What moves.
+            velocity: The velocity commanded last.
+            dt: Time since the last step, seconds.
+        """
+        p = self._parameters
+        self._shift(dt)
+        controls = self._drawn(velocity, path)
+        poses = _rolled_out(controls, p.step)
+        prices = (
+            self._of_standing(poses, controls, stands)
+            + self._of_moving(poses, controls, movers)
+            + self._of_way(poses, path)
+            + self._of_effort(controls)
+        )
+        weights = np.exp(-(prices - prices.min()) / p.temperature)
+        weights /= weights.sum()
+        self._plan = np.tensordot(weights, controls, axes=1).astype(np.float32)
+        # The mean of two good ways around somebody can be a bad one.
+        mean = self._priced(self._plan[None], path, stands, movers)
+        if mean > prices.min() + 2.0:
+            self._plan = controls[int(prices.argmin())].copy()
+        speed, turn = self._plan[0]
+        return Velocity(float(speed), float(turn))
+
+    def _priced(
+        self, controls: Floats, path: Points, stands: Points, movers: Sequence[Mover]
+    ) -> float:
+        poses = _rolled_out(controls, self._parameters.step)
+        return float(
+            self._of_standing(poses, controls, stands)[0]
+            + self._of_moving(poses, controls, movers)[0]
+            + self._of_way(poses, path)[0]
+            + self._of_effort(controls)[0]
+        )
+
+    def _shift(self, dt: float) -> None:
+        p = self._parameters
+        moments = np.minimum(np.arange(p.steps) + dt / p.step, p.steps - 1)
+        for column in range(2):
+            self._plan[:, column] = np.interp(moments, np.arange(p.steps), self._plan[:, column])
+
+    def _pursuit(self, path: Points) -> Floats:
+        """Return the velocity that leads back to the path and along it, shape (2,)."""
+        robot = self._robot
+        look = path[int(np.argmin(np.abs(np.hypot(*path.T) - 0.6)))]
+        bearing = math.atan2(look[1], look[0])
+        speed = robot.speed * max(math.cos(bearing), 0.0)
+        turn = min(max(1.5 * bearing, -robot.turn), robot.turn)
+        return np.array([speed, turn], np.float32)
+
+    def _drawn(self, velocity: Velocity, path: Points) -> Floats:
+        """Return the sequences of speed and turning speed, shape (samples, steps, 2)."""
+        p, robot = self._parameters, self._robot
+        spread = np.array([p.speed_spread, p.turn_spread], np.float32)
+        noise = self._rng.standard_normal((p.samples, 5, 2), dtype=np.float32) * spread
+        controls = np.einsum('sk,nkc->nsc', self._blend, noise)
+        half = p.samples // 2
+        controls[:half] += self._plan
+        controls[half:] += self._pursuit(path)
+        controls[: len(self._manoeuvres)] = self._manoeuvres
+        controls[len(self._manoeuvres)] = self._plan
+        controls[half] = self._pursuit(path)
+        last = np.array([velocity.speed, velocity.turn], np.float32)
+        change = np.array([robot.acceleration, robot.turn_acceleration], np.float32) * p.step
+        low = np.array([-p.reverse, -robot.turn], np.float32)
+        high = np.array([robot.speed, robot.turn], np.float32)
+        np.clip(controls, low, high, out=controls)
+        for moment in range(p.steps):
+            np.clip(controls[:, moment], last - change, last + change, out=controls[:, moment])
+            last = controls[:, moment]
+        return np.asarray(controls, np.float32)
+
+    def _of_standing(self, poses: Floats, controls: Floats, stands: Points) -> Floats:
+        """Return what coming near to what stands costs, shape (samples,)."""
+        p = self._parameters
+        if not len(stands):
+            return np.zeros(len(poses), np.float32)
+        side = 2 * math.ceil(p.reach / p.cell)
+        near = stands[(np.abs(stands) < p.reach - p.cell).all(axis=1)]
+        open_cells = np.ones((side, side), np.uint8)
+        cells = ((near + p.reach) / p.cell).astype(np.intp)
+        open_cells[cells[:, 1], cells[:, 0]] = 0
+        if not len(near):
+            return np.zeros(len(poses), np.float32)
+        away = cv2.distanceTransform(open_cells, cv2.DIST_L2, 3) * p.cell
+        at = np.clip((poses[..., :2] + p.reach) / p.cell, 0, side - 1).astype(np.intp)
+        gaps = away[at[..., 1], at[..., 0]] - self._robot.radius
+        moving = np.abs(controls[..., 0]) > 0.02
+        touched = (gaps < self._robot.margin + p.cell / 2) & moving
+        beside = np.exp(-np.maximum(gaps, 0.0) / 0.1)
+        return np.asarray(50.0 * touched.sum(axis=1) + 0.5 * beside.sum(axis=1), np.float32)
+
+    def _of_moving(self, poses: Floats, controls: Floats, movers: Sequence[Mover]) -> Floats:
+        """Return what moving near to what moves costs, shape (samples,)."""
+        p = self._parameters
+        price = np.zeros(len(poses), np.float32)
+        moving = 0.5 + np.abs(controls[..., 0]) / self._robot.speed
+        sooner = np.linspace(1.5, 0.5, p.steps, dtype=np.float32)
+        for mover in movers:
+            x = np.float32(mover.x) + np.float32(mover.vx) * self._ahead.astype(np.float32)
+            y = np.float32(mover.y) + np.float32(mover.vy) * self._ahead.astype(np.float32)
+            gaps = np.hypot(poses[..., 0] - x, poses[..., 1] - y)
+            gaps -= np.float32(self._robot.radius + mover.radius)
+            wanted = (p.gap + p.gap_growth * self._ahead).astype(np.float32)
+            near = 20.0 * (gaps < wanted) + 2.0 * np.exp(-np.maximum(gaps - wanted, 0) / 0.25)
+            price += (near * moving * sooner).sum(axis=1)
+        return price
+
+    def _of_way(self, poses: Floats, path: Points) -> Floats:
+        """Return what leaving the path costs, less what getting on along it is worth."""
+        line = path.astype(np.float32)
+        some = poses[:, 1::3, :2]
+        gaps = np.hypot(some[..., 0, None] - line[:, 0], some[..., 1, None] - line[:, 1])
+        off = gaps.min(axis=2)
+        done = gaps[:, -1].argmin(axis=1)
+        spacing = float(np.hypot(*(path[1] - path[0]))) if len(path) > 1 else 0.0
+        end = np.hypot(*(poses[:, -1, :2] - line[-1]).T)
+        ahead = np.diff(line, axis=0, append=2 * line[-1:] - line[-2:-1])
+        heading = np.arctan2(ahead[done, 1], ahead[done, 0])
+        askew = 1.0 - np.cos(poses[:, -1, 2] - heading)
+        # Towards the end of a short path, coming nearer to it counts.
+        left = (len(path) - 1 - done) * spacing + off[:, -1] + 0.3 * end
+        return np.asarray(1.0 * off.sum(axis=1) + 4.0 * left + askew, np.float32)
+
+    @staticmethod
+    def _of_effort(controls: Floats) -> Floats:
+        back = np.maximum(-controls[..., 0], 0.0).sum(axis=1)
+        rough = np.abs(np.diff(controls, axis=1)).sum(axis=(1, 2))
+        return np.asarray(1.5 * back + 0.15 * rough, np.float32)
+
+
+def _rolled_out(controls: Floats, step: float) -> Floats:
+    """Return where sequences of velocities lead, x, y and yaw, shape (samples, steps, 3)."""
+    turns = controls[..., 1] * np.float32(step)
+    yaw = np.cumsum(turns, axis=1)
+    middle = yaw - turns / 2
+    ways = controls[..., 0] * np.float32(step)
+    x = np.cumsum(ways * np.cos(middle), axis=1)
+    y = np.cumsum(ways * np.sin(middle), axis=1)
+    return np.stack([x, y, yaw], axis=-1)
+
+
+def is_safe(
+    velocity: Velocity, movers: Sequence[Mover], robot: DriveParameters, gap: float = 0.03
+) -> bool:
+    """Tell whether the robot will stand before anybody comes within `gap` metres of it.
+
+    Passive safety (Macek, Vasquez, Fraichard, Siegwart, 2009): somebody may walk into a robot that
+    stands, or that moves away; it does not move into anybody.
+
+    Args:
+        velocity: To be commanded now; the robot brakes after its latency.
+        movers: What moves, robot's frame.
+        robot: The robot's limits.
+        gap: Kept free, metres.
+    """
+    if not movers or velocity.speed == 0.0:
+        return True
+    brake = abs(velocity.speed) / robot.acceleration
+    times = np.linspace(0.0, robot.latency + brake, 12)
+    braking = np.maximum(times - robot.latency, 0.0)
+    way = np.minimum(times, robot.latency) + braking - 0.5 * braking**2 / max(brake, 1e-6)
+    turn = velocity.turn * way
+    x = velocity.speed * way * np.cos(turn / 2)
+    y = velocity.speed * way * np.sin(turn / 2)
+    towards = math.copysign(1.0, velocity.speed)
+    for mover in movers:
+        dx = mover.x + mover.vx * times - x
+        dy = mover.y + mover.vy * times - y
+        gaps = np.hypot(dx, dy) - robot.radius - mover.radius
+        near = gaps < gap
+        first = int(near.argmax())
+        # Who comes from behind walks into the robot, not the robot into them.
+        closing = towards * (dx[first] * math.cos(turn[first]) + dy[first] * math.sin(turn[first]))
+        if near[first] and closing > 0:
+            return False
+    return True
