@@ -26,9 +26,8 @@ from surveillance_behaviour.map_from_markers.assembly import (
     SurveyReport,
     notes_of,
 )
-from surveillance_behaviour.map_from_markers.camera_scanner import CameraScanner
 from surveillance_behaviour.map_from_markers.initial_scan import InitialScan, Progress
-from surveillance_behaviour.map_from_markers.marker_inquiry import MarkerInquiry
+from surveillance_behaviour.map_from_markers.scan_peers import CameraScanner, MarkerInquiry
 from surveillance_fsm.ros import CallError, ServiceCaller
 from surveillance_interfaces.msg import OntologyMap
 from surveillance_interfaces.srv import ReferenceName

@@ -178,23 +178,3 @@ class Battery:
         if left > 0:
             self.energy += left * p.taper_floor * p.charging_power
         self.energy = min(self.energy, p.capacity)
-
-    def seconds_to_charge(self, level: float = 100.0) -> float:
-        """How long charging to `level` percent takes from the present charge, s; 0 when it is
-        reached."""
-        p = self.parameters
-        wanted = p.capacity * min(level, 100.0) / 100.0
-        energy, hours = self.energy, 0.0
-        bound = p.taper_from * p.capacity
-        if energy < min(bound, wanted):
-            hours += (min(bound, wanted) - energy) / p.charging_power
-            energy = min(bound, wanted)
-        floor_from = p.capacity * (1.0 - p.taper_floor * (1.0 - p.taper_from))
-        if energy < min(floor_from, wanted):
-            rate = p.charging_power / (p.capacity * (1.0 - p.taper_from))
-            end = min(floor_from, wanted)
-            hours += math.log((p.capacity - energy) / (p.capacity - end)) / rate
-            energy = end
-        if energy < wanted:
-            hours += (wanted - energy) / (p.taper_floor * p.charging_power)
-        return hours * SECONDS_PER_HOUR

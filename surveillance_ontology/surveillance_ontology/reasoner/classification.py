@@ -128,10 +128,6 @@ class Classification:
         """Every named class."""
         return set(self._above)
 
-    def unsatisfiable(self) -> set[str]:
-        """Named classes that can have no members."""
-        return set(self._impossible)
-
     def _hierarchy(self) -> None:
         contexts = self._contexts
         if contexts.context(()).clash:

@@ -189,10 +189,6 @@ class PropertyHierarchy:
         """Whether an individual has at most one value, by this property or one above it."""
         return not self._functional.isdisjoint(self.above(prop))
 
-    def is_functional_as(self, prop: _Directed) -> bool:
-        """Whether this very property, read in this direction, is stated to be functional."""
-        return prop in self._functional
-
 
 Body = tuple[BodyAtom, ...]
 _X, _Y, _Z = 0, 1, 2

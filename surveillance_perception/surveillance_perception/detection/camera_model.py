@@ -106,11 +106,6 @@ class CameraModel:
         """Horizontal field of view in radians."""
         return 2.0 * math.atan(self.width / 2.0 / float(self.matrix[0, 0]))
 
-    @property
-    def vertical_field_of_view(self) -> float:
-        """Vertical field of view in radians."""
-        return 2.0 * math.atan(self.height / 2.0 / float(self.matrix[1, 1]))
-
     def project(self, points: Array) -> Array:
         """Pixels (n, 2) of points (n, 3) in the optical frame, ignoring distortion."""
         homogeneous = points @ self.matrix.T

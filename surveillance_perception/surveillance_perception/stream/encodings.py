@@ -19,7 +19,6 @@ import numpy.typing as npt
 from surveillance_perception.stream.image_files import ImageArray, ImageError
 
 _LONGEST_NAME = 40
-_Pixels = npt.NDArray[np.uint8] | npt.NDArray[np.uint16]
 
 
 @dataclass(frozen=True)
