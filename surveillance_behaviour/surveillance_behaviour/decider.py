@@ -143,8 +143,9 @@ class Decider:
             PeerError: The ontology cannot be asked.
             NowhereToGoError: Nothing can be reached.
         """
-        if self.model.requested in avoided:
-            self.model.requested = ''  # It was tried.
+        if self.experience.requested in avoided:
+            self.experience.requested = ''  # It was tried.
+        self.model.stands(now, interrupt)
         world = self.look(now, interrupt, avoided)
         self.model.saw(world.place, now)
         if to_charge and not self.experience.sent_to_charge:
@@ -153,14 +154,19 @@ class Decider:
         try:
             decision = decide(world, self.battery(), self.settings)
         except NowhereToGoError:
-            self.model.requested = ''
+            self.experience.requested = ''
             raise
         self.model.target = decision.target
         if decision.rule == RECHARGE and not self.experience.sent_to_charge:
             self.experience.sent_to_charge = decision.reason.rpartition(': ')[0]
         self._leg = decision
-        self.experience.save()
+        self._save()
         return decision
+
+    def _save(self) -> None:
+        # A request and a decision come from two threads.
+        with self._lock:
+            self.experience.save()
 
     def why_charge(self) -> str:
         """Return why the robot must charge now, as far as is known without looking; empty: no."""
@@ -235,7 +241,8 @@ class Decider:
         known_place(place, world.graph.places)
         if place == self.model.place and self._leg is None:
             return f'the robot is in {place} already'
-        self.model.requested = place
+        self.experience.requested = place
+        self._save()
         return f'the robot goes to {place} when it has ended what it is at'
 
     def why_not(

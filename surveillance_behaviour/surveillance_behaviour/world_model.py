@@ -49,6 +49,7 @@ class Experience:
         leg_times: How long the legs take.
         draw: How fast the battery falls.
         sent_to_charge: Why the robot was sent to charge and has not been charged since.
+        requested: Where an operator wants the robot, and it has not been since; empty: nowhere.
     """
 
     path: Path | None = None
@@ -56,6 +57,8 @@ class Experience:
     leg_times: LegTimes = field(default_factory=LegTimes)
     draw: DrawEstimate = field(default_factory=DrawEstimate)
     sent_to_charge: str = ''
+    requested: str = ''
+    problem: str = ''
 
     @classmethod
     def of_record(cls, record: str) -> Experience:
@@ -76,8 +79,6 @@ class Experience:
                 experience.visits[place] = max(at, experience.visits.get(place, at))
         return experience
 
-    problem: str = ''
-
     def _read(self) -> str:
         if self.path is None or not self.path.exists():
             return ''
@@ -87,6 +88,7 @@ class Experience:
             self.leg_times.restore(kept['leg_times'])
             self.draw.restore(kept['draw'])
             self.sent_to_charge = str(kept['sent_to_charge'])
+            self.requested = str(kept.get('requested', ''))
         except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
             self.visits, self.leg_times, self.draw = {}, LegTimes(), DrawEstimate()
             return f'{self.path}: what was learned before is not used: {error}'
@@ -101,6 +103,7 @@ class Experience:
             'leg_times': self.leg_times.to_json(),
             'draw': self.draw.to_json(),
             'sent_to_charge': self.sent_to_charge,
+            'requested': self.requested,
         }
         new = self.path.with_name(self.path.name + '.new')
         with contextlib.suppress(OSError):
@@ -136,7 +139,6 @@ class WorldModel:
         self.experience = experience or Experience()
         self.place = ''
         self.target: str | None = None
-        self.requested = ''
         self.world: World | None = None
         self._ontology = ontology
         self._places = places
@@ -212,7 +214,7 @@ class WorldModel:
             target=self.target,
             avoided=avoided,
             rules=classes,
-            requested=self.requested,
+            requested=self.experience.requested,
             memory=self._memory,
         )
         return self.world
@@ -264,14 +266,23 @@ class WorldModel:
             self._positions[place] = self._places.position(place, interrupt)
         return self._positions[place]
 
+    def stands(self, now: float, interrupt: Interrupt) -> None:
+        """Note that the robot is now where it was heard of last, if anybody said so.
+
+        Its visit is then told with the snapshot's own time, so that the ontology, and not only
+        this process, knows until when the robot was there.
+        """
+        if here := self._ontology.await_place(self.place, 0.0, interrupt):
+            self.saw(here, now)
+
     def saw(self, place: str, now: float) -> None:
         """Note that the robot was in ``place``; finer than the ontology's whole seconds."""
         self.place = place
         self.experience.saw(place, now)
         if place == self.target:
             self.target = None
-        if place == self.requested:
-            self.requested = ''
+        if place == self.experience.requested:
+            self.experience.requested = ''
 
 
 def _distance(start: Point, goal: Point) -> float:

@@ -96,7 +96,6 @@ class PatrolOntology:
         self._armor = armor
         self._robot = robot
         self._places: tuple[str, ...] = ()
-        self._visited: dict[str, int] = {}
 
     @property
     def reference(self) -> str:
@@ -305,7 +304,8 @@ class PatrolOntology:
     ) -> Snapshot:
         """Tell the time, and ask for all that a decision needs; mostly one round trip.
 
-        It takes a second one when the map has changed, or when the ontology had forgotten visits.
+        It takes another one when the map has changed, or for a visit that the ontology does not
+        know and that is not of this moment.
 
         Args:
             now: The robot's time, seconds.
@@ -313,7 +313,8 @@ class PatrolOntology:
             not_before: The answer must know where the robot was at this time, nanoseconds of ROS
                 time; it is waited for.
             visits: When the robot visited places, seconds; the ontology is told what it does not
-                know of that. Somebody else's later visit stays.
+                know of that. Somebody else's later visit stays, and a place that was taken away
+                does not come back.
             patience: How long to wait for an ontology that is consistent and knows where the
                 robot is, seconds of steady time.
             interrupt: Ends the wait early.
@@ -339,14 +340,12 @@ class PatrolOntology:
 
     def _ask(self, now: float, classes: Sequence[str], visits: Mapping[str, float]) -> Snapshot:
         request, robot = self._request, self._robot
+        asked = self._places
+        # A visit of this moment is the latest there can be, and nobody takes away the place that
+        # the robot stands in: it can be told unasked. For any other the ontology is asked first.
+        owed = [place for place, at in visits.items() if place in asked and int(at) >= int(now)]
         while True:
-            asked = self._places
-            owed = {
-                place: int(at)
-                for place, at in visits.items()
-                if place in asked and int(at) > self._visited.get(place, NEVER)
-            }
-            told = [self._set_value('visitedAt', place, at) for place, at in owed.items()]
+            told = [self._set_value('visitedAt', place, int(visits[place])) for place in owed]
             told += [self._set_value('now', robot, int(now)), request('REASON')]
             questions = [
                 request('QUERY OBJECTPROP IND', 'isIn', robot),
@@ -360,17 +359,18 @@ class PatrolOntology:
             is_in, seen_at, can_reach, locations, *rest = answers
             members, rest = rest[: len(classes)], rest[len(classes) :]
             self._places = _names(locations)
-            self._visited = {
+            visited = {
                 place: _time(f'visitedAt of {place}', answer)
                 for place, answer in zip(asked, rest[len(asked) :], strict=True)
             }
-            forgotten = any(
-                int(at) > self._visited[place]
-                for place, at in visits.items()
-                if place in self._visited and place not in owed
-            )
-            if asked == self._places and not forgotten:
+            owed = [
+                place
+                for place in asked
+                if place in self._places and int(visits.get(place, NEVER)) > visited[place]
+            ]
+            if asked == self._places and not owed:
                 break
+            asked = self._places
         if not is_in.is_consistent:
             raise OntologyNotReadyError(f'ontology {self.reference} is inconsistent')
         where = _names(is_in)
@@ -386,7 +386,7 @@ class PatrolOntology:
                 place: frozenset(name for name in classes if place in among[name])
                 for place in asked
             },
-            visited_at={place: float(at) for place, at in self._visited.items() if at != NEVER},
+            visited_at={place: float(at) for place, at in visited.items() if at != NEVER},
             connections={place: _names(answer) for place, answer in zip(asked, rest, strict=False)},
         )
 

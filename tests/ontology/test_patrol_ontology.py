@@ -83,7 +83,7 @@ def test_each_verb_is_one_round_trip(ontology: PatrolOntology, transport: Counti
     ontology.snapshot(110.0, RULES)
     before = transport.trips
     ontology.record_place('C1', 200)
-    ontology.snapshot(120.0, RULES, visits={'E': 115.0, 'C1': 119.5}, not_before=200)
+    ontology.snapshot(120.0, RULES, visits={'C1': 120.0}, not_before=200)
     ontology.record_visits({'C1': 121.0}, 121.0)
     ontology.set_urgency_threshold(20.0)
     assert transport.trips - before == 4
@@ -144,6 +144,29 @@ def test_visits_that_the_ontology_forgot_are_told_and_later_ones_are_left(
     found = ontology.snapshot(113.0, RULES, visits=visits)
     assert found.visited_at == {'E': 105.0, 'C1': 109.0}
     assert 'R9' not in found.connections, 'a place that is not on the map does not come to be'
+
+
+def test_a_later_visit_of_somebody_else_stays(
+    ontology: PatrolOntology, transport: Counting
+) -> None:
+    other = PatrolOntology(ArmorClient('other', 'map', transport), robot='Robot2')
+    other.record_visits({'E': 111.0}, 111.0)
+    fresh = PatrolOntology(ArmorClient('fresh', 'map', transport))
+    found = fresh.snapshot(112.0, RULES, visits={'E': 105.0, 'C1': 106.0})
+    assert found.visited_at == {'E': 111.0, 'C1': 106.0}, 'at the first snapshot'
+    other.record_visits({'R1': 118.0}, 118.0)
+    found = fresh.snapshot(120.0, RULES, visits={'R1': 115.0, 'E': 120.0})
+    assert found.visited_at == {'E': 120.0, 'C1': 106.0, 'R1': 118.0}, 'between two snapshots'
+
+
+def test_a_room_that_was_taken_away_does_not_come_back_by_a_visit(
+    ontology: PatrolOntology,
+) -> None:
+    ontology.snapshot(110.0, RULES)
+    ontology.change(PLACE, PLACE.without_room('R4'))
+    found = ontology.snapshot(120.0, RULES, visits={'R4': 115.0, 'E': 120.0})
+    assert 'R4' not in found.connections
+    assert 'R4' not in ontology.places()
 
 
 def test_a_snapshot_waits_for_the_place_that_is_on_its_way(ontology: PatrolOntology) -> None:

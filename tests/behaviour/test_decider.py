@@ -1,0 +1,53 @@
+"""What is remembered between two decisions, and beyond the process that decides."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from surveillance_behaviour.decider import Decider
+from surveillance_behaviour.decision import REQUEST, DecisionSettings
+from surveillance_behaviour.world_model import Experience
+from surveillance_fsm import Interrupt
+
+from .scripted_world import World
+
+NOBODY = Interrupt()
+
+
+def decider(world: World, record: Path) -> Decider:
+    experience = Experience.of_record(str(record))
+    assert not experience.problem
+    return Decider(DecisionSettings(), world, world, world.battery, experience)
+
+
+def test_a_request_outlives_the_node_that_took_it(tmp_path: Path) -> None:
+    world, record = World(), tmp_path / 'mission.jsonl'
+    first = decider(world, record)
+    first.begin(1.0, NOBODY)
+    assert 'goes to R4' in first.request('R4')
+    decision = decider(world, record).decide(2.0, NOBODY)
+    assert (decision.rule, decision.place) == (REQUEST, 'R4')
+
+
+@pytest.mark.parametrize('avoided', [frozenset[str](), frozenset({'R4'})])
+def test_a_request_ends_when_the_robot_has_been_there_or_cannot_go(
+    tmp_path: Path, avoided: frozenset[str]
+) -> None:
+    world, record = World(), tmp_path / 'mission.jsonl'
+    first = decider(world, record)
+    first.begin(1.0, NOBODY)
+    first.request('R4')
+    if not avoided:
+        world.is_in = 'R4'
+    assert first.decide(2.0, NOBODY, avoided).rule != REQUEST
+    assert decider(world, record).decide(3.0, NOBODY).rule != REQUEST
+
+
+def test_the_ontology_knows_until_when_the_robot_was_in_a_place() -> None:
+    world = World()
+    told = Decider(DecisionSettings(), world, world, world.battery)
+    told.begin(1.0, NOBODY)
+    told.decide(20.0, NOBODY)
+    assert world.visited_at['E'] == 20.0
