@@ -42,7 +42,7 @@ COLCON = [
 
 
 def main() -> int:
-    """Builds, checks, and returns the exit code."""
+    """Return builds, checks, and returns the exit code."""
     folder = Path(sys.argv[1] if len(sys.argv) > 1 else CHECKOUT / 'build' / 'colcon').resolve()
     folder.mkdir(parents=True, exist_ok=True)
     # A workspace that this checkout is part of is not to look for packages in here.
@@ -56,7 +56,7 @@ def main() -> int:
 
 
 def make_environment(venv: Path) -> Path:
-    """A virtual environment with what the build and the nodes need."""
+    """Return a virtual environment with what the build and the nodes need."""
     python = venv / 'bin' / 'python'
     if not python.exists():
         run([sys.executable, '-m', 'venv', str(venv)])
@@ -68,7 +68,7 @@ def make_environment(venv: Path) -> Path:
 
 
 def build(folder: Path, python: Path) -> None:
-    """Builds every package of the checkout into `folder`/install."""
+    """Build every package of the checkout into `folder`/install."""
     # Neither CMAKE_PREFIX_PATH nor AMENT_PREFIX_PATH: the interfaces ask the interpreter for both.
     environ = clean_environ()
     environ['PATH'] = f'{python.parent}{os.pathsep}{environ["PATH"]}'
@@ -80,7 +80,7 @@ def build(folder: Path, python: Path) -> None:
 
 
 def misplaced(install: Path) -> list[str]:
-    """What is wrong with the executables."""
+    """Return what is wrong with the executables."""
     wrong = []
     for node in node_table.NODES:
         executable = install / node.package / 'lib' / node.package / node.name
@@ -90,7 +90,7 @@ def misplaced(install: Path) -> list[str]:
 
 
 def broken(install: Path) -> list[str]:
-    """Which executables do not run: each is given a wrong argument, which it has to name."""
+    """Return which executables do not run: each is given a wrong argument, which it has to name."""
     wrong = []
     for node in node_table.NODES:
         executable = install / node.package / 'lib' / node.package / node.name
@@ -110,7 +110,7 @@ def broken(install: Path) -> list[str]:
 
 
 def run(words: list[str], cwd: Path = CHECKOUT, environ: dict[str, str] | None = None) -> None:
-    """Runs a command; ends the program where it fails."""
+    """Run a command; end the program where it fails."""
     done = subprocess.run(words, cwd=cwd, env=environ or clean_environ(), check=False)
     if done.returncode != 0:
         sys.exit(f'colcon: {" ".join(words[:6])} ... ended with exit code {done.returncode}')

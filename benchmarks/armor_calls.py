@@ -117,7 +117,7 @@ class Visit:
 
 
 def single_calls(client: Any) -> dict[str, Callable[[], Any]]:
-    """The directives that are measured one by one."""
+    """Return the directives that are measured one by one."""
     times = iter(range(2_100_000_000, 2_200_000_000))
     last = [str(next(times))]
     client.manipulation.replace_one_dataprop_b2_ind('visitedAt', 'R1', 'LONG', last[0])
@@ -136,7 +136,7 @@ def single_calls(client: Any) -> dict[str, Callable[[], Any]]:
 
 
 def inside(rounds: int) -> list[Row]:
-    """The service without ROS, without and with the store."""
+    """Return the service without ROS, without and with the store."""
     from surveillance_ontology.armor.store import Store
 
     rows = _service_rows('in process', None, rounds)
@@ -167,7 +167,7 @@ def _service_rows(label: str, store: Any, rounds: int) -> list[Row]:
 
 @contextmanager
 def servers() -> Any:
-    """The processes that answer."""
+    """Provide the processes that answer."""
     module = 'surveillance_ontology.'
     arguments = [
         ['-m', module + 'armor_server_node', '--ros-args', '-p', 'store:=none'],
@@ -188,7 +188,7 @@ def servers() -> Any:
 
 
 def through_ros(rounds: int) -> list[Row]:
-    """Calls over ROS, beside a bare service call."""
+    """Call over ROS, beside a bare service call."""
     import rclpy
     from std_srvs.srv import Trigger
 
@@ -227,7 +227,7 @@ def through_ros(rounds: int) -> list[Row]:
 
 
 def under_load(seconds: float, axioms: int) -> list[Row]:
-    """A client beside others that ask much of the server."""
+    """Return a client beside others that ask much of the server."""
     import rclpy
 
     from surveillance_interfaces.srv import ArmorDirective
@@ -324,7 +324,7 @@ FIELDS = (
 def percentile(
     call: Callable[[], Any], seconds: float, go_on: Callable[[], bool] = lambda: True
 ) -> float:
-    """The 99th percentile of a call's milliseconds, called every 2 ms."""
+    """Return the 99th percentile of a call's milliseconds, called every 2 ms."""
     taken = []
     end = time.perf_counter() + seconds
     while time.perf_counter() < end and go_on():
@@ -352,7 +352,7 @@ def write_large(path: Path, axioms: int) -> None:
 
 
 def large(axioms: int, rounds: int) -> list[Row]:
-    """Calls inside the server on a large ontology."""
+    """Call inside the server on a large ontology."""
     from surveillance_ontology.armor import ArmorClient, ArmorService, InProcessTransport, Settings
 
     def resident() -> float:
@@ -417,7 +417,7 @@ def large(axioms: int, rounds: int) -> list[Row]:
 
 
 def rows(quick: bool) -> list[Row]:
-    """All rows of the table."""
+    """Return all rows of the table."""
     return [
         *inside(200 if quick else 2000),
         *through_ros(200 if quick else 2000),

@@ -153,7 +153,7 @@ class Watcher:
         self.collisions = max(self.collisions, message.data)
 
     def answers(self, name: str, seconds: float = 1.0) -> bool:
-        """Whether a node answers a request for its parameters."""
+        """Tell whether a node answers a request for its parameters."""
         client = self._clients.get(name)
         if client is None:
             client = self.node.create_client(ListParameters, f'/{name}/list_parameters')
@@ -161,7 +161,7 @@ class Watcher:
         return self._ask(client, ListParameters.Request(), seconds) is not None
 
     def visited_at(self, reference: str, places: Sequence[str]) -> dict[str, int]:
-        """What the ontology has as each place's last visit, seconds."""
+        """Return what the ontology has as each place's last visit, seconds."""
         found = {}
         for place in places:
             request = ArmorDirective.Request()
@@ -202,12 +202,12 @@ class Results:
 
 
 def records(folder: Path) -> list[Path]:
-    """The files of a run's mission record, oldest first."""
+    """Return the files of a run's mission record, oldest first."""
     return sorted(folder.glob('mission*.jsonl')) + sorted(folder.glob('mission/*.jsonl'))
 
 
 def visits(folder: Path) -> list[tuple[float, str]]:
-    """(simulated seconds, place) of every visit in a run's record."""
+    """Return (simulated seconds, place) of every visit in a run's record."""
     return [
         (float(event['time']), str(event['place']))
         for path in records(folder)

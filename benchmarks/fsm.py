@@ -40,7 +40,9 @@ LEVELS = 3
 
 
 def states_of(library: Any) -> tuple[type, type]:
-    """The states of the ring for a library with SMACH's interface: plain, and with userdata."""
+    """Return the states of the ring for a library with SMACH's interface: plain, and with
+    userdata.
+    """
 
     class Plain(library.State):  # type: ignore[misc,name-defined]
         """Goes on until the machine has made enough transitions."""
@@ -68,7 +70,7 @@ def states_of(library: Any) -> tuple[type, type]:
 
 
 def ring(states: Sequence[Any], library: Any = fsm) -> Any:
-    """A machine whose states follow one another in a ring."""
+    """Return a machine whose states follow one another in a ring."""
     machine = library.StateMachine(['done'])
     with machine:
         for number, state in enumerate(states):
@@ -78,13 +80,13 @@ def ring(states: Sequence[Any], library: Any = fsm) -> Any:
 
 
 def flat(count: int, library: Any = fsm) -> Any:
-    """A ring without userdata."""
+    """Return a ring without userdata."""
     left, plain = [count], states_of(library)[0]
     return ring([plain(left) for _ in range(RING)], library)
 
 
 def counting(count: int, library: Any = fsm) -> Any:
-    """A ring with userdata."""
+    """Return a ring with userdata."""
     state = states_of(library)[1]
     machine = ring([state() for _ in range(RING)], library)
     machine.userdata.left = count
@@ -92,7 +94,7 @@ def counting(count: int, library: Any = fsm) -> Any:
 
 
 def nested(count: int, library: Any = fsm) -> Any:
-    """A ring of three machines of three machines of three states each, with userdata.
+    """Return a ring of three machines of three machines of three states each, with userdata.
 
     Each inner machine ends after its states, so that one transition in three enters or leaves one.
     """
@@ -158,7 +160,8 @@ def with_feed(machine: Any, count: int) -> Callable[[], object]:
 
 
 def timed(work: Callable[[], object]) -> float:
-    """Seconds of processor time that `work` takes in all its threads, without garbage collection.
+    """Return the seconds of processor time that `work` takes in all its threads, without garbage
+    collection.
 
     Processor time and not the wall's, so that other programs on the computer count less.
     """
@@ -173,7 +176,9 @@ def timed(work: Callable[[], object]) -> float:
 
 
 def clock_reading(count: int) -> float:
-    """Seconds that reading the clock and keeping what it says takes: the least a trace can cost."""
+    """Return the seconds that reading the clock and keeping what it says takes: the least a trace
+    can cost.
+    """
     keep, now = deque[float](maxlen=1_000).append, time.monotonic
 
     def read() -> None:
@@ -265,7 +270,7 @@ def run_yasmin(count: int) -> Callable[[], object]:
 
 
 def one_state(library: Any = fsm) -> Any:
-    """A machine of one state."""
+    """Return a machine of one state."""
     machine = library.StateMachine(['done'])
     with machine:
         library.StateMachine.add(
@@ -275,7 +280,7 @@ def one_state(library: Any = fsm) -> Any:
 
 
 def time_of(work: Callable[[], object], repeats: int = 300, rounds: int = 20) -> float:
-    """Seconds that some work takes, the wall's: the best of several rounds."""
+    """Return the seconds that some work takes, the wall's: the best of several rounds."""
     work()
     best = float('inf')
     for _ in range(rounds):
@@ -287,7 +292,9 @@ def time_of(work: Callable[[], object], repeats: int = 300, rounds: int = 20) ->
 
 
 def handing_over() -> float:
-    """Seconds to hand something to another thread and get it back: the least of two threads."""
+    """Return the seconds to hand something to another thread and get it back: the least of two
+    threads.
+    """
     there, back = threading.Lock(), threading.Lock()
     there.acquire()
     back.acquire()
@@ -314,7 +321,7 @@ def handing_over() -> float:
 
 
 def sleeper_of(library: Any) -> type:
-    """A state that waits for the preempt and notes when it left."""
+    """Return a state that waits for the preempt and notes when it left."""
 
     class Sleeper(library.State):  # type: ignore[misc,name-defined]
         def __init__(self) -> None:
@@ -343,7 +350,7 @@ def sleeper_of(library: Any) -> type:
 def preempt_latencies(
     repeats: int, library: Any = fsm, depth: int = 5
 ) -> tuple[list[float], list[float]]:
-    """Seconds from the request to the deepest state's exit, and to the root's end."""
+    """Return the seconds from the request to the deepest state's exit, and to the root's end."""
     sleeper = sleeper_of(library)()
     machine = sleeper
     for _ in range(depth):
@@ -375,7 +382,9 @@ def preempt_latencies(
 
 
 def event_latencies(repeats: int) -> list[float]:
-    """Seconds from setting an event to its waiter's waking: what the computer takes by itself."""
+    """Return the seconds from setting an event to its waiter's waking: what the computer takes by
+    itself.
+    """
     woke: list[float] = []
     for _ in range(repeats):
         event, ready = threading.Event(), threading.Semaphore(0)
@@ -412,7 +421,7 @@ def bytes_of_a_state(library: Any, count: int = 5_000) -> float:
 
 
 def large_machine(width: int) -> fsm.StateMachine:
-    """A ring of states, each of which writes a key of its own and reads the one before."""
+    """Return a ring of states, each of which writes a key of its own and reads the one before."""
 
     class Link(fsm.State):
         def execute(self, ud: object) -> str:
@@ -492,7 +501,9 @@ def lost_preempts(count: int, seed: int = 1) -> int:
 
 
 def mission(log: Any, checkpoint: Path, items: int) -> fsm.StateMachine:
-    """A mission over items that says in a log what it begins and what its checkpoint has done."""
+    """Return a mission over items that says in a log what it begins and what its checkpoint has
+    done.
+    """
 
     def deed(ud: Any) -> str:
         log.write(f'begun {ud.item}\n')
@@ -593,7 +604,7 @@ def find_smach() -> Any:
 
 
 def percentile(values: Sequence[float], share: float) -> float:
-    """The value below which `share` of the values lie."""
+    """Return the value below which `share` of the values lie."""
     ordered = sorted(values)
     return ordered[min(len(ordered) - 1, int(share * len(ordered)))]
 

@@ -382,7 +382,7 @@ class Fuzzer:
         report.memory = max(report.memory, process.memory())
 
     def answers(self, name: str) -> bool:
-        """Whether the node answers a parameter request in time."""
+        """Tell whether the node answers a parameter request in time."""
         return self._list_parameters(name) is not None
 
 

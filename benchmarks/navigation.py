@@ -345,7 +345,7 @@ def people(*, quick: bool) -> None:
 
 
 def stack(*, quick: bool) -> None:
-    """Simulated seconds per real second of the whole patrol."""
+    """Return the simulated seconds per real second of the whole patrol."""
     seconds = 5.0 if quick else 30.0
     rows = []
     for name, measure in (
@@ -454,7 +454,7 @@ def _await(condition: Callable[[], Any], patience: float) -> None:
 
 
 def pace(*, quick: bool) -> None:
-    """Simulated seconds of a leg and of a stop: at full speed beside real time."""
+    """Measure the simulated seconds of a leg and of a stop: at full speed beside real time."""
     rows = []
     for name, speed, seconds in (
         ('as fast as it goes', 0.0, 250.0 if quick else 900.0),

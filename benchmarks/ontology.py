@@ -102,7 +102,7 @@ class Patrol:
             self.beyond[place].append(neighbour)
 
     def assertions(self) -> Iterator[Axiom]:
-        """The map and the robot."""
+        """Yield the map and the robot."""
         for place, doors in self.doors.items():
             for door in doors:
                 yield ObjectPropertyAssertion(named('hasDoor'), place, door)
@@ -125,7 +125,7 @@ class Patrol:
         return DataPropertyAssertion(named('now'), self.robot, seconds(self.now))
 
     def step(self) -> tuple[list[Axiom], list[Axiom], tuple[str, ...]]:
-        """Goes to a neighbour: assertions that go, those that come, and the words of a Java
+        """Go to a neighbour: assertions that go, those that come, and the words of a Java
         `visit`.
         """
         self._steps += 1
@@ -140,7 +140,7 @@ class Patrol:
 
 
 def schema() -> list[Axiom]:
-    """The project's own ontology without what it states of individuals' values."""
+    """Return the project's own ontology without what it states of individuals' values."""
     axioms = read_ontology(SCHEMA, IRI).axioms
     return [axiom for axiom in axioms if not isinstance(axiom, DataPropertyAssertion)]
 
@@ -150,7 +150,7 @@ def resident_bytes() -> int:
 
 
 def first_reason(kb: KnowledgeBase) -> float:
-    """Seconds of the first reasoning."""
+    """Return the seconds of the first reasoning."""
     start = time.perf_counter()
     kb.reason()
     return time.perf_counter() - start
@@ -163,7 +163,7 @@ def recomputing(kb: KnowledgeBase) -> float:
 
 
 def measure(places: int, visits: int) -> Figures:
-    """All figures of one size, in this process."""
+    """Return all figures of one size, in this process."""
     patrol = Patrol(places)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / 'map.owl'
@@ -212,7 +212,7 @@ def measure(places: int, visits: int) -> Figures:
 
 
 def measure_apart(places: int, visits: int) -> Figures:
-    """All figures of one size, in a process of its own."""
+    """Return all figures of one size, in a process of its own."""
     command = [sys.executable, __file__, '--one', str(places), '--visits', str(visits)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:
@@ -242,7 +242,7 @@ def measure_java(kind: str, places: int, visits: int) -> tuple[float, float]:
 
 
 def duration(value: float) -> str:
-    """Seconds with three significant digits in a unit that suits."""
+    """Return the seconds with three significant digits in a unit that suits."""
     for unit, scale in (('s', 1.0), ('ms', 1e-3), ('us', 1e-6)):
         if value >= scale or unit == 'us':
             return f'{value / scale:.3g} {unit}'

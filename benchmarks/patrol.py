@@ -72,14 +72,14 @@ class Map:
 
 
 def place_map(name: str, path: Path) -> Map:
-    """A place of config/."""
+    """Return a place of config/."""
     place = read_place(path)
     neighbours = {room: list(place.neighbours(room)) for room in place.rooms}
     return Map(name, graph_of_places(neighbours, place.positions, SPEED, DWELL), place.start)
 
 
 def grid(width: int, height: int) -> Map:
-    """A grid of places 5 m apart."""
+    """Return a grid of places 5 m apart."""
     positions = {f'P{x}_{y}': (5.0 * x, 5.0 * y) for x in range(width) for y in range(height)}
     neighbours = {
         f'P{x}_{y}': [
@@ -104,21 +104,21 @@ def _joined(pairs: Sequence[tuple[int, int]], draw: random.Random) -> PatrolGrap
 
 
 def tree(count: int) -> Map:
-    """A random tree of places 2 to 10 m apart."""
+    """Return a random tree of places 2 to 10 m apart."""
     draw = random.Random(SEED)
     pairs = [(child, draw.randrange(max(0, child - 10), child)) for child in range(1, count)]
     return Map(f'tree {count}', _joined(pairs, draw), 'P0')
 
 
 def ring(count: int) -> Map:
-    """A ring of places 2 to 10 m apart."""
+    """Return a ring of places 2 to 10 m apart."""
     draw = random.Random(SEED)
     pairs = [(number, (number + 1) % count) for number in range(count)]
     return Map(f'ring {count}', _joined(pairs, draw), 'P0')
 
 
 def maps(quick: bool) -> Iterator[Map]:
-    """The maps of the benchmark."""
+    """Yield the maps of the benchmark."""
     yield place_map('seven rooms', ROOT / 'config' / 'seven_rooms.yaml')
     yield place_map('patrol world', ROOT / 'config' / 'patrol_world.yaml')
     yield place_map('office, 40 rooms', ROOT / 'config' / 'office.yaml')
@@ -139,7 +139,7 @@ def patrol(
     threshold: float = URGENCY,
     battery: SimulatedBattery | None = None,
 ) -> PatrolRun:
-    """One patrol."""
+    """Return one patrol."""
     rules = Rules() if policy in RULED else Rules(())
     run = Patrol(
         place.graph,
@@ -168,7 +168,7 @@ def table(rows: Sequence[Sequence[str]]) -> str:
 
 
 def compare(place: Map, hours: float) -> dict[str, PatrolRun]:
-    """All policies on one map, printed."""
+    """Return all policies on one map, printed."""
     began = time.perf_counter()
     tour = place.graph.tour
     planning = time.perf_counter() - began
@@ -242,7 +242,7 @@ def random_graph(count: int, seed: int) -> Map:
 
 
 def within_rules(places: Sequence[Map], periods: float) -> None:
-    """The ruled policies over a bound that knows the rules, once settled, by threshold / tour.
+    """Measure the ruled policies over a bound that knows the rules, by threshold / tour.
 
     The bound is exhaustive on maps of up to nine places where the search ends; else the greater of
     the tour's bound and, where a place has one way only, the threshold.
@@ -295,7 +295,7 @@ def first_choice(count: int) -> None:
 
 
 def configured(places: Sequence[Map], hours: float) -> None:
-    """What the threshold of config/parameters.yaml comes to, with the default policy."""
+    """Print what the threshold of config/parameters.yaml comes to, with the default policy."""
     text = (ROOT / 'config' / 'parameters.yaml').read_text(encoding='utf-8')
     nodes = yaml.safe_load(text)
     threshold = nodes['/**']['ros__parameters']['urgency_threshold']
@@ -319,7 +319,7 @@ def configured(places: Sequence[Map], hours: float) -> None:
 
 
 def strandings(place: Map, hours: float) -> None:
-    """The battery: fixed level against a reserve for the worst leg and the way home."""
+    """Measure the battery: fixed level against a reserve for the worst leg and the way home."""
     graph = place.graph
     far = max(graph.seconds(place.start, other) for other in graph.places)
     print(f'\n{place.name}: battery, farthest place {far:.0f} s from the station, {hours:g} h')
@@ -359,7 +359,7 @@ COLOURS = {
 
 
 def plot(path: Path, results: dict[str, tuple[float, dict[str, PatrolRun]]]) -> None:
-    """Draws the ratios to the bound on a logarithmic scale, a group of bars for each map."""
+    """Draw the ratios to the bound on a logarithmic scale, a group of bars for each map."""
     import cv2
     import numpy as np
 
@@ -398,7 +398,7 @@ def plot(path: Path, results: dict[str, tuple[float, dict[str, PatrolRun]]]) -> 
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs the benchmark; returns the exit code."""
+    """Run the benchmark; return the exit code."""
     parser = argparse.ArgumentParser(
         description=(__doc__ or '').partition('\n')[0],
         epilog=(__doc__ or '').partition('\n')[2],

@@ -114,7 +114,7 @@ def apriltag3() -> Detect | None:
 
 
 def this_project(known: frozenset[int] | None = KNOWN, dictionary: str = 'DICT_5X5_100') -> Detect:
-    """The detector of surveillance_perception."""
+    """Return the detector of surveillance_perception."""
     detector = MarkerDetector(DetectorSettings(dictionary, known))
     return lambda image: [(each.marker_id, each.corners) for each in detector.detect(image)]
 
@@ -163,7 +163,7 @@ Tallies = dict[str, Tally]
 
 
 def panel(distance: float, degrees: float, generator: np.random.Generator) -> Panel:
-    """A known marker somewhere in the image, turned about an upright or a level axis."""
+    """Return a known marker somewhere in the image, turned about an upright or a level axis."""
     upright = generator.random() < 0.75
     return Panel(
         int(generator.choice(sorted(KNOWN))),
@@ -182,7 +182,7 @@ def scene(
     generator: np.random.Generator,
     dictionary: cv2.aruco.Dictionary = DICTIONARY,
 ) -> ImageArray:
-    """An image of panels in front of a backdrop."""
+    """Return an image of panels in front of a backdrop."""
     ground = backdrop_of(backdrop, CAMERA, generator)
     return image_of(list(panels), CAMERA, dictionary, ground, degradation, generator)
 
@@ -242,7 +242,7 @@ LIGHTS = (
 
 
 def under_light(light: str, index: int) -> tuple[ImageArray, Panel]:
-    """A known marker at 1.2 to 3 m, up to 40 degrees, under one of `LIGHTS`."""
+    """Return a known marker at 1.2 to 3 m, up to 40 degrees, under one of `LIGHTS`."""
     generator = np.random.default_rng([4, LIGHTS.index(light), index])
     shown = replace(
         panel(generator.uniform(1.2, 3.0), generator.uniform(0, 40), generator),
@@ -452,7 +452,7 @@ def print_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
 
 
 def ratio(ours: float, theirs: float) -> str:
-    """How many times as much."""
+    """Return how many times as much."""
     return f'{ours / theirs:.2f}x' if theirs else '-'
 
 

@@ -43,7 +43,7 @@ class Start:
 
 
 def own_environ() -> dict[str, str]:
-    """This environment as a shell has it that never entered the project's."""
+    """Return this environment as a shell has it that never entered the project's."""
     environ = dict(os.environ)
     if environ.pop('_ROS_WHEELS_BOOTSTRAP_COMPLETE', None):
         environ.pop('LD_LIBRARY_PATH', None)
@@ -53,7 +53,7 @@ def own_environ() -> dict[str, str]:
 
 
 def launch(checkout: Path, *options: str, longest: float = LONGEST) -> Start:
-    """Starts the robot, waits for the first chosen room, looks at the memory, stops it."""
+    """Start the robot, waits for the first chosen room, looks at the memory, stops it."""
     begin = time.monotonic()
     process = subprocess.Popen(
         [BASE_PYTHON, str(checkout / 'launch.py'), '--for', str(longest), *options],
@@ -82,7 +82,7 @@ def launch(checkout: Path, *options: str, longest: float = LONGEST) -> Start:
 
 
 def proportional_size(pid: int) -> float:
-    """The memory of a process in MB, pages shared with others counted in part."""
+    """Return the memory of a process in MB, pages shared with others counted in part."""
     text = Path(f'/proc/{pid}/smaps_rollup').read_text()
     match = re.search(r'^Pss: +(\d+) kB', text, re.MULTILINE)
     assert match is not None
@@ -107,7 +107,7 @@ def cold_start() -> float:
 
 
 def main() -> None:
-    """Measures and prints the tables."""
+    """Measure and print the tables."""
     parser = argparse.ArgumentParser(description=(__doc__ or '').partition('\n')[0])
     parser.add_argument('--quick', action='store_true', help='two starts of each kind')
     parser.add_argument('--cold', action='store_true', help='also a start from nothing (minutes)')

@@ -59,7 +59,7 @@ def main(words: list[str]) -> int:
 
 
 def product(checkout: Path) -> dict[str, Path]:
-    """The product's modules by dotted name, setup scripts left out."""
+    """Return the product's modules by dotted name, setup scripts left out."""
     listing = subprocess.run(
         ['git', 'ls-files', 'surveillance_*/*.py', 'armor_api/*.py', 'launcher/*.py', 'launch.py'],
         cwd=checkout,
@@ -77,7 +77,7 @@ def product(checkout: Path) -> dict[str, Path]:
 
 
 def code_lines(path: Path) -> int:
-    """How many lines hold code: no blank line, comment or docstring."""
+    """Return how many lines hold code: no blank line, comment or docstring."""
     source = path.read_text(encoding='utf-8')
     skipped = set()
     for node in ast.walk(ast.parse(source)):
@@ -103,7 +103,7 @@ def code_lines(path: Path) -> int:
 
 
 def importers_of(trees: dict[str, ast.Module]) -> dict[str, set[str]]:
-    """Which modules import each module."""
+    """Return which modules import each module."""
     found: dict[str, set[str]] = defaultdict(set)
     for name, tree in trees.items():
         for node in ast.walk(tree):
@@ -118,7 +118,7 @@ def importers_of(trees: dict[str, ast.Module]) -> dict[str, set[str]]:
 
 
 def longest_chain(trees: dict[str, ast.Module]) -> list[str]:
-    """The longest line of inheritance of the project's own classes, errors left out."""
+    """Return the longest line of inheritance of the project's own classes, errors left out."""
     bases: dict[str, list[str]] = {}
     for tree in trees.values():
         for node in ast.walk(tree):
@@ -138,7 +138,7 @@ def longest_chain(trees: dict[str, ast.Module]) -> list[str]:
 
 
 def error_classes(tree: ast.Module) -> list[str]:
-    """Names of the exception classes of a module."""
+    """Return the names of the exception classes of a module."""
     return [
         node.name
         for node in ast.walk(tree)
@@ -148,7 +148,7 @@ def error_classes(tree: ast.Module) -> list[str]:
 
 
 def spelling(trees: dict[str, ast.Module]) -> list[str]:
-    """The modules in which a string constant outside docstrings holds a vocabulary name."""
+    """Return the modules in which a string constant outside docstrings holds a vocabulary name."""
     word = re.compile(rf'(?<!\w)({"|".join(VOCABULARY)})(?!\w)')
     found = []
     for name, tree in trees.items():
@@ -165,13 +165,13 @@ def spelling(trees: dict[str, ast.Module]) -> list[str]:
 
 
 def writers(modules: dict[str, Path]) -> list[str]:
-    """The modules that write isIn with a directive of ADD, REMOVE, REPLACE or SET."""
+    """Return the modules that write isIn with a directive of ADD, REMOVE, REPLACE or SET."""
     change = re.compile(r"(?:ADD|REMOVE|REPLACE|SET)[^'\n]*OBJECTPROP[^\n]*\n?[^\n]*isIn")
     return [name for name, path in modules.items() if change.search(path.read_text('utf-8'))]
 
 
 def listed(names: object) -> str:
-    """A count, and the names when they are few."""
+    """Return a count, and the names when they are few."""
     all_names = list(names)  # type: ignore[call-overload]
     few = ', '.join(all_names) if len(all_names) <= 8 else ', '.join(all_names[:8]) + ', ...'
     return f'{len(all_names)}{": " + few if few else ""}'

@@ -51,7 +51,7 @@ MODULES = {
 
 
 def page() -> str:
-    """The page's text."""
+    """Return the page's text."""
     lines = [
         '# Reference of the state machine engine',
         '',
@@ -66,7 +66,7 @@ def page() -> str:
 
 
 def _entry(name: str, thing: Any) -> Iterator[str]:
-    """What a name stands for."""
+    """Yield what a name stands for."""
     if not callable(thing):
         yield f'### `{name}`'
         yield ''
@@ -84,7 +84,7 @@ def _entry(name: str, thing: Any) -> Iterator[str]:
 
 
 def _methods(kind: type) -> Iterator[tuple[str, str]]:
-    """The public methods and properties that a class has itself, and what each does."""
+    """Yield the public methods and properties that a class has itself, and what each does."""
     for label, member in vars(kind).items():
         if label.startswith(('_', 'fsm_')):
             continue
@@ -97,7 +97,7 @@ def _methods(kind: type) -> Iterator[tuple[str, str]]:
 
 
 def _signature(thing: Any) -> str:
-    """Names and defaults of arguments; types are in the text."""
+    """Return the names and defaults of arguments; types are in the text."""
     try:
         signature = inspect.signature(thing)
     except (TypeError, ValueError):
@@ -117,7 +117,7 @@ def _first_line(function: Any) -> str:
 
 
 def _shown(text: str) -> str:
-    """A docstring as Markdown: its sections as lists."""
+    """Return a docstring as Markdown: its sections as lists."""
     lines, section = [], False
     for line in text.splitlines():
         if re.fullmatch(r'(Args|Returns|Raises|Attributes):', line):

@@ -49,7 +49,7 @@ ImageArray = npt.NDArray[np.uint8]
 
 
 def place() -> dict[str, Any]:
-    """The parameters of the marker patrol's place, with dotted names."""
+    """Return the parameters of the marker patrol's place, with dotted names."""
     text = (ROOT / 'config' / 'patrol_world.yaml').read_text()
     flat: dict[str, Any] = {}
     for name, value in yaml.safe_load(text)['/**']['ros__parameters'].items():
@@ -66,7 +66,9 @@ def overrides(**values: Any) -> list[Parameter]:
 
 
 def markers_seen() -> ImageArray:
-    """What the detector shows at three poses, and looking at the two markers that none shows."""
+    """Return what the detector shows at three poses, and looking at the two markers that none
+    shows.
+    """
     # a domain of its own: another robot may be running on this machine
     rclpy.init(domain_id=97)
     spinner = ExecutorThread()

@@ -39,7 +39,7 @@ class Explore(fsm.State):
 
 
 def patrol(seconds: float) -> fsm.StateMachine:
-    """A robot explores every room while another state watches the battery."""
+    """Return a robot explores every room while another state watches the battery."""
     machine = fsm.StateMachine(['finished', 'preempted'])
     machine.set_name('PATROL')
     machine.userdata.rooms = ['R1', 'R2']

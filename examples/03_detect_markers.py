@@ -29,7 +29,7 @@ MARKER_SIZE = 0.2  # metres
 
 
 def drawn_room(camera: CameraModel) -> np.ndarray:
-    """An image with markers 11 and 14."""
+    """Return an image with markers 11 and 14."""
     generator = np.random.default_rng(1)
     panels = [Panel(11, 2.0, 0.4, offset=(-120.0, 0.0)), Panel(14, 3.0, 0.2, offset=(100.0, 20.0))]
     shade = Degradation(shadows=(Shadow((420.0, 260.0), 0.6),))

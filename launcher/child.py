@@ -18,7 +18,7 @@ PR_SET_PDEATHSIG = 1  # linux/prctl.h
 
 
 def end_with_parent(parent: int) -> None:
-    """Has the kernel end this process when its launcher dies, however that happens."""
+    """Have the kernel end this process when its launcher dies, however that happens."""
     if sys.platform == 'linux' and parent:
         ctypes.CDLL(None, use_errno=True).prctl(PR_SET_PDEATHSIG, signal.SIGTERM, 0, 0, 0)
         if os.getppid() != parent:  # it died before the call
@@ -26,14 +26,16 @@ def end_with_parent(parent: int) -> None:
 
 
 def say_up() -> None:
-    """Tells the launcher that the imports, most of the start, are done: the next one may begin."""
+    """Tell the launcher that the imports, most of the start, are done: the next one may begin."""
     descriptor = os.environ.pop('LAUNCH_UP', None)
     if descriptor is not None:
         os.close(int(descriptor))
 
 
 def limit_memory() -> None:
-    """Has one huge allocation fail by itself: it costs the message that caused it, not the node."""
+    """Have one huge allocation fail by itself: it costs the message that caused it, not the
+    node.
+    """
     given = os.environ.pop('LAUNCH_MEMORY', None)
     if given is not None:
         most = int(given)

@@ -21,7 +21,9 @@ if TYPE_CHECKING:
 
 
 def runs_folder(checkout: Path = CHECKOUT) -> Path:
-    """Where runs leave what they write: in the checkout, or the user's own of a read-only one."""
+    """Return where runs leave what they write: in the checkout, or the user's own of a read-only
+    one.
+    """
     if os.access(checkout, os.W_OK):
         return checkout / 'runs'
     state = os.environ.get('XDG_STATE_HOME') or os.path.expanduser('~/.local/state')
@@ -177,7 +179,7 @@ def _shared_options() -> argparse.ArgumentParser:
 
 
 def make_parser(*, help_too: bool = True) -> argparse.ArgumentParser:
-    """The parser of the whole command line."""
+    """Return the parser of the whole command line."""
     package_lines = ''.join(
         f'  {name:<25} {purpose}\n' for name, (_, purpose) in PACKAGE_COMMANDS.items()
     )
@@ -272,7 +274,7 @@ def make_parser(*, help_too: bool = True) -> argparse.ArgumentParser:
 
 
 def main(argv: Sequence[str]) -> int:
-    """Runs one command and returns its exit code."""
+    """Run one command and return its exit code."""
     # A set-up that is told to end has to take its compilers along.
     _make_streams_safe()
     try:
@@ -298,7 +300,7 @@ def main(argv: Sequence[str]) -> int:
 
 
 def _make_streams_safe() -> None:
-    """Lets output be closed, and the terminal's encoding lack a character."""
+    """Let output be closed, and the terminal's encoding lack a character."""
     for name in ('stdout', 'stderr'):
         stream = getattr(sys, name)
         if stream is None:
@@ -342,7 +344,7 @@ def _run(argv: list[str]) -> int:
 
 
 def wanted_run(options: argparse.Namespace) -> Run:
-    """What the options of `run`, or those that `node` has of them, ask for."""
+    """Return what the options of `run`, or those that `node` has of them, ask for."""
     from launcher.run import Run
 
     given = vars(options)
@@ -515,7 +517,9 @@ def _package_command(name: str, argv: list[str]) -> int:
 
 
 def _environment(extras: Sequence[str]) -> Environment | None:
-    """The environment to run in; None where an installed ROS with this workspace is active."""
+    """Return the environment to run in; None where an installed ROS with this workspace is
+    active.
+    """
     if system.sourced_ros():
         if system.sourced_workspace():
             return None
@@ -527,7 +531,7 @@ def _environment(extras: Sequence[str]) -> Environment | None:
 
 
 def _enter(argv: list[str], extras: Sequence[str] = ()) -> None:
-    """Goes on in the project's environment: sets it up, then becomes a process of it."""
+    """Set the project's environment up, and go on as a process of it."""
     environment = _environment(extras)
     if environment is None:
         return

@@ -60,16 +60,18 @@ class Environment:
         self._wanted_extras = tuple(extras)
 
     def active(self) -> bool:
-        """Whether this very process runs in the environment."""
+        """Tell whether this very process runs in the environment."""
         return Path(sys.prefix).resolve() == self.venv.resolve()
 
     def ready(self) -> bool:
-        """Whether the set-up is complete and made for the present sources; takes milliseconds."""
+        """Tell whether the set-up is complete and made for the present sources; takes
+        milliseconds.
+        """
         journal = Journal.read(self.venv)
         return self.python.exists() and journal.fits(current(self.checkout, self._extras(journal)))
 
     def prepare(self) -> None:
-        """Brings the environment up to date; does nothing when it is.
+        """Bring the environment up to date; do nothing when it is.
 
         Raises:
             LaunchError: a step failed, or the machine lacks something that only its owner can give.
@@ -167,7 +169,7 @@ class Environment:
         return [str(self.python), '-m', 'pip', 'install', *options]
 
     def _usable(self, journal: Journal, python: str) -> bool:
-        """Whether the environment has a working pip and stands on this interpreter."""
+        """Tell whether the environment has a working pip and stands on this interpreter."""
         if not self.python.exists() or journal.python not in ('', python):
             return False
         answer = subprocess.run(
@@ -185,12 +187,12 @@ class Environment:
         return self.venv / 'lib' / version / 'site-packages'
 
     def _write_path_file(self) -> None:
-        """Makes the packages importable where they lie: an edit needs no installation."""
+        """Make the packages importable where they lie: an edit needs no installation."""
         lines = [str(self.checkout / package) for package in PACKAGES]
         (self._site_packages() / PATH_FILE).write_text('\n'.join(lines) + '\n', encoding='utf-8')
 
     def _remove_half_installed(self, package: str) -> None:
-        """Takes away the record of a package that was not installed to its end."""
+        """Take away the record of a package that was not installed to its end."""
         for record in self._site_packages().glob(f'{package}-*.dist-info'):
             if not (record / 'RECORD').exists():
                 for path in record.iterdir():
@@ -199,7 +201,7 @@ class Environment:
 
     @contextmanager
     def _alone(self) -> Iterator[int]:
-        """Holds the checkout's set-up lock; waits while another launch has it."""
+        """Hold the checkout's set-up lock; wait while another launch has it."""
         # The folder itself is the lock: no lock file is left behind.
         lock = os.open(self.checkout, os.O_RDONLY)
         try:
@@ -264,7 +266,9 @@ class _Runner:
 
 
 def clean_environ() -> dict[str, str]:
-    """This process's environment without what belongs to another ROS or virtual environment."""
+    """Return this process's environment without what belongs to another ROS or virtual
+    environment.
+    """
     environ = dict(os.environ)
     if environ.pop(_BOOTSTRAP, None):
         environ.pop('LD_LIBRARY_PATH', None)
@@ -278,12 +282,14 @@ def clean_environ() -> dict[str, str]:
 
 
 def _base_python() -> str:
-    """The interpreter that a new environment is made from, also when this one is in a venv."""
+    """Return the interpreter that a new environment is made from, also when this one is in a
+    venv.
+    """
     return str(getattr(sys, '_base_executable', sys.executable))
 
 
 def _lines(process: subprocess.Popen[bytes], step: Step) -> Iterator[str]:
-    """The lines that a process prints, while the step's clock is kept going."""
+    """Yield the lines that a process prints, while the step's clock is kept going."""
     assert process.stdout is not None
     rest = b''
     with selectors.DefaultSelector() as selector:

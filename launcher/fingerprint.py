@@ -52,7 +52,7 @@ class Journal:
 
     @classmethod
     def read(cls, venv: Path) -> Journal:
-        """The journal in `venv`; an empty one where none is, or where it cannot be read."""
+        """Return the journal in `venv`; an empty one where none is, or where it cannot be read."""
         try:
             stored = json.loads((venv / JOURNAL).read_text(encoding='utf-8'))
             return cls(**stored)
@@ -72,7 +72,7 @@ class Journal:
 
 
 def requirements(checkout: Path, extras: Iterable[str]) -> list[str]:
-    """The project's dependencies with those of the named extras, as pip takes them."""
+    """Return the project's dependencies with those of the named extras, as pip takes them."""
     project = tomllib.loads((checkout / 'pyproject.toml').read_text(encoding='utf-8'))['project']
     wanted = list(project['dependencies'])
     for extra in extras:
@@ -81,7 +81,7 @@ def requirements(checkout: Path, extras: Iterable[str]) -> list[str]:
 
 
 def current(checkout: Path, extras: Iterable[str]) -> Fingerprint:
-    """The fingerprint of this checkout under this interpreter."""
+    """Return the fingerprint of this checkout under this interpreter."""
     return Fingerprint(
         python=f'{sys.version_info.major}.{sys.version_info.minor} {sys.base_prefix}',
         checkout=str(checkout),

@@ -80,7 +80,7 @@ def runtime_folder() -> Path:
 
 
 def _open(folder: Path, name: str) -> int | None:
-    """The file of a claim; None where it cannot be had, and nothing is claimed then."""
+    """Return the file of a claim; None where it cannot be had, and nothing is claimed then."""
     try:
         for each in (folder.parent, folder):
             with contextlib.suppress(FileExistsError):

@@ -63,7 +63,7 @@ class MergedLog:
         self._heard = heard
 
     def say(self, text: str) -> None:
-        """A line of the launcher's own."""
+        """Print a line of the launcher's own."""
         self._write(LAUNCHER, '', text)
 
     def warn(self, text: str) -> None:
@@ -73,7 +73,7 @@ class MergedLog:
         self._write(LAUNCHER, 'ERROR', text)
 
     def line(self, process: str, raw: str) -> None:
-        """A line that `process` printed."""
+        """Print a line that `process` printed."""
         # A progress bar redraws its line: only what it ended with belongs into a log.
         text = bounded(raw.rstrip().rsplit('\r', 1)[-1])
         if match := _ROS_LINE.match(_ESCAPES.sub('', text)):
@@ -90,7 +90,7 @@ class MergedLog:
             self._write(process, '', text)
 
     def plain(self, text: str) -> None:
-        """A block of text without time and name, such as the summary."""
+        """Print a block of text without time and name, such as the summary."""
         self._emit(text, text)
 
     def close(self) -> None:
@@ -118,7 +118,7 @@ class MergedLog:
         self._emit('\n'.join([head + lines[0], *(more + line for line in lines[1:])]), plain)
 
     def _fitting(self, text: str, taken: int) -> list[str]:
-        """The text as lines that fit beside what is `taken` of a terminal's columns."""
+        """Return the text as lines that fit beside what is `taken` of a terminal's columns."""
         if not self._terminal or '\x1b' in text:
             return [text]
         room = shutil.get_terminal_size().columns - taken
@@ -160,7 +160,7 @@ def bounded(text: str) -> str:
 
 
 def _discard(stream: TextIO) -> None:
-    """Sends what is still buffered nowhere: at its exit, Python would fail to write it."""
+    """Send what is still buffered nowhere: at its exit, Python would fail to write it."""
     with contextlib.suppress(OSError, ValueError):
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, stream.fileno())

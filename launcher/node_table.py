@@ -180,7 +180,7 @@ RUN_NODES = frozenset((*_ALWAYS, *_OF_PATROL))
 
 
 def find(name: str) -> Node:
-    """The node called `name`.
+    """Return the node called `name`.
 
     Raises:
         LaunchError: there is no such node.
@@ -197,7 +197,7 @@ def select(
     only: Iterable[str] = (),
     without: Iterable[str] = (),
 ) -> tuple[Node, ...]:
-    """The nodes that a run starts, in start order.
+    """Return the nodes that a run starts, in start order.
 
     Args:
         mode: one of `MODES`; SIMULATED adds the simulator.

@@ -104,7 +104,7 @@ def _make_once(node: node_table.Node, context: Any, overrides: Sequence[Any]) ->
 
 
 def _portable(value: Any) -> Any:
-    """A default without the folder that this checkout lies in."""
+    """Return a default without the folder that this checkout lies in."""
     return value.removeprefix(f'{CHECKOUT}/') if isinstance(value, str) else value
 
 
@@ -139,7 +139,7 @@ class _Record:
 
 @contextmanager
 def _recording(node_class: Any) -> Iterator[_Record]:
-    """Notes every declaration of a parameter."""
+    """Note every declaration of a parameter."""
     record = _Record()
     declare, under = node_class._declare_checked, node_class.parameters_under
 

@@ -18,7 +18,9 @@ _PLAIN_EVERY = 15.0
 
 
 def describe(line: str) -> str:
-    """What a line of pip's or of the build's output says about progress, empty when nothing."""
+    """Return what a line of pip's or of the build's output says about progress, empty when
+    nothing.
+    """
     if build := _BUILD_STEP.search(line):
         done, total = int(build[1]), int(build[2])
         return f'compiling {done}/{total}'
@@ -55,7 +57,7 @@ class Step:
         return self
 
     def feed(self, line: str) -> None:
-        """Takes one line of the step's output."""
+        """Take one line of the step's output."""
         if detail := describe(line):
             self._detail = detail
         self.tick()

@@ -131,7 +131,7 @@ class Supervisor:
         self._code = 0
 
     def read_from(self, descriptor: int, on_line: Callable[[str], None]) -> None:
-        """Calls `on_line` for each line that can be read from a descriptor until its end."""
+        """Call `on_line` for each line that can be read from a descriptor until its end."""
         rest = b''
 
         def take() -> None:
@@ -150,7 +150,7 @@ class Supervisor:
         self._selector.register(descriptor, selectors.EVENT_READ, take)
 
     def send(self, name: str, line: str) -> bool:
-        """Writes a line to a program's input; whether somebody is there to read it."""
+        """Write a line to a program's input; return whether somebody is there to read it."""
         process = self.children[name].process
         if process is None or process.stdin is None:
             return False
@@ -162,7 +162,7 @@ class Supervisor:
         return True
 
     def stop(self, code: int = 0) -> None:
-        """Begins to end every process; `run` returns when all are gone."""
+        """Begin to end every process; `run` returns when all are gone."""
         if self._stopping_since is None:
             self._stopping_since = time.monotonic()
             self._code = code
@@ -173,7 +173,7 @@ class Supervisor:
             self._keep_stopping(self._stopping_since)
 
     def run(self, seconds: float | None = None) -> int:
-        """Starts everything and returns the exit code when everything has ended.
+        """Start everything and return the exit code when everything has ended.
 
         Args:
             seconds: stop after this time; None runs until a signal or until every program ended.
@@ -221,7 +221,7 @@ class Supervisor:
 
     @contextlib.contextmanager
     def _awaited(self, child: Child) -> Iterator[int | None]:
-        """Gives what a process closes when it is up, or lets go of when it dies before that."""
+        """Give what a process closes when it is up, or lets go of when it dies before that."""
         if not child.program.says_up:
             yield None
             return
@@ -242,7 +242,7 @@ class Supervisor:
 
     @contextlib.contextmanager
     def _listening(self, child: Child) -> Iterator[int | None]:
-        """Gives what a process writes its heartbeats to."""
+        """Give what a process writes its heartbeats to."""
         if not child.program.watched:
             yield None
             return
@@ -287,7 +287,7 @@ class Supervisor:
         )
 
     def _read(self, child: Child, process: subprocess.Popen[bytes]) -> bool:
-        """Takes what a process printed; whether there may be more."""
+        """Take what a process printed; return whether there may be more."""
         assert process.stdout is not None
         try:
             chunk = os.read(process.stdout.fileno(), 65536)
@@ -316,7 +316,7 @@ class Supervisor:
             self._after_death(child, code)
 
     def _close(self, child: Child, process: subprocess.Popen[bytes]) -> None:
-        """Takes what a dead process still printed, then lets its pipes go."""
+        """Take what a dead process still printed, then let its pipes go."""
         assert process.stdout is not None
         # A process that left its group may hold the pipe open: its end is not waited for.
         if process.stdout in self._selector.get_map():
@@ -356,7 +356,7 @@ class Supervisor:
         self._on_trouble(text)
 
     def _watch(self, now: float) -> None:
-        """Ends what hangs or holds too much memory; it is started again as after a death."""
+        """End what hangs or holds too much memory; it is started again as after a death."""
         if now < self._look_at:
             return
         notify('WATCHDOG=1')
@@ -403,7 +403,7 @@ class Supervisor:
                 child.process.terminate()
 
     def _keep_stopping(self, now: float) -> None:
-        """Goes on with a stop: leaders first, then the rest, at last by force."""
+        """Go on with a stop: leaders first, then the rest, at last by force."""
         since = self._stopping_since
         if since is None:
             return
@@ -435,7 +435,7 @@ class Supervisor:
 
     @contextlib.contextmanager
     def _signals(self) -> Iterator[None]:
-        """Turns stop signals and deaths of children into events of the loop.
+        """Turn stop signals and deaths of children into events of the loop.
 
         Afterwards stop signals are ignored: what was running has ended, the rest is soon said.
         """
@@ -469,7 +469,7 @@ class Supervisor:
 
 
 def describe_exit(code: int) -> str:
-    """An exit code in words, e.g. `killed by SIGKILL` or `exit code 1`."""
+    """Return an exit code in words, e.g. `killed by SIGKILL` or `exit code 1`."""
     if code < 0:
         try:
             return f'killed by {signal.Signals(-code).name}'
@@ -479,7 +479,7 @@ def describe_exit(code: int) -> str:
 
 
 def _has_ended(process: subprocess.Popen[bytes]) -> bool:
-    """Whether a child is dead; it is not reaped, so that its group's number stays taken."""
+    """Tell whether a child is dead; it is not reaped, so that its group's number stays taken."""
     options = os.WEXITED | os.WNOHANG | os.WNOWAIT
     return os.waitid(os.P_PID, process.pid, options) is not None
 

@@ -50,7 +50,7 @@ class Machine:
         )
 
     def why_no_wheels(self) -> str:
-        """Why the ROS wheels do not fit this machine, empty when they do."""
+        """Return why the ROS wheels do not fit this machine, empty when they do."""
         if self.system != 'Linux' or self.processor not in ('x86_64', 'AMD64'):
             return f'there are no ROS 2 wheels for {self.system} on {self.processor}'
         if self.libc != 'glibc':
@@ -64,13 +64,13 @@ class Machine:
 
 
 def sourced_ros(environ: Mapping[str, str] | None = None) -> bool:
-    """Whether a ROS 2 Jazzy is active in this shell."""
+    """Tell whether a ROS 2 Jazzy is active in this shell."""
     environ = os.environ if environ is None else environ
     return environ.get('ROS_DISTRO') == 'jazzy' and bool(environ.get('AMENT_PREFIX_PATH'))
 
 
 def sourced_workspace() -> bool:
-    """Whether this very interpreter imports ROS and the compiled interfaces already."""
+    """Tell whether this very interpreter imports ROS and the compiled interfaces already."""
     # The folders of the checkout look like packages without a file to load: those do not count.
     specs = [
         importlib.util.find_spec(name)
@@ -80,7 +80,7 @@ def sourced_workspace() -> bool:
 
 
 def note_of_unused_ros(checkout: Path, ros_prefix: Path = ROS_PREFIX) -> str:
-    """Says, where a ROS is installed but not active, how to use it; empty where none is."""
+    """Say, where a ROS is installed but not active, how to use it; empty where none is."""
     if not ros_prefix.exists():
         return ''
     return (
@@ -90,12 +90,12 @@ def note_of_unused_ros(checkout: Path, ros_prefix: Path = ROS_PREFIX) -> str:
 
 
 def colcon_advice(checkout: Path) -> str:
-    """The commands that build and run the project on an installed ROS 2 Jazzy."""
+    """Return the commands that build and run the project on an installed ROS 2 Jazzy."""
     return COLCON_STEPS.format(checkout=checkout)
 
 
 def no_wheels_advice(reason: str, checkout: Path, ros_prefix: Path = ROS_PREFIX) -> str:
-    """What to do on a machine that the wheels do not fit."""
+    """Return what to do on a machine that the wheels do not fit."""
     if ros_prefix.exists():
         return f'{reason}, but ROS 2 Jazzy is installed. Build with it:\n{colcon_advice(checkout)}'
     return (
@@ -106,7 +106,7 @@ def no_wheels_advice(reason: str, checkout: Path, ros_prefix: Path = ROS_PREFIX)
 
 
 def missing_packages() -> list[str]:
-    """The Debian packages without which the set-up would fail half-way."""
+    """Return the Debian packages without which the set-up would fail half-way."""
     major, minor = sys.version_info[:2]
     versioned = f'python{major}.{minor}'
     system_python = Path('/usr/bin/python3')
@@ -165,7 +165,9 @@ def install_packages(packages: Sequence[str]) -> None:
 
 
 def _privilege() -> list[str] | None:
-    """What to write before apt-get: nothing for root, sudo when it asks no password, else None."""
+    """Return what to write before apt-get: nothing for root, sudo when it asks no password, else
+    None.
+    """
     if os.geteuid() == 0:
         return []
     if shutil.which('sudo') is not None:

@@ -42,7 +42,7 @@ MISSION_FIXTURES = {'robot', 'launch', 'started', 'mission', 'page', 'viewer'}
 
 @pytest.fixture(scope='session')
 def ros_domain() -> int:
-    """The ROS domain of this test process, also in its environment."""
+    """Provide the ROS domain of this test process, also in its environment."""
     return _domain
 
 
@@ -156,7 +156,7 @@ class Graph:
 
 @pytest.fixture
 def graph() -> Iterator[Graph]:
-    """A graph of real nodes; see `Graph`."""
+    """Provide a graph of real nodes; see `Graph`."""
     graph = Graph()
     yield graph
     graph.close()

@@ -60,7 +60,9 @@ ARGUMENTS = [
 
 
 def start_nodes(context: LaunchContext) -> list[Node]:
-    """The nodes that the arguments ask for, each with the parameter files and started again."""
+    """Return the nodes that the arguments ask for, each with the parameter files and started
+    again.
+    """
 
     def argument(name: str) -> str:
         return str(LaunchConfiguration(name).perform(context))
@@ -122,5 +124,5 @@ def stop_if_unusable(event: ProcessExited, _context: LaunchContext) -> list[Shut
 
 
 def generate_launch_description() -> LaunchDescription:
-    """What `ros2 launch` calls."""
+    """Return what `ros2 launch` calls."""
     return LaunchDescription([*ARGUMENTS, OpaqueFunction(function=start_nodes)])

@@ -70,7 +70,7 @@ _DEADLINES = {
 
 
 def choice_settings(node: PatrolNode, *, explores: bool = True) -> DecisionSettings:
-    """Declares what a decision depends on; the result follows changes at run time.
+    """Declare what a decision depends on; the result follows changes at run time.
 
     Args:
         node: The node.
@@ -157,7 +157,7 @@ def _battery_limits(node: PatrolNode, settings: DecisionSettings) -> BatteryLimi
 
 
 def mission_settings(node: PatrolNode) -> MissionSettings:
-    """Declares everything about the mission but the deadlines.
+    """Declare everything about the mission but the deadlines.
 
     Raises:
         ParameterError: A value is of the wrong type or out of range.
@@ -168,13 +168,13 @@ def mission_settings(node: PatrolNode) -> MissionSettings:
 
 
 def deadlines(node: PatrolNode, names: Sequence[str] = tuple(_DEADLINES)) -> Deadlines:
-    """Declares the deadlines of the peers, seconds of steady time."""
+    """Declare the deadlines of the peers, seconds of steady time."""
     described = {name: _DEADLINES[name] for name in names}
     return declare_fields(node, Deadlines(), described, prefix='deadline.')
 
 
 def random_seed(node: PatrolNode) -> int:
-    """Declares the seed of the policies that take a chance."""
+    """Declare the seed of the policies that take a chance."""
     seed: int = node.parameter(
         'random_seed',
         -1,
@@ -186,7 +186,7 @@ def random_seed(node: PatrolNode) -> int:
 
 
 def record_path(node: PatrolNode) -> str:
-    """Declares the file of the mission record; what was learned is kept beside it."""
+    """Declare the file of the mission record; what was learned is kept beside it."""
     path: str = node.parameter(
         'record',
         '',

@@ -21,28 +21,28 @@ MOST_CANDIDATES = 10_000
 
 
 def point_from(message: PointMessage) -> Point:
-    """A point in metres."""
+    """Return a point in metres."""
     return (message.x, message.y, message.z)
 
 
 def point_message(point: Sequence[float]) -> PointMessage:
-    """A point from x, y and perhaps z, metres."""
+    """Return a point from x, y and perhaps z, metres."""
     x, y, z = (*(float(value) for value in point), 0.0)[:3]
     return PointMessage(x=x, y=y, z=z)
 
 
 def points_from(messages: Iterable[PointMessage]) -> list[Point]:
-    """A path in metres."""
+    """Return a path in metres."""
     return [point_from(message) for message in messages]
 
 
 def point_messages(points: Iterable[Sequence[float]]) -> list[PointMessage]:
-    """A path as messages."""
+    """Return a path as messages."""
     return [point_message(point) for point in points]
 
 
 def decision_message(decision: Decision, sequence: int, stamp: Any) -> DecisionMessage:
-    """A decision, numbered and stamped."""
+    """Return a decision, numbered and stamped."""
     return DecisionMessage(
         stamp=stamp,
         sequence=sequence,
@@ -90,7 +90,7 @@ def decision_from(message: DecisionMessage) -> Decision:
 
 
 def charging_from(message: BatteryState) -> bool | None:
-    """Whether a battery is being charged, or is full at its charger; None: it does not say."""
+    """Tell whether a battery is being charged, or is full at its charger; None: it does not say."""
     status = message.power_supply_status
     if status in (
         BatteryState.POWER_SUPPLY_STATUS_CHARGING,
@@ -101,7 +101,9 @@ def charging_from(message: BatteryState) -> bool | None:
 
 
 def place_note_from(response: Any) -> PlaceNote | None:
-    """What a marker stands for, from the answer of `room_info`; None when it is not known."""
+    """Return what a marker stands for, from the answer of `room_info`; None when it is not
+    known.
+    """
     if not response.connections:
         return None
     doors = {each.through_door: each.connected_to for each in response.connections}
@@ -109,7 +111,7 @@ def place_note_from(response: Any) -> PlaceNote | None:
 
 
 def map_message(places: Iterable[PlaceNote], robot_room: str) -> OntologyMap:
-    """The message that enters places into the ontology."""
+    """Return the message that enters places into the ontology."""
     return OntologyMap(
         places=[
             OntologyPlace(

@@ -316,7 +316,9 @@ def _listed(names: Mapping[str, float]) -> str:
 
 
 def _premises(place: str, world: World, rule: str) -> tuple[str, ...]:
-    """The facts that a choice of ``place`` rests on, with whether they hold, missing ones first."""
+    """Return the facts that a choice of ``place`` rests on, with whether they hold, missing ones
+    first.
+    """
     facts = [
         (f'the robot canReach {place}', place in world.reachable),
         (f'{world.place} connectedTo {place}', place in world.graph.legs.get(world.place, {})),

@@ -101,7 +101,7 @@ class Reasoner(PatrolNode):
         self._work.stop()
 
     def _choose(self) -> str:
-        """The next place; empty when there is none, and the log says why."""
+        """Return the next place; empty when there is none, and the log says why."""
         with self._sharing:
             # The lock is held until the request that began this choice has noted it as the next.
             self._next = None

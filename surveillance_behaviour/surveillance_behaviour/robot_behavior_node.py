@@ -187,5 +187,5 @@ def _open_record(path: str) -> MissionRecord | None:
 
 
 def main(args: Sequence[str] | None = None) -> int:
-    """Runs the node until it is stopped."""
+    """Run the node until it is stopped."""
     return run_node(RobotBehavior, args)

@@ -76,7 +76,7 @@ class BatteryController(PatrolNode):
             self._robot = RobotBattery(self, self._settings, self._battery, self._change, since)
 
     def _change(self, change: Callable[[], None]) -> None:
-        """Changes the charge and publishes what became different."""
+        """Change the charge and publish what became different."""
         with self._lock:
             change()
             said = self._battery.percent, self._battery.level < self._low_below
@@ -186,7 +186,7 @@ class RobotBattery:
         node.create_timer(settings.update_period, self._update)
 
     def why_not_charging(self) -> str | None:
-        """Says why the battery cannot charge now; None when it can."""
+        """Say why the battery cannot charge now; None when it can."""
         return self._use.why_not_charging()
 
     def _on_pose(self, message: PoseWithCovarianceStamped) -> None:
@@ -211,5 +211,5 @@ class RobotBattery:
 
 
 def main(args: Sequence[str] | None = None) -> int:
-    """Runs the node until it is stopped."""
+    """Run the node until it is stopped."""
     return run_node(BatteryController, args)

@@ -60,7 +60,8 @@ _SETTINGS = {
 
 
 def allowed(wanted: Velocity, seen: Points, settings: MonitorSettings) -> Velocity:
-    """The velocity nearest to a wanted one, on the same arc, from which the robot can still brake.
+    """Return the velocity nearest to a wanted one, on the same arc, from which the robot can still
+    brake.
 
     Args:
         wanted: What is commanded.
@@ -147,5 +148,5 @@ class CollisionMonitor(PatrolNode):
 
 
 def main(args: Sequence[str] | None = None) -> int:
-    """Runs the node until it is stopped."""
+    """Run the node until it is stopped."""
     return run_node(CollisionMonitor, args)

@@ -14,7 +14,7 @@ EXECUTION_MODES = ('MANUAL', 'RANDOM', 'SIMULATED')
 
 
 def execution_mode(node: PatrolNode) -> str:
-    """Declares `execution_mode`."""
+    """Declare `execution_mode`."""
     mode: str = node.parameter(
         'execution_mode',
         'RANDOM',
@@ -123,7 +123,7 @@ class BatterySettings:
 def battery_settings(
     node: PatrolNode, on_require_recharge: Callable[[int], None]
 ) -> BatterySettings:
-    """Declares the parameters of `battery_controller`.
+    """Declare the parameters of `battery_controller`.
 
     Args:
         node: The node.
@@ -151,7 +151,7 @@ class Environment:
     y_max: float
 
     def contains(self, point: Sequence[float] | Points) -> bool:
-        """Whether a point lies within the limits."""
+        """Tell whether a point lies within the limits."""
         return bool(self.x_min <= point[0] <= self.x_max and self.y_min <= point[1] <= self.y_max)
 
     def __str__(self) -> str:
@@ -181,12 +181,12 @@ class PlannerSettings:
     console: bool = True
 
     def spacing(self, length: float) -> float:
-        """The distance of the via points of a path of `length` metres, metres."""
+        """Return the distance of the via points of a path of `length` metres, metres."""
         return max(length, 1e-6) / (self.via_point_count - 1)
 
 
 def planner_settings(node: PatrolNode) -> PlannerSettings:
-    """Declares the parameters of `planner_controller`.
+    """Declare the parameters of `planner_controller`.
 
     Raises:
         ParameterError: A value is of the wrong type or out of range.
@@ -249,7 +249,7 @@ class MotionSettings:
 
 
 def motion_settings(node: PatrolNode) -> MotionSettings:
-    """Declares the parameters of `motion_controller`.
+    """Declare the parameters of `motion_controller`.
 
     Raises:
         ParameterError: A value is of the wrong type or out of range.

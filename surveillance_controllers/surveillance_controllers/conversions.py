@@ -30,18 +30,18 @@ if TYPE_CHECKING:
 
 
 def array_from_points(points: Iterable[Point]) -> Points:
-    """Points as an array of shape (n, 3), metres."""
+    """Return points as an array of shape (n, 3), metres."""
     return np.array([(p.x, p.y, p.z) for p in points], dtype=float).reshape(-1, 3)
 
 
 def point_from(coordinates: Sequence[float] | Points) -> Point:
-    """A point from x, y and perhaps z, metres."""
+    """Return a point from x, y and perhaps z, metres."""
     x, y, z = (*(float(c) for c in coordinates), 0.0)[:3]
     return Point(x=x, y=y, z=z)
 
 
 def points_from_array(array: Points) -> list[Point]:
-    """The rows of an array of shape (n, 2) or (n, 3) as points."""
+    """Return the rows of an array of shape (n, 2) or (n, 3) as points."""
     return [point_from(row) for row in array]
 
 
@@ -57,7 +57,7 @@ def path_from_array(array: Points, stamp: Any) -> PathMessage:
 
 
 def battery_state(battery: Battery, *, charging: bool) -> BatteryState:
-    """A battery's charge as the message that ROS has for it; the caller stamps it."""
+    """Return a battery's charge as the message that ROS has for it; the caller stamps it."""
     p = battery.parameters
     message = BatteryState()
     message.voltage = float(battery.voltage)
@@ -91,7 +91,7 @@ LONGEST_RANGE = 1000.0
 
 
 def pose_from(message: PoseMessage) -> Pose:
-    """A pose in the plane: x, y in metres and yaw in radians.
+    """Return a pose in the plane: x, y in metres and yaw in radians.
 
     Raises:
         ValueError: A coordinate is not finite, or too large to be one.
@@ -109,7 +109,7 @@ def pose_from(message: PoseMessage) -> Pose:
 
 
 def pose_message(pose: Pose) -> PoseMessage:
-    """A pose in the plane as a message."""
+    """Return a pose in the plane as a message."""
     message = PoseMessage()
     message.position = point_from(pose[:2])
     message.orientation = Quaternion(z=math.sin(pose[2] / 2), w=math.cos(pose[2] / 2))
@@ -117,7 +117,9 @@ def pose_message(pose: Pose) -> PoseMessage:
 
 
 def pose_estimate(pose: Pose, deviation: float, turn_deviation: float) -> PoseWithCovarianceStamped:
-    """An estimated pose with its standard deviations in metres and rad; the caller stamps it."""
+    """Return an estimated pose with its standard deviations in metres and rad; the caller stamps
+    it.
+    """
     message = PoseWithCovarianceStamped()
     message.header.frame_id = 'map'
     message.pose.pose = pose_message(pose)
@@ -129,7 +131,7 @@ def pose_estimate(pose: Pose, deviation: float, turn_deviation: float) -> PoseWi
 
 
 def twist_from(velocity: Velocity) -> Twist:
-    """A velocity of a differential drive as a message."""
+    """Return a velocity of a differential drive as a message."""
     message = Twist()
     message.linear.x = float(velocity.speed)
     message.angular.z = float(velocity.turn)
@@ -137,7 +139,7 @@ def twist_from(velocity: Velocity) -> Twist:
 
 
 def grid_from(message: OccupancyGrid) -> GridMap:
-    """A map.
+    """Return a map.
 
     Raises:
         ValueError: The message is not sound, or its origin is turned.
@@ -166,7 +168,7 @@ def grid_from(message: OccupancyGrid) -> GridMap:
 
 
 def scan_from(message: LaserScan, mount: Pose = (0.0, 0.0, 0.0)) -> Scan:
-    """A turn of a lidar; rays that are out of its range or not a number met nothing.
+    """Return a turn of a lidar; rays that are out of its range or not a number met nothing.
 
     Args:
         message: The scan.
@@ -202,7 +204,7 @@ def scan_from(message: LaserScan, mount: Pose = (0.0, 0.0, 0.0)) -> Scan:
 
 
 def planar_from(transform: Transform) -> Pose:
-    """A transform as a pose in the plane.
+    """Return a transform as a pose in the plane.
 
     Raises:
         ValueError: It is not finite, or leaves the plane by more than 0.1 rad.

@@ -12,12 +12,12 @@ Pose = tuple[float, float, float]
 
 
 def angle_between(first: float, second: float) -> float:
-    """The turn from one yaw to another, -pi to pi, radians."""
+    """Return the turn from one yaw to another, -pi to pi, radians."""
     return math.remainder(second - first, math.tau)
 
 
 def composed(pose: Pose, step: Pose) -> Pose:
-    """The pose reached from `pose` by a step given in its own frame."""
+    """Return the pose reached from `pose` by a step given in its own frame."""
     cos, sin = math.cos(pose[2]), math.sin(pose[2])
     return (
         pose[0] + cos * step[0] - sin * step[1],
@@ -27,7 +27,7 @@ def composed(pose: Pose, step: Pose) -> Pose:
 
 
 def relative(first: Pose, second: Pose) -> Pose:
-    """The step, in the first pose's own frame, that leads to the second."""
+    """Return the step, in the first pose's own frame, that leads to the second."""
     dx, dy = second[0] - first[0], second[1] - first[1]
     cos, sin = math.cos(first[2]), math.sin(first[2])
     return cos * dx + sin * dy, cos * dy - sin * dx, angle_between(first[2], second[2])
@@ -48,19 +48,19 @@ def in_map(pose: Pose, points: Points) -> Points:
 
 
 def distances_along(path: ArrayLike) -> Points:
-    """The way from the first point to each point, shape (n,), metres; the first is 0."""
+    """Return the way from the first point to each point, shape (n,), metres; the first is 0."""
     steps = np.linalg.norm(np.diff(np.asarray(path, dtype=float), axis=0), axis=1)
     return np.concatenate(([0.0], np.cumsum(steps)))
 
 
 def length(path: ArrayLike) -> float:
-    """The length of a path in metres; 0 for a path of one point or none."""
+    """Return the length of a path in metres; 0 for a path of one point or none."""
     points = np.asarray(path, dtype=float)
     return float(distances_along(points)[-1]) if len(points) > 1 else 0.0
 
 
 def point_at(path: ArrayLike, distance: ArrayLike) -> Points:
-    """The point `distance` metres along a path, held at its two ends.
+    """Return the point `distance` metres along a path, held at its two ends.
 
     Args:
         path: At least one point, shape (n, d).
@@ -81,7 +81,7 @@ def point_at(path: ArrayLike, distance: ArrayLike) -> Points:
 
 
 def equally_spaced(path: ArrayLike, spacing: float) -> Points:
-    """Points at equal distances along a path, both ends included.
+    """Return points at equal distances along a path, both ends included.
 
     Args:
         path: At least one point, shape (n, d).
@@ -99,7 +99,7 @@ def equally_spaced(path: ArrayLike, spacing: float) -> Points:
 
 
 def distance_nearest(path: ArrayLike, position: ArrayLike) -> float:
-    """How far along a path its point nearest to a position lies, metres.
+    """Return how far along a path its point nearest to a position lies, metres.
 
     Args:
         path: At least one point, shape (n, d).
@@ -117,5 +117,5 @@ def distance_nearest(path: ArrayLike, position: ArrayLike) -> float:
 
 
 def points_passed(path: ArrayLike, distance: float) -> int:
-    """How many of a path's points lie at most `distance` metres along it."""
+    """Return how many of a path's points lie at most `distance` metres along it."""
     return int(np.searchsorted(distances_along(path), distance + 1e-6, side='right'))

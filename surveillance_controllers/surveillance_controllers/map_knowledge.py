@@ -58,13 +58,14 @@ class MapKnowledge:
         node.create_subscription(RobotPlace, 'robot_place', self._on_robot_place, STATE_QOS)
 
     def assume(self, positions: Mapping[str, Points]) -> None:
-        """Takes points of places, so that the map builder need not be asked for them."""
+        """Take points of places, so that the map builder need not be asked for them."""
         self._known.update(positions)
 
     # --- what the map builder knows ---
 
     def find_position(self, place: str, interrupt: Interrupt) -> Points | None:
-        """The point of a place that the robot can reach; None when the map has no such place.
+        """Return the point of a place that the robot can reach; None when the map has no such
+        place.
 
         Returns:
             Shape (3,), metres, world frame.
@@ -81,7 +82,7 @@ class MapKnowledge:
         return point
 
     def position(self, place: str, interrupt: Interrupt) -> Points:
-        """The point of a place that the robot can reach, shape (3,), metres, world frame.
+        """Return the point of a place that the robot can reach, shape (3,), metres, world frame.
 
         Raises:
             KnowledgeError: The map has no such place, or does not answer.
@@ -94,7 +95,7 @@ class MapKnowledge:
     # --- what the ontology knows ---
 
     def connect(self, interrupt: Interrupt) -> PatrolOntology:
-        """The ontology, once the map is built.
+        """Return the ontology, once the map is built.
 
         Raises:
             KnowledgeError: It is not built within the deadline.
@@ -121,7 +122,7 @@ class MapKnowledge:
         return self._ontology is not None
 
     def watch_doors(self, interrupt: Interrupt, on_change: Callable[[], None]) -> None:
-        """Calls in the executor's thread with each change that `doors` and `places` then show.
+        """Call back in the executor's thread with each change that `doors` and `places` then show.
 
         Args:
             interrupt: Ends the wait for the map.
@@ -136,7 +137,7 @@ class MapKnowledge:
     def watch_robot_place(
         self, interrupt: Interrupt, on_change: Callable[[], None]
     ) -> FactSubscription:
-        """Keeps the ontology's facts of where the robot is as long as the node lives.
+        """Keep the ontology's facts of where the robot is as long as the node lives.
 
         Args:
             interrupt: Ends the wait for the map.
@@ -153,7 +154,7 @@ class MapKnowledge:
         )
 
     def doors(self, interrupt: Interrupt) -> dict[str, set[str]]:
-        """The places that each door leads into, as the ontology has them now.
+        """Return the places that each door leads into, as the ontology has them now.
 
         Raises:
             KnowledgeError: The ontology does not answer.
@@ -177,7 +178,7 @@ class MapKnowledge:
         return rooms_of
 
     def places(self, interrupt: Interrupt) -> dict[str, Points]:
-        """Every place with its point.
+        """Return every place with its point.
 
         Raises:
             KnowledgeError: Map or ontology do not answer.
@@ -193,7 +194,7 @@ class MapKnowledge:
         return dict(self._known)
 
     def robot_place(self, interrupt: Interrupt) -> str:
-        """The place that the robot is in, from whoever knows it, or else from the ontology.
+        """Return the place that the robot is in, from whoever knows it, or else from the ontology.
 
         Raises:
             KnowledgeError: Nobody knows within the deadline, or the ontology does not answer.
@@ -224,7 +225,7 @@ class MapKnowledge:
 
 @contextmanager
 def answered() -> Iterator[None]:
-    """Turns what a peer did not answer into a `KnowledgeError`."""
+    """Turn what a peer did not answer into a `KnowledgeError`."""
     try:
         yield
     except (CallError, ArmorServiceCallError, ArmorServiceInternalError) as error:

@@ -63,7 +63,7 @@ class MotionController(PatrolNode):
             self._console.open(console_source)
 
     def _make_robot(self) -> Motion:
-        """The way to move that the parameters ask for."""
+        """Return the way to move that the parameters ask for."""
         # Only here, for the libraries behind it take their time to import.
         from surveillance_controllers.motion.docking import DockingMotion
         from surveillance_controllers.motion.nav2 import Nav2Motion
@@ -137,7 +137,7 @@ class MotionController(PatrolNode):
         return Control.Result(reached_point=conversions.point_from(end))
 
     def _arrive(self, goal: Points, end: Points, run: GoalRun) -> None:
-        """Makes sure that the robot is in a place, tells it, and looks around there."""
+        """Make sure that the robot is in a place, tell it, and look around there."""
         if self._robot is None:
             places = self._knowledge.places(run.interrupt)
             place = place_reached(places, end, self._settings.place_reach)
@@ -164,7 +164,9 @@ class MotionController(PatrolNode):
 
 
 def _checked(points: Sequence[Any]) -> Points:
-    """The points of a goal as an array; aborts the goal when it has none that can be followed."""
+    """Return the points of a goal as an array; aborts the goal when it has none that can be
+    followed.
+    """
     path = conversions.array_from_points(points)
     if len(path) == 0:
         raise GoalAbortedError('no points, expected at least one')
@@ -176,5 +178,5 @@ def _checked(points: Sequence[Any]) -> Points:
 
 
 def main(args: Sequence[str] | None = None) -> int:
-    """Runs the node until it is stopped."""
+    """Run the node until it is stopped."""
     return run_node(MotionController, args)

@@ -133,5 +133,5 @@ class PlannerController(PatrolNode):
 
 
 def main(args: Sequence[str] | None = None) -> int:
-    """Runs the node until it is stopped."""
+    """Run the node until it is stopped."""
     return run_node(PlannerController, args)

@@ -42,14 +42,16 @@ class StateFile:
             node.spawn(self._work, 'state file')
 
     def number(self, name: str) -> float | None:
-        """A finite number of the state that was found; None when there is none of this name."""
+        """Return a finite number of the state that was found; None when there is none of this
+        name.
+        """
         value = self.found.get(name)
         if not isinstance(value, int | float) or not math.isfinite(value):
             return None
         return float(value)
 
     def text(self, name: str) -> str:
-        """A text of the state that was found; empty when there is none of this name."""
+        """Return a text of the state that was found; empty when there is none of this name."""
         value = self.found.get(name)
         return value if isinstance(value, str) else ''
 

@@ -26,8 +26,9 @@ GOAL_ERROR = 0.2
 
 
 def generator(seed: int) -> random.Random:
-    """A generator for a node's `random_seed`: repeatable, or seeded by the system when `seed` is
-    negative."""
+    """Return a generator for a node's `random_seed`: repeatable, or seeded by the system when
+    `seed` is negative.
+    """
     return random.Random(seed if seed >= 0 else None)
 
 
@@ -41,12 +42,12 @@ def via_points(draw: random.Random) -> list[Point3]:
 
 
 def move(draw: random.Random) -> tuple[float, float]:
-    """The time of a random move in seconds, and the largest error of its end in metres."""
+    """Return the time of a random move in seconds, and the largest error of its end in metres."""
     return float(draw.randint(*MOVE_SECONDS)), draw.uniform(-GOAL_ERROR, GOAL_ERROR)
 
 
 def reached(draw: random.Random, goal: Sequence[float], delta: float) -> np.ndarray:
-    """Where a move towards `goal` ends: off by at most `delta` metres on each axis."""
+    """Return where a move towards `goal` ends: off by at most `delta` metres on each axis."""
     size = abs(delta)
     return np.array([axis + draw.uniform(-size, size) for axis in goal])
 
@@ -55,10 +56,10 @@ class Pace(Protocol):
     """Time as a goal's run gives it: `surveillance_fsm.ros.GoalRun` is one."""
 
     def now(self) -> float:
-        """The time in seconds."""
+        """Return the time in seconds."""
 
     def sleep(self, seconds: float) -> bool:
-        """Lets time pass; False when the motion shall end at once."""
+        """Let time pass; return False when the motion shall end at once."""
 
 
 def glide(
@@ -69,7 +70,7 @@ def glide(
     on_position: Callable[[Points], None],
     period: float,
 ) -> Points:
-    """Goes along a path in a given time.
+    """Go along a path in a given time.
 
     Args:
         path: At least one point, shape (n, 3), metres.

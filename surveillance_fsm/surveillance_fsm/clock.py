@@ -104,7 +104,7 @@ class Clock(Protocol):
     """
 
     def now(self) -> float:
-        """The time in seconds; only differences have a meaning."""
+        """Return the time in seconds; only differences have a meaning."""
 
     def sleep(self, seconds: float, interrupt: Interrupt) -> bool:
         """Wait; True when the full time passed, False when `interrupt` ended it."""
@@ -114,7 +114,7 @@ class WallClock:
     """The monotonic clock of the machine the program runs on."""
 
     def now(self) -> float:
-        """Seconds of the monotonic clock."""
+        """Return the seconds of the monotonic clock."""
         return time.monotonic()
 
     def sleep(self, seconds: float, interrupt: Interrupt) -> bool:
@@ -130,6 +130,6 @@ WALL_CLOCK = WallClock()
 
 
 def elapsed_of(clock: Clock) -> Callable[[], float]:
-    """What tells how much time passes on a clock, whether it may jump back or not."""
+    """Return what tells how much time passes on a clock, whether it may jump back or not."""
     elapsed: Callable[[], float] = getattr(clock, 'elapsed', clock.now)
     return elapsed

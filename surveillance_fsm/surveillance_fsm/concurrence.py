@@ -95,7 +95,7 @@ class OutcomePolicy:
             )
 
     def faults(self, states: Mapping[str, State]) -> list[str]:
-        """What the outcome map asks of states that they cannot do."""
+        """Return what the outcome map asks of states that they cannot do."""
         faults = []
         for outcome, wanted in self.outcome_map.items():
             for label, end in wanted.items():
@@ -115,13 +115,13 @@ class OutcomePolicy:
         return self._outcome_cb is not None or self._child_termination_cb is not None
 
     def possible_outcomes(self) -> set[str]:
-        """The outcomes that may come of it; all of them, if a callback decides."""
+        """Return the outcomes that may come of it; all of them, if a callback decides."""
         if self._outcome_cb is not None:
             return set(self._outcomes)
         return {self.default, *self.outcome_map}
 
     def to_stop(self, path: str, ends: Outcomes) -> frozenset[str]:
-        """Labels of the states to stop now that one has ended.
+        """Return the labels of the states to stop now that one has ended.
 
         Args:
             path: The concurrence's path, for errors.
@@ -153,7 +153,7 @@ class OutcomePolicy:
         return frozenset(labels)
 
     def decide(self, path: str, ends: Outcomes) -> str:
-        """The concurrence's outcome, all states having ended.
+        """Return the concurrence's outcome, all states having ended.
 
         Raises:
             InvalidUserCodeError: The callback raised.
@@ -315,7 +315,7 @@ class Concurrence(Container):
     # The container's interface.
 
     def get_initial_states(self) -> list[str]:
-        """The labels of all states."""
+        """Return the labels of all states."""
         return list(self.fsm_states)
 
     def set_initial_state(
@@ -328,7 +328,7 @@ class Concurrence(Container):
             self.userdata.update(userdata)
 
     def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
-        """The outcome map as (child outcome, label, outcome)."""
+        """Return the outcome map as (child outcome, label, outcome)."""
         return [
             (child_outcome, label, outcome)
             for outcome, wanted in self.policy.outcome_map.items()
@@ -368,7 +368,9 @@ class ConcurrentFrame(Frame):
         return not isinstance(self.current, Node)
 
     def successor(self) -> Frame:
-        """A copy for the thread that takes this execution over, while an interrupt's state runs."""
+        """Return a copy for the thread that takes this execution over, while an interrupt's state
+        runs.
+        """
         frame = super().successor()
         assert isinstance(frame, ConcurrentFrame)
         frame.outcomes = self.outcomes
@@ -437,7 +439,9 @@ class ConcurrentFrame(Frame):
                     return self._decide()
 
     def _decide(self) -> str:
-        """The outcome, all states having ended; a preempt that one of them served has its own."""
+        """Return the outcome, all states having ended; a preempt that one of them served has its
+        own.
+        """
         container = self.container
         preempted = container.preempt_requested()
         served = self._served_preempt(preempted=preempted)
@@ -688,13 +692,13 @@ class ConcurrentFrame(Frame):
         self._wakeup.set()
 
     def where(self) -> History | None:
-        """Where the container would go on if its process ended now."""
+        """Return where the container would go on if its process ended now."""
         return History(
             outcomes={label: end for label, end in self.outcomes.items() if end is not None}
         )
 
     def active_labels(self) -> list[str]:
-        """The labels of the states that run."""
+        """Return the labels of the states that run."""
         return [label for label, outcome in self.outcomes.items() if outcome is None]
 
 

@@ -132,7 +132,7 @@ class Container(State):
     # What each kind of container defines.
 
     def get_initial_states(self) -> list[str]:
-        """Labels of the children a run begins with."""
+        """Return the labels of the children a run begins with."""
         raise NotImplementedError
 
     def set_initial_state(
@@ -164,16 +164,16 @@ class Container(State):
             ) from None
 
     def get_children(self) -> dict[str, State]:
-        """The children by label."""
+        """Return the children by label."""
         return dict(self.fsm_states)
 
     def get_active_states(self) -> list[str]:
-        """Labels of the children that are running."""
+        """Return the labels of the children that are running."""
         frame = self.fsm_frame
         return [] if frame is None or frame.ended else frame.active_labels()
 
     def is_running(self) -> bool:
-        """Whether the container is executing."""
+        """Tell whether the container is executing."""
         frame = self.fsm_frame
         return frame is not None and not frame.ended
 
@@ -222,7 +222,7 @@ class Container(State):
         self.fsm_path = name
 
     def get_name(self) -> str:
-        """The path of the container: a root's name, or where a run found it."""
+        """Return the path of the container: a root's name, or where a run found it."""
         return self.fsm_path
 
     # Callbacks.
@@ -355,7 +355,7 @@ class Container(State):
             logerr(str(error))
 
     def is_opened(self) -> bool:
-        """Whether states added now go to this container."""
+        """Tell whether states added now go to this container."""
         return bool(_construction.stack) and _construction.stack[-1][0] is self
 
     def assert_opened(self, msg: str = '') -> None:
@@ -406,7 +406,7 @@ class Container(State):
             )
 
     def fsm_path_of(self, label: str) -> str:
-        """The path of the state with a label."""
+        """Return the path of the state with a label."""
         return f'{self.fsm_path}/{label}'
 
     # Nodes.
@@ -445,7 +445,7 @@ class Container(State):
         raise NotImplementedError
 
     def fsm_current_table(self, path: str, clock: Clock) -> Mapping[str, Node]:
-        """The nodes of states and interrupts by label, made anew if anything has changed.
+        """Return the nodes of states and interrupts by label, made anew if anything has changed.
 
         Args:
             path: The path at which the container is executed.
@@ -485,7 +485,7 @@ class Container(State):
         return table
 
     def has_limits(self) -> bool:
-        """Whether a state inside has limits that somebody must watch."""
+        """Tell whether a state inside has limits that somebody must watch."""
         return bool(self.fsm_limits) or any(
             isinstance(state, Container) and state.has_limits()
             for state in (
@@ -519,7 +519,7 @@ class Container(State):
         return self._execute_as_root(parent_ud)
 
     def is_entered_directly(self) -> bool:
-        """Whether nobody has put code of his own around `execute`."""
+        """Tell whether nobody has put code of his own around `execute`."""
         return type(self).execute is Container.execute and 'execute' not in self.__dict__
 
     def fsm_enter(self, parent_ud: Any) -> Any:
@@ -698,7 +698,7 @@ class Container(State):
             return urgent
 
     def fsm_urgent(self, priority: float) -> bool:
-        """Whether an interrupt was raised that is more urgent than `priority`."""
+        """Tell whether an interrupt was raised that is more urgent than `priority`."""
         return any(branch.priority > priority for branch in self.fsm_raised)
 
     def fsm_suspend(self) -> None:

@@ -26,7 +26,9 @@ shutdown_check: Callable[[], bool] | None = None
 
 
 def is_shutdown() -> bool:
-    """Whether the check set with `set_shutdown_check` says that the program is shutting down."""
+    """Tell whether the check set with `set_shutdown_check` says that the program is shutting
+    down.
+    """
     return shutdown_check is not None and bool(shutdown_check())
 
 
@@ -185,7 +187,7 @@ class Control:
             return list(self._active())
 
     def _active(self) -> dict[str, tuple[Frame | ExecutionThread, Node]]:
-        """The active states by path: where an outcome is forced, and their nodes."""
+        """Return the active states by path: where an outcome is forced, and their nodes."""
         active: dict[str, tuple[Frame | ExecutionThread, Node]] = {}
         for thread in self._run.threads if self._run is not None else ():
             if thread.leaf is not None:

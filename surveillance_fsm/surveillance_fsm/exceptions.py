@@ -66,7 +66,7 @@ def describe(error: BaseException) -> str:
 
 
 def shown(value: object) -> str:
-    """A value as an error message shows it, whatever its own ``__repr__`` does."""
+    """Return a value as an error message shows it, whatever its own ``__repr__`` does."""
     try:
         return repr(value)
     except Exception:

@@ -143,12 +143,12 @@ class Node:
         return self.path
 
     def step(self, outcome: Any) -> tuple[str, str, str, str]:
-        """What `outcome` leads to by the table: (path of the container, from, to, kind)."""
+        """Return what `outcome` leads to by the table: (path of the container, from, to, kind)."""
         target = self.targets[outcome]
         return self.container.get_name(), self.label, target.label, target.kind
 
     def target(self, outcome: Any) -> Node | Exit:
-        """Where `outcome` leads.
+        """Return where `outcome` leads.
 
         Raises:
             InvalidTransitionError: The state has no such outcome.
@@ -166,13 +166,13 @@ class Node:
         self.view = self.container.fsm_view(self)
 
     def user_fault(self, error: Exception) -> SmachError:
-        """The engine's error for what the state's code raised; to be raised from that."""
+        """Return the engine's error for what the state's code raised; to be raised from that."""
         return self.view.fsm_explain(error) or InvalidUserCodeError(
             f"State '{self.path}' of type {type(self.state).__name__} raised {describe(error)}"
         )
 
     def wrong_outcome(self, outcome: object) -> InvalidTransitionError:
-        """The error for an outcome that the state did not declare."""
+        """Return the error for an outcome that the state did not declare."""
         returned = 'None instead of an outcome' if outcome is None else f'outcome {shown(outcome)}'
         return InvalidTransitionError(
             f"State '{self.path}' of type {type(self.state).__name__} returned {returned}: its "
@@ -346,11 +346,11 @@ class Frame:
         raise NotImplementedError
 
     def where(self) -> History | None:
-        """Where the container would go on if its process ended now; under the condition."""
+        """Return where the container would go on if its process ended now; under the condition."""
         raise NotImplementedError
 
     def active_labels(self) -> list[str]:
-        """Labels of the states that run."""
+        """Return the labels of the states that run."""
         raise NotImplementedError
 
     def woken(self) -> None:
@@ -359,7 +359,7 @@ class Frame:
     # What they share.
 
     def successor(self) -> Frame:
-        """A copy for the thread that takes this execution over."""
+        """Return a copy for the thread that takes this execution over."""
         frame = type(self)(self.container, self.thread, self.path, self.current, self.parent_ud)
         for name in ('preempted', 'cut', 'suspending', 'forced', 'items', 'index', 'repeat'):
             setattr(frame, name, getattr(self, name))
@@ -367,7 +367,7 @@ class Frame:
         return frame
 
     def history(self, target: Node | Exit) -> History:
-        """Where to go on when the container is put aside before `target`."""
+        """Return where to go on when the container is put aside before `target`."""
         return History(
             target.label,
             target.is_exit,
@@ -461,7 +461,7 @@ class Run:
         self.threads: list[ExecutionThread] = []
 
     def frames(self) -> list[Frame]:
-        """The frames of all threads, outermost first; under the condition."""
+        """Return the frames of all threads, outermost first; under the condition."""
         return [frame for thread in self.threads for frame in tuple(thread.stack)]
 
     def call_attention(self) -> None:
@@ -522,7 +522,7 @@ class ExecutionThread:
     # The side of the thread that executes.
 
     def executes_next(self, container: Container, stack: list[Frame]) -> bool:
-        """Whether `container` is what the engine executes next, not some user code."""
+        """Tell whether `container` is what the engine executes next, not some user code."""
         if stack:
             current = stack[-1].current
             return isinstance(current, Node) and current.state is container
@@ -531,7 +531,7 @@ class ExecutionThread:
         return self.root is container
 
     def path_inside(self) -> str:
-        """The path of the state that is being executed."""
+        """Return the path of the state that is being executed."""
         for frame in reversed(self.stack):
             if isinstance(frame.current, Node):
                 return frame.current.path
@@ -645,7 +645,7 @@ class Work:
         worker.give(self)
 
     def is_going_on(self) -> bool:
-        """Whether it has not ended."""
+        """Tell whether it has not ended."""
         return not self._ended
 
     def await_end(self, seconds: float | None) -> bool:

@@ -106,7 +106,7 @@ def _graphviz(structure: Structure, lines: list[str], indent: str) -> None:
 
 
 def _entry(structure: Structure, label: str) -> tuple[str, str]:
-    """The node that stands for a state in Graphviz, and its cluster if it is a container."""
+    """Return the node that stands for a state in Graphviz, and its cluster if it is a container."""
     path = f'{structure.path}/{label}'
     inner = structure.inner.get(label)
     if inner is None:
@@ -166,12 +166,12 @@ def _bundles(edges: Iterable[Edge]) -> list[tuple[str, str, bool, list[str]]]:
 
 
 def _id(path: str) -> str:
-    """An identifier that Mermaid accepts; different paths keep different ones."""
+    """Return an identifier that Mermaid accepts; different paths keep different ones."""
     return re.sub(r'[^A-Za-z0-9]', lambda match: f'_{ord(match.group()):x}_', path)
 
 
 def _quoted(text: str) -> str:
-    """A string as Graphviz has it."""
+    """Return a string as Graphviz has it."""
     escaped = text.replace('\\', '\\\\').replace('"', '\\"')
     return f'"{escaped}"'
 
@@ -306,7 +306,7 @@ def _state_data(container: Container, label: str, state: State, path: str) -> di
 
 
 def _what(state: State, path: str) -> dict[str, Any]:
-    """What a state is, as data."""
+    """Return what a state is, as data."""
     if isinstance(state, Container):
         return {'machine': _kind_of(state), **_container_data(state, path)}
     if state.fsm_source is not None:

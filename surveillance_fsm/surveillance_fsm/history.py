@@ -109,7 +109,7 @@ class Transition:
 
 
 def presentable(userdata: dict[str, Any]) -> dict[str, Any]:
-    """The part of userdata that JSON can show."""
+    """Return the part of userdata that JSON can show."""
     part = {}
     for key, value in userdata.items():
         try:
@@ -504,7 +504,7 @@ def _kept(
 
 
 def _encoded(value: Any) -> Any:
-    """What JSON holds of a value, so that `_decoded` gives it back exactly."""
+    """Return what JSON holds of a value, so that `_decoded` gives it back exactly."""
     kind = type(value)
     if value is None or kind in (bool, int, str):
         return value
@@ -634,7 +634,7 @@ def _read_values(path: str, what: str, values: Any) -> dict[str, Any]:
 
 
 def _read_place(state: Container, path: str, at: Any) -> History:
-    """Where a container goes on.
+    """Return where a container goes on.
 
     Raises:
         HistoryError: It is none of its states.

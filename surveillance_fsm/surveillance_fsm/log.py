@@ -47,5 +47,5 @@ def reset_loggers() -> None:
 
 
 def chatty() -> bool:
-    """Whether transitions are worth a line: the info level is read by somebody."""
+    """Tell whether transitions are worth a line: the info level is read by somebody."""
     return 'info' in _loggers or _standard.isEnabledFor(logging.INFO)

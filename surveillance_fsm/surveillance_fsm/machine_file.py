@@ -84,7 +84,7 @@ def load_machine(path: str | Path, offered: Mapping[str, Any] | None = None) -> 
 
 
 def parse(text: str) -> Any:
-    """The values of a YAML text; a key that comes twice is an error.
+    """Return the values of a YAML text; a key that comes twice is an error.
 
     Raises:
         MachineFileError: It is no YAML.
@@ -273,7 +273,7 @@ class _Builder:
         return state, options
 
     def _value(self, value: Any, place: str, *, import_names: bool = False) -> Any:
-        """What a value of the file stands for."""
+        """Return what a value of the file stands for."""
         if isinstance(value, str) and value.startswith('$'):
             if value[1:] not in self._offered:
                 raise MachineFileError(f'{place}: {_unknown(value[1:], self._offered)}')

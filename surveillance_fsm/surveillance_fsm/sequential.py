@@ -207,7 +207,7 @@ class SequentialFrame(Frame):
     def _decide(
         self, move: _Move, ended: Node | None, moved: bool
     ) -> tuple[Node | Exit, list[_Move]]:
-        """Where to go, and the transitions to be told; under the run's condition.
+        """Return where to go, and the transitions to be told; under the run's condition.
 
         Args:
             move: What the table says.
@@ -305,7 +305,7 @@ class SequentialFrame(Frame):
         return target, not stays
 
     def _end_of_loop(self, outcome: Any, target: Node | Exit) -> Node | Exit:
-        """Where a preempt leads that came while a state led to itself; an iterator ends."""
+        """Return where a preempt leads that came while a state led to itself; an iterator ends."""
         return target
 
     def _drop_requests(self, left: Node) -> None:
@@ -323,7 +323,7 @@ class SequentialFrame(Frame):
             target.state.request_preempt()
 
     def _stands_still(self, target: Node | Exit) -> bool:
-        """Whether the machine is paused here; takes one step if it may."""
+        """Tell whether the machine is paused here; takes one step if it may."""
         run = self.run
         if not run.paused or not isinstance(target, Node) or isinstance(target.state, Container):
             return False
@@ -421,12 +421,12 @@ class SequentialFrame(Frame):
             stop_for_now(current.state)
 
     def where(self) -> History | None:
-        """Where the container would go on if its process ended now."""
+        """Return where the container would go on if its process ended now."""
         if self.current is ASIDE:
             return self.container.fsm_history
         return self.history(self.stopped if self.current is SHUTDOWN else self.current)
 
     def active_labels(self) -> list[str]:
-        """The label of the state that runs; empty when none does."""
+        """Return the label of the state that runs; empty when none does."""
         current = self.current
         return [] if current.is_exit else [current.label]

@@ -67,7 +67,7 @@ def names(what: str, given: Iterable[str]) -> frozenset[str]:
 
 
 def has_smach_interface(obj: object) -> bool:
-    """Whether `obj` tells its outcomes and userdata keys the way a state does."""
+    """Tell whether `obj` tells its outcomes and userdata keys the way a state does."""
     return (
         hasattr(obj, 'get_registered_input_keys')
         and hasattr(obj, 'get_registered_output_keys')
@@ -101,15 +101,15 @@ class CBInterface:
         return self._cb(*args, **kwargs)
 
     def get_registered_input_keys(self) -> tuple[str, ...]:
-        """The userdata keys the callback reads."""
+        """Return the userdata keys the callback reads."""
         return tuple(self._input_keys)
 
     def get_registered_output_keys(self) -> tuple[str, ...]:
-        """The userdata keys the callback writes."""
+        """Return the userdata keys the callback writes."""
         return tuple(self._output_keys)
 
     def get_registered_outcomes(self) -> tuple[str, ...]:
-        """The outcomes the callback may return."""
+        """Return the outcomes the callback may return."""
         return tuple(self._outcomes)
 
 
@@ -185,7 +185,7 @@ class State:
         self._output_keys = names('output_keys', both.union(names('output_keys', output_keys)))
 
     def __getstate__(self) -> Any:
-        """What a copy takes over: all but what belongs to an execution."""
+        """Return what a copy takes over: all but what belongs to an execution."""
         whole: Any = super().__getstate__()
         if isinstance(whole, tuple):
             attributes, slots = whole
@@ -213,7 +213,7 @@ class State:
         structure_version.changed()
 
     def get_registered_outcomes(self) -> tuple[str, ...]:
-        """The outcomes the state may return."""
+        """Return the outcomes the state may return."""
         return tuple(self._outcomes)
 
     def register_io_keys(self, keys: Iterable[str]) -> None:
@@ -228,7 +228,7 @@ class State:
         structure_version.changed()
 
     def get_registered_input_keys(self) -> tuple[str, ...]:
-        """The userdata keys the state reads."""
+        """Return the userdata keys the state reads."""
         return tuple(self._input_keys)
 
     def register_output_keys(self, keys: Iterable[str]) -> None:
@@ -237,7 +237,7 @@ class State:
         structure_version.changed()
 
     def get_registered_output_keys(self) -> tuple[str, ...]:
-        """The userdata keys the state writes."""
+        """Return the userdata keys the state writes."""
         return tuple(self._output_keys)
 
     def request_preempt(self) -> None:
@@ -257,7 +257,7 @@ class State:
         self._drop_preempt()
 
     def preempt_requested(self) -> bool:
-        """Whether a request to stop is pending."""
+        """Tell whether a request to stop is pending."""
         return self._preempt_requested
 
     def request_shutdown(self) -> None:

@@ -265,7 +265,7 @@ class StateMachine(Container):
     # The container's interface.
 
     def get_initial_states(self) -> list[str]:
-        """The label of the state a run begins with."""
+        """Return the label of the state a run begins with."""
         return [self._initial_state_label] if self._initial_state_label is not None else []
 
     def set_initial_state(
@@ -292,7 +292,7 @@ class StateMachine(Container):
             self.userdata.update(userdata)
 
     def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
-        """All transitions as (outcome, from label, to label or outcome)."""
+        """Return all transitions as (outcome, from label, to label or outcome)."""
         return [
             (outcome, label, target)
             for label, transitions in self._transitions.items()
@@ -556,20 +556,22 @@ class Iterator(Container):
         return self._exhausted_outcome
 
     def loop_data(self) -> dict[str, Any]:
-        """Which outcomes of the state go on and which end, as `set_contained_state` takes it."""
+        """Return which outcomes of the state go on and which end, as `set_contained_state` takes
+        it.
+        """
         data: dict[str, Any] = {'loop_outcomes': sorted(self._loop_outcomes)}
         if self._final_outcome_map:
             data['final_outcome_map'] = dict(self._final_outcome_map)
         return data
 
     def ending(self, outcome: str) -> str:
-        """The iterator's outcome when its state's `outcome` ends the loop."""
+        """Return the iterator's outcome when its state's `outcome` ends the loop."""
         return self._final_outcome_map.get(outcome, outcome)
 
     # The container's interface.
 
     def get_initial_states(self) -> list[str]:
-        """The state's label."""
+        """Return the state's label."""
         return [self._state_label]
 
     def set_initial_state(

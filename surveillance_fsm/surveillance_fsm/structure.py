@@ -66,7 +66,7 @@ class Structure:
         return self.container.together
 
     def walk(self) -> Iterator[Structure]:
-        """This container and all inside, outermost first."""
+        """Return this container and all inside, outermost first."""
         yield self
         for inner in self.inner.values():
             yield from inner.walk()
@@ -113,7 +113,7 @@ def structure_of(container: Container, path: str | None = None) -> Structure:
 
 
 def children_of(state: State) -> dict[str, State]:
-    """The states and interrupts inside a container by label; none inside any other state."""
+    """Return the states and interrupts inside a container by label; none inside any other state."""
     if not isinstance(state, Container):
         return {}
     branches = {label: branch.state for label, branch in state.fsm_branches.items()}
@@ -121,7 +121,7 @@ def children_of(state: State) -> dict[str, State]:
 
 
 def state_at(container: Container, path: str) -> State:
-    """The state at a path that begins with the container's own.
+    """Return the state at a path that begins with the container's own.
 
     Raises:
         KeyError: There is none; the message names the part that is missing.

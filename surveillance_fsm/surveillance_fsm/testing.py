@@ -42,7 +42,7 @@ class FakeClock:
         self._sleepers: list[tuple[float, Interrupt]] = []
 
     def now(self) -> float:
-        """The time in seconds."""
+        """Return the time in seconds."""
         return self._now
 
     def sleep(self, seconds: float, interrupt: Interrupt) -> bool:
@@ -160,7 +160,9 @@ class Watched:
             self.transitions.append((noted.path, noted.source, noted.outcome, noted.target))
 
     def path(self, container: str | None = None) -> list[str]:
-        """Labels of the states that were executed in a container, in order; default: the root."""
+        """Return the labels of the states that were executed in a container, in order; default: the
+        root.
+        """
         path = container or self._structure.path
         return [left for where, left, _, _ in self.transitions if where == path]
 
@@ -194,7 +196,7 @@ class Watched:
         ]
 
     def coverage(self) -> float:
-        """The share of all transitions that were taken, 0 to 1."""
+        """Return the share of all transitions that were taken, 0 to 1."""
         everything = [
             edge for inner in self._structure.walk() if not inner.together for edge in inner.edges
         ]

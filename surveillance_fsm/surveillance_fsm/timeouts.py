@@ -195,7 +195,7 @@ def end_watch(thread: ExecutionThread, watch: Watch) -> None:
 
 
 def watch_of(frame: Frame) -> Watch | None:
-    """The limits at work on the state that `frame` executes."""
+    """Return the limits at work on the state that `frame` executes."""
     for watch in frame.thread.watches:
         if watch.depth >= 0 and frame.thread.stack[watch.depth] is frame:
             return watch
@@ -292,7 +292,7 @@ STOPPED = ('preempted', 'aborted')
 
 
 def stopped_outcome(node: Node) -> str | None:
-    """The outcome that a state is taken to have ended with, if it has one for that."""
+    """Return the outcome that a state is taken to have ended with, if it has one for that."""
     for outcome in STOPPED:
         if outcome in node.targets:
             return outcome

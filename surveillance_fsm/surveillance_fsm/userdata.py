@@ -53,7 +53,7 @@ class UserData:
             self[remapping.get(key, key)] = copy.copy(ud[key])
 
     def keys(self) -> list[str]:
-        """The keys that have a value."""
+        """Return the keys that have a value."""
         return list(self._data)
 
     def __contains__(self, key: object) -> bool:
@@ -141,7 +141,7 @@ class Remapper:
         self._ud.update(other_userdata)
 
     def keys(self) -> list[str]:
-        """The state's names of its input keys that have a value."""
+        """Return the state's names of its input keys that have a value."""
         return [key for key in self._input if key in self]
 
     def fsm_copy_to(self, target: dict[str, Any], keys: Iterable[str]) -> list[str]:

@@ -104,7 +104,7 @@ class _View:
     written: _Keys = field(default_factory=lambda: _Keys())
 
     def walk(self) -> Iterator[_View]:
-        """This container and all inside, outermost first."""
+        """Return this container and all inside, outermost first."""
         yield self
         for inner in self.inner.values():
             yield from inner.walk()
@@ -144,7 +144,7 @@ def _reachable(view: _View) -> set[str]:
 
 
 def _endings(view: _View) -> set[str]:
-    """What a container can end with."""
+    """Return what a container can end with."""
     structure, container = view.structure, view.structure.container
     endings = {edge.target for label in view.reached for edge in view.edges[label] if edge.leaving}
     if isinstance(container, Concurrence):
@@ -304,7 +304,7 @@ _BLOCKS = {'sleep', 'input', 'join', 'acquire', 'spin', 'spin_until_future_compl
 
 
 def _deaf(structure: Structure) -> list[Finding]:
-    """States whose code waits or loops without ever looking at the preempt."""
+    """Return the states whose code waits or loops without ever looking at the preempt."""
     findings = []
     for label, state in structure.members.items():
         if isinstance(state, Container):
@@ -325,7 +325,9 @@ def _deaf(structure: Structure) -> list[Finding]:
 
 @lru_cache(maxsize=4096)
 def _cannot_be_preempted(code: Any) -> str | None:
-    """What a state's class or function does that a preempt does not end; None for nothing."""
+    """Return what a state's class or function does that a preempt does not end; None for
+    nothing.
+    """
     own = [code]
     if isinstance(code, type):
         own = [kind for kind in code.__mro__ if kind not in State.__mro__]
@@ -413,7 +415,7 @@ def _follow_keys(view: _View) -> None:
 
 
 def _follow_loop(view: _View, entry: _Keys, adds: dict[str, _Keys]) -> dict[str, _Keys]:
-    """The keys before each state that can be reached, when one runs at a time."""
+    """Return the keys before each state that can be reached, when one runs at a time."""
     order = _order(view)
     before: dict[str, _Keys] = {label: entry for label in view.structure.initial if label in order}
     pending = [(order[label], label) for label in before]
@@ -471,7 +473,7 @@ def _order(view: _View) -> dict[str, int]:
 
 
 def _added(view: _View, label: str) -> _Keys:
-    """What a state adds, in the container's names."""
+    """Return what a state adds, in the container's names."""
     state = view.structure.members[label]
     renamed = _remapping(view.structure.container, label)
     outputs = state.get_registered_output_keys()
@@ -487,7 +489,7 @@ def _added(view: _View, label: str) -> _Keys:
 
 
 def _unset_reads(view: _View, always: Iterable[str], sometimes: Iterable[str]) -> list[Finding]:
-    """Reads that find nothing, or may find nothing.
+    """Return reads that find nothing, or may find nothing.
 
     Args:
         view: A container.

@@ -75,7 +75,7 @@ class Feed:
     def subscribe(
         self, callback: Callable[[Changes], None], engine: Engine | None
     ) -> Callable[[], None]:
-        """Adds a subscriber; a function that takes it off again."""
+        """Add a subscriber; return a function that takes it off again."""
         if not self._subscribers:
             self._show(engine)
         self._subscribers.append(callback)
@@ -87,20 +87,20 @@ class Feed:
         return unsubscribe
 
     def asserted(self, added: Iterable[Axiom], removed: Iterable[Axiom]) -> None:
-        """Tells of one batch of assertions."""
+        """Tell of one batch of assertions."""
         self._tell([(axiom, False) for axiom in added], [(axiom, False) for axiom in removed])
 
     def shown_by(self, engine: Engine | None) -> set[Axiom]:
-        """What subscribers know of derived facts, before `engine` is given up."""
+        """Return what subscribers know of derived facts, before `engine` is given up."""
         return visible(engine) if self._shown is None else self._shown
 
     def replaced(self, before: set[Axiom], engine: Engine) -> None:
-        """Tells what a new engine shows that the old one did not, and the reverse."""
+        """Tell what a new engine shows that the old one did not, and the reverse."""
         after = self._show(engine)
         self._derived(engine, after - before, before - after)
 
     def updating(self, engine: Engine, update: Callable[[], None]) -> None:
-        """Runs an engine's update and tells what it changed."""
+        """Run an engine's update and tell what it changed."""
         before = self._shown
         log: dict[StoredFact, bool] = {}
         engine.changed, engine.renamed = log, False
@@ -149,7 +149,7 @@ def justify(
     schema: Iterable[Axiom],
     assumed: tuple[Axiom, ...] = (),
 ) -> tuple[Axiom, ...]:
-    """A smallest set of axioms from which a goal follows (Junker, "QuickXplain", AAAI 2004).
+    """Return a smallest set of axioms from which a goal follows (Junker, "QuickXplain", AAAI 2004).
 
     Args:
         axioms: Where to look.
@@ -178,14 +178,14 @@ def justify(
 
 
 def follows(axioms: Iterable[Axiom], goal: Axiom | None) -> bool:
-    """Whether a fact, or with None a contradiction, follows from axioms."""
+    """Tell whether a fact, or with None a contradiction, follows from axioms."""
     kb = KnowledgeBase('', axioms)
     consistent = kb.reason()
     return not consistent if goal is None else consistent and kb.holds(goal)
 
 
 def _fewest(candidates: list[Axiom], follows: Callable[[Iterable[Axiom]], bool]) -> list[Axiom]:
-    """The candidates without those that are not needed."""
+    """Return the candidates without those that are not needed."""
 
     def narrow(known: list[Axiom], changed: bool, rest: list[Axiom]) -> list[Axiom]:
         if changed and follows(known):
@@ -202,14 +202,16 @@ def _fewest(candidates: list[Axiom], follows: Callable[[Iterable[Axiom]], bool])
 
 
 def visible(engine: Engine | None) -> set[Axiom]:
-    """The derived facts that queries show: none while there is a contradiction."""
+    """Return the derived facts that queries show: none while there is a contradiction."""
     if engine is None or not engine.consistent:
         return set()
     return set(FactView(engine).derived())
 
 
 def _before(engine: Engine, view: FactView, log: dict[StoredFact, bool]) -> set[Axiom]:
-    """The derived facts before an update that began with every individual under its own name."""
+    """Return the derived facts before an update that began with every individual under its own
+    name.
+    """
     now = {fact for fact in view.stored() if fact not in engine.asserted and fact not in log}
     now.update(fact for fact, was_derived in log.items() if was_derived)
     return {axiom for fact in now if is_public(fact[0]) for axiom in view.public(fact, {})}
@@ -246,7 +248,7 @@ class KnowledgeBase:
     # --- asserted axioms ---
 
     def axioms(self) -> Iterator[Axiom]:
-        """The asserted axioms, oldest first."""
+        """Return the asserted axioms, oldest first."""
         return iter(tuple(self._told.axioms))
 
     def __contains__(self, axiom: object) -> bool:
@@ -256,15 +258,17 @@ class KnowledgeBase:
         return len(self._told.axioms)
 
     def axioms_about(self, entity: str) -> Iterator[Axiom]:
-        """The asserted axioms that mention an entity in any role."""
+        """Return the asserted axioms that mention an entity in any role."""
         return iter(tuple(self._told.about.get(entity, ())))
 
     def asserted_values(self, prop: str, individual: str) -> Iterable[Literal]:
-        """The values asserted now for a data property of an individual, as they are written."""
+        """Return the values asserted now for a data property of an individual, as they are
+        written.
+        """
         return tuple(self._told.literals.get((prop, individual), ()))
 
     def asserted_objects(self, prop: str, individual: str) -> Iterable[str]:
-        """What an individual is asserted to be related to by an object property."""
+        """Return what an individual is asserted to be related to by an object property."""
         return tuple(
             axiom.object
             for axiom in self._told.about.get(individual, ())
@@ -274,7 +278,7 @@ class KnowledgeBase:
         )
 
     def is_known(self, kind: str, iri: str) -> bool:
-        """Whether an asserted axiom declares or uses the entity as this kind."""
+        """Tell whether an asserted axiom declares or uses the entity as this kind."""
         return any((kind, iri) in entities_of(axiom) for axiom in self._told.about.get(iri, ()))
 
     # --- the last reasoning ---
@@ -311,7 +315,7 @@ class KnowledgeBase:
         return self._engine if self._consistent else None
 
     def instances(self, cls: str) -> frozenset[str]:
-        """Individuals of a class, direct and indirect."""
+        """Return individuals of a class, direct and indirect."""
         pending = self._told.added or self._told.removed
         if not pending and cls in self._snapshots and self._consistent:
             return self._snapshots[cls]
@@ -346,7 +350,7 @@ class KnowledgeBase:
         return (found - gone) | come
 
     def _keep_snapshot(self, predicate: Predicate, members: frozenset[str]) -> None:
-        """Remembers the instances until one comes or goes."""
+        """Remember the instances until one comes or goes."""
         cls, snapshots = predicate.name, self._snapshots
 
         def forget(_: str) -> None:
@@ -406,7 +410,7 @@ class KnowledgeBase:
         return found - {cls}
 
     def object_values(self, prop: str, individual: str) -> set[str]:
-        """What an individual is related to by an object property."""
+        """Return what an individual is related to by an object property."""
         engine = self._usable
         known = None if engine is None else engine.program.objects.get(prop)
         if engine is None or known is None or self._told.added:
@@ -431,8 +435,8 @@ class KnowledgeBase:
         return found
 
     def data_values(self, prop: str, individual: str) -> set[Literal]:
-        """Values of a data property: asserted ones as written, derived ones in one form for each
-        value.
+        """Return values of a data property: asserted ones as written, derived ones in one form for
+        each value.
         """
         engine = self._usable
         if engine is None:
@@ -454,7 +458,7 @@ class KnowledgeBase:
         return found
 
     def object_properties_of(self, individual: str) -> set[str]:
-        """Object properties with at least one value for the individual."""
+        """Return object properties with at least one value for the individual."""
         names = {
             axiom.prop
             for axiom in self._told.about.get(individual, ())
@@ -465,7 +469,7 @@ class KnowledgeBase:
         return {name for name in names if self.object_values(name, individual)}
 
     def data_properties_of(self, individual: str) -> set[str]:
-        """Data properties with at least one value for the individual."""
+        """Return data properties with at least one value for the individual."""
         names = {
             axiom.prop
             for axiom in self._told.about.get(individual, ())
@@ -476,7 +480,7 @@ class KnowledgeBase:
         return {name for name in names if self.data_values(name, individual)}
 
     def equivalents(self, cls: str) -> list[ClassExpression]:
-        """The other sides of the asserted equivalences that have the class as one side."""
+        """Return the other sides of the asserted equivalences that have the class as one side."""
         return [
             other
             for axiom in self._told.about.get(cls, ())
@@ -486,7 +490,7 @@ class KnowledgeBase:
         ]
 
     def facts(self, derived: bool = True) -> Iterator[Fact]:
-        """Every fact about individuals; the asserted ones alone when `derived` is False."""
+        """Yield every fact about individuals; the asserted ones alone when `derived` is False."""
         stated = (ClassAssertion, ObjectPropertyAssertion, DataPropertyAssertion, SameIndividual)
         for axiom in tuple(self._told.axioms):
             if isinstance(axiom, stated):
@@ -497,7 +501,7 @@ class KnowledgeBase:
                     yield axiom  # type: ignore[misc]
 
     def holds(self, fact: Axiom) -> bool:
-        """Whether a fact is asserted or was derived: what `explain` explains."""
+        """Tell whether a fact is asserted or was derived: what `explain` explains."""
         if fact in self._told.axioms:
             return True
         engine = self._usable
@@ -512,7 +516,7 @@ class KnowledgeBase:
         return engine.understands(fact) and engine.holds(fact)
 
     def explain(self, fact: Axiom) -> Explanation | None:
-        """Why a fact holds; None when it is neither asserted nor derived.
+        """Return why a fact holds; None when it is neither asserted nor derived.
 
         A fact is a class, property, same- or different-individuals assertion, or a subclass axiom
         between named classes.
@@ -530,7 +534,9 @@ class KnowledgeBase:
         return self._complete(found, fact)
 
     def explain_inconsistency(self) -> Explanation | None:
-        """Why the ontology contradicts itself; None where the last `reason` found it does not."""
+        """Return why the ontology contradicts itself; None where the last `reason` found it does
+        not.
+        """
         if self._engine is None or self._consistent:
             return None
         found = Reasons(self._engine, self._schema_axioms).of_inconsistency()
@@ -539,7 +545,7 @@ class KnowledgeBase:
         return self._complete(found, None)
 
     def _complete(self, found: Explanation, goal: Axiom | None) -> Explanation:
-        """The explanation with the axioms that its steps use without saying so."""
+        """Return the explanation with the axioms that its steps use without saying so."""
         sources = found.sources()
         schema = [axiom for axiom in self._told.axioms if not is_assertion(axiom)]
         declared = (axiom for axiom in schema if isinstance(axiom, Declaration))
@@ -549,8 +555,8 @@ class KnowledgeBase:
         return replace(found, background=tuple(a for a in needed if a not in sources))
 
     def justification(self, fact: Axiom | None) -> tuple[Axiom, ...]:
-        """The fewest asserted axioms to which a fact is owed: without any of them it would not
-        follow from the others.
+        """Return the fewest asserted axioms to which a fact is owed: without any of them it would
+        not follow from the others.
 
         Args:
             fact: As for `explain`; None asks for a contradiction.
@@ -573,7 +579,7 @@ class KnowledgeBase:
         return justify(self._told.axioms, fact, proof.sources() if proof else (), schema)
 
     def _schema_axioms(self, assumed: tuple[Axiom, ...], goal: Axiom | None) -> tuple[Axiom, ...]:
-        """The axioms about classes and properties by which assumptions imply something."""
+        """Return the axioms about classes and properties by which assumptions imply something."""
         schema = [axiom for axiom in self._told.axioms if not is_assertion(axiom)]
         found = justify([*schema, *assumed], goal, (), schema, assumed)
         return tuple(axiom for axiom in found if axiom not in assumed)
@@ -585,7 +591,7 @@ class KnowledgeBase:
     # --- changes ---
 
     def add(self, axiom: Axiom) -> bool:
-        """Asserts an axiom; False when it was asserted already."""
+        """Assert an axiom; return False when it was asserted already."""
         if not self._told.insert(axiom):
             return False
         if self._feed:
@@ -593,7 +599,7 @@ class KnowledgeBase:
         return True
 
     def remove(self, axiom: Axiom) -> bool:
-        """Retracts an axiom; False when it was not asserted."""
+        """Retract an axiom; return False when it was not asserted."""
         if not self._told.discard(axiom):
             return False
         if self._feed:
@@ -601,7 +607,7 @@ class KnowledgeBase:
         return True
 
     def change(self, added: Iterable[Axiom] = (), removed: Iterable[Axiom] = ()) -> int:
-        """Retracts `removed`, then asserts `added`, as one batch; the number of axioms that
+        """Retract `removed`, then assert `added`, as one batch; return the number of axioms that
         changed.
         """
         gone = [axiom for axiom in removed if self._told.discard(axiom)]
@@ -611,7 +617,7 @@ class KnowledgeBase:
         return len(gone) + len(come)
 
     def rename(self, kind: str, old: str, new: str) -> int:
-        """Gives an entity another IRI in every asserted axiom; merges with `new` where that exists.
+        """Give an entity another IRI in every asserted axiom; merge with `new` where that exists.
 
         Returns:
             The number of axioms rewritten.
@@ -622,7 +628,7 @@ class KnowledgeBase:
         return len(affected)
 
     def remove_entity(self, kind: str, iri: str) -> int:
-        """Retracts every axiom that mentions the entity; a set of (different, same) individuals
+        """Retract every axiom that mentions the entity; a set of (different, same) individuals
         shrinks instead.
 
         Returns:
@@ -647,7 +653,7 @@ class KnowledgeBase:
     # --- reasoning ---
 
     def reason(self) -> bool:
-        """Brings what is derived up to date; whether the ontology is consistent."""
+        """Bring what is derived up to date; return whether the ontology is consistent."""
         engine, told = self._engine, self._told
         if engine is None or told.schema_changed or not self._fits(engine):
             before = self._feed.shown_by(engine) if self._feed else set()
@@ -664,7 +670,9 @@ class KnowledgeBase:
         return self._consistent
 
     def _fits(self, engine: Engine) -> bool:
-        """Whether the program knows every complex class and negated property that was added."""
+        """Tell whether the program knows every complex class and negated property that was
+        added.
+        """
         return all(engine.understands(axiom) for axiom in self._told.added)
 
     def _rebuild(self, old: Engine | None) -> Engine:
@@ -683,16 +691,14 @@ class KnowledgeBase:
         return engine
 
     def recompute(self) -> bool:
-        """Forgets what is derived and derives it again from nothing; whether the ontology is
-        consistent.
-        """
+        """Forget what is derived and derive it again; return whether the ontology is consistent."""
         self._told.schema_changed = True
         return self.reason()
 
     # --- whoever listens ---
 
     def subscribe(self, callback: Callable[[Changes], None]) -> Callable[[], None]:
-        """Calls back once per batch of assertions and once per `reason` that changed derived facts.
+        """Call back once per batch of assertions and once per `reason` that changed derived facts.
 
         Returns:
             A function that ends the subscription.

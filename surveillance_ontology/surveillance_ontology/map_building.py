@@ -28,7 +28,7 @@ class RoomNote:
 
 
 def shown_doors(place: Place) -> dict[str, tuple[str, ...]]:
-    """The doors of each room as the ontology has them: closed ones on one side only."""
+    """Return the doors of each room as the ontology has them: closed ones on one side only."""
     doors = {room: list(found) for room, found in place.rooms.items()}
     for door in sorted(place.closed):
         sides = place.doors[door]
@@ -39,7 +39,7 @@ def shown_doors(place: Place) -> dict[str, tuple[str, ...]]:
 
 
 def closed_doors(place: Place, shown: Mapping[str, Iterable[str]]) -> frozenset[str]:
-    """The closed doors of a place of which an ontology has some rooms, see `shown_doors`.
+    """Return the closed doors of a place of which an ontology has some rooms, see `shown_doors`.
 
     Args:
         place: The place; what the ontology does not tell of a door is as it is here.
@@ -57,7 +57,7 @@ def closed_doors(place: Place, shown: Mapping[str, Iterable[str]]) -> frozenset[
 
 
 def extended(place: Place | None, notes: Sequence[RoomNote], robot_room: str) -> Place:
-    """A place with further rooms, or with further doors of rooms it has.
+    """Return a place with further rooms, or with further doors of rooms it has.
 
     A connection is entered on both its sides as far as they are known.
 

@@ -60,7 +60,7 @@ class Waiting(Protocol):
     """What ends a wait early; a `threading.Event` is one."""
 
     def wait(self, timeout: float) -> bool:
-        """Waits; True when the wait is to end."""
+        """Wait; return True when the wait is to end."""
 
 
 @dataclass(frozen=True)
@@ -188,7 +188,7 @@ class PatrolOntology:
         self._armor.utils.drop_ref()
 
     def contradiction(self) -> str:
-        """Which facts of the ontology clash, as a sentence; empty when it is consistent.
+        """Return which facts of the ontology clash, as a sentence; empty when it is consistent.
 
         Raises:
             ArmorServiceCallError: The server does not answer.
@@ -202,7 +202,7 @@ class PatrolOntology:
         return answer.queried_objects[0] if answer.queried_objects else 'for no known reason'
 
     def places(self) -> tuple[str, ...]:
-        """The names of all places.
+        """Return the names of all places.
 
         Raises:
             ArmorServiceCallError: The server does not answer.
@@ -212,7 +212,7 @@ class PatrolOntology:
         return _names(answer)
 
     def doors(self) -> dict[str, set[str]]:
-        """The places that each door leads into.
+        """Return the places that each door leads into.
 
         Raises:
             ArmorServiceCallError: The server does not answer.
@@ -231,7 +231,7 @@ class PatrolOntology:
     # --- the robot ---
 
     def robot_places(self) -> tuple[str, ...]:
-        """Where the ontology has the robot: one place, or none yet.
+        """Return where the ontology has the robot: one place, or none yet.
 
         Raises:
             ArmorServiceCallError: The server does not answer.
@@ -399,7 +399,9 @@ class PatrolOntology:
         return self._request('SET DATAPROP IND', prop, individual, 'LONG', str(value))
 
     def _known_doors(self, place: Place) -> dict[str, list[str]]:
-        """The doors of the rooms that the ontology has already; empty when it has none of them."""
+        """Return the doors of the rooms that the ontology has already; empty when it has none of
+        them.
+        """
         rooms = tuple(place.rooms)
         answers = self._carry_out(
             [
@@ -440,8 +442,9 @@ class PatrolOntology:
     def _carry_out(
         self, requests: Sequence[DirectiveRequest], *, whole: bool = False
     ) -> list[DirectiveResponse]:
-        """Sends the directives in one batch; in several where there are very many, unless all must
-        be of one moment."""
+        """Send the directives in one batch; in several where there are very many, unless all must
+        be of one moment.
+        """
         answers: list[DirectiveResponse] = []
         size = len(requests) if whole else CHUNK
         for start in range(0, len(requests), size):
@@ -481,7 +484,7 @@ def _names(answer: DirectiveResponse) -> tuple[str, ...]:
 
 
 def _time(what: str, answer: DirectiveResponse) -> int:
-    """The latest of the times in an answer.
+    """Return the latest of the times in an answer.
 
     Raises:
         OntologyNotReadyError: One of them is none.

@@ -153,7 +153,7 @@ class ArucoDetector(PatrolNode):
             self._annotated.publish(image_to_ros(drawn, message.header))
 
     def _camera_of(self, width: int, height: int) -> CameraModel | None:
-        """The camera that took an image of this size; None when it is not known."""
+        """Return the camera that took an image of this size; None when it is not known."""
         if self._undescribed:
             return CameraModel.from_field_of_view(width, height, self._options.field_of_view)
         if self._described is None:

@@ -32,7 +32,7 @@ from surveillance_perception.stream.image_files import ImageArray, decode_image
 
 
 def image_from_ros(message: Image, max_pixels: int) -> ImageArray:
-    """A grey (height, width) or BGR (height, width, 3) image from an Image.
+    """Return a grey (height, width) or BGR (height, width, 3) image from an Image.
 
     Args:
         message: sensor_msgs/Image.
@@ -54,7 +54,7 @@ def image_from_ros(message: Image, max_pixels: int) -> ImageArray:
 
 
 def image_from_compressed(message: CompressedImage, max_pixels: int) -> ImageArray:
-    """A BGR image (height, width, 3) from a CompressedImage.
+    """Return a BGR image (height, width, 3) from a CompressedImage.
 
     Raises:
         ImageError: The data is no image, or the image is larger than `max_pixels`.
@@ -63,14 +63,14 @@ def image_from_compressed(message: CompressedImage, max_pixels: int) -> ImageArr
 
 
 def image_from_any(message: Image | CompressedImage, max_pixels: int) -> ImageArray:
-    """An image from either kind of message; otherwise as the two above."""
+    """Return an image from either kind of message; otherwise as the two above."""
     if isinstance(message, Image):
         return image_from_ros(message, max_pixels)
     return image_from_compressed(message, max_pixels)
 
 
 def image_to_ros(image: npt.NDArray[np.uint8], header: Header) -> Image:
-    """An Image (mono8 or bgr8) of a grey or BGR image."""
+    """Return an Image (mono8 or bgr8) of a grey or BGR image."""
     height, width = image.shape[:2]
     message = Image(header=header, height=height, width=width)
     message.encoding = 'mono8' if image.ndim == 2 else 'bgr8'
@@ -81,7 +81,8 @@ def image_to_ros(image: npt.NDArray[np.uint8], header: Header) -> Image:
 
 
 def camera_from_ros(message: CameraInfo) -> CameraModel:
-    """The camera that a CameraInfo describes, as its images come: binned, and cut to its region.
+    """Return the camera that a CameraInfo describes, as its images come: binned, and cut to its
+    region.
 
     Raises:
         ValueError: It describes no calibrated camera, or one of a distortion model that is not
@@ -104,7 +105,7 @@ def camera_from_ros(message: CameraInfo) -> CameraModel:
 
 
 def camera_to_ros(camera: CameraModel, header: Header) -> CameraInfo:
-    """A CameraInfo of a camera whose image is not rectified further."""
+    """Return a CameraInfo of a camera whose image is not rectified further."""
     message = CameraInfo(header=header, width=camera.width, height=camera.height)
     message.distortion_model = camera.distortion_model
     message.d = camera.distortion.tolist()
@@ -117,7 +118,7 @@ def camera_to_ros(camera: CameraModel, header: Header) -> CameraInfo:
 def detection_to_ros(
     detection: Detection, pose: MarkerPose | None, size: float, confirmed: bool
 ) -> MarkerDetection:
-    """A MarkerDetection; without a pose its position is not a number."""
+    """Return a MarkerDetection; without a pose its position is not a number."""
     message = MarkerDetection(
         id=detection.marker_id, known=detection.known, confirmed=confirmed, size=size
     )
@@ -136,7 +137,7 @@ def detection_to_ros(
 
 
 def detections_to_ros(header: Header, sightings: Iterable[Sighting]) -> MarkerDetectionArray:
-    """All markers of one image."""
+    """Return all markers of one image."""
     return MarkerDetectionArray(
         header=header,
         detections=[
@@ -147,13 +148,15 @@ def detections_to_ros(header: Header, sightings: Iterable[Sighting]) -> MarkerDe
 
 
 def poses_to_ros(header: Header, sightings: Iterable[Sighting]) -> PoseArray:
-    """The poses of those markers of an image that are confirmed."""
+    """Return the poses of those markers of an image that are confirmed."""
     poses = [pose_to_ros(each.pose) for each in sightings if each.pose and each.confirmed]
     return PoseArray(header=header, poses=poses)
 
 
 def transforms_to_ros(header: Header, sightings: Iterable[Sighting]) -> list[TransformStamped]:
-    """The poses of an image's confirmed markers as frames `marker_ID` of the camera's frame."""
+    """Return the poses of an image's confirmed markers as frames `marker_ID` of the camera's
+    frame.
+    """
     transforms = []
     for each in sightings:
         if each.pose is None or not each.confirmed:
@@ -172,7 +175,7 @@ def transforms_to_ros(header: Header, sightings: Iterable[Sighting]) -> list[Tra
 def diagnostics_to_ros(
     name: str, stamp: Any, statistics: Statistics, further: Mapping[str, Any]
 ) -> DiagnosticArray:
-    """How the stream of images was, with further figures to show."""
+    """Return how the stream of images was, with further figures to show."""
     status = DiagnosticStatus(name=f'{name}: pictures', hardware_id='camera')
     status.level, status.message = DiagnosticStatus.OK, 'looking'
     if statistics.refused:
@@ -193,7 +196,7 @@ def diagnostics_to_ros(
 
 
 def scan_plan_from_ros(goal: ScanSurroundings.Goal, horizontal: float, vertical: float) -> ScanPlan:
-    """What a goal asks a camera with these fields of view (rad) to look at.
+    """Return what a goal asks a camera with these fields of view (rad) to look at.
 
     Raises:
         ValueError: An elevation or the overlap is out of range.
@@ -207,7 +210,7 @@ def scan_plan_from_ros(goal: ScanSurroundings.Goal, horizontal: float, vertical:
 def scan_feedback_to_ros(
     index: int, count: int, view: View, resting: bool
 ) -> ScanSurroundings.Feedback:
-    """Where a scan is."""
+    """Return where a scan is."""
     return ScanSurroundings.Feedback(
         view=index + 1,
         views=count,
@@ -218,7 +221,7 @@ def scan_feedback_to_ros(
 
 
 def scan_result_to_ros(outcome: ScanOutcome) -> ScanSurroundings.Result:
-    """What came of a scan."""
+    """Return what came of a scan."""
     return ScanSurroundings.Result(
         views=outcome.rested,
         unreachable=outcome.unreachable,
@@ -228,7 +231,7 @@ def scan_result_to_ros(outcome: ScanOutcome) -> ScanSurroundings.Result:
 
 
 def pose_to_ros(pose: MarkerPose) -> Pose:
-    """A Pose message."""
+    """Return a Pose message."""
     x, y, z = pose.position.tolist()
     qx, qy, qz, qw = pose.quaternion
     return Pose(position=Point(x=x, y=y, z=z), orientation=Quaternion(x=qx, y=qy, z=qz, w=qw))
@@ -263,7 +266,7 @@ def marked_place_to_ros(place: MarkedPlace, response: RoomInformation.Response) 
 
 
 def trajectory_to_ros(trajectory: ArmTrajectory, names: tuple[str, ...]) -> JointTrajectory:
-    """A JointTrajectory whose points run from now."""
+    """Return a JointTrajectory whose points run from now."""
     message = JointTrajectory(joint_names=list(names))
     for time, position, speed, acceleration in zip(
         trajectory.times,

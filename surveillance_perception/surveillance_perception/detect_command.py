@@ -78,7 +78,9 @@ def _detect(detector: MarkerDetector, path: Path, folder: Path | None, written: 
 
 
 def _target(path: Path, folder: Path, written: set[Path]) -> Path:
-    """Where the annotated copy goes: neither onto an image of this call nor onto another copy."""
+    """Return where the annotated copy goes: neither onto an image of this call nor onto another
+    copy.
+    """
     target, number = folder / f'{path.stem}_markers.png', 1
     while target.resolve() in written:
         number += 1

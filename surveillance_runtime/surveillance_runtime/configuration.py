@@ -200,7 +200,7 @@ def file_layer(path: str | Path) -> Layer:
 
 
 def _noted_origins(file: YamlFile) -> dict[int, str]:
-    """The sources that a resolved file notes behind its lines, by line."""
+    """Return the sources that a resolved file notes behind its lines, by line."""
     try:
         lines = file.path.read_text(encoding='utf-8').splitlines()
     except OSError:
@@ -395,7 +395,7 @@ class Configuration:
 
 
 def _check_plain(entry: Entry) -> None:
-    """Refuses what a ROS parameter cannot hold: dates, lists in lists, values of several types."""
+    """Refuse what a ROS parameter cannot hold: dates, lists in lists, values of several types."""
     value = entry.value
     kinds = {type(each) for each in value} if isinstance(value, list) else {type(value)}
     if kinds == {int, float}:

@@ -19,7 +19,9 @@ def nanoseconds_of(stamp: Time) -> int:
 
 
 def cloud_from_points(points: NDArray[np.float64]) -> PointCloud2:
-    """Points of shape (n, 2), metres, as a cloud in the map's frame; the caller stamps it."""
+    """Return points of shape (n, 2), metres, as a cloud in the map's frame; the caller stamps
+    it.
+    """
     message = PointCloud2()
     message.header.frame_id = 'map'
     message.height, message.width = 1, len(points)
@@ -36,7 +38,7 @@ def cloud_from_points(points: NDArray[np.float64]) -> PointCloud2:
 
 
 def points_from_cloud(message: PointCloud2) -> NDArray[np.float64]:
-    """The x and y of a cloud's points, shape (n, 2), metres.
+    """Return the x and y of a cloud's points, shape (n, 2), metres.
 
     Raises:
         ValueError: The cloud has no x and y of 32 bits.

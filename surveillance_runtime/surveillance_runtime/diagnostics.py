@@ -169,7 +169,7 @@ def _restarts() -> int:
 
 
 def _process() -> dict[str, str]:
-    """What the process uses, where the kernel says so."""
+    """Return what the process uses, where the kernel says so."""
     figures = {'threads': str(threading.active_count())}
     with contextlib.suppress(OSError, ValueError, IndexError):
         with open('/proc/self/statm', encoding='ascii') as file:

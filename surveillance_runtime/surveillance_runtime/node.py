@@ -249,7 +249,7 @@ class PatrolNode(Node):  # type: ignore[misc]
         return super().create_service(srv_type, name, answering, **options)
 
     def _answering(self, callback: Callable[..., Any], name: str) -> Callable[..., Any]:
-        """A callback that answers whatever happens: who asked is not to wait for ever."""
+        """Return a callback that answers whatever happens: who asked is not to wait for ever."""
 
         def empty(error: Exception, request: Any, response: Any) -> Any:
             report_exception(error, self, f'service {name}')
@@ -328,7 +328,7 @@ class PatrolNode(Node):  # type: ignore[misc]
         self.ended.set()
 
     def on_stop(self) -> None:
-        """Called once when the node stops, while messages still flow."""
+        """Do what is to be done once when the node stops, while messages still flow."""
 
     def stop(self) -> None:
         """End the node's work; call it from outside the executor while that still spins."""
@@ -373,7 +373,7 @@ def report_exception(error: BaseException, node: Node, what: str) -> None:
 
 
 def _refusal(response: Any, request: Any, error: Exception) -> Any:
-    """An answer that says no, in the words of the services of parameters."""
+    """Return an answer that says no, in the words of the services of parameters."""
     no = SetParametersResult(successful=False, reason=clean(str(error)))
     if isinstance(response, SetParameters.Response):
         response.results = [no for _ in request.parameters]

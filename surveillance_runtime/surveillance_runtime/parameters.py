@@ -116,7 +116,7 @@ class ParameterSpec:
         return element
 
     def _choice(self, element: Any, whole: Any) -> Any:
-        """The choice that is meant: of texts also one in other letters, as `manual`."""
+        """Return the choice that is meant: of texts also one in other letters, as `manual`."""
         if element in self.choices:
             return element
         if isinstance(element, str):
@@ -126,7 +126,7 @@ class ParameterSpec:
         raise self.error(whole)
 
     def _usual(self) -> float:
-        """A default that is not finite says that such values make sense."""
+        """Return a default that is not finite says that such values make sense."""
         defaults = self.default if isinstance(self.default, list | tuple) else [self.default]
         return next((d for d in defaults if isinstance(d, float) and not math.isfinite(d)), 0.0)
 

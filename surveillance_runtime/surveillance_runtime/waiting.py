@@ -71,7 +71,7 @@ class AwaitedEvent:
         self._futures: set[Future] = set()
 
     def next_time(self) -> Future:
-        """The next time it happens, to be awaited in a callback."""
+        """Return the next time it happens, to be awaited in a callback."""
         future = Future()
         with self._lock:
             self._futures.add(future)

@@ -135,7 +135,7 @@ class World:
         self.set_level(self.level + (self.charge if self.docked() else -self.draw))
 
     def set_level(self, level: float) -> None:
-        """Sets the charge, and notices a robot that has none away from the station."""
+        """Set the charge, and notice a robot that has none away from the station."""
         if level < 0.0 <= self.level:
             self.stranded += 1
         self.level = min(100.0, max(-1e-9, level))
@@ -152,7 +152,7 @@ class World:
             raise InterruptedWaitError
 
     def neighbours(self, place: str) -> tuple[str, ...]:
-        """Where the open doors of a place lead."""
+        """Return where the open doors of a place lead."""
         doors = set(self.rooms.get(place, ())) - self.closed
         return tuple(
             sorted(
@@ -163,7 +163,7 @@ class World:
         )
 
     def urgent(self) -> set[str]:
-        """The places that went unvisited for longer than the threshold."""
+        """Return the places that went unvisited for longer than the threshold."""
         now = int(self.clock.time)
         return {p for p, seen in self.visited_at.items() if now - int(seen) > self.threshold}
 
@@ -213,11 +213,11 @@ class World:
         return self.positions[place]
 
     def push(self, place: str) -> None:
-        """Moves the robot by hand; the battery notices within a second."""
+        """Move the robot by hand; the battery notices within a second."""
         self.at, self.place = self.positions[place], place
 
     def docked(self) -> bool:
-        """Whether the robot stands at a station."""
+        """Tell whether the robot stands at a station."""
         return any(math.dist(self.at, self.positions[place]) < 1.0 for place in self.stations)
 
     def plan_path(self, start: Point, goal: Point, interrupt: Interrupt) -> list[Point]:
@@ -278,7 +278,7 @@ class World:
         machine: str = 'surveillance',
         experience: Experience | None = None,
     ) -> Mission:
-        """A mission in this world."""
+        """Return a mission in this world."""
         settings = settings or MissionSettings(settle_seconds=0.0)
         kind = ScriptedReasoner if machine == 'patrol' else Decider
         self.decider = kind(
@@ -363,7 +363,7 @@ def fails(
     reason: str = 'scripted fault',
     kind: type[PeerError] = PeerError,
 ) -> Callable[[str], None]:
-    """A fault: the first ``times`` calls of a port method fail."""
+    """Return a fault: the first ``times`` calls of a port method fail."""
     left = [times]
 
     def fault(call: str) -> None:

@@ -46,7 +46,7 @@ class CheckedWorld(World):
         self.check(decision)
 
     def check(self, decision: Decision) -> None:
-        """Notes what is wrong with a decision made now."""
+        """Note what is wrong with a decision made now."""
         if decision.rule == 'recharge':
             assert decision.place in self.stations
             return

@@ -97,7 +97,9 @@ def test_the_same_world_gives_the_same_mission(name: str) -> None:
 
 
 def troubled(call: str, times: float, level: float, charge: float = 2.0) -> World:
-    """A world in which calls fail at the start and again later, with a battery that falls."""
+    """Return a world in which calls fail at the start and again later, with a battery that
+    falls.
+    """
     world = World(charge=charge)
     world.faults = fails(call, 2.0)
 
@@ -110,7 +112,7 @@ def troubled(call: str, times: float, level: float, charge: float = 2.0) -> Worl
 
 
 def low_during(call: str) -> World:
-    """A world in which the battery falls during a call."""
+    """Return a world in which the battery falls during a call."""
     world = World()
 
     def fall(called: str) -> None:

@@ -42,7 +42,7 @@ def world(**changes: object) -> World:
 
 @st.composite
 def graphs(draw: st.DrawFn, most: int = 8) -> PatrolGraph:
-    """Connected graphs: a random tree with some edges more."""
+    """Draw connected graphs: a random tree with some edges more."""
     count = draw(st.integers(2, most))
     legs: dict[str, dict[str, float]] = {f'P{number}': {} for number in range(count)}
     extra = draw(st.lists(st.tuples(st.integers(0, count - 1), st.integers(0, count - 1))))

@@ -30,18 +30,20 @@ class Operator:
         print(line, file=self._keyboard, flush=True)
 
     def hang_up(self) -> None:
-        """Ends the input."""
+        """End the input."""
         self._keyboard.close()
 
     def close(self) -> None:
-        """Closes both ends."""
+        """Close both ends."""
         self.source.close()
         self._keyboard.close()
 
 
 @pytest.fixture
 def operator() -> Iterator[Operator]:
-    """An operator at a pipe; hand `operator.source` to a controller as its `console_source`."""
+    """Provide an operator at a pipe; hand `operator.source` to a controller as its
+    `console_source`.
+    """
     operator = Operator()
     yield operator
     operator.close()
@@ -49,7 +51,7 @@ def operator() -> Iterator[Operator]:
 
 @pytest.fixture
 def in_background() -> Iterator[Callable[[Callable[[], Any]], Callable[[], Any]]]:
-    """Runs work on a thread; gives a function that waits for what the work returned or raised."""
+    """Run work on a thread; give a function that waits for what the work returned or raised."""
     with ThreadPoolExecutor() as pool:
 
         def start(work: Callable[[], Any]) -> Callable[[], Any]:
@@ -85,8 +87,9 @@ class Flat:
         obstacles: Sequence[tuple[float, float, float]] = (),
         closed: bool = False,
     ) -> Scan:
-        """What a lidar of 8 m sees: x, y and radius of obstacles in metres, the door closed or
-        not."""
+        """Return what a lidar of 8 m sees: x, y and radius of obstacles in metres, the door closed
+        or not.
+        """
         grid = with_walls(self.grid, [self.DOOR]) if closed else self.grid
         angles = np.linspace(-math.pi, math.pi, 180, endpoint=False)
         way = np.arange(0, 8, 0.02)
@@ -103,7 +106,7 @@ class Flat:
 
 @pytest.fixture
 def seven_rooms() -> dict[str, Any]:
-    """The seven rooms' file as flat parameter overrides."""
+    """Provide the seven rooms' file as flat parameter overrides."""
     file = Path(__file__).parents[2] / 'config' / 'seven_rooms.yaml'
     flat: dict[str, Any] = {}
     for name, value in yaml.safe_load(file.read_text())['/**']['ros__parameters'].items():

@@ -30,7 +30,9 @@ def two_rooms(door: tuple[float, float] = (1.5, 2.5)) -> GridMap:
 
 
 def true_clearance(grid: GridMap, path: np.ndarray) -> float:
-    """The least distance from points along a path to the occupied squares, by brute force."""
+    """Return the least distance from points along a path to the occupied squares, by brute
+    force.
+    """
     samples = geometry.equally_spaced(path, 0.02)
     low = grid.centres_of(np.argwhere(~grid.free)) - RESOLUTION / 2
     gap = np.maximum(low - samples[:, None], samples[:, None] - low - RESOLUTION)

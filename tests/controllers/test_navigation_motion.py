@@ -80,7 +80,7 @@ class World:
         return self._control.run(Control.Goal(point_set=points), accept_timeout=10.0)
 
     def ask_until(self, holds: Callable[[], bool]) -> None:
-        """Asks again and again, which `graph.until` cannot: it must not wait for answers."""
+        """Ask again and again, which `graph.until` cannot: it must not wait for answers."""
         deadline = time.monotonic() + 40.0
         while not holds():
             assert time.monotonic() < deadline, 'not within 40 s'

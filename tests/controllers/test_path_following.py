@@ -25,7 +25,7 @@ ROBOT = DriveParameters()
 
 
 def moved(pose: tuple[float, float, float], velocity: Velocity) -> tuple[float, float, float]:
-    """The pose after one period on the arc of a velocity."""
+    """Return the pose after one period on the arc of a velocity."""
     turn = velocity.turn * PERIOD
     distance = velocity.speed * PERIOD
     chord = distance if abs(turn) < 1e-9 else 2 * distance * math.sin(turn / 2) / turn
@@ -37,7 +37,7 @@ def moved(pose: tuple[float, float, float], velocity: Velocity) -> tuple[float, 
 def follow(
     path: np.ndarray, pose: tuple[float, float, float]
 ) -> tuple[list[tuple[float, float, float]], list[Velocity], bool]:
-    """Drives without errors until the end, or for as long as a slow robot would need."""
+    """Drive without errors until the end, or for as long as a slow robot would need."""
     follower = PathFollower(path, ROBOT)
     poses, velocities = [pose], [Velocity()]
     for _ in range(int(60 + 30 * geometry.length(path)) * 10):
@@ -112,7 +112,7 @@ def test_the_robot_stops_before_what_it_sees(distance: float, lag: int) -> None:
 
 
 def at_top_speed() -> PathFollower:
-    """A follower of a straight path that has come up to speed, at (3, 0)."""
+    """Return a follower of a straight path that has come up to speed, at (3, 0)."""
     follower, pose = PathFollower([[0.0, 0], [6, 0]], ROBOT), (0.0, 0.0, 0.0)
     while pose[0] < 3.0:
         pose = moved(pose, follower.step(pose, NOTHING, PERIOD).velocity)

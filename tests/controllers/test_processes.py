@@ -26,7 +26,7 @@ def start(node: str, *parameters: str, stdin: int = subprocess.PIPE) -> subproce
 
 
 def wait_for(process: subprocess.Popen[str], text: str) -> list[str]:
-    """Reads the process's lines up to one that has the text."""
+    """Read the process's lines up to one that has the text."""
     assert process.stdout is not None
     lines: list[str] = []
     for line in process.stdout:

@@ -15,7 +15,9 @@ NOISE = np.random.default_rng(3)
 
 
 def body(x: float, y: float, radius: float = 0.25) -> Points:
-    """The near half of a round body, as a lidar at the origin sees it at one degree a ray."""
+    """Return the near half of a round body, as a lidar at the origin sees it at one degree a
+    ray.
+    """
     away, bearing = math.hypot(x, y), math.atan2(y, x)
     half = math.asin(radius / away)
     angles = np.arange(bearing - half, bearing + half, math.radians(1))[1:]

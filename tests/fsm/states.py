@@ -85,7 +85,7 @@ class Background:
             self._error = error
 
     def result(self, timeout: float = 10.0) -> Any:
-        """The outcome; raises what the execution raised."""
+        """Return the outcome; raises what the execution raised."""
         self._thread.join(timeout)
         assert not self._thread.is_alive(), 'still running'
         if self._error is not None:

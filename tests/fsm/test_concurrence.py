@@ -182,7 +182,7 @@ def test_of_several_outcomes_that_hold_the_most_specific_wins():
 
 
 def guarded(*states, default='succeeded', outcomes=('succeeded', 'preempted'), **arguments):
-    """A mission whose next state runs unless the concurrence before it ends preempted."""
+    """Build a mission whose next state runs unless the concurrence before it ends preempted."""
     concurrence = fsm.Concurrence(outcomes, default, **arguments)
     following = Answer('done')
     root = fsm.StateMachine(['done', 'preempted'])

@@ -68,7 +68,7 @@ def build(description, choose, log, path='ROOT'):
 
 
 def walk(description, choose, log, path='ROOT'):
-    """What the machine does, said as plainly as possible."""
+    """Say what the machine does, as plainly as possible."""
     number: int | str = 0
     while not isinstance(number, str):
         inner, targets = description[number]

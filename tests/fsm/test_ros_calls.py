@@ -195,7 +195,9 @@ def test_exception_in_execute_aborts_the_goal_and_the_server_goes_on(graph, serv
 
 
 def waiting_server(server, name='follow_path'):
-    """A server whose goals run until they are interrupted; returns its list of started runs."""
+    """Offer a server whose goals run until they are interrupted; return its list of started
+    runs.
+    """
     runs = []
 
     def execute(goal, run):

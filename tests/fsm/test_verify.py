@@ -21,7 +21,7 @@ def keyed(reads=(), writes=(), outcomes=('done',)):
 
 
 def machine_of(states, outcomes=('done',), **arguments):
-    """A machine of {label: (state, transitions, remapping)}."""
+    """Build a machine of {label: (state, transitions, remapping)}."""
     machine = fsm.StateMachine(outcomes, **arguments)
     machine.set_name('ROOT')
     with machine:

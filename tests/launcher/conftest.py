@@ -46,7 +46,7 @@ class Started:
             self._changed.notify_all()
 
     def until(self, pattern: str, timeout: float = 20.0, after: int = 0) -> re.Match[str]:
-        """Waits for a line that the pattern is found in, from line number `after` on."""
+        """Wait for a line that the pattern is found in, from line number `after` on."""
         deadline = time.monotonic() + timeout
         seen = after
         with self._changed:
@@ -61,7 +61,7 @@ class Started:
                 self._changed.wait(remaining)
 
     def answer(self, pattern: str, answers: Mapping[str, str], after: int = 0) -> None:
-        """Writes the answer to each line that asks for one, until a line has the pattern."""
+        """Write the answer to each line that asks for one, until a line has the pattern."""
         seen = after
         while True:
             found = self.until('|'.join((pattern, *answers)), after=seen)
@@ -76,7 +76,7 @@ class Started:
         self.process.stdin.flush()
 
     def end(self, number: int | None = None, timeout: float = 20.0) -> tuple[int, float]:
-        """Sends a signal, if one is given, and waits; returns the exit code and the seconds."""
+        """Send a signal, if one is given, and wait; return the exit code and the seconds."""
         start = time.monotonic()
         if number is not None:
             self.process.send_signal(number)
@@ -88,7 +88,7 @@ class Started:
 
 @pytest.fixture
 def start() -> Iterator[Callable[..., Started]]:
-    """Starts Python with the given arguments; what is left at the end of the test is killed."""
+    """Start Python with the given arguments; what is left at the end of the test is killed."""
     started: list[Started] = []
 
     def start_python(*arguments: str, environ: Mapping[str, str] | None = None) -> Started:
@@ -103,7 +103,7 @@ def start() -> Iterator[Callable[..., Started]]:
 
 
 def is_alive(pid: int) -> bool:
-    """Whether a process exists and is no zombie."""
+    """Tell whether a process exists and is no zombie."""
     try:
         with open(f'/proc/{pid}/stat', encoding='utf-8') as file:
             return file.read().rsplit(')', 1)[1].split()[0] != 'Z'
@@ -112,7 +112,7 @@ def is_alive(pid: int) -> bool:
 
 
 def gone(pids: Sequence[int], timeout: float = 5.0) -> bool:
-    """Whether all processes end within the time; each is watched by the kernel's own means."""
+    """Tell whether all processes end within the time; each is watched by the kernel's own means."""
     deadline = time.monotonic() + timeout
     for pid in pids:
         try:

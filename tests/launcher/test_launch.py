@@ -31,7 +31,7 @@ TICK = 0.02
 
 @pytest.fixture
 def clock(graph) -> None:
-    """Simulated time that passes `SPEED` times as fast as real time."""
+    """Provide simulated time that passes `SPEED` times as fast as real time."""
     publisher = graph.node.create_publisher(ClockMessage, 'clock', 10)
     ticks = itertools.count(1)
 

@@ -35,7 +35,7 @@ ENDING = (
 
 
 def after(seconds: float, *looks: Look) -> str:
-    """The judgement that long after a heartbeat, with looks spread over the time."""
+    """Return the judgement that long after a heartbeat, with looks spread over the time."""
     heartbeats = Heartbeats(0.0)
     heartbeats.beat(0.0)
     problems = [

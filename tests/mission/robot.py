@@ -52,7 +52,7 @@ IMPATIENT = {
 
 
 def place_parameters(name: str = 'seven_rooms.yaml') -> dict[str, Any]:
-    """A place's file as the parameters of the map builder."""
+    """Return a place's file as the parameters of the map builder."""
     with open(CONFIG / name, encoding='utf-8') as file:
         place = yaml.safe_load(file)['/**']['ros__parameters']
     values = {
@@ -111,17 +111,17 @@ class Robot:
             self._parameters['ontology_map_builder'] = {'armor_timeout': PATIENCE}
 
     def configure(self, name: str, **parameters: Any) -> None:
-        """Changes parameters of a node that is not there yet."""
+        """Change parameters of a node that is not there yet."""
         self._parameters[name].update({key.replace('__', '.'): v for key, v in parameters.items()})
 
     def be_impatient(self) -> None:
-        """Has nobody wait long for whoever does not answer."""
+        """Have nobody wait long for whoever does not answer."""
         self._parameters['robot_behavior'].update(IMPATIENT)
         for name in ('planner_controller', 'motion_controller'):
             self._parameters[name]['peer_timeout'] = 0.5
 
     def begin(self, *without: str) -> None:
-        """Starts all nodes but some, and time."""
+        """Start all nodes but some, and time."""
         for name in self._parameters:
             if name not in without:
                 self.arrive(name)
@@ -129,7 +129,7 @@ class Robot:
         self.time.start()
 
     def arrive(self, name: str) -> None:
-        """Starts one node."""
+        """Start one node."""
         parameters = {**self._parameters[name], 'use_sim_time': True}
         self.nodes[name] = self._graph.add(NODES[name], parameters)
         self.time.unattended = 'robot_behavior' not in self.nodes
@@ -137,32 +137,32 @@ class Robot:
             self.time.tell()
 
     def leave(self, name: str) -> None:
-        """Ends one node, as when its process dies."""
+        """End one node, as when its process dies."""
         node = self.nodes.pop(name)
         self.time.unattended = 'robot_behavior' not in self.nodes
         self._graph.remove(node)
 
     def until(self, seconds: float, timeout: float = 60.0) -> None:
-        """Runs the mission until ``seconds`` after its start."""
+        """Run the mission until ``seconds`` after its start."""
         end = START + seconds
         self._graph.until(lambda: self.time.error or self.time.now >= end, timeout)
         assert self.time.error is None, repr(self.time.error)
 
     def summary(self) -> Summary:
-        """What the record says."""
+        """Return what the record says."""
         return summarize(read(self.record))
 
     def events(self) -> list[Event]:
-        """The record."""
+        """Return the record."""
         return read(self.record)
 
     def set_parameter(self, node: Any, name: str, value: Any) -> str:
-        """Sets a parameter at run time; why that was refused, empty: it was not."""
+        """Set a parameter at run time; why that was refused, empty: it was not."""
         (result,) = node.set_parameters([Parameter(name, value=value)])
         return '' if result.successful else str(result.reason)
 
     def decisions(self) -> list[tuple[str, str]]:
-        """The places that were chosen, with the rule."""
+        """Return the places that were chosen, with the rule."""
         return [
             (event.text('place'), event.text('rule'))
             for event in read(self.record)
@@ -170,7 +170,7 @@ class Robot:
         ]
 
     def visited(self, since: float = 0.0) -> set[str]:
-        """The places that were visited, from ``since`` seconds after the start on."""
+        """Return the places that were visited, from ``since`` seconds after the start on."""
         return {
             event.text('place')
             for event in read(self.record)
@@ -180,7 +180,7 @@ class Robot:
 
 @contextmanager
 def mission(graph: Any, patch: pytest.MonkeyPatch, behaviour: str, record: Path) -> Iterator[Robot]:
-    """A robot whose time stops when the block ends."""
+    """Provide a robot whose time stops when the block ends."""
     with simulated_time(graph, patch) as time:
         robot = Robot(graph, time, behaviour, record)
         time.follow(lambda: list(robot.nodes.values()))

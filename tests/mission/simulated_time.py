@@ -53,39 +53,39 @@ class SimulatedTime:
         self._thread = threading.Thread(target=self._run, name='simulated time')
 
     def follow(self, nodes: Callable[[], list[Any]]) -> None:
-        """Names the nodes that must have seen each moment before the next one comes."""
+        """Name the nodes that must have seen each moment before the next one comes."""
         self._nodes = nodes
 
     def start(self) -> None:
-        """Lets time run."""
+        """Let time run."""
         self._publish()
         self._thread.start()
 
     def tell(self) -> None:
-        """Tells a node that has just come what time it is."""
+        """Tell a node that has just come what time it is."""
         self._publish()
 
     def stop(self) -> None:
-        """Ends time; sleepers stay asleep."""
+        """End time; sleepers stay asleep."""
         with self._condition:
             self._ended = True
             self._condition.notify_all()
         self._thread.join(5.0)
 
     def at(self, seconds: float, action: Any) -> None:
-        """Does something ``seconds`` after the start, while everybody sleeps."""
+        """Do something ``seconds`` after the start, while everybody sleeps."""
         with self._condition:
             self.alarms.append((START + seconds, action))
             self.alarms.sort(key=lambda alarm: alarm[0])
 
     def fell_asleep(self, deadline: float) -> None:
-        """The calling thread sleeps until ``deadline``."""
+        """Have the calling thread sleep until ``deadline``."""
         with self._condition:
             self._sleepers[threading.get_ident()] = (deadline, threading.current_thread().name)
             self._condition.notify_all()
 
     def woke_up(self) -> None:
-        """The calling thread goes on."""
+        """Have the calling thread go on."""
         with self._condition:
             self._sleepers.pop(threading.get_ident(), None)
             self._condition.notify_all()
@@ -139,7 +139,7 @@ class SimulatedTime:
 
 @contextmanager
 def simulated_time(graph: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[SimulatedTime]:
-    """Puts the graph's nodes on simulated time; call ``start`` once they are there."""
+    """Put the graph's nodes on simulated time; call ``start`` once they are there."""
     driver = SimulatedTime(graph)
     sleep = ClockWait.sleep
 

@@ -16,7 +16,7 @@ from .seven_rooms import FIXTURES, IRI, ONTOLOGY, Ask, asker
 
 @pytest.fixture
 def service(tmp_path: Path) -> Iterator[ArmorService]:
-    """A service that may read and write in the test's directory and read the fixtures."""
+    """Provide a service that may read and write in the test's directory and read the fixtures."""
     made = ArmorService(
         Settings(
             ontologies_folder=tmp_path,
@@ -32,7 +32,7 @@ def service(tmp_path: Path) -> Iterator[ArmorService]:
 
 @pytest.fixture
 def ask(service: ArmorService) -> Ask:
-    """Sends directives to a service that has the patrol's ontology as `map`, nothing buffered."""
+    """Send directives to a service that has the patrol's ontology as `map`, nothing buffered."""
     send = asker(service)
     loaded = send('LOAD FILE', ONTOLOGY, IRI, 'false', 'PELLET', 'false')
     assert loaded.success, loaded
@@ -41,5 +41,5 @@ def ask(service: ArmorService) -> Ask:
 
 @pytest.fixture
 def client(service: ArmorService) -> ArmorClient:
-    """A client of the reference `map`, which is not loaded yet."""
+    """Provide a client of the reference `map`, which is not loaded yet."""
     return ArmorClient('tester', 'map', InProcessTransport(service))

@@ -26,7 +26,7 @@ Ask = Callable[..., DirectiveResponse]
 
 
 def asker(service: ArmorService, reference: str = 'map', client: str = 'tester') -> Ask:
-    """A short way to send directives: ``ask('ADD IND CLASS', 'R1', 'ROOM')``."""
+    """Return a short way to send directives: ``ask('ADD IND CLASS', 'R1', 'ROOM')``."""
 
     def ask(
         words: str, *args: str, client: str = client, reference: str = reference
@@ -40,7 +40,7 @@ def asker(service: ArmorService, reference: str = 'map', client: str = 'tester')
 
 
 def names(response: DirectiveResponse) -> list[str]:
-    """The local names in an answer."""
+    """Return the local names in an answer."""
     assert response.success, response
     return sorted(
         item.removeprefix(f'<{IRI}#').removesuffix('>') for item in response.queried_objects
@@ -48,7 +48,7 @@ def names(response: DirectiveResponse) -> list[str]:
 
 
 def build_seven_rooms(client: ArmorClient, buffered: bool, lazy: bool) -> None:
-    """The usual order of building a map: add, reason, tell apart, place the robot, reason."""
+    """Build a map in the usual order: add, reason, tell apart, place the robot, reason."""
     client.utils.load_ref_from_file(ONTOLOGY, IRI, buffered, 'PELLET', lazy)
     for room, doors in SEVEN_ROOMS.items():
         for door in doors:

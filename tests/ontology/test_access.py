@@ -17,13 +17,13 @@ PAYLOAD = 'x\nimport os; os.system("id")\n'
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """The ontologies folder of the run, in a folder that stands for a checkout."""
+    """Provide the ontologies folder of the run, in a folder that stands for a checkout."""
     return tmp_path / 'run' / 'ontologies'
 
 
 @pytest.fixture
 def ask(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Ask:
-    """A client of a service with the default settings, started in a checkout."""
+    """Provide a client of a service with the default settings, started in a checkout."""
     monkeypatch.chdir(tmp_path)
     service = ArmorService(Settings(folder), screen=lambda _: None, warn=lambda _: None)
     send = asker(service)

@@ -51,7 +51,7 @@ client.utils.save_ref_with_inferences('inferred_test.owl')
 
 @pytest.fixture
 def server(graph: Any, tmp_path: Path) -> ArmorServer:
-    """A server under ARMOR's own service names."""
+    """Provide a server under ARMOR's own service names."""
     parameters = {'ontologies_folder': str(tmp_path), 'directories': [str(FIXTURES)]}
     made: ArmorServer = graph.add(ArmorServer, parameters)
     return made

@@ -65,19 +65,19 @@ class Caller:
 
 @pytest.fixture
 def armor(graph: Any) -> ArmorClient:
-    """A client of the map builder's ontology."""
+    """Provide a client of the map builder's ontology."""
     return ArmorClient(graph.node, 'test', 'surveillance')
 
 
 @pytest.fixture
 def call(graph: Any) -> Caller:
-    """Calls services of the map builder."""
+    """Call services of the map builder."""
     return Caller(graph)
 
 
 @pytest.fixture
 def built(graph: Any, call: Caller) -> OntologyMapBuilder:
-    """A server, and a builder that has built the seven rooms."""
+    """Provide a server, and a builder that has built the seven rooms."""
     graph.add(ArmorServer)
     builder: OntologyMapBuilder = graph.add(OntologyMapBuilder, PLACE)
     assert call('reference_name').name == 'surveillance'
@@ -86,7 +86,7 @@ def built(graph: Any, call: Caller) -> OntologyMapBuilder:
 
 
 def connected(armor: ArmorClient) -> list[str]:
-    """What C1 is connected to; nothing while there is no ontology."""
+    """Return what C1 is connected to; nothing while there is no ontology."""
     try:
         return armor.query.objectprop_b2_ind('connectedTo', 'C1')
     except ArmorServiceInternalError:

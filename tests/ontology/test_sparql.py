@@ -30,7 +30,7 @@ ENDLESS = PREFIX + 'SELECT (COUNT(*) AS ?n) { ?a ?b ?c . ?d ?e ?f . ?g ?h ?i . ?
 
 @pytest.fixture
 def built(client: ArmorClient) -> ArmorClient:
-    """A client of a built map."""
+    """Provide a client of a built map."""
     build_seven_rooms(client, False, True)
     return client
 

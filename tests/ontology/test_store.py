@@ -49,7 +49,7 @@ class Server:
 
 @pytest.fixture
 def server(tmp_path: Path) -> Server:
-    """A fresh durable service with the patrol's ontology, nothing buffered."""
+    """Provide a fresh durable service with the patrol's ontology, nothing buffered."""
     made = Server(tmp_path / 'store')
     made.ask(*LOAD, 'false', 'PELLET', 'false')
     return made

@@ -22,7 +22,9 @@ DECISION = Decision(90.0, 'A', 'B', 'B', 'URGENT', 'tour', 'B waits longest', {}
 
 
 def two_rooms() -> Grid:
-    """A room of 4 x 2 m and one of 2 x 2 m, a wall of 5 cm with an opening of 1 m between."""
+    """Return a room of 4 x 2 m and one of 2 x 2 m, a wall of 5 cm with an opening of 1 m
+    between.
+    """
     cells = np.zeros((40, 120), np.int8)
     cells[[0, -1], :] = cells[:, [0, 80, -1]] = 100
     cells[10:30, 80] = 0

@@ -40,7 +40,7 @@ def place() -> dict[str, Any]:
 
 
 def robot(graph: Any) -> list[Int32]:
-    """All nodes of the start, with no deadline; the list of ids as they are found."""
+    """Return all nodes of the start, with no deadline; the list of ids as they are found."""
     ids = graph.listen(Int32, 'aruco_detector/id', IDS_QOS)
     # every wait ends by what happens: a busy machine only makes it longer
     patient = SIMULATED | {'patience': 60.0, 'pictures': 2}

@@ -176,7 +176,7 @@ def test_the_places_that_come_along_are_places(name: str) -> None:
 
 
 def problem_of(path: Path) -> str:
-    """What is wrong with a place's file; empty when nothing is."""
+    """Return what is wrong with a place's file; empty when nothing is."""
     try:
         read_place(path)
     except YamlFileError as error:

@@ -60,15 +60,17 @@ class MissionState(fsm.State):
             return FAILED
 
     def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
-        """The state's own work; the outcome."""
+        """Return the state's own work; the outcome."""
         raise NotImplementedError
 
     def interrupted(self, ud: Any) -> str:
-        """The outcome when something else than a preempt ended the work."""
+        """Return the outcome when something else than a preempt ended the work."""
         raise NotImplementedError
 
     def goal(self, ud: Any) -> str | None:
-        """The place that is not reached when the state fails; None: it is not about a place."""
+        """Return the place that is not reached when the state fails; None: it is not about a
+        place.
+        """
         return None
 
     def _preempted(self) -> str:
@@ -85,7 +87,7 @@ class Recover(fsm.State):
         self.mission = mission
 
     def execute(self, ud: Any) -> str:
-        """The step that the recovery takes; one that the machine lacks becomes waiting."""
+        """Return the step that the recovery takes; one that the machine lacks becomes waiting."""
         if self.preempt_requested():
             self.service_preempt()
             return PREEMPTED
@@ -145,7 +147,7 @@ def add(
 
 
 def path_length(path: list[Point]) -> float:
-    """Length of a path, metres."""
+    """Return the length of a path, metres."""
     return sum(math.dist(start, end) for start, end in itertools.pairwise(path))
 
 

@@ -63,7 +63,7 @@ class SurveyReport:
         )
 
     def sentences(self) -> list[str]:
-        """What is missing or wrong, one sentence each."""
+        """Return what is missing or wrong, one sentence each."""
         said = [
             f'no marker tells of {room}, to which {" and ".join(doors)} '
             f'lead{"s" if len(doors) == 1 else ""}'
@@ -167,7 +167,7 @@ class Survey:
         )
 
     def _by_room(self, contradictions: list[str]) -> dict[str, PlaceNote]:
-        """One note for each place: of several markers for one place the lowest id counts."""
+        """Return one note for each place: of several markers for one place the lowest id counts."""
         owners: dict[str, int] = {}
         for marker_id in sorted(self._notes):
             note = self._notes[marker_id]
@@ -219,7 +219,7 @@ def _reached(start: str, agreed: Mapping[str, Mapping[str, str]]) -> frozenset[s
 
 
 def notes_of(place: Place) -> tuple[PlaceNote, ...]:
-    """A place that is described already, as notes."""
+    """Return a place that is described already, as notes."""
     notes = []
     for room, doors in place.rooms.items():
         behind = {door: other for door in doors for other in place.doors[door] if other != room}

@@ -79,15 +79,15 @@ class Event:
     fields: Mapping[str, object]
 
     def text(self, key: str) -> str:
-        """The field ``key`` as text."""
+        """Return the field ``key`` as text."""
         return str(self.fields[key])
 
     def number(self, key: str) -> float:
-        """The field ``key`` as a number."""
+        """Return the field ``key`` as a number."""
         return float(str(self.fields[key]))
 
     def names(self, key: str) -> tuple[str, ...]:
-        """The field ``key`` as a sequence of names."""
+        """Return the field ``key`` as a sequence of names."""
         value = self.fields[key]
         return tuple(str(name) for name in value) if isinstance(value, list) else ()
 
@@ -121,7 +121,7 @@ class MissionRecord:
             ) from None
 
     def _cut_torn_line(self) -> None:
-        """Drops an unfinished last line, so that the next one starts on a line of its own."""
+        """Drop an unfinished last line, so that the next one starts on a line of its own."""
         with open(self.path, 'rb') as reader:
             content = reader.read()
         complete = content.rfind(b'\n') + 1
@@ -133,7 +133,7 @@ class MissionRecord:
             self._account = Account()  # Whoever reads it says which line is broken.
 
     def write(self, name: str, time: float, **fields: object) -> None:
-        """Appends one event.
+        """Append one event.
 
         Args:
             name: One of :data:`EVENTS`.
@@ -178,11 +178,13 @@ class MissionRecord:
         self._file = file
 
     def start(self, time: float, machine: str, place: str, places: Sequence[str]) -> None:
-        """A machine starts, or starts again, in ``place``; ``places`` are all to be patrolled."""
+        """Note that a machine starts, or starts again, in ``place``; ``places`` are all to be
+        patrolled.
+        """
         self.write('start', time, machine=machine, place=place, places=sorted(places))
 
     def visit(self, time: float, place: str, distance: float = 0.0) -> None:
-        """The robot arrived in ``place`` after ``distance`` metres."""
+        """Note that the robot arrived in ``place`` after ``distance`` metres."""
         self.write('visit', time, place=place, distance=round(distance, 3))
 
     def decision(self, time: float, place: str, rule: str, reason: str) -> None:
@@ -190,19 +192,19 @@ class MissionRecord:
         self.write('decision', time, place=place, rule=rule, reason=reason)
 
     def recharge(self, time: float, place: str, seconds: float) -> None:
-        """The robot was charged in ``place`` for ``seconds``."""
+        """Note that the robot was charged in ``place`` for ``seconds``."""
         self.write('recharge', time, place=place, seconds=round(seconds, 3))
 
     def failure(self, time: float, what: str, reason: str) -> None:
-        """``what`` (a state's label) failed because of ``reason``."""
+        """Note that ``what`` (a state's label) failed because of ``reason``."""
         self.write('failure', time, what=what, reason=reason)
 
     def end(self, time: float) -> None:
-        """The mission was told to end."""
+        """Note that the mission was told to end."""
         self.write('end', time)
 
     def close(self) -> None:
-        """Closes the file; nothing is lost without it."""
+        """Close the file; nothing is lost without it."""
         if self._file >= 0:
             os.close(self._file)
             self._file = -1
@@ -230,7 +232,7 @@ def _check(name: str, fields: Mapping[str, object], where: str) -> None:
 
 
 def read(path: str | Path) -> list[Event]:
-    """Reads a record, without an unfinished last line.
+    """Read a record, without an unfinished last line.
 
     Raises:
         MissionLogError: The file cannot be read, or a finished line is not an event.

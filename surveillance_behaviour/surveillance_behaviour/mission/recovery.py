@@ -79,11 +79,11 @@ class Recovery:
     _pauses: int = 0
 
     def tries(self, goal: str) -> int:
-        """How often ``goal`` failed since it last worked or was given up."""
+        """Return how often ``goal`` failed since it last worked or was given up."""
         return self._tries[goal]
 
     def next_step(self, failure: Failure, now: float, *, may_go_back: bool = True) -> Step:
-        """What to do after ``failure``.
+        """Return what to do after ``failure``.
 
         Args:
             failure: What happened.
@@ -115,14 +115,14 @@ class Recovery:
         self._given_up[goal] += 1
 
     def avoided(self, now: float) -> frozenset[str]:
-        """Places that are left alone at present."""
+        """Return places that are left alone at present."""
         # Later than the longest time from now: the clock has begun anew.
         latest = now + self.limits.longest_avoid
         until = self._avoided_until
         return frozenset(place for place in tuple(until) if now < until.get(place, now) <= latest)
 
     def arrived(self, place: str) -> None:
-        """A place was reached."""
+        """Note that a place was reached."""
         self._in_a_row = 0
         self._went_back = False
         if not self._charge_tries:
@@ -131,7 +131,7 @@ class Recovery:
             self._forget(place)
 
     def charged(self, place: str) -> None:
-        """The battery was charged in ``place``."""
+        """Note that the battery was charged in ``place``."""
         self._charge_tries.clear()
         self._pauses = 0
         self._forget(place)
@@ -141,7 +141,7 @@ class Recovery:
             memory.pop(place, None)
 
     def pause(self) -> float:
-        """Seconds to wait for help now; after them all steps are open again."""
+        """Return the seconds to wait for help now; after them all steps are open again."""
         seconds = min(
             self.limits.help_seconds * 2.0 ** min(self._pauses, DOUBLINGS), self.limits.longest_help
         )

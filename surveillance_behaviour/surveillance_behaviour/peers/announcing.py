@@ -92,7 +92,7 @@ class RosAnnouncer:
         self._topic = node.create_publisher(MissionStatus, 'mission_status', STATE_QOS)
 
     def attach(self, mission: Mission, machine: fsm.StateMachine) -> None:
-        """Reports this machine's state from now on, at every transition and every message."""
+        """Report this machine's state from now on, at every transition and every message."""
 
         def status() -> MissionStatus:
             level = mission.battery.level
@@ -114,12 +114,12 @@ class RosAnnouncer:
             container.register_transition_cb(lambda _data, _states: self._publish())
 
     def decision(self, decision: Decision) -> None:
-        """A place was chosen."""
+        """Announce that a place was chosen."""
         if self._decisions is not None:
             self._decisions.publish(decision)
 
     def say(self, text: str, *, warning: bool = False) -> None:
-        """Logs and publishes."""
+        """Log and publish."""
         log = self._node.get_logger()
         if warning:
             log.warn(text)
@@ -129,7 +129,7 @@ class RosAnnouncer:
         self._publish()
 
     def waiting_for_help(self, reason: str) -> None:
-        """Says that the robot waits, or that it goes on."""
+        """Say that the robot waits, or that it goes on."""
         self._waiting = bool(reason)
         self._text = f'waiting for help: {reason}' if reason else 'trying again'
         if reason:
@@ -145,7 +145,7 @@ class RosAnnouncer:
 
 
 def containers(state: fsm.State) -> list[fsm.Container]:
-    """A container and all containers inside it."""
+    """Return a container and all containers inside it."""
     if not isinstance(state, fsm.Container):
         return []
     found = [state]
@@ -155,7 +155,7 @@ def containers(state: fsm.State) -> list[fsm.Container]:
 
 
 def active_path(state: fsm.State) -> list[str]:
-    """Labels from the machine's active state down to the deepest one."""
+    """Return the labels from the machine's active state down to the deepest one."""
     if not isinstance(state, fsm.Container):
         return []
     active = state.get_active_states()

@@ -27,10 +27,10 @@ class Wake(Protocol):
     """The interrupt that the transport heeds."""
 
     def set(self) -> None:
-        """Ends the call that is under way."""
+        """End the call that is under way."""
 
     def clear(self) -> None:
-        """Lets the next call run."""
+        """Let the next call run."""
 
 
 class Whereabouts:
@@ -48,7 +48,7 @@ class Whereabouts:
         self.stamp = 0
 
     def note(self, place: str, stamp: int) -> None:
-        """Takes a message: the place, empty when it is not known, and nanoseconds of ROS time."""
+        """Take a message: the place, empty when it is not known, and nanoseconds of ROS time."""
         with self._changed:
             self._heard, self.place = True, place
             if place:
@@ -56,7 +56,7 @@ class Whereabouts:
             self._changed.notify_all()
 
     def await_place(self, place: str, seconds: float, interrupt: fsm.Interrupt) -> str:
-        """Waits until the robot is in a place.
+        """Wait until the robot is in a place.
 
         Args:
             place: The place.
@@ -115,16 +115,16 @@ class ArmorKnowledge:
         self._patience = patience
 
     def wait_until_built(self, interrupt: fsm.Interrupt) -> None:
-        """Asks for the name of the ontology, which is answered once the map is built."""
+        """Ask for the name of the ontology, which is answered once the map is built."""
         self._armor.reference_name = self._ask_reference(interrupt)
 
     def set_urgency_threshold(self, seconds: float, interrupt: fsm.Interrupt) -> None:
-        """Replaces the robot's urgencyThreshold."""
+        """Replace the robot's urgencyThreshold."""
         with self._talking(interrupt):
             self._ontology.set_urgency_threshold(seconds)
 
     def await_place(self, place: str, seconds: float, interrupt: fsm.Interrupt) -> str:
-        """Waits until the robot is in ``place``; where it is then, empty when nobody says."""
+        """Wait until the robot is in ``place``; return where it is then, empty when nobody says."""
         found = self._whereabouts.await_place(place, seconds, interrupt)
         if interrupt.is_set():
             raise InterruptedWaitError
@@ -137,7 +137,7 @@ class ArmorKnowledge:
         visits: Mapping[str, float],
         interrupt: fsm.Interrupt,
     ) -> Snapshot:
-        """Tells the time and what the ontology does not know of ``visits``; asks what follows.
+        """Tell the time and what the ontology does not know of ``visits``; ask what follows.
 
         The answer knows where the robot is by the last that was heard of it.
         """
@@ -153,7 +153,7 @@ class ArmorKnowledge:
 
     @contextmanager
     def _talking(self, interrupt: fsm.Interrupt) -> Iterator[None]:
-        """Heeds the interrupt, and turns what went wrong into the ports' errors.
+        """Heed the interrupt, and turn what went wrong into the ports' errors.
 
         Raises:
             PeerError: ARMOR is away, refuses something, or the ontology is not ready.

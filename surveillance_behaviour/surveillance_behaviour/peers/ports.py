@@ -81,7 +81,7 @@ class Places(Protocol):
     """Where the places are."""
 
     def position(self, place: str, interrupt: Interrupt) -> Point:
-        """A point in the place; raises UnknownPlaceError when there is no such place."""
+        """Return a point in the place; raises UnknownPlaceError when there is no such place."""
 
 
 class Decisions(Protocol):
@@ -112,67 +112,71 @@ class Decisions(Protocol):
         """
 
     def why_charge(self) -> str:
-        """Why the robot must charge now, as a sentence; empty: it need not."""
+        """Return why the robot must charge now, as a sentence; empty: it need not."""
 
     def send_to_charge(self, why: str) -> None:
         """Have the robot charge before anything else."""
 
     def saw(self, place: str, now: float) -> None:
-        """The robot is in ``place``."""
+        """Note that the robot is in ``place``."""
 
     def arrived(self, place: str, now: float, metres: float | None = None) -> None:
-        """The robot has come to ``place`` over a path of so many metres."""
+        """Note that the robot has come to ``place`` over a path of so many metres."""
 
     def disturbed(self) -> None:
-        """The present drive is no example of how long a leg takes."""
+        """Note that the present drive is no example of how long a leg takes."""
 
     def charged(self) -> None:
-        """The battery was charged."""
+        """Note that the battery was charged."""
 
     def route_round(self, start: str, goal: str) -> tuple[str, ...]:
-        """The places of another way between two neighbours, ``goal`` included; empty: none."""
+        """Return the places of another way between two neighbours, ``goal`` included; empty:
+        none.
+        """
 
 
 class Motion(Protocol):
     """The planner and the motion controller of the behaviour `surveillance`."""
 
     def plan(self, start: Point, goal: Point, interrupt: Interrupt) -> list[Point]:
-        """A path from ``start`` to ``goal``, both included."""
+        """Return a path from ``start`` to ``goal``, both included."""
 
     def follow(self, path: Sequence[Point], interrupt: Interrupt) -> Point:
-        """Drives along the path; where the robot is at the end."""
+        """Drive along the path; return where the robot is at the end."""
 
     def last_position(self) -> Point | None:
-        """Where the robot was when it was last heard of; None: never."""
+        """Return where the robot was when it was last heard of; None: never."""
 
 
 class Routine(Protocol):
     """The services and actions of the behaviour `patrol`."""
 
     def start(self, interrupt: Interrupt) -> None:
-        """Looks around and builds the ontology."""
+        """Look around and build the ontology."""
 
     def plan(self, target: str, interrupt: Interrupt) -> list[Point]:
         """Via points from where the robot is to the place."""
 
     def control(self, via_points: Sequence[Point], interrupt: Interrupt) -> Point:
-        """Drives through the points and notes the visit; where the robot is at the end."""
+        """Drive through the points and note the visit; return where the robot is at the end."""
 
     def recharge(self, interrupt: Interrupt) -> None:
-        """Charges the battery; returns when the peer says it is done."""
+        """Charge the battery; return when the peer says it is done."""
 
 
 class Announcer(Protocol):
     """Where the machine says what it does."""
 
     def decision(self, decision: Decision) -> None:
-        """A place was chosen."""
+        """Announce that a place was chosen."""
 
     def say(self, text: str, *, warning: bool = False) -> None:
         """Something worth knowing happened."""
 
     def waiting_for_help(self, reason: str) -> None:
-        """The robot waits for help because of ``reason``; an empty reason: it goes on."""
+        """Announce that the robot waits for help because of ``reason``; an empty reason: it goes
+        on.
+        """
 
 
 @dataclass

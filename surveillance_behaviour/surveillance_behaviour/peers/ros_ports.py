@@ -109,7 +109,7 @@ class RosPlaces:
         self._service = ServiceCaller(node, RoomPosition, 'ontology_map/room_position')
 
     def position(self, place: str, interrupt: Interrupt) -> Point:
-        """A point in the place."""
+        """Return a point in the place."""
         request = RoomPosition.Request(room_name=place)
         answer = call(self._service, request, self._deadlines.answer, interrupt)
         if not answer.valid:
@@ -127,7 +127,7 @@ class RosMotion:
         self._position: Point | None = None
 
     def plan(self, start: Point, goal: Point, interrupt: Interrupt) -> list[Point]:
-        """A path from ``start`` to ``goal``."""
+        """Return a path from ``start`` to ``goal``."""
         request = ComputePath.Goal(
             start=conversions.point_message(start), goal=conversions.point_message(goal)
         )
@@ -136,7 +136,7 @@ class RosMotion:
         return conversions.points_from(result.path)
 
     def follow(self, path: Sequence[Point], interrupt: Interrupt) -> Point:
-        """Drives along the path."""
+        """Drive along the path."""
         request = FollowPath.Goal(path=conversions.point_messages(path))
         limits = self._deadlines
 
@@ -148,7 +148,7 @@ class RosMotion:
         return self._position
 
     def last_position(self) -> Point | None:
-        """Where the robot was when it was last heard of."""
+        """Return where the robot was when it was last heard of."""
         return self._position
 
 
@@ -269,7 +269,7 @@ class RosRoutine:
         self._recharge = ServiceCaller(node, Empty, 'recharge')
 
     def start(self, interrupt: Interrupt) -> None:
-        """Has the robot look around and build the ontology."""
+        """Have the robot look around and build the ontology."""
         limits = self._deadlines
         self._clock.wait_for_event()
         ask(self._start, Empty.Request(), limits.build, interrupt, limits.answer)
@@ -282,14 +282,14 @@ class RosRoutine:
         return conversions.points_from(result.via_points)
 
     def control(self, via_points: Sequence[Point], interrupt: Interrupt) -> Point:
-        """Drives through the points."""
+        """Drive through the points."""
         limits = self._deadlines
         goal = Control.Goal(point_set=conversions.point_messages(via_points))
         result = run(self._controller, goal, limits.answer, limits.move, interrupt)
         return conversions.point_from(result.reached_point)
 
     def recharge(self, interrupt: Interrupt) -> None:
-        """Has the battery charged; gives up when its level does not change for too long.
+        """Have the battery charged; give up when its level does not change for too long.
 
         A service cannot tell that it still works on the answer, and a full charge may take an
         hour: the battery's level is what shows that it does.
@@ -329,7 +329,7 @@ class _Watchdog:
         self._timer: threading.Timer | None = None
 
     def feed(self) -> None:
-        """Starts the time anew."""
+        """Start the time anew."""
         self.stop()
         if self._seconds > 0.0:
             self._timer = threading.Timer(self._seconds, self._bark)
@@ -349,7 +349,7 @@ def call(
     interrupt: Interrupt,
     discovery: float | None = None,
 ) -> Any:
-    """Calls a service.
+    """Call a service.
 
     Args:
         caller: The service.
@@ -374,7 +374,7 @@ def call(
 def ask(
     caller: ServiceCaller, request: Any, deadline: float, interrupt: Interrupt, discovery: float
 ) -> Any:
-    """Calls a service whose answer takes long and that may be asked twice; else as `call`.
+    """Call a service whose answer takes long and that may be asked twice; else as `call`.
 
     It is asked anew now and then: a server that has just taken the place of another one may have
     been found before its end of the line was there, and does not know that anybody waits.
@@ -399,7 +399,7 @@ def run(
     interrupt: Interrupt,
     on_feedback: Callable[[Any], None] | None = None,
 ) -> Any:
-    """Runs a goal to its result.
+    """Run a goal to its result.
 
     Args:
         caller: The action.

@@ -86,7 +86,7 @@ class DrawEstimate:
     _mark: tuple[float, float] | None = None
 
     def observe(self, time: float, level: float) -> None:
-        """The level at the end of a leg or of a stay; charging starts a new stretch."""
+        """Take the level at the end of a leg or of a stay; charging starts a new stretch."""
         if self._mark is None or level > self._mark[1] or time <= self._mark[0]:
             self._mark = (time, level)
             return
@@ -96,7 +96,7 @@ class DrawEstimate:
             self._mark = (time, level)
 
     def forget(self) -> None:
-        """The level was set from outside: what it did since the last leg says nothing."""
+        """Note that the level was set from outside: what it did since the last leg says nothing."""
         self._mark = None
 
     @property

@@ -102,11 +102,13 @@ class PatrolGraph:
         return seconds
 
     def seconds(self, start: str, goal: str) -> float:
-        """Seconds from ``start`` to ``goal`` by the shortest way; inf when there is none."""
+        """Return the seconds from ``start`` to ``goal`` by the shortest way; inf when there is
+        none.
+        """
         return float(self.distances[self.index[start], self.index[goal]])
 
     def route(self, start: str, goal: str) -> tuple[str, ...]:
-        """The places on the shortest way, without ``start``, with ``goal``.
+        """Return the places on the shortest way, without ``start``, with ``goal``.
 
         Raises:
             GraphError: There is no way.
@@ -121,7 +123,9 @@ class PatrolGraph:
         return tuple(way)
 
     def connected(self, place: str) -> PatrolGraph:
-        """The part of the map that can be reached from ``place``; itself when that is all."""
+        """Return the part of the map that can be reached from ``place``; itself when that is
+        all.
+        """
         within = np.isfinite(self.distances[self.index[place]])
         if within.all():
             return self
@@ -130,7 +134,7 @@ class PatrolGraph:
         )
 
     def restricted(self, kept: Iterable[str]) -> PatrolGraph:
-        """The map without all places but ``kept``."""
+        """Return the map without all places but ``kept``."""
         names = set(kept)
         legs = {
             place: {other: cost for other, cost in ways.items() if other in names}
@@ -140,7 +144,7 @@ class PatrolGraph:
         return PatrolGraph(legs, self.dwell)
 
     def without_leg(self, start: str, goal: str) -> PatrolGraph:
-        """The map without the direct way between two places."""
+        """Return the map without the direct way between two places."""
         gone = {(start, goal), (goal, start)}
         legs = {
             place: {other: cost for other, cost in ways.items() if (place, other) not in gone}
@@ -188,7 +192,7 @@ def graph_of_places(
     speed: float = 1.0,
     dwell: float = 0.0,
 ) -> PatrolGraph:
-    """A graph whose legs are as long as the straight line between the places.
+    """Return a graph whose legs are as long as the straight line between the places.
 
     Args:
         connections: For each place, its neighbours.

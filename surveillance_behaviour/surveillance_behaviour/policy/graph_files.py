@@ -15,7 +15,7 @@ from surveillance_behaviour.policy.graph import GraphError, PatrolGraph
 
 
 def read_patrolling_sim(path: str | Path, speed: float = 1.0, dwell: float = 0.0) -> PatrolGraph:
-    """Reads a graph file.
+    """Read a graph file.
 
     Args:
         path: The file.

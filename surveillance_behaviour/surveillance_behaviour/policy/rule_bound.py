@@ -52,7 +52,7 @@ def rule_bound(
 def _goes_on(
     graph: PatrolGraph, threshold: float, ranks: Sequence[int], limit: float
 ) -> bool | None:
-    """Whether the robot can go on for ever with no wait above the limit; None: not found out.
+    """Tell whether the robot can go on for ever with no wait above the limit; None: not found out.
 
     It begins in any place, with all places visited just now; the wait before the first visit of a
     place after that may be several times as long, so that the start does not count.

@@ -59,7 +59,7 @@ class Tour:
 
 
 def shortest_tour(distances: Matrix) -> Tour:
-    """The exact tour of a small map, a good tour and a lower bound of a large one."""
+    """Return the exact tour of a small map, a good tour and a lower bound of a large one."""
     count = len(distances)
     if count <= EXACT_UP_TO:
         order = _exact_order(distances) if count > 2 else tuple(range(count))
@@ -72,7 +72,7 @@ def shortest_tour(distances: Matrix) -> Tour:
 
 
 def tour_over_blocks(distances: Matrix, blocks: Iterable[Sequence[int]]) -> Tour:
-    """The tour of a map from the tours of its biconnected blocks.
+    """Return the tour of a map from the tours of its biconnected blocks.
 
     A closed walk through the whole map passes from block to block only at the places they share,
     so it splits there into one closed walk for each block: the shortest tours add up.
@@ -97,7 +97,7 @@ def tour_over_blocks(distances: Matrix, blocks: Iterable[Sequence[int]]) -> Tour
 
 
 def _joined(rings: list[list[int]], at: dict[int, list[int]]) -> Iterator[int]:
-    """All places in the order in which one walk through all rings first meets them."""
+    """Yield all places in the order in which one walk through all rings first meets them."""
     used: set[int] = set()
     pending: list[Iterator[int]] = [iter([0])]
     while pending:
@@ -114,7 +114,7 @@ def _joined(rings: list[list[int]], at: dict[int, list[int]]) -> Iterator[int]:
 
 
 def tour_length(distances: Matrix, order: tuple[int, ...]) -> float:
-    """Length of the closed tour that visits the places in this order."""
+    """Return the length of the closed tour that visits the places in this order."""
     indices = np.asarray(order, dtype=np.intp)
     return float(distances[indices, np.roll(indices, -1)].sum())
 
@@ -145,7 +145,7 @@ def _exact_order(distances: Matrix) -> tuple[int, ...]:
 
 
 def _good_order(distances: Matrix) -> tuple[int, ...]:
-    """The better of two first tours, each improved until no single change shortens it."""
+    """Return the better of two first tours, each improved until no single change shortens it."""
     ranked = np.argsort(distances, axis=1, kind='stable')[:, 1 : NEIGHBOURS + 1].tolist()
     rows = distances.tolist()
     tours = [_Improvement(rows, ranked, start(distances)) for start in (_preorder, _nearest)]
@@ -172,7 +172,7 @@ def _preorder(distances: Matrix) -> list[int]:
 
 
 def _nearest(distances: Matrix) -> list[int]:
-    """Always on to the nearest place not visited yet."""
+    """Go on to the nearest place not visited yet."""
     order = [0]
     left = np.ones(len(distances), dtype=bool)
     left[0] = False
@@ -236,7 +236,7 @@ class _Improvement:
         return saved
 
     def kick(self, times: int, generator: random.Random) -> None:
-        """Exchanges two short neighbouring stretches at random, improves, keeps what is shorter."""
+        """Exchange two short neighbouring stretches at random, improve, keep what is shorter."""
         count, rows = len(self.order), self._rows
         reach = min(30, (count - 2) // 2)
         for _ in range(times):
@@ -258,7 +258,9 @@ class _Improvement:
                 self.order, self._at = order, at
 
     def _two_opt(self, place: int) -> tuple[float, tuple[int, ...]]:
-        """Exchanges two edges, one of them at ``place``; the gain and the changed edges' ends."""
+        """Exchange two edges, one of them at ``place``; return the gain and the changed edges'
+        ends.
+        """
         order, rows, count = self.order, self._rows, len(self.order)
         for step in (1, -1):
             position = self._at[place]
@@ -279,7 +281,7 @@ class _Improvement:
         return 0.0, ()
 
     def _reverse(self, first: int, last: int) -> None:
-        """Turns round the stretch from ``first`` to ``last``, or what is outside of it."""
+        """Turn round the stretch from ``first`` to ``last``, or what is outside of it."""
         order, count = self.order, len(self.order)
         first, last = first % count, last % count
         if first <= last and 2 * (last - first + 1) <= count + 2:
@@ -295,7 +297,7 @@ class _Improvement:
             self._at[order[low]], self._at[order[high]] = low, high
 
     def _or_opt(self, place: int) -> tuple[float, tuple[int, ...]]:
-        """Moves a stretch of up to three places that begins with ``place`` beside a near one."""
+        """Move a stretch of up to three places that begins with ``place`` beside a near one."""
         order, rows, count = self.order, self._rows, len(self.order)
         for length in (1, 2, 3):
             first = self._at[place]
@@ -325,7 +327,7 @@ class _Improvement:
         return self.order[(self._at[place] + step) % len(self.order)]
 
     def _move(self, first: int, length: int, near: int, outer: int) -> None:
-        """Puts the stretch between ``near`` and ``outer``, its head at ``near``."""
+        """Put the stretch between ``near`` and ``outer``, its head at ``near``."""
         order = self.order
         stretch = order[first : first + length]
         forward = self._neighbour(near, 1) == outer

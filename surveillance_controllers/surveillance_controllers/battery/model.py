@@ -103,7 +103,7 @@ class Battery:
         return p.empty_voltage + (p.full_voltage - p.empty_voltage) * self.state_of_charge
 
     def set_level(self, level: float) -> None:
-        """Sets the charge, percent; held between 0 and 100."""
+        """Set the charge, percent; held between 0 and 100."""
         self.energy = self.parameters.capacity * min(max(level, 0.0), 100.0) / 100.0
 
     def draw(
@@ -113,7 +113,7 @@ class Battery:
         radians: float = 0.0,
         equipment_seconds: float = 0.0,
     ) -> float:
-        """Takes what the robot used.
+        """Take what the robot used.
 
         Args:
             seconds: Time that passed.
@@ -144,7 +144,7 @@ class Battery:
         return taken
 
     def charging_power(self) -> float:
-        """The power the station gives at the present charge, W; 0 when full."""
+        """Return the power the station gives at the present charge, W; 0 when full."""
         p = self.parameters
         charge = self.state_of_charge
         if charge >= 1.0:
@@ -154,7 +154,7 @@ class Battery:
         return p.charging_power * max(p.taper_floor, (1.0 - charge) / (1.0 - p.taper_from))
 
     def charge(self, seconds: float) -> None:
-        """Charges for some time at the station.
+        """Charge for some time at the station.
 
         Raises:
             ValueError: The time is negative.

@@ -37,7 +37,7 @@ class MotionMeter:
         self._radians = 0.0
 
     def see(self, pose: Pose, now: float) -> None:
-        """Takes a new pose, seen at `now` (seconds)."""
+        """Take a new pose, seen at `now` (seconds)."""
         if self.pose is not None and now > self._at:
             passed = now - self._at
             step = math.hypot(pose[0] - self.pose[0], pose[1] - self.pose[1])
@@ -47,7 +47,7 @@ class MotionMeter:
         self.pose, self._at = pose, now
 
     def take(self) -> tuple[float, float]:
-        """The way (m) and turn (rad) since the last call."""
+        """Return the way (m) and turn (rad) since the last call."""
         taken = self._metres, self._radians
         self._metres = self._radians = 0.0
         return taken
@@ -89,17 +89,17 @@ class BatteryInUse:
         return gap <= self._dock_reach
 
     def see_pose(self, pose: Pose, now: float) -> None:
-        """Takes where the robot is at `now` (seconds)."""
+        """Take where the robot is at `now` (seconds)."""
         self._meter.see(pose, now)
 
     def see_joints(self, positions: Sequence[float]) -> None:
-        """Takes the joints of the arm, radians."""
+        """Take the joints of the arm, radians."""
         joints = tuple(positions)
         self._arm_moved |= self._joints is not None and joints != self._joints
         self._joints = joints
 
     def advance(self, now: float) -> None:
-        """Lets time pass up to `now` (seconds): draws, and charges at the station."""
+        """Let time pass up to `now` (seconds): draw, and charge at the station."""
         passed = 0.0 if self._last is None else now - self._last
         self._last = now
         if not 0.0 <= passed <= LONGEST_AWAY:
@@ -111,7 +111,7 @@ class BatteryInUse:
             self._battery.charge(passed)
 
     def why_not_charging(self) -> str | None:
-        """Says why the battery cannot charge now; None when it can."""
+        """Say why the battery cannot charge now; None when it can."""
         if self.docked:
             return None
         if self.pose is None:

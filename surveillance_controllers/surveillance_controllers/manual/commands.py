@@ -76,7 +76,7 @@ class ParsedCommand:
 
 
 def integer(name: str, low: int, high: int) -> Argument:
-    """An argument that is a whole number from `low` to `high`."""
+    """Return an argument that is a whole number from `low` to `high`."""
 
     def read(text: str) -> int:
         if not re.fullmatch(r'[+-]?\d{1,9}', text, re.ASCII) or not low <= int(text) <= high:
@@ -87,7 +87,7 @@ def integer(name: str, low: int, high: int) -> Argument:
 
 
 def number(name: str, low: float, high: float, unit: str) -> Argument:
-    """An argument that is a real number from `low` to `high`."""
+    """Return an argument that is a real number from `low` to `high`."""
 
     def read(text: str) -> float:
         value = _real(text)
@@ -99,7 +99,7 @@ def number(name: str, low: float, high: float, unit: str) -> Argument:
 
 
 def points(name: str) -> Argument:
-    """An argument that is a list of points, `[[x, y, z], ...]`, possibly empty."""
+    """Return an argument that is a list of points, `[[x, y, z], ...]`, possibly empty."""
     return Argument(name, 'a list of points as [[x, y, z], ...]', _read_points, takes_rest=True)
 
 
@@ -197,7 +197,7 @@ class Grammar:
         self.commands = (*commands, *BUILT_IN)
 
     def parse(self, line: str) -> ParsedCommand | None:
-        """Reads one line.
+        """Read one line.
 
         Words may be in any case. A blank line, and one that begins with `#`, is no command.
 
@@ -238,13 +238,14 @@ class Grammar:
         return candidates[0]
 
     def help(self) -> str:
-        """Every command with its arguments and what it does, one a line."""
+        """Return every command with its arguments and what it does, one a line."""
         width = max(len(command.usage) for command in self.commands)
         return '\n'.join(f'  {c.usage:<{width}}  {c.description}' for c in self.commands)
 
     def completions(self, text: str) -> list[str]:
-        """The words that can stand where the last word of `text` is being typed, in alphabetical
-        order."""
+        """Return the words that can stand where the last word of `text` is being typed, in
+        alphabetical order.
+        """
         words = text.lower().split()
         if not text or text[-1].isspace():
             words.append('')
@@ -306,12 +307,12 @@ MOST_POINTS = 12
 
 
 def point(coordinates: Iterable[float]) -> str:
-    """A point in metres: `(10, 5, 0)`."""
+    """Return a point in metres: `(10, 5, 0)`."""
     return '(' + ', '.join(f'{c:.4g}' for c in coordinates) + ')'
 
 
 def path_request(what: str, start: Points, goal: Points) -> str:
-    """The text for a path that the operator shall give."""
+    """Return the text for a path that the operator shall give."""
     return (
         f'New request: {what}\n'
         f'  start {point(start)}, goal {point(goal)}, '
@@ -321,7 +322,7 @@ def path_request(what: str, start: Points, goal: Points) -> str:
 
 
 def move_request(what: str, path: Points) -> str:
-    """The text for a motion that the operator shall carry out."""
+    """Return the text for a motion that the operator shall carry out."""
     shown = [point(p) for p in path]
     if len(shown) > MOST_POINTS:
         half = MOST_POINTS // 2

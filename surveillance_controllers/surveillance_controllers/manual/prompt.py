@@ -62,7 +62,7 @@ class Console:
         self._lock = threading.Lock()
 
     def run(self) -> str:
-        """Reads lines until there are no more.
+        """Read lines until there are no more.
 
         Returns:
             Why it ended: 'end of input', 'stopped', or 'interrupted' (Ctrl-C at the prompt).
@@ -78,7 +78,7 @@ class Console:
                 os.close(self._wake_write)
 
     def stop(self) -> None:
-        """Ends `run` from another thread, also while it waits for a line."""
+        """End `run` from another thread, also while it waits for a line."""
         with self._lock:
             if self._stopped:
                 return

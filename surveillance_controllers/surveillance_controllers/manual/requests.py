@@ -39,11 +39,12 @@ class Interruption(Protocol):
     does."""
 
     def is_set(self) -> bool:
-        """Tells whether the flag is raised."""
+        """Tell whether the flag is raised."""
 
     def subscribe(self, callback: Callable[[], None]) -> Callable[[], None]:
-        """Has `callback` called when the flag is raised (at once if it is); returns what undoes
-        that."""
+        """Have `callback` called when the flag is raised (at once if it is); return what undoes
+        that.
+        """
 
 
 @dataclass(eq=False)
@@ -73,7 +74,7 @@ class RequestQueue(Generic[Answer]):
         return '\n'.join(waiting) if waiting else 'No request is waiting.'
 
     def ask(self, description: str, interruption: Interruption) -> Answer | None:
-        """Waits until the operator answers.
+        """Wait until the operator answers.
 
         Args:
             description: What is asked, shown to the operator: lines of text.
@@ -101,7 +102,7 @@ class RequestQueue(Generic[Answer]):
         return request.answer
 
     def answer(self, answer: Answer) -> None:
-        """Answers the request that has waited longest.
+        """Answer the request that has waited longest.
 
         Raises:
             CommandError: No request is waiting.
@@ -141,7 +142,7 @@ class CommandConsole:
         node.create_service(ConsoleCommand, '~/command', self._on_request)
 
     def open(self, source: TextIO | None = None) -> None:
-        """Starts to read commands from a terminal or pipe, standard input unless given."""
+        """Start to read commands from a terminal or pipe, standard input unless given."""
         name = self._node.get_name()
         self._console = Console(name, self._on_line, self._grammar.completions, source=source)
         if self._console.on_terminal:
@@ -155,7 +156,7 @@ class CommandConsole:
         return self._console is not None and self._console.on_terminal
 
     def announce(self, text: str) -> None:
-        """Tells the operator something, wherever the operator is."""
+        """Tell the operator something, wherever the operator is."""
         if self._console is not None:
             _tell(text)
         self._announcements.publish(String(data=text))

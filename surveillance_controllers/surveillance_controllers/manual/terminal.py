@@ -58,12 +58,12 @@ class TerminalLines:
 
     @contextmanager
     def shown(self) -> Iterator[None]:
-        """What is printed meanwhile appears above the prompt; what is typed, only in a prompt."""
+        """Show what is printed meanwhile above the prompt; what is typed, only in a prompt."""
         with _silent(self._session.app.input), patch_stdout(raw=True):
             yield
 
     def read(self) -> str:
-        """Waits for a line.
+        """Wait for a line.
 
         Raises:
             EOFError: The input ended, or `stop` was called.
@@ -72,7 +72,7 @@ class TerminalLines:
         return self._session.prompt(handle_sigint=False, pre_run=self._exit_if_stopped)
 
     def stop(self) -> None:
-        """Ends `read` from another thread."""
+        """End `read` from another thread."""
         self._stopped = True
         loop = self._session.app.loop
         if loop is not None:
@@ -86,7 +86,7 @@ class TerminalLines:
 
 @contextmanager
 def _silent(keyboard: Input) -> Iterator[None]:
-    """Keeps the terminal from echoing keys between two prompts: they wait for the next one.
+    """Keep the terminal from echoing keys between two prompts: they wait for the next one.
 
     Ctrl-C is a signal meanwhile.
     """
@@ -120,7 +120,7 @@ class WordCompleter(Completer):
     def get_completions(
         self, document: Document, complete_event: CompleteEvent
     ) -> Iterable[Completion]:
-        """The words that can stand where the last one is being typed."""
+        """Yield the words that can stand where the last one is being typed."""
         text = document.text_before_cursor
         typed = '' if not text or text[-1].isspace() else text.split()[-1]
         for word in self._completions(text):
@@ -147,7 +147,7 @@ PLAIN_STEP = 10
 def charge_display(
     start: float, stream: TextIO | None = None, *, bar: bool = True
 ) -> Iterator[Callable[[float], None]]:
-    """Shows a charge while the context lasts.
+    """Show a charge while the context lasts.
 
     Args:
         start: Charge at the beginning, percent.

@@ -25,7 +25,7 @@ class MotionFailedError(Exception):
 
 
 def nearest_place(places: Mapping[str, Points], point: Points) -> tuple[str | None, float]:
-    """The place whose point is nearest, and its distance in metres.
+    """Return the place whose point is nearest, and its distance in metres.
 
     Args:
         places: A point in each place, shape (3,), metres.
@@ -40,7 +40,7 @@ def nearest_place(places: Mapping[str, Points], point: Points) -> tuple[str | No
 
 
 def place_reached(places: Mapping[str, Points], end: Points, reach: float) -> str:
-    """The place in which a motion ended.
+    """Return the place in which a motion ended.
 
     Args:
         places: A point in each place, shape (3,), metres.

@@ -104,11 +104,11 @@ class RobotBase:
         return self._navigator.pose
 
     def place_at(self, point: Points) -> str | None:
-        """The place that a point is in."""
+        """Return the place that a point is in."""
         return self._navigator.place_at(point)
 
     def set_positions(self, positions: Mapping[str, Points]) -> None:
-        """Takes the places: a point in each."""
+        """Take the places: a point in each."""
         with self._lock:
             self._navigator.set_positions(positions)
 
@@ -119,7 +119,7 @@ class RobotBase:
         on_step: Callable[[Pose], None],
         another_path: Callable[[Pose], Points],
     ) -> Pose:
-        """Carries out a drive; blocks, so it belongs on a worker thread.
+        """Carry out a drive; it blocks, so it belongs on a worker thread.
 
         Args:
             drive: The drive.
@@ -152,7 +152,7 @@ class RobotBase:
         return self._navigator.pose or (float('nan'),) * 3
 
     def spin(self, spin: Spin, interrupt: Interrupt) -> None:
-        """Turns once on the spot; blocks.
+        """Turn once on the spot; it blocks.
 
         Raises:
             MotionFailedError: The sensors gave nothing for too long.
@@ -241,7 +241,7 @@ class RobotBase:
 
     @contextmanager
     def _refusing(self, topic: str) -> Iterator[None]:
-        """Lets a message that is not sound cost one line, and nothing else."""
+        """Let a message that is not sound cost one line, and nothing else."""
         try:
             yield
         except ValueError as error:
@@ -257,7 +257,7 @@ class RobotBase:
         return float(self._node.get_clock().now().nanoseconds) / 1e9
 
     def _unheard(self) -> str:
-        """The topic that has been silent for too long to drive on; empty: none."""
+        """Return the topic that has been silent for too long to drive on; empty: none."""
         now = self._now()
         return next((t for t, at in self._heard.items() if now - at > LONGEST_SILENCE), '')
 
@@ -328,7 +328,7 @@ class Transforms:
             node.create_subscription(TFMessage, 'tf_static', self._on_static, latched)
 
     def tick(self, pose: Pose, odometry: Pose, stamp: Any) -> None:
-        """Publishes the correction that leads from the odometry to the pose."""
+        """Publish the correction that leads from the odometry to the pose."""
         if self._publisher is None:
             return
         # map <- odom = (map <- base) (base <- odom)
@@ -340,7 +340,7 @@ class Transforms:
         self._publisher.publish(TFMessage(transforms=[transform]))
 
     def mount_of(self, frame: str) -> Pose:
-        """Where a sensor's frame is on the robot; at its centre while nobody says."""
+        """Return where a sensor's frame is on the robot; at its centre while nobody says."""
         pose: Pose = (0.0, 0.0, 0.0)
         at, passed = frame, 0
         while at.rpartition('/')[2] not in BASE_FRAMES:

@@ -22,17 +22,19 @@ class Motion(Protocol):
     """What drives the robot: `NavigationMotion` or `Nav2Motion`."""
 
     def follow(self, path: Points, run: GoalRun, report: Callable[[Points], None]) -> Points:
-        """Drives along a path; returns where the robot is then, or raises `MotionFailedError`."""
+        """Drive along a path; return where the robot is then, or raise `MotionFailedError`."""
 
     def place_reached(self, goal: Points, end: Points, run: GoalRun) -> str:
-        """The place the robot is in; raises `MotionFailedError` when it is not the goal's."""
+        """Return the place the robot is in; raises `MotionFailedError` when it is not the
+        goal's.
+        """
 
     def look_around(self, run: GoalRun) -> None:
-        """Looks around in the place."""
+        """Look around in the place."""
 
 
 def docking_actions() -> tuple[Any, Any]:
-    """The docking server's action types, to dock and to undock.
+    """Return the docking server's action types, to dock and to undock.
 
     Raises:
         StartError: opennav_docking_msgs is not installed.

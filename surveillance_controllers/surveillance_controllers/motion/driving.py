@@ -159,7 +159,7 @@ class Drive:
         movers: Sequence[Mover] = (),
         lost: bool = False,
     ) -> Velocity:
-        """Decides the velocity for the next moment.
+        """Decide the velocity for the next moment.
 
         Args:
             now: The time, seconds.
@@ -197,8 +197,7 @@ class Drive:
         return self._follower.halt(seen, dt)
 
     def heed(self, obstacles: Points) -> None:
-        """Takes the obstacles known now (map frame); asks for another path if one is on the
-        path."""
+        """Take the obstacles known now (map frame); ask for another path if one is on the path."""
         r = self._recovery
         if self.state is State.DRIVING and self._now is not None:
             reach = self._robot.radius + self._robot.margin / 2
@@ -206,14 +205,14 @@ class Drive:
                 self._ask(self._now, 'something is on the path ahead')
 
     def new_path(self, path: ArrayLike) -> None:
-        """Goes on along another path."""
+        """Go on along another path."""
         self._follower = PathFollower(path, self._robot)
         self.state = State.DRIVING
         self._blocked_since = self._mark = None
         self._best = 0.0
 
     def no_path(self, reason: str) -> None:
-        """Says that no other path was found; the drive tries the next recovery."""
+        """Say that no other path was found; the drive tries the next recovery."""
         self.reason = reason
         if self.state is State.ASKING and self._now is not None:
             self._recover(self._now, reason)
@@ -368,7 +367,7 @@ class Spin:
         return self._turned >= math.tau - 0.02
 
     def step(self, yaw: float) -> Velocity:
-        """Decides the velocity for the next moment from the robot's yaw, rad."""
+        """Decide the velocity for the next moment from the robot's yaw, rad."""
         if self._last is not None:
             self._turned += angle_between(self._last, yaw)
         self._last = yaw

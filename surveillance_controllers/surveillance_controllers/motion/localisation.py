@@ -145,7 +145,7 @@ class Localiser:
         self.set_map(grid)
 
     def set_map(self, grid: GridMap) -> None:
-        """Replaces the map; the estimate stays."""
+        """Replace the map; the estimate stays."""
         self.grid = grid
         half = np.float32(grid.resolution / 2)
         occupied = grid.occupied
@@ -168,7 +168,7 @@ class Localiser:
         return not self.lost and self._look_at is None
 
     def believe(self, pose: Pose) -> None:
-        """Takes a pose that somebody gave as the estimate."""
+        """Take a pose that somebody gave as the estimate."""
         self.pose = pose
         self.lost = False
         self._look_at = None
@@ -176,7 +176,7 @@ class Localiser:
         self._used_at = None
 
     def move(self, odometry: Pose) -> None:
-        """Takes a new reading of the odometry, in the odometry's own frame."""
+        """Take a new reading of the odometry, in the odometry's own frame."""
         if self._odometry is not None:
             dx, dy, turn = relative(self._odometry, odometry)
             step = math.hypot(dx, dy)
@@ -187,7 +187,7 @@ class Localiser:
         self._odometry = odometry
 
     def see(self, scan: Scan, now: float) -> bool:
-        """Takes a scan made where the robot is now: corrects the estimate, or looks for it.
+        """Take a scan made where the robot is now: correct the estimate, or look for it.
 
         Args:
             scan: The scan.
@@ -273,7 +273,7 @@ class Localiser:
         self._rival = None
 
     def search(self, scan: Scan) -> tuple[Pose, float] | None:
-        """Looks for the pose that explains a scan: near the last one first, then everywhere.
+        """Look for the pose that explains a scan: near the last one first, then everywhere.
 
         Returns:
             The pose and the part of the rays it explains; None when the scan shows too little.
@@ -290,14 +290,14 @@ class Localiser:
         return explained - 0.003 * min(math.dist(pose[:2], self.pose[:2]), 20.0)
 
     def explained(self, pose: Pose, scan: Scan) -> float:
-        """The part of a scan's rays that go as far as they should from a pose, 0 to 1."""
+        """Return the part of a scan's rays that go as far as they should from a pose, 0 to 1."""
         expected = self.cast(composed(pose, scan.mount), scan.angles, scan.range_max)
         measured = np.minimum(scan.ranges, scan.range_max)
         slack = self.parameters.hit + self.grid.resolution / 2
         return float((np.abs(expected - measured) <= slack).mean()) if len(measured) else 0.0
 
     def cast(self, pose: Pose, angles: Points, range_max: float) -> Points:
-        """How far rays go in the map from a pose until they meet something occupied.
+        """Return how far rays go in the map from a pose until they meet something occupied.
 
         Returns:
             Shape of `angles`, metres, at most `range_max`; to half a cell.
@@ -320,7 +320,7 @@ class Localiser:
         return np.where(met, np.minimum(way[first], range_max), range_max)
 
     def _matched(self, pose: Pose, points: Points, moved: tuple[float, float]) -> Pose:
-        """The pose near `pose` at which points (robot's frame) lie on the map's edges."""
+        """Return the pose near `pose` at which points (robot's frame) lie on the map's edges."""
         if len(points) < 8:
             return pose
         estimate = np.array(pose)
@@ -397,7 +397,7 @@ class Localiser:
         )
 
     def _scores(self, poses: Points, points: Points) -> Points:
-        """How well the points fit the edges from each pose; the greater the better."""
+        """Return how well the points fit the edges from each pose; the greater the better."""
         scores = np.empty(len(poses))
         flat = np.exp(-0.5 * (self._edges / np.float32(0.2)) ** 2).ravel()
         rows, columns = self._edges.shape
@@ -415,7 +415,7 @@ class Localiser:
 
 
 def _apart(poses: Points, scores: Points, count: int, distance: float) -> list[Pose]:
-    """The best poses that are not all the same: some way or turn lies between any two."""
+    """Return the best poses that are not all the same: some way or turn lies between any two."""
     taken: list[Pose] = []
     for index in np.argsort(-scores)[: 60 * count]:
         x, y, yaw = (float(value) for value in poses[index])

@@ -78,7 +78,7 @@ class Nav2Motion:
         node.create_subscription(PoseWithCovarianceStamped, 'amcl_pose', self._on_pose, STATE_QOS)
 
     def follow(self, path: Points, run: GoalRun, report: Callable[[Points], None]) -> Points:
-        """Sends the robot along a path of shape (n, 3).
+        """Send the robot along a path of shape (n, 3).
 
         Returns:
             Where the robot is then, as Nav2 said last, shape (3,).
@@ -110,7 +110,7 @@ class Nav2Motion:
         return path[-1] if position is None else position
 
     def _poses(self, path: Points) -> list[PoseStamped]:
-        """The poses behind the start, each facing along the path."""
+        """Return the poses behind the start, each facing along the path."""
         points = equally_spaced(path, SPACING)
         if len(points) == 1:
             points = np.vstack([path[-1], path[-1]])
@@ -137,7 +137,7 @@ class Nav2Motion:
         self._recorder.tell_point(np.array([x, y, 0.0]), passing=True)
 
     def place_reached(self, _goal: Points, end: Points, run: GoalRun) -> str:
-        """The place nearest to where the robot is, shape (3,).
+        """Return the place nearest to where the robot is, shape (3,).
 
         Raises:
             MotionFailedError: No place is within reach.
@@ -150,7 +150,7 @@ class Nav2Motion:
 
 
 def _why(result: Any) -> str:
-    """What Nav2 says of a goal that it did not reach, in brackets; empty: nothing."""
+    """Return what Nav2 says of a goal that it did not reach, in brackets; empty: nothing."""
     code = getattr(result, 'error_code', 0)
     text = str(getattr(result, 'error_msg', '')).strip()
     said = [f'error code {code}'] * bool(code) + [text] * bool(text)

@@ -56,7 +56,7 @@ class NavigationMotion:
         node.spawn(self._follow_map, name='map follower')
 
     def follow(self, path: Points, run: GoalRun, report: Callable[[Points], None]) -> Points:
-        """Drives along a path of shape (n, 3).
+        """Drive along a path of shape (n, 3).
 
         Returns:
             Where the robot is then, shape (3,).
@@ -85,7 +85,7 @@ class NavigationMotion:
         return end
 
     def place_reached(self, goal: Points, end: Points, _run: GoalRun) -> str:
-        """The place the robot is in after a drive.
+        """Return the place the robot is in after a drive.
 
         Args:
             goal: Where the robot should be, shape (3,).
@@ -101,7 +101,7 @@ class NavigationMotion:
         return place
 
     def look_around(self, run: GoalRun) -> None:
-        """Turns once on the spot, as the place's exploration asks for.
+        """Turn once on the spot, as the place's exploration asks for.
 
         Raises:
             MotionFailedError: The robot's sensors are silent.
@@ -110,7 +110,7 @@ class NavigationMotion:
             self._base.spin(Spin(), run.interrupt)
 
     def _follow_map(self) -> None:
-        """Takes the places that come and go: they change what the robot's place can be."""
+        """Take the places that come and go: they change what the robot's place can be."""
         stopping, watched = self._node.stopping, False
         while not stopping.is_set():
             self._news.clear()

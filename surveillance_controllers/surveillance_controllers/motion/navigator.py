@@ -104,37 +104,37 @@ class Navigator:
         return np.zeros((0, 2)) if self._memory is None else self._memory.points
 
     def set_map(self, grid: GridMap) -> None:
-        """Takes the map, or another one."""
+        """Take the map, or another one."""
         self._grid = grid
         self._redraw()
         self._divide()
 
     def set_closed(self, doors: Iterable[str]) -> None:
-        """Takes which doors are closed: the lidar sees them as walls."""
+        """Take which doors are closed: the lidar sees them as walls."""
         closed = frozenset(doors) & self._doors.keys()
         if closed != self._closed:
             self._closed = closed
             self._redraw()
 
     def set_positions(self, positions: Mapping[str, ArrayLike]) -> None:
-        """Takes the places: a point in each, metres."""
+        """Take the places: a point in each, metres."""
         self._positions = {name: np.asarray(at, float)[:2] for name, at in positions.items()}
         self._divide()
 
     def believe(self, pose: Pose) -> None:
-        """Takes where the robot is said to be."""
+        """Take where the robot is said to be."""
         self._believed = pose
         if self._localiser is not None:
             self._localiser.believe(pose)
 
     def move(self, odometry: Pose) -> None:
-        """Takes a reading of the odometry."""
+        """Take a reading of the odometry."""
         self._odometry = odometry
         if self._localiser is not None:
             self._localiser.move(odometry)
 
     def see(self, scan: Scan, now: float) -> Velocity | None:
-        """Takes a scan and decides what to do.
+        """Take a scan and decide what to do.
 
         Args:
             scan: What the lidar sees from where the robot is.
@@ -168,7 +168,7 @@ class Navigator:
         return None
 
     def _first_localiser(self, scan: Scan, odometry: Pose) -> Localiser:
-        """Begins where the robot is said to be, or else where its first scan fits best."""
+        """Begin where the robot is said to be, or else where its first scan fits best."""
         localiser = Localiser(self._seen_map, odometry, self._localisation)
         if self._believed is not None:
             localiser.believe(self._believed)
@@ -232,5 +232,7 @@ class Navigator:
             self._candidate = None
 
     def place_at(self, point: ArrayLike) -> str | None:
-        """The place that a point belongs to; None when it is in none, or there is no map yet."""
+        """Return the place that a point belongs to; None when it is in none, or there is no map
+        yet.
+        """
         return None if self._regions is None else self._regions.place_at(point)

@@ -44,7 +44,7 @@ class ObstacleMemory:
         self.set_map(grid)
 
     def set_map(self, grid: GridMap) -> None:
-        """Replaces the map; obstacles that it has are the map's from now on."""
+        """Replace the map; obstacles that it has are the map's from now on."""
         self._grid = grid
         self._known = distance_to(grid.occupied, grid.resolution)
         for cell in list(self._seen):
@@ -71,7 +71,7 @@ class ObstacleMemory:
         now: float,
         may_move: Callable[[Points], NDArray[np.bool_]] | None = None,
     ) -> bool:
-        """Takes a scan made at a pose that is to be trusted.
+        """Take a scan made at a pose that is to be trusted.
 
         Args:
             pose: Where the robot is.

@@ -115,7 +115,7 @@ class PathFollower:
         return float(self._along[-1])
 
     def step(self, pose: Pose, seen: Points, dt: float) -> Guidance:
-        """Decides the velocity for the next moment.
+        """Decide the velocity for the next moment.
 
         Args:
             pose: Where the robot is, in the path's frame.
@@ -204,7 +204,7 @@ class PathFollower:
         return Guidance(self._velocity, True, False, self.progress, off_path)
 
     def _safe_speed(self, seen: Points, curvature: float, way: float) -> float:
-        """The speed from which the robot stops before what it sees on an arc, m/s.
+        """Return the speed from which the robot stops before what it sees on an arc, m/s.
 
         Args:
             seen: Points in the robot's frame, shape (n, 2), metres.
@@ -224,7 +224,9 @@ class PathFollower:
         return min(p.speed, max(0.0, math.sqrt((a * t) ** 2 + 2 * a * room) - a * t))
 
     def _safely(self, speed: float, turn: float, seen: Points, way: float = math.inf) -> float:
-        """The speed, or less where the robot could not stop on the arc that this turn makes."""
+        """Return the speed, or less where the robot could not stop on the arc that this turn
+        makes.
+        """
         if speed == 0.0:
             return 0.0
         if speed < 0.0:
@@ -233,7 +235,7 @@ class PathFollower:
         return min(speed, self._safe_speed(seen, turn / speed, way))
 
     def is_clear(self, obstacles: Points, reach: float, ahead: float) -> bool:
-        """Whether the next part of the path keeps away from obstacles.
+        """Tell whether the next part of the path keeps away from obstacles.
 
         What is within reach already counts only where going on brings it closer.
 
@@ -280,7 +282,7 @@ class PathFollower:
         return now + min(max(wanted - now, -change), change)
 
     def _project(self, position: Points) -> float:
-        """Moves the progress to the nearest point of the path ahead; returns the distance to it."""
+        """Move the progress to the nearest point of the path ahead; return the distance to it."""
         if len(self.path) == 1:
             return float(np.hypot(*(self.path[0] - position)))
         # Only a window: where a path comes back past itself, the near leg ahead must not be taken.
@@ -320,7 +322,7 @@ def _nearest(seen: Points) -> float:
 
 
 def room_ahead(seen: Points, curvature: float, reach: float, horizon: float) -> float:
-    """How far the robot can go on an arc before a point comes within `reach` of its centre.
+    """Return how far the robot can go on an arc before a point comes within `reach` of its centre.
 
     A point that is within reach already only counts where going on brings it closer, so that a
     robot that stands too near to something can leave it.

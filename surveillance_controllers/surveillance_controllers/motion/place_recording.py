@@ -74,7 +74,7 @@ class PlaceRecorder:
         node.spawn(self._work, name='place recorder')
 
     def tell(self, place: str | None, stamp: Time | None = None) -> None:
-        """Takes where the robot is; from any thread, returns at once.
+        """Take where the robot is; from any thread, without waiting.
 
         Args:
             place: The place; None: that is not known.
@@ -91,7 +91,7 @@ class PlaceRecorder:
         self._news.set()
 
     def tell_point(self, point: Points, *, passing: bool = False) -> None:
-        """Takes where the robot is as a point; from any thread, returns at once.
+        """Take where the robot is as a point; from any thread, without waiting.
 
         The place is the nearest one within reach, as soon as the map says where the places are.
 
@@ -123,7 +123,7 @@ class PlaceRecorder:
                 self._news.wait(wait)
 
     def _catch_up(self) -> float | None:
-        """Writes what is to be written.
+        """Write what is to be written.
 
         Returns:
             Seconds after which to look again; None: when something has changed.
@@ -158,7 +158,7 @@ class PlaceRecorder:
         return None
 
     def _find_place(self) -> None:
-        """Tells the place of the last point."""
+        """Tell the place of the last point."""
         with self._lock:
             found = self._point
         if found is None:
@@ -174,7 +174,7 @@ class PlaceRecorder:
                 self._point = None
 
     def _begin(self) -> None:
-        """Takes the place in which an earlier process left the robot, or else where it starts."""
+        """Take the place in which an earlier process left the robot, or else where it starts."""
         kept = self._kept.text('place')
         if kept and kept in self._knowledge.places(self._node.stopping):
             self.tell(kept)

@@ -20,7 +20,7 @@ Segment = tuple[float, float, float, float]
 
 
 def door_segment(x: float, y: float, yaw: float, width: float) -> Segment:
-    """The opening of a door as a segment x1, y1, x2, y2.
+    """Return the opening of a door as a segment x1, y1, x2, y2.
 
     Args:
         x: Of the centre, metres.
@@ -79,7 +79,7 @@ class PlaceRegions:
                 self._beside.setdefault(second, set()).add(first)
 
     def place_at(self, point: ArrayLike) -> str | None:
-        """The place that a point (x, y in metres) belongs to; None off the map.
+        """Return the place that a point (x, y in metres) belongs to; None off the map.
 
         A room without a place (it was taken from the map, or never entered) belongs to the place
         that one comes into through its doors.
@@ -105,7 +105,7 @@ class PlaceRegions:
 
 
 def _sides(door: Segment) -> tuple[np.ndarray, np.ndarray]:
-    """A point on each side of a door, metres."""
+    """Return a point on each side of a door, metres."""
     x1, y1, x2, y2 = door
     middle = np.array([(x1 + x2) / 2, (y1 + y2) / 2])
     across = np.array([y1 - y2, x2 - x1]) / max(math.hypot(x2 - x1, y2 - y1), 1e-9)

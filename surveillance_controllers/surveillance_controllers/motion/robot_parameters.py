@@ -34,7 +34,7 @@ _DRIVE = {
 
 
 def door_segments(node: PatrolNode) -> dict[str, Segment]:
-    """Declares and reads the doors of the place, `doors.NAME: [x, y, yaw, width]`.
+    """Declare and read the doors of the place, `doors.NAME: [x, y, yaw, width]`.
 
     Raises:
         ParameterError: A door is not four numbers.
@@ -50,7 +50,7 @@ def door_segments(node: PatrolNode) -> dict[str, Segment]:
 
 
 def place_positions(node: PatrolNode) -> dict[str, Points]:
-    """Declares and reads the places' points, `room_positions.NAME: [x, y]`.
+    """Declare and read the places' points, `room_positions.NAME: [x, y]`.
 
     Raises:
         ParameterError: A position is not two or three numbers.
@@ -72,7 +72,7 @@ def _are_numbers(values: object, count: int) -> bool:
 
 
 def planning_parameters(node: PatrolNode) -> PlanningParameters:
-    """Declares how `planner_controller` plans in SIMULATED mode."""
+    """Declare how `planner_controller` plans in SIMULATED mode."""
     return declare_fields(node, PlanningParameters(), _PLANNING, prefix='planning.')
 
 
@@ -93,7 +93,7 @@ class RobotSettings:
 
 
 def robot_settings(node: PatrolNode, motion: MotionSettings) -> RobotSettings:
-    """Declares the parameters of `motion_controller` in SIMULATED mode.
+    """Declare the parameters of `motion_controller` in SIMULATED mode.
 
     Raises:
         ParameterError: A value is of the wrong type or out of range.
@@ -130,7 +130,7 @@ def robot_settings(node: PatrolNode, motion: MotionSettings) -> RobotSettings:
 
 
 def lidar_mount(node: PatrolNode) -> Pose | None:
-    """Declares where the lidar sits on the robot; None: `tf_static` says it.
+    """Declare where the lidar sits on the robot; None: `tf_static` says it.
 
     Raises:
         ParameterError: A value is of the wrong type.

@@ -53,7 +53,7 @@ class DoorWatch:
         node.spawn(self._work, name='door watch')
 
     def rooms_of(self, interrupt: Interrupt) -> dict[str, set[str]]:
-        """The places that each door leads into; empty while the ontology does not say.
+        """Return the places that each door leads into; empty while the ontology does not say.
 
         Blocks for the ontology's answer, so it belongs on a worker thread.
         """
@@ -66,7 +66,7 @@ class DoorWatch:
             return {}
 
     def closed(self, rooms_of: Mapping[str, set[str]]) -> frozenset[str]:
-        """The doors that are closed, by their contacts or because they join no two places.
+        """Return the doors that are closed, by their contacts or because they join no two places.
 
         A door whose other room was taken from the map is not closed by that: who is in that room
         must be able to leave it.
@@ -83,7 +83,7 @@ class DoorWatch:
         return self._contacts | half if rooms_of else self._contacts
 
     def closed_segments(self, interrupt: Interrupt) -> dict[str, Segment]:
-        """Where the closed doors are; blocks as `rooms_of` does."""
+        """Return where the closed doors are; blocks as `rooms_of` does."""
         closed = self.closed(self.rooms_of(interrupt))
         return {door: self._segments[door] for door in closed if door in self._segments}
 
@@ -103,8 +103,9 @@ class DoorWatch:
                 stopping.wait(RETRY_PERIOD)
 
     def _catch_up(self) -> bool:
-        """Subscribes to the ontology's doors and tells it of the contacts; whether all went
-        well."""
+        """Subscribe to the ontology's doors and tell it of the contacts; return whether all went
+        well.
+        """
         try:
             self._knowledge.connect(self._node.stopping)
             for door in sorted(self._contacts ^ self._told):

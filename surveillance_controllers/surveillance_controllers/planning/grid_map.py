@@ -56,7 +56,9 @@ class GridMap:
         return np.asarray((self.cells >= 0) & (self.cells < OCCUPIED_FROM))
 
     def cells_of(self, points: ArrayLike) -> NDArray[np.intp]:
-        """Row and column of each point, shape (n, 2); they may lie outside of the map."""
+        """Return the row and column of each point, shape (n, 2); they may lie outside of the
+        map.
+        """
         xy = np.asarray(points, dtype=float).reshape(-1, 2)
         columns_rows = np.nan_to_num(np.floor((xy - self.origin) / self.resolution), nan=-1.0)
         # Far outside is outside: no larger number survives the conversion.
@@ -64,17 +66,17 @@ class GridMap:
         return cells
 
     def centres_of(self, cells: ArrayLike) -> Points:
-        """The centre of each cell (row, column), shape (n, 2), metres."""
+        """Return the centre of each cell (row, column), shape (n, 2), metres."""
         rows_columns = np.asarray(cells, dtype=float).reshape(-1, 2)
         return np.asarray((rows_columns[:, ::-1] + 0.5) * self.resolution + self.origin)
 
     def contains(self, cells: ArrayLike) -> NDArray[np.bool_]:
-        """Which cells (row, column) lie on the map, shape (n,)."""
+        """Return which cells (row, column) lie on the map, shape (n,)."""
         rows_columns = np.asarray(cells).reshape(-1, 2)
         return np.asarray(((rows_columns >= 0) & (rows_columns < self.cells.shape)).all(axis=1))
 
     def interpolated(self, field: NDArray[np.float32], points: ArrayLike) -> Points:
-        """The values of a field of the map's shape at points, bilinear between cell centres.
+        """Return the values of a field of the map's shape at points, bilinear between cell centres.
 
         Outside of the map the value is that of the nearest cell.
 
@@ -97,7 +99,7 @@ class GridMap:
 
 
 def distance_to(mask: NDArray[np.bool_], resolution: float) -> NDArray[np.float32]:
-    """How far each cell's centre is from the centre of the nearest cell of `mask`, metres.
+    """Return how far each cell's centre is from the centre of the nearest cell of `mask`, metres.
 
     Where `mask` is empty, the distance is infinite.
     """
@@ -108,7 +110,7 @@ def distance_to(mask: NDArray[np.bool_], resolution: float) -> NDArray[np.float3
 
 
 def drawn_lines(grid: GridMap, lines: ArrayLike) -> NDArray[np.bool_]:
-    """The cells that line segments run through.
+    """Return the cells that line segments run through.
 
     Args:
         grid: The map.
@@ -127,14 +129,14 @@ def drawn_lines(grid: GridMap, lines: ArrayLike) -> NDArray[np.bool_]:
 
 
 def with_walls(grid: GridMap, lines: ArrayLike) -> GridMap:
-    """The map with further walls: segments x1, y1, x2, y2, shape (n, 4), metres."""
+    """Return the map with further walls: segments x1, y1, x2, y2, shape (n, 4), metres."""
     cells = grid.cells.copy()
     cells[drawn_lines(grid, lines)] = OCCUPIED
     return GridMap(cells, grid.resolution, grid.origin)
 
 
 def marked(grid: GridMap, points: ArrayLike) -> NDArray[np.bool_]:
-    """The cells that points lie in; points outside of the map are left out."""
+    """Return the cells that points lie in; points outside of the map are left out."""
     mask = np.zeros(grid.cells.shape, dtype=np.bool_)
     cells = grid.cells_of(points)
     inside = cells[grid.contains(cells)]

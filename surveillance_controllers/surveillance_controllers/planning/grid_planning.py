@@ -95,13 +95,13 @@ class GridPlanner:
         self._update()
 
     def set_closed(self, doors: Lines) -> None:
-        """Closes doors: nothing leads across their segments. Replaces what was closed before."""
+        """Close doors: nothing leads across their segments. Replaces what was closed before."""
         if dict(doors) != dict(self._closed):
             self._closed = dict(doors)
             self._update()
 
     def set_obstacles(self, points: ArrayLike) -> None:
-        """Takes obstacles that the map does not have, points of shape (n, 2) on their surface."""
+        """Take obstacles that the map does not have, points of shape (n, 2) on their surface."""
         array = np.asarray(points, dtype=float).reshape(-1, 2)
         if not np.array_equal(array, self._obstacles):
             self._obstacles = array
@@ -113,20 +113,20 @@ class GridPlanner:
         return self._costs.cost
 
     def clearance(self, points: ArrayLike) -> Points:
-        """How far points are from everything that is not free, shape (n,), metres.
+        """Return how far points are from everything that is not free, shape (n,), metres.
 
         A lower bound, to within a part of a cell: what is not free fills its cells.
         """
         return self.grid.interpolated(self._costs.clearance, points)
 
     def is_free(self, path: ArrayLike) -> bool:
-        """Whether the robot can go along a path, shape (n, 2), without touching anything."""
+        """Tell whether the robot can go along a path, shape (n, 2), without touching anything."""
         samples = _samples(np.asarray(path, dtype=float), self.grid.resolution / 2)
         inside = self.grid.contains(self.grid.cells_of(samples)).all()
         return bool(inside and (self.clearance(samples) >= self.parameters.radius).all())
 
     def plan(self, start: ArrayLike, goal: ArrayLike) -> Points:
-        """Finds the way from one point to another.
+        """Find the way from one point to another.
 
         Args:
             start: x, y in metres; when it is not free, the path leaves it by the shortest way.
@@ -215,7 +215,9 @@ class GridPlanner:
     def _cell_beside(
         self, goal: Points, cell: tuple[int, int], start: tuple[int, int]
     ) -> tuple[int, int]:
-        """The cell nearest to a goal that an obstacle covers, among those that can be reached."""
+        """Return the cell nearest to a goal that an obstacle covers, among those that can be
+        reached.
+        """
         needed = self.parameters.radius + self.parameters.margin
         if self._static[cell] >= needed:
             reach = int(self.parameters.goal_shift / self.grid.resolution)
@@ -232,7 +234,7 @@ class GridPlanner:
         raise NoPathError(f'the goal {_shown(goal)} {self._why_not_free(goal)}')
 
     def _can_escape(self, start: Points, end: Points) -> bool:
-        """Whether the way out only leads away from what is near: it must never come closer."""
+        """Tell whether the way out only leads away from what is near: it must never come closer."""
         clearance = self.clearance(_samples(np.array([start, end]), self.grid.resolution / 2))
         return bool((np.diff(clearance) > -self.grid.resolution / 4).all())
 
@@ -265,7 +267,7 @@ class GridPlanner:
         return min(gaps, key=lambda name: gaps[name])
 
     def _what_blocks(self, start: tuple[int, int], goal: tuple[int, int]) -> str:
-        """Names what lies on the path that would be taken if doors and obstacles were not there."""
+        """Name what lies on the path that would be taken if doors and obstacles were not there."""
         needed = np.float32(self.parameters.radius + self.parameters.margin)
         cost = np.where(self._costs.cost > 0, self._costs.cost, np.float32(_THROUGH))
         cost = np.where(self._static >= needed, cost, np.float32(-1))
@@ -285,7 +287,7 @@ class GridPlanner:
         return np.asarray(search.traceback(goal), dtype=np.intp)
 
     def _shortened(self, path: Points) -> Points:
-        """Replaces steps of the grid by straight lines that are free and no dearer."""
+        """Replace steps of the grid by straight lines that are free and no dearer."""
         path = path[_corners(path)]
         dear = np.array([self._price(first, last) for first, last in pairwise(path)])
         dear = np.concatenate(([0.0], np.cumsum(dear)))
@@ -312,7 +314,7 @@ class GridPlanner:
         return price <= float(dear[last] - dear[first]) * 1.02 + 1e-6
 
     def _price(self, begin: Points, end: Points) -> float:
-        """What the straight line between two points costs; infinite where it is not free."""
+        """Return what the straight line between two points costs; infinite where it is not free."""
         (x, y), (dx, dy) = begin, end - begin
         length = math.hypot(dx, dy)
         count = math.ceil(2 * length / self.grid.resolution) + 1
@@ -328,7 +330,7 @@ class GridPlanner:
         return float(np.abs(costs).sum()) / count * length
 
     def _rounded(self, path: Points) -> Points:
-        """Rounds each corner by a quadratic Bezier curve, as far as that is free."""
+        """Round each corner by a quadratic Bezier curve, as far as that is free."""
         result = [path[:1]]
         for before, corner, after in zip(path, path[1:], path[2:], strict=False):
             reach = self.parameters.corner
@@ -354,7 +356,7 @@ class GridPlanner:
 
 
 def _corners(path: Points) -> NDArray[np.intp]:
-    """Where a path of cells changes its direction, and its two ends."""
+    """Return where a path of cells changes its direction, and its two ends."""
     if len(path) < 3:
         return np.arange(len(path))
     steps = np.diff(path, axis=0)

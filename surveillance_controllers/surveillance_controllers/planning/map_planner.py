@@ -58,7 +58,7 @@ class MapPlanner:
         return self._pose
 
     def plan(self, start: Points, goal: Points, timeout: float, interrupt: Interrupt) -> Points:
-        """Finds the path between two points, shape (3,) each, metres.
+        """Find the path between two points, shape (3,) each, metres.
 
         Args:
             start: Where it begins.
@@ -129,7 +129,8 @@ class NavigationPlanning:
         self._map = MapPlanner(node, planning_parameters(node), self._doors)
 
     def start(self, target: str, run: GoalRun) -> Points:
-        """Where the robot is, shape (3,), once there is a route over doors from there to a place.
+        """Return where the robot is, shape (3,), once there is a route over doors from there to a
+        place.
 
         Raises:
             GoalAbortedError: There is no route.
@@ -149,7 +150,7 @@ class NavigationPlanning:
         return positions[place] if pose is None else np.array([pose[0], pose[1], 0.0])
 
     def path(self, start: Points, goal: Points, run: GoalRun, what: str) -> Points:
-        """The path between two points, shape (n, 3).
+        """Return the path between two points, shape (n, 3).
 
         Raises:
             GoalAbortedError: There is none; the text says what blocks it.

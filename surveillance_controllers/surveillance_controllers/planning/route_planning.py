@@ -23,7 +23,7 @@ def route(
     goal: str,
     positions: Mapping[str, ArrayLike],
 ) -> list[str]:
-    """The doors to go through, in order; none when start and goal are one place.
+    """Return the doors to go through, in order; none when start and goal are one place.
 
     Args:
         rooms_of: The places that each door leads into.

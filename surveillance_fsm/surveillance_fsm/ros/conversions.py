@@ -26,7 +26,9 @@ from surveillance_interfaces.msg import (
 
 
 def transition_message(transition: Transition, active: list[str], stamp: Any) -> FsmTransition:
-    """A transition of a machine, with the paths that are active and the time of publishing."""
+    """Return a transition of a machine, with the paths that are active and the time of
+    publishing.
+    """
     return FsmTransition(
         stamp=stamp,
         sequence=transition.sequence,
@@ -44,7 +46,7 @@ def transition_message(transition: Transition, active: list[str], stamp: Any) ->
 
 
 def transition_from(message: FsmTransition) -> Transition:
-    """The transition of a message; its time is the time of publishing, in seconds."""
+    """Return the transition of a message; its time is the time of publishing, in seconds."""
     return Transition(
         sequence=message.sequence,
         time=message.stamp.sec + message.stamp.nanosec / 1e9,
@@ -63,7 +65,7 @@ def transition_from(message: FsmTransition) -> Transition:
 
 
 def status_message(root: Container, sequence: int, stamp: Any) -> FsmStatus:
-    """What a machine's root is doing, after the transition with number `sequence`."""
+    """Return what a machine's root is doing, after the transition with number `sequence`."""
     return FsmStatus(
         stamp=stamp,
         root=root.get_name(),
@@ -76,7 +78,7 @@ def status_message(root: Container, sequence: int, stamp: Any) -> FsmStatus:
 
 
 def structure_message(root: Container, stamp: Any) -> FsmStructure:
-    """A machine's root and all its containers."""
+    """Return a machine's root and all its containers."""
     return FsmStructure(
         stamp=stamp,
         root=root.get_name(),
@@ -125,12 +127,12 @@ def userdata_text(userdata: UserData) -> str:
 
 
 def smach_path(path: str) -> str:
-    """A path as SMACH's introspection writes it."""
+    """Return a path as SMACH's introspection writes it."""
     return f'/{path}'
 
 
 def smach_structure_messages(root: Container, stamp: Any) -> list[SmachContainerStructure]:
-    """A machine's root and all its containers, a message each."""
+    """Return a machine's root and all its containers, a message each."""
     return [
         SmachContainerStructure(
             header=Header(stamp=stamp),
@@ -148,7 +150,7 @@ def smach_structure_messages(root: Container, stamp: Any) -> list[SmachContainer
 def smach_status_messages(
     structures: Iterable[Structure], info: str, stamp: Any
 ) -> list[SmachContainerStatus]:
-    """What containers are doing, a message each.
+    """Return what containers are doing, a message each.
 
     Args:
         structures: The containers.

@@ -12,7 +12,7 @@ from surveillance_fsm.exceptions import describe
 
 
 def seconds(duration: Any) -> float | None:
-    """A duration in seconds: a number, an rclpy ``Duration``, or None."""
+    """Return a duration in seconds: a number, an rclpy ``Duration``, or None."""
     if duration is None or isinstance(duration, int | float):
         return duration
     return float(duration.nanoseconds) / 1e9

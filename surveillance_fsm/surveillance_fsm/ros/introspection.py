@@ -221,7 +221,7 @@ class IntrospectionServer:
 
 
 def _said(error: Exception) -> str:
-    """What an error says; a KeyError alone would show it in quotes."""
+    """Return what an error says; a KeyError alone would show it in quotes."""
     if isinstance(error, KeyError) and not isinstance(error, fsm.SmachError):
         return str(error.args[0])
     return str(error)
@@ -242,7 +242,7 @@ class IntrospectionClient:
         self._told: set[tuple[str, str, tuple[str, ...]]] = set()
 
     def get_servers(self) -> list[str]:
-        """The names of the servers that are there, fully resolved."""
+        """Return the names of the servers that are there, fully resolved."""
         wanted = 'surveillance_interfaces/msg/SmachContainerStructure'
         return sorted(
             name[: -len(STRUCTURE_TOPIC)]

@@ -54,7 +54,7 @@ def own(node: Node, entity: Any) -> None:
 
 
 def stopping_of(node: Node) -> Interrupt | None:
-    """What a node raises when it stops; None for a plain one."""
+    """Return what a node raises when it stops; None for a plain one."""
     stopping = getattr(node, 'stopping', None)
     return stopping if isinstance(stopping, Interrupt) else None
 
@@ -172,7 +172,7 @@ def work_aside(node: Node, work: Callable[[], Any], name: str) -> Future:
 
 
 def reported(node: Node, work: Callable[[], Any]) -> tuple[Future, Callable[[], None]]:
-    """A future, and the work that completes it."""
+    """Return a future, and the work that completes it."""
     future = Future()
 
     def report() -> None:

@@ -208,13 +208,13 @@ _IN_BRACKETS = re.compile(r'<([^<>]*)>')
 
 
 def name_in(rendered: str) -> str:
-    """The local name in ``<iri#name>``; a text of another form as it is."""
+    """Return the local name in ``<iri#name>``; a text of another form as it is."""
     match = _IN_BRACKETS.fullmatch(rendered)
     return local_name(match[1]) if match else rendered
 
 
 def value_in(rendered: str) -> str:
-    """The value in ``"1665579740"^^xsd:long``.
+    """Return the value in ``"1665579740"^^xsd:long``.
 
     Raises:
         ValueError: Not of that form.
@@ -456,7 +456,7 @@ class Query(ClientPart):
 
     @operation
     def ind_b2_class(self, class_name: str, with_URI: bool = False) -> Steps[list[str]]:  # noqa: N803
-        """Individuals of a class: names, or ``<iri#name>`` when asked for."""
+        """Yield individuals of a class: names, or ``<iri#name>`` when asked for."""
         return (yield from self._names(with_URI, 'QUERY IND CLASS', class_name))
 
     @operation
@@ -466,13 +466,13 @@ class Query(ClientPart):
         ind_name: str,
         with_URI: bool = False,  # noqa: N803
     ) -> Steps[list[str]]:
-        """Individuals that an individual is related to: names, or ``<iri#name>``."""
+        """Yield individuals that an individual is related to: names, or ``<iri#name>``."""
         args = (objectprop_name, ind_name)
         return (yield from self._names(with_URI, 'QUERY OBJECTPROP IND', *args))
 
     @operation
     def dataprop_b2_ind(self, dataprop_name: str, ind_name: str) -> Steps[list[str]]:
-        """Values of a data property, as ``"1665579740"^^xsd:long``; see `value_in`."""
+        """Yield values of a data property, as ``"1665579740"^^xsd:long``; see `value_in`."""
         return (yield from self._objects('QUERY DATAPROP IND', dataprop_name, ind_name))
 
     @operation
@@ -485,7 +485,7 @@ class Query(ClientPart):
 
     @operation
     def class_of_ind(self, ind_name: str, with_URI: bool = False) -> Steps[list[str]]:  # noqa: N803
-        """All classes of an individual: names, or ``<iri#name>``."""
+        """Yield all classes of an individual: names, or ``<iri#name>``."""
         return (yield from self._names(with_URI, 'QUERY CLASS IND', ind_name, 'false'))
 
     @operation
@@ -508,12 +508,12 @@ class Query(ClientPart):
 
     @operation
     def dataprops_of_ind(self, ind_name: str, with_URI: bool = False) -> Steps[list[str]]:  # noqa: N803
-        """Data properties that have a value for an individual."""
+        """Yield data properties that have a value for an individual."""
         return (yield from self._names(with_URI, 'QUERY IND DATAPROP', ind_name))
 
     @operation
     def objectprops_of_ind(self, ind_name: str, with_URI: bool = False) -> Steps[list[str]]:  # noqa: N803
-        """Object properties that have a value for an individual."""
+        """Yield object properties that have a value for an individual."""
         return (yield from self._names(with_URI, 'QUERY IND OBJECTPROP', ind_name))
 
     @operation
@@ -532,21 +532,23 @@ class Query(ClientPart):
 
     @operation
     def facts(self, pattern: str) -> Steps[list[ShortFact]]:
-        """Asserted and derived facts that match a pattern such as ``canReach(Robot1, ?)``."""
+        """Yield asserted and derived facts that match a pattern such as ``canReach(Robot1, ?)``."""
         parse_fact(pattern)
         objects = yield from self._objects('QUERY FACT', pattern)
         return [parse_fact(text) for text in objects]
 
     @operation
     def facts_at(self, time: float, pattern: str) -> Steps[list[ShortFact]]:
-        """Asserted and derived facts that matched a pattern at a time, seconds since the epoch."""
+        """Yield asserted and derived facts that matched a pattern at a time, seconds since the
+        epoch.
+        """
         parse_fact(pattern)
         objects = yield from self._objects('QUERY AT', repr(float(time)), pattern)
         return [parse_fact(text) for text in objects]
 
     @operation
     def facts_by_origin(self, pattern: str) -> Steps[tuple[list[ShortFact], list[ShortFact]]]:
-        """Facts that match a pattern: all of them, and those of them that are asserted."""
+        """Yield facts that match a pattern: all of them, and those of them that are asserted."""
         parse_fact(pattern)
         rows = [
             self.request('QUERY FACT', pattern),
@@ -561,7 +563,9 @@ class Query(ClientPart):
 
     @operation
     def explain(self, fact: str) -> Steps[tuple[str, str] | None]:
-        """Why a fact such as ``URGENT(R3)`` holds: a sentence and a tree; None when it does not."""
+        """Yield why a fact such as ``URGENT(R3)`` holds: a sentence and a tree; None when it does
+        not.
+        """
         parse_fact(fact)
         response: DirectiveResponse = yield self.request('QUERY EXPLAIN', fact)
         if not response.success and response.exit_code == ExitCode.OK:
@@ -571,7 +575,7 @@ class Query(ClientPart):
 
     @operation
     def explain_inconsistency(self) -> Steps[tuple[str, str] | None]:
-        """Why the ontology contradicts itself; None when it does not."""
+        """Yield why the ontology contradicts itself; None when it does not."""
         objects = yield from self._objects('QUERY EXPLAIN INCONSISTENCY')
         return (objects[0], objects[1]) if objects else None
 
@@ -636,13 +640,15 @@ class Utils(ClientPart):
 
     @operation
     def get_all_refs(self) -> Steps[list[str]]:
-        """Names of all references."""
+        """Yield names of all references."""
         response: DirectiveResponse = checked((yield self.request('GET ALL REFS')))
         return response.queried_objects
 
     @operation
     def get_ref_client(self, reference_name: str = '') -> Steps[str | None]:
-        """The client mounted on a reference (the own one if none is named); None when nobody is."""
+        """Yield the client mounted on a reference (the own one if none is named); None when nobody
+        is.
+        """
         name = reference_name or self.client.reference_name
         response: DirectiveResponse = checked((yield self.request('GET REF CLIENT', name)))
         mounted = response.queried_objects[0]

@@ -39,7 +39,7 @@ _CODES = {
 
 
 def directives_text() -> str:
-    """The tables of directives, exit codes and value types, as Markdown."""
+    """Return the tables of directives, exit codes and value types, as Markdown."""
     parts = []
     for kind, title in _TITLES.items():
         rows = [
@@ -61,7 +61,7 @@ def directives_text() -> str:
 
 
 def updated(manual: str) -> str:
-    """The manual with the text between its marks written anew.
+    """Return the manual with the text between its marks written anew.
 
     Raises:
         ValueError: A mark is missing.

@@ -90,7 +90,9 @@ def parse_names(text: str) -> ShortFact:
 
 
 def short_name(name: str) -> str:
-    """The local name of an entity that is written ``<iri>`` or as a full IRI; else as it is."""
+    """Return the local name of an entity that is written ``<iri>`` or as a full IRI; else as it
+    is.
+    """
     bracketed = name[0] == '<' and name[-1] == '>'
     if name[0] == '"' or not (bracketed or '://' in name):
         return name
@@ -103,7 +105,7 @@ def _shown(name: str) -> str:
 
 
 def short_facts(axiom: Axiom) -> Sequence[ShortFact]:
-    """The short forms of an assertion; empty for any other axiom."""
+    """Return the short forms of an assertion; empty for any other axiom."""
     if isinstance(axiom, ClassAssertion):
         if isinstance(axiom.cls, str):
             return (ShortFact(local_name(axiom.cls), (local_name(axiom.individual),)),)

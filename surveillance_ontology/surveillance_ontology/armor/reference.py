@@ -220,7 +220,7 @@ class Registry:
         return name in self._references
 
     def names(self) -> list[str]:
-        """All names, sorted."""
+        """Return all names, sorted."""
         return sorted(self._references)
 
     def get(self, name: str) -> Reference | None:

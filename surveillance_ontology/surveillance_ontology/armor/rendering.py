@@ -257,7 +257,7 @@ def one_line(text: str, limit: int = 2000) -> str:
 
 
 def shown(text: str, limit: int = 80) -> str:
-    """A text in quotes for a message, cut when it is long."""
+    """Return a text in quotes for a message, cut when it is long."""
     return repr(text) if len(text) <= limit else repr(text[: limit - 3]) + '...'
 
 

@@ -187,7 +187,7 @@ class _Worker:
         self.version = wanted.version
 
     def ask(self, query: str, deadline: float, rows: int) -> Any:
-        """The process's answer to a query on the graph that it holds."""
+        """Return the process's answer to a query on the graph that it holds."""
         seconds = max(deadline - time.monotonic(), 0.0) + GRACE
         return self._exchange({'query': query, 'rows': rows, 'seconds': seconds}, deadline)
 

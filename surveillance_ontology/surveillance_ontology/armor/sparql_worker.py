@@ -127,7 +127,7 @@ class WrittenForms:
             places[_iri(quad.subject), quad.predicate.value] = None
 
     def reader(self, query: str) -> Reader:
-        """What reads the rows of one query."""
+        """Return what reads the rows of one query."""
         return Reader(self._forms, query)
 
 
@@ -146,7 +146,7 @@ class Reader:
         self._before: dict[str, list[str]] = {}
 
     def written(self, variable: str, row: Mapping[str, Any]) -> Any:
-        """A variable's value in a row as it was written."""
+        """Return a variable's value in a row as it was written."""
         term = row[variable]
         if variable in self._computed or not isinstance(term, pyoxigraph.Literal):
             return term
@@ -163,7 +163,7 @@ class Reader:
         return next(iter(_narrowed(found, lambda place: place[0] in near)))
 
     def _predicates(self, variable: str, row: Mapping[str, Any]) -> set[str]:
-        """The properties whose value the variable may be."""
+        """Return the properties whose value the variable may be."""
         before = self._before.get(variable)
         if before is None:
             pattern = _BEFORE.format(re.escape(variable))
@@ -178,7 +178,7 @@ class Reader:
 
 
 def _narrowed(forms: dict[Any, _Places], fits: Any) -> dict[Any, _Places]:
-    """The forms that stand in a place that fits, with these places; all where none does."""
+    """Return the forms that stand in a place that fits, with these places; all where none does."""
     found = {
         form: kept
         for form, places in forms.items()

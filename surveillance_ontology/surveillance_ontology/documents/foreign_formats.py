@@ -75,7 +75,7 @@ def owl_xml_to_ntriples(data: bytes, iri: str) -> bytes:
 
 @contextmanager
 def _untold() -> Iterator[None]:
-    """Keeps owlready2 from printing a traceback of what it raises besides."""
+    """Keep owlready2 from printing a traceback of what it raises besides."""
     hook = sys.excepthook
     sys.excepthook = lambda *_: None
     try:

@@ -369,7 +369,7 @@ def _key(values: Any) -> Axiom:
 
 
 def _about_property(name: str) -> Callable[[Any], Any]:
-    """An axiom of annotation properties, as an annotation of the property."""
+    """Return an axiom of annotation properties, as an annotation of the property."""
     return lambda values: ax.AnnotationAssertion(RDFS + name, *_exactly(values, _iri, _iri))
 
 

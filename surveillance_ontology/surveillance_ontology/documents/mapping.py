@@ -92,7 +92,7 @@ class Mapping(NodeReader):
         self._add(ax.EquivalentClasses((subject, self._restriction(subject, properties))))
 
     def _attempt(self, subject: str, read: Callable[..., None], *arguments: object) -> None:
-        """Reads one statement; an ill-formed class in it costs the statement alone."""
+        """Read one statement; an ill-formed class in it costs the statement alone."""
         try:
             read(*arguments)
         except IllFormedError as error:
@@ -180,7 +180,7 @@ class Mapping(NodeReader):
         self._add(ax.DisjointUnion(subject, tuple(map(self.expression, self._list(value)))))
 
     def _defined(self, subject: str, predicate: str, value: str) -> None:
-        """A named class directly carries the expression (OWL 1 style): an equivalence."""
+        """Read a named class that carries the expression itself (OWL 1 style): an equivalence."""
         if subject.startswith('_:'):
             return
         operands = [value] if predicate == OWL + 'complementOf' else self._list(value)
@@ -319,7 +319,7 @@ class Mapping(NodeReader):
         self._note(found[-1:], node, properties)
 
     def _note(self, axioms: Sequence[Axiom], node: str, properties: dict[str, list[Node]]) -> None:
-        """Keeps what a node says besides the axioms that it stands for."""
+        """Keep what a node says besides the axioms that it stands for."""
         notes = tuple(
             (predicate, value)
             for predicate, values in properties.items()

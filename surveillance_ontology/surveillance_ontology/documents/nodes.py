@@ -180,7 +180,7 @@ class NodeReader:
         return number
 
     def data_range(self, node: Node) -> ex.DataRange:
-        """The data range a node stands for."""
+        """Return the data range a node stands for."""
         if not isinstance(node, str):
             raise RdfSyntaxError(f'expected a data range, got the literal {node.lexical!r}')
         if not node.startswith('_:'):
@@ -206,7 +206,7 @@ class NodeReader:
         raise self._ill_formed(node, 'expected a data range')
 
     def expression(self, node: Node) -> ex.ClassExpression:
-        """The class expression a node stands for."""
+        """Return the class expression a node stands for."""
         if not isinstance(node, str):
             raise RdfSyntaxError(f'expected a class, got the literal {node.lexical!r}')
         if not node.startswith('_:'):

@@ -34,7 +34,7 @@ def _unescape(text: str) -> str:
 
 
 def parse_ntriples(data: bytes) -> Graph:
-    """Parses a document.
+    """Parse a document.
 
     Raises:
         RdfSyntaxError: With line and column, for a line that is no triple or bytes that are not

@@ -67,7 +67,7 @@ class _Frame:
 
 
 def resolve(base: str, reference: str) -> str:
-    """An IRI reference against a base IRI (RFC 3986); raises RdfSyntaxError for a forbidden
+    """Return an IRI reference against a base IRI (RFC 3986); raises RdfSyntaxError for a forbidden
     character.
     """
     found = _FORBIDDEN.search(reference)
@@ -313,7 +313,7 @@ def _text(text: str, datatype: str, language: str) -> Literal:
 
 
 def parse_rdf_xml(data: bytes, base: str) -> Graph:
-    """Parses a document.
+    """Parse a document.
 
     Raises:
         RdfSyntaxError: With line and column, for anything that is not RDF/XML or would expand

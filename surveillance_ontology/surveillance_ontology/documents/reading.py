@@ -55,7 +55,7 @@ class OntologyDocument:
 def read_ontology(
     source: str | Path | bytes, iri: str, *, size_limit: int = DEFAULT_SIZE_LIMIT
 ) -> OntologyDocument:
-    """Reads a document and the documents beside it that it imports.
+    """Read a document and the documents beside it that it imports.
 
     Its format is told by how it begins: RDF/XML, OWL/XML, Turtle, N-Triples, or OWL functional
     syntax. An import is followed where a file of its name (with any ending) lies in the folder of
@@ -94,7 +94,7 @@ def read_ontology(
 
 
 def _imported(iri: str, folder: Path | None) -> Path | None:
-    """The local file that an import names."""
+    """Return the local file that an import names."""
     if iri.startswith('file:'):
         path = Path(unquote(urlsplit(iri).path))
         return path if path.is_file() else None
@@ -108,7 +108,7 @@ def _imported(iri: str, folder: Path | None) -> Path | None:
 
 
 def _read(source: str | Path | bytes, iri: str, size_limit: int) -> OntologyDocument:
-    """Reads one document."""
+    """Read one document."""
     if isinstance(source, bytes):
         name, data = '<document>', source
     else:
@@ -149,7 +149,7 @@ def _functional(name: str, data: bytes) -> OntologyDocument:
 
 
 def _parsed(data: bytes, start: bytes, iri: str) -> tuple[Graph, str]:
-    """The document as triples, and its format."""
+    """Return the document as triples, and its format."""
     if not start:
         raise RdfSyntaxError('the document is empty', 1, 1)
     if foreign_formats.is_owl_xml(start):

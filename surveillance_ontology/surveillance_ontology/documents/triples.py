@@ -264,7 +264,9 @@ class _Mapping:
             self.add(self.blank(OWL + group), OWL + 'members', self.sequence(nodes))
 
     def annotated(self, axiom: Axiom, notes: Sequence[ax.AxiomAnnotation]) -> None:
-        """An axiom with what is said of it: on its node, where it has one, else on its triples."""
+        """Write an axiom with what is said of it: on its node, where it has one, else on its
+        triples.
+        """
         start = len(self.triples)
         self.axiom(axiom)
         written = self.triples[start:]
@@ -338,7 +340,7 @@ class _Mapping:
 
 
 def triples_of(axioms: Iterable[Axiom], iri: str) -> Iterator[Triple]:
-    """The triples of an ontology, its header first.
+    """Return the triples of an ontology, its header first.
 
     Classes, properties and datatypes that are used but not declared are declared: without, a reader
     could not tell an object property from a data property.

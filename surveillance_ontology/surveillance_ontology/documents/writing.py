@@ -32,7 +32,7 @@ def write_ontology(
     format: str = 'rdfxml',
     prefixes: Mapping[str, str] | None = None,
 ) -> None:
-    """Writes a document through a temporary file beside it, so that the old one stays until the new
+    """Write a document through a temporary file beside it, so that the old one stays until the new
     is whole.
 
     Args:
@@ -76,7 +76,7 @@ def ontology_bytes(
     format: str = 'rdfxml',
     prefixes: Mapping[str, str] | None = None,
 ) -> bytes:
-    """The document as bytes; arguments and errors as in `write_ontology`."""
+    """Return the document as bytes; arguments and errors as in `write_ontology`."""
     triples = triples_of(axioms, iri)
     if format == 'ntriples':
         return ''.join(map(_ntriple, triples)).encode()
@@ -237,7 +237,7 @@ class _RdfXml:
             self._lines.append(f'{margin}<{name} rdf:resource={quoteattr(_checked(value))}/>')
 
     def _items(self, head: str) -> list[str]:
-        """The items of a plain list of resources; empty for anything else."""
+        """Return the items of a plain list of resources; empty for anything else."""
         items: list[str] = []
         while head != RDF + 'nil':
             cell = dict(self._nodes.get(head, ()))

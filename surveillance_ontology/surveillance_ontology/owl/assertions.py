@@ -44,7 +44,7 @@ class Assertions:
         self._notes: dict[Axiom, dict[AxiomAnnotation, None]] = {}
 
     def settle(self) -> tuple[tuple[Axiom, ...], tuple[Axiom, ...]]:
-        """Takes what was added and removed; from here on, nothing changed."""
+        """Take what was added and removed; from here on, nothing changed."""
         changes = tuple(self.added), tuple(self.removed)
         self.added.clear()
         self.removed.clear()
@@ -52,11 +52,11 @@ class Assertions:
         return changes
 
     def mentioning(self, entity: str) -> Iterable[Axiom]:
-        """The axioms that mention an entity."""
+        """Return the axioms that mention an entity."""
         return self.about.get(entity, ())
 
     def insert(self, axiom: Axiom) -> bool:
-        """Asserts an axiom; False when it was asserted already."""
+        """Assert an axiom; return False when it was asserted already."""
         if axiom in self.axioms:
             return False
         self.axioms[axiom] = None
@@ -80,7 +80,7 @@ class Assertions:
         return True
 
     def discard(self, axiom: Axiom) -> bool:
-        """Retracts an axiom and what annotates it; False when it was not asserted."""
+        """Retract an axiom and what annotates it; return False when it was not asserted."""
         if axiom not in self.axioms:
             return False
         if self._notes:
@@ -125,7 +125,7 @@ def _mentioned(axiom: Axiom) -> Iterable[str]:
 
 
 def is_assertion(axiom: Axiom) -> bool:
-    """Whether an axiom is about individuals; the declaration of one is."""
+    """Tell whether an axiom is about individuals; the declaration of one is."""
     if isinstance(axiom, Declaration):
         return axiom.kind == 'individual'
     return isinstance(axiom, Assertion)
@@ -139,7 +139,7 @@ def _is_schema(axiom: Axiom) -> bool:
 
 @contextmanager
 def uncollected() -> Iterator[None]:
-    """Switches the cyclic garbage collector off for a while, where it is on."""
+    """Switch the cyclic garbage collector off for a while, where it is on."""
     if not gc.isenabled():
         yield
         return

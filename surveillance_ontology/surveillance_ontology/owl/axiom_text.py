@@ -27,7 +27,7 @@ _CHARACTERISTICS = {
 
 
 def literal_text(literal: Literal) -> str:
-    """A literal's lexical form, with its datatype where that is not plain from the form."""
+    """Return a literal's lexical form, with its datatype where that is not plain from the form."""
     if literal.language:
         return f'"{literal.lexical}"@{literal.language}'
     if literal.datatype in _PLAIN:
@@ -36,7 +36,9 @@ def literal_text(literal: Literal) -> str:
 
 
 def expression_text(expression: object) -> str:
-    """A class expression, property expression, data range, individual or literal by local names."""
+    """Return a class expression, property expression, data range, individual or literal by local
+    names.
+    """
     if isinstance(expression, str):
         return local_name(expression)
     if isinstance(expression, Literal):
@@ -98,7 +100,7 @@ def _atom_text(atom: ex.Atom) -> str:
 
 
 def axiom_text(axiom: ax.Axiom) -> str:
-    """An axiom in one line."""
+    """Return an axiom in one line."""
     if isinstance(axiom, ax.Rule):
         body = ', '.join(map(_atom_text, axiom.body))
         head = ', '.join(map(_atom_text, axiom.head))

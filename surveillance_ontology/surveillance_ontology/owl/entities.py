@@ -69,7 +69,7 @@ def _roles_of(record: type[Any]) -> tuple[tuple[str, str], ...]:
 
 
 def entities_of(record: object) -> Iterator[tuple[str, str]]:
-    """Every entity a record mentions, as pairs (kind, IRI), with repeats.
+    """Yield every entity a record mentions, as pairs (kind, IRI), with repeats.
 
     `kind` is one of `axioms.KINDS`, or 'annotated' for the IRIs of an annotation.
     """
@@ -92,7 +92,9 @@ def entities_of(record: object) -> Iterator[tuple[str, str]]:
 
 
 def renamed(axiom: Axiom, kind: str, old: str, new: str) -> Axiom:
-    """The axiom with an entity's IRI replaced wherever it stands for an entity of that kind."""
+    """Return the axiom with an entity's IRI replaced wherever it stands for an entity of that
+    kind.
+    """
     rewritten = _renamed(axiom, kind, old, new)
     assert isinstance(rewritten, Axiom)
     return rewritten

@@ -15,7 +15,7 @@ TOP_LITERAL = RDFS + 'Literal'
 
 
 def local_name(iri: str) -> str:
-    """What follows the last `#`, else the last `/`, else the whole."""
+    """Return what follows the last `#`, else the last `/`, else the whole."""
     for mark in ('#', '/'):
         _, found, name = iri.rpartition(mark)
         if found and name:

@@ -43,7 +43,7 @@ class _Counter:
         self.test = None if isinstance(filler, Predicate) else filler
 
     def related(self, z: str) -> list[Any]:
-        """What counts for `z`."""
+        """Return what counts for `z`."""
         values = self.succ.get(z, ())
         if self.filler is not None:
             members = self.filler.members
@@ -54,7 +54,7 @@ class _Counter:
         return list(values)
 
     def facts(self, z: str, values: list[Any]) -> Premises:
-        """The facts by which the values count for `z`."""
+        """Return the facts by which the values count for `z`."""
         prop, filler = self.prop, self.filler
         facts: list[Fact] = [(prop, y, z) if self.inverse else (prop, z, y) for y in values]
         if filler is not None:
@@ -72,7 +72,7 @@ class _Counter:
         yield from islice(found, _MAX_CHOICES)
 
     def differences(self, values: list[str]) -> Premises:
-        """The facts by which the values are pairwise different; values of data just are."""
+        """Return the facts by which the values are pairwise different; values of data just are."""
         if self.is_data:
             return ()
         predicate = self.difference.predicate
@@ -117,7 +117,7 @@ class AtLeastCounter(_Counter):
         self.touch_delete = self._each_subject(self.lose)
 
     def gain(self, z: str) -> None:
-        """Counts again after something came."""
+        """Count again after something came."""
         if z in self.head.members or len(self.succ.get(z, ())) < self.n:
             return
         values = self.related(z)
@@ -132,7 +132,7 @@ class AtLeastCounter(_Counter):
             self._overdelete((self.head, z))
 
     def supports(self, z: str) -> Iterator[Premises]:
-        """Facts by which `z` has enough."""
+        """Yield facts by which `z` has enough."""
         for chosen in self.choices(self.related(z), self.n):
             yield self.facts(z, chosen) + self.differences(chosen)
 
@@ -167,7 +167,7 @@ class AtMostCounter(_Counter):
         self.touch_delete = self._each_subject(self.lose)
 
     def gain(self, z: str) -> None:
-        """Looks again after something came."""
+        """Look again after something came."""
         values = self.succ.get(z)
         if values is None or len(values) <= self.n:
             return
@@ -211,7 +211,7 @@ class AtMostCounter(_Counter):
         return () if self.label is None else ((self.label, z),)
 
     def supports(self, z: str) -> Iterator[Premises]:
-        """Facts by which `z` has too many."""
+        """Yield facts by which `z` has too many."""
         values = self.succ.get(z)
         if values is None or len(values) <= self.n:
             return
@@ -251,7 +251,7 @@ class AtMostCounter(_Counter):
                     yield mark + facts + ((self.difference.predicate, one, other),)
 
     def pairs(self, x: str, y: str) -> Iterator[tuple[str, str]]:
-        """Where one is allowed: pairs of values that must be the same if `x` and `y` are."""
+        """Yield where one is allowed: pairs of values that must be the same if `x` and `y` are."""
         if x not in self.succ or y not in self.succ or self.n != 1:
             return
         members = None if self.label is None else self.label.members
@@ -272,7 +272,7 @@ class KeyWatcher:
             )
 
     def gain(self, x: str) -> None:
-        """Looks for individuals that `x` now shares its key with."""
+        """Look for individuals that `x` now shares its key with."""
         cls = self._key.cls
         if cls is not None and x not in cls.members:
             return

@@ -83,7 +83,7 @@ class Classification:
         program.unsupported += (gap for gap in gaps if gap not in program.unsupported)
 
     def _report_partial(self) -> None:
-        """Reports what is defined by expressions whose members are not all recognised.
+        """Report what is defined by expressions whose members are not all recognised.
 
         Nothing is lost where what membership implies follows from less than membership anyway.
         """
@@ -125,7 +125,7 @@ class Classification:
         return (found | self._impossible) - {cls}
 
     def classes(self) -> set[str]:
-        """Every named class."""
+        """Return every named class."""
         return set(self._above)
 
     def _hierarchy(self) -> None:
@@ -157,7 +157,7 @@ class Classification:
     # --- what existentials mean for named individuals ---
 
     def _requirements(self) -> None:
-        """Adds what each existential implies alone; asks for contexts where several interact."""
+        """Add what each existential implies alone; ask for contexts where several interact."""
         program, contexts = self.program, self._contexts
         labels = list(dict.fromkeys(existential.label for existential in program.existentials))
         alone: set[HeadAtom] = set()
@@ -177,7 +177,7 @@ class Classification:
             program.contexts, program.relevant = contexts, relevant
 
     def _follow_alone(self, relevant: frozenset[Predicate], alone: set[HeadAtom]) -> bool:
-        """Whether all classes together imply no more than the existentials do one by one."""
+        """Tell whether all classes together imply no more than the existentials do one by one."""
         contexts = self._contexts
         everything = contexts.context(relevant, bare=True)
         stated = {PredicateAtom(token, (_X,)) for token in relevant - everything.derived}
@@ -195,7 +195,9 @@ class Classification:
             self.program.clauses.append(Clause(atoms, head))
 
     def _relevant(self, labels: list[Predicate]) -> frozenset[Predicate]:
-        """The classes that can make a difference to what an individual must be related to."""
+        """Return the classes that can make a difference to what an individual must be related
+        to.
+        """
         program, rules = self.program, self._contexts.edge_rules
         roles: dict[Role, None] = {}
         for existential in program.existentials:
@@ -224,7 +226,7 @@ class Classification:
         )
 
     def _named_neighbours(self, translation: Translation) -> None:
-        """What an existential requires of the one known individual that can fulfil it."""
+        """Add what an existential requires of the one known individual that can fulfil it."""
         program = self.program
         for existential in program.existentials:
             role = (existential.prop, existential.inverse)
@@ -289,7 +291,7 @@ class Classification:
     # --- properties that exclude each other ---
 
     def _exclusions(self) -> None:
-        """Finds the properties that can relate nothing to itself, or never the same two."""
+        """Find the properties that can relate nothing to itself, or never the same two."""
         program = self.program
         if not (program.irreflexive or program.asymmetric or program.disjoint_properties):
             return

@@ -73,20 +73,20 @@ class Predicate:
         return f'<{self.kind} {self.name}>'
 
     def clear(self) -> None:
-        """Empties the extension, in place: compiled joins hold on to the containers."""
+        """Empty the extension, in place: compiled joins hold on to the containers."""
         self.members.clear()
         self.succ.clear()
         self.pred.clear()
 
     def holds(self, fact: Fact) -> bool:
-        """Whether a fact of this predicate is in its extension."""
+        """Tell whether a fact of this predicate is in its extension."""
         if len(fact) == 2:
             return fact[1] in self.members
         values = self.succ.get(fact[1])
         return values is not None and fact[2] in values
 
     def insert(self, fact: Fact) -> None:
-        """Adds a fact that is not there."""
+        """Add a fact that is not there."""
         if len(fact) == 2:
             self.members.add(fact[1])
             return
@@ -103,7 +103,7 @@ class Predicate:
             subjects.add(x)
 
     def discard(self, fact: Fact) -> None:
-        """Takes away a fact that is there."""
+        """Take away a fact that is there."""
         if len(fact) == 2:
             self.members.discard(fact[1])
             return
@@ -118,7 +118,7 @@ class Predicate:
             del self.pred[y]
 
     def facts(self) -> Iterator[Fact]:
-        """The whole extension."""
+        """Yield the whole extension."""
         if self.kind == 'class':
             for x in self.members:
                 yield self, x
@@ -293,28 +293,28 @@ class Program:
     same: Predicate = field(default_factory=lambda: Predicate('different', 'same as'))
 
     def cls(self, iri: str) -> Predicate:
-        """The predicate of a named class."""
+        """Return the predicate of a named class."""
         found = self.classes.get(iri)
         if found is None:
             found = self.classes[iri] = Predicate('class', iri, iri)
         return found
 
     def object(self, iri: str) -> Predicate:
-        """The predicate of an object property."""
+        """Return the predicate of an object property."""
         found = self.objects.get(iri)
         if found is None:
             found = self.objects[iri] = Predicate('object', iri, iri)
         return found
 
     def data(self, iri: str) -> Predicate:
-        """The predicate of a data property."""
+        """Return the predicate of a data property."""
         found = self.datas.get(iri)
         if found is None:
             found = self.datas[iri] = Predicate('data', iri, iri)
         return found
 
     def predicates(self) -> Iterator[Predicate]:
-        """Every predicate with an extension."""
+        """Yield every predicate with an extension."""
         yield from (self.thing, self.nothing, self.different)
         yield from self.classes.values()
         yield from self.objects.values()
@@ -324,7 +324,7 @@ class Program:
 
 
 def property_atom(program: Program, prop: PropertyExpression, x: Term, y: Term) -> PredicateAtom:
-    """The atom `prop(x, y)`, an inverse turned round."""
+    """Return the atom `prop(x, y)`, an inverse turned round."""
     if isinstance(prop, str):
         return PredicateAtom(program.object(prop), (x, y))
     return PredicateAtom(program.object(prop.prop), (y, x))

@@ -84,7 +84,7 @@ class ContextIndex:
         predicate.on_delete.append(lose)
 
     def flush(self) -> None:
-        """Adds what the changed individuals' classes imply."""
+        """Add what the changed individuals' classes imply."""
         for x in tuple(self._changed):
             held = self._labels.get(x)
             if held is not None and not self._requiring.isdisjoint(held):
@@ -127,7 +127,9 @@ class ContextIndex:
                 self._overdelete(fact)
 
     def gaps(self) -> Iterable[str]:
-        """Sentences about axioms whose consequences for the individuals may be incomplete."""
+        """Return sentences about axioms whose consequences for the individuals may be
+        incomplete.
+        """
         return self._contexts.gaps({frozenset(held) for held in self._labels.values()})
 
     # --- reasons ---
@@ -184,7 +186,7 @@ class ContextIndex:
         return found
 
     def premises(self, x: str, y: str) -> Iterator[Premises]:
-        """The classes by which two individuals differ: none can be in all of them."""
+        """Yield the classes by which two individuals differ: none can be in all of them."""
         mine, theirs = self._labels.get(x), self._labels.get(y)
         if mine is None or theirs is None:
             return

@@ -46,7 +46,7 @@ _NOMINALS = 'facts about the individual are not used for classes and unnamed ind
 
 
 def closure(start: T, following: Callable[[T], Iterable[T]]) -> dict[T, None]:
-    """What is reached from `start` by following again and again, itself included."""
+    """Return what is reached from `start` by following again and again, itself included."""
     found = {start: None}
     pending = [start]
     while pending:
@@ -58,7 +58,7 @@ def closure(start: T, following: Callable[[T], Iterable[T]]) -> dict[T, None]:
 
 
 def turned(role: Role) -> Role:
-    """The role in the other direction."""
+    """Return the role in the other direction."""
     return role[0], not role[1]
 
 
@@ -164,7 +164,7 @@ class Contexts:
     # --- rules ---
 
     def _take(self, clause: Clause) -> None:
-        """Indexes a clause about one individual, or one and what it is directly related to."""
+        """Index a clause about one individual, or one and what it is directly related to."""
         tokens: dict[Any, set[Token]] = {}
         roles: dict[tuple[Any, Any], set[Role]] = {}
         datas: dict[Any, tuple[Any, set[Predicate]]] = {}
@@ -242,7 +242,7 @@ class Contexts:
         return ('y', token) if place == y else None
 
     def _token(self, head: HeadAtom) -> tuple[Any, Token | None]:
-        """What a head says of one individual, as (place, token).
+        """Return what a head says of one individual, as (place, token).
 
         Without a token it is a clash, without a place nothing that a context can use.
         """
@@ -315,7 +315,7 @@ class Contexts:
     # --- questions ---
 
     def context(self, core: Iterable[Token], bare: bool = False) -> Context:
-        """The completed context of a core; `bare`: without what classes alone imply."""
+        """Return the completed context of a core; `bare`: without what classes alone imply."""
         found = self._open(frozenset(core), bare)
         while self._queue:
             context = self._queue.popleft()
@@ -324,7 +324,7 @@ class Contexts:
         return found
 
     def gaps(self, cores: Iterable[Tokens]) -> dict[str, None]:
-        """Sentences about axioms whose consequences for these cores may be incomplete."""
+        """Return sentences about axioms whose consequences for these cores may be incomplete."""
         found: dict[str, None] = {}
         reached: dict[Context, None] = {}
         for core in cores:
@@ -340,7 +340,7 @@ class Contexts:
         return found
 
     def roles_above(self, role: Role) -> frozenset[Role]:
-        """The role and every role that it implies by itself."""
+        """Return the role and every role that it implies by itself."""
         return frozenset(closure(role, self._implied_roles))
 
     def _implied_roles(self, role: Role) -> list[Role]:
@@ -356,7 +356,7 @@ class Contexts:
         return [*heads, *map(turned, heads)]
 
     def contradictory(self, roles: frozenset[Role]) -> bool:
-        """Whether one individual cannot be related to another by all roles."""
+        """Tell whether one individual cannot be related to another by all roles."""
         return any(
             rule.head[0] == 'clash' and not (rule.xs or rule.ys) and rule.roles <= roles
             for role in roles
@@ -364,7 +364,9 @@ class Contexts:
         )
 
     def heads(self, core: Tokens) -> frozenset[HeadAtom] | None:
-        """What an individual 0 with all tokens is, as heads of clauses; None: there is none."""
+        """Return what an individual 0 with all tokens is, as heads of clauses; None: there is
+        none.
+        """
         if core in self._heads:
             return self._heads[core]
         context = self.context(core)
@@ -373,7 +375,7 @@ class Contexts:
         return heads
 
     def heads_of(self, context: Context) -> Iterator[HeadAtom]:
-        """The tokens and edges of a context as heads of clauses about individual 0."""
+        """Yield the tokens and edges of a context as heads of clauses about individual 0."""
         for token in context.tokens:
             if isinstance(token, Predicate):
                 yield PredicateAtom(token, (0,))
@@ -394,7 +396,7 @@ class Contexts:
         yield from self._about_named(context)
 
     def _about_named(self, context: Context) -> Iterator[HeadAtom]:
-        """What named individuals are because of individuals that must exist."""
+        """Yield what named individuals are because of individuals that must exist."""
         for one in closure(context, lambda one: [edge.target for edge in one.edges]):
             for name in _names(one):
                 for token in one.tokens:
@@ -456,7 +458,7 @@ class Contexts:
             self._changed = True
 
     def _close(self, context: Context) -> None:
-        """What classes imply without relations."""
+        """Add what classes imply without relations."""
         if context.bare:
             return
         tokens = context.tokens
@@ -478,7 +480,7 @@ class Contexts:
                     pending.append(token)
 
     def _relate(self, context: Context) -> None:
-        """Adds the edges and values that the tokens require."""
+        """Add the edges and values that the tokens require."""
         for token in tuple(context.tokens):
             if ('related', token) in context.done:
                 continue
@@ -518,7 +520,7 @@ class Contexts:
     # --- edges ---
 
     def _along(self, context: Context, edge: _Edge) -> None:
-        """Applies the rules that speak of both ends of an edge."""
+        """Apply the rules that speak of both ends of an edge."""
         if edge.target.clash:
             self._clash(context)
             return
@@ -580,7 +582,7 @@ class Contexts:
                         self._changed = True
 
     def _loops(self, context: Context) -> None:
-        """Applies the rules to what relates an individual to itself."""
+        """Apply the rules to what relates an individual to itself."""
         if not context.loops:
             return
         for role in tuple(context.loops):
@@ -599,7 +601,7 @@ class Contexts:
     # --- counting ---
 
     def _merge(self, context: Context) -> None:
-        """Makes one edge of those that must lead to the same individual."""
+        """Make one edge of those that must lead to the same individual."""
         for condition in self._at_most:
             if condition.n == 1 and _holds(condition.label, context.tokens):
                 role = (condition.prop, condition.inverse)
@@ -667,7 +669,7 @@ class Contexts:
                 self._case_gap(context, condition)
 
     def _most_different(self, context: Context, edges: list[_Edge]) -> int:
-        """How many individuals pairwise known to be different some of the edges lead to."""
+        """Return how many individuals pairwise known to be different some of the edges lead to."""
         order = sorted(edges, key=lambda edge: -edge.count)
         apart = {
             (one, other): self._different(context, one, other)
@@ -713,14 +715,14 @@ class Contexts:
         what: str,
         condition: AtLeast | AtMost | None = None,
     ) -> None:
-        """Notes an axiom some of whose consequences in a context may be missing."""
+        """Note an axiom some of whose consequences in a context may be missing."""
         subject = 'an assertion' if origin is None else axiom_text(origin)
         self._gaps.setdefault(context, {})[f'{subject}: {what}'] = condition
 
     # --- values ---
 
     def _evaluate(self, context: Context) -> None:
-        """Applies the rules about values and counts them."""
+        """Apply the rules about values and count them."""
         if not context.values:
             return
         for held in tuple(context.values):
@@ -796,7 +798,7 @@ class Contexts:
 
 
 def _key(term: Any) -> Any:
-    """A term of a clause: a variable's number, or ('is', individual)."""
+    """Return a term of a clause: a variable's number, or ('is', individual)."""
     return ('is', term.value) if isinstance(term, Constant) else term
 
 
@@ -809,7 +811,7 @@ def _names(context: Context) -> list[str]:
 
 
 def _is_redundant(edge: _Edge, others: list[_Edge]) -> bool:
-    """Whether an individual that another edge leads to serves for this edge as well."""
+    """Tell whether an individual that another edge leads to serves for this edge as well."""
     for other in others:
         if other is not edge and edge.count <= other.count and edge.roles <= other.roles:
             mine, theirs = edge.target.tokens, other.target.tokens

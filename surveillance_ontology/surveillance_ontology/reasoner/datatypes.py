@@ -90,7 +90,7 @@ def _floating(space: str, text: str) -> Value:
 
 
 def floating_value(space: str, number: float) -> Value:
-    """The value of a Python float in the space 'float' or 'double'."""
+    """Return the value of a Python float in the space 'float' or 'double'."""
     if space == 'float' and math.isfinite(number):
         try:
             number = struct.unpack('f', struct.pack('f', number))[0]
@@ -126,7 +126,7 @@ def _moment(text: str) -> Value:
 
 
 def parse_value(literal: Literal) -> Value:
-    """The value a literal denotes.
+    """Return the value a literal denotes.
 
     Raises:
         IllFormedLiteralError: The lexical form is outside the datatype's lexical space.
@@ -185,7 +185,7 @@ def parse_value(literal: Literal) -> Value:
 
 
 def value_of(literal: Literal) -> Value:
-    """The value a literal denotes; an ill-formed literal denotes a value of its own, in no
+    """Return the value a literal denotes; an ill-formed literal denotes a value of its own, in no
     datatype.
     """
     try:
@@ -195,7 +195,7 @@ def value_of(literal: Literal) -> Value:
 
 
 def literal_of(value: Value) -> Literal:
-    """A literal that denotes the value, in the most general datatype that suits it."""
+    """Return a literal that denotes the value, in the most general datatype that suits it."""
     if isinstance(value, int):
         return Literal(str(value), XSD + 'integer')
     if isinstance(value, str):
@@ -236,7 +236,7 @@ def literal_of(value: Value) -> Literal:
 
 
 def is_decimal(number: Fraction) -> bool:
-    """Whether a number is a decimal: its digits end."""
+    """Tell whether a number is a decimal: its digits end."""
     return _terminating(number) is not None
 
 
@@ -311,8 +311,8 @@ def _datatype_test(datatype: str) -> Test | None:
 
 
 def comparable(value: Value) -> tuple[str, Any]:
-    """A value as (kind, key): keys of one kind compare by order; numbers of all spaces are one
-    kind.
+    """Return a value as (kind, key): keys of one kind compare by order; numbers of all spaces are
+    one kind.
     """
     if isinstance(value, (int, Fraction)):
         return 'number', value
@@ -326,7 +326,7 @@ def comparable(value: Value) -> tuple[str, Any]:
 
 
 def facet_test(facet: str, bound: Literal) -> Test | None:
-    """A predicate on values for one facet; None when the facet is not supported."""
+    """Return a predicate on values for one facet; None when the facet is not supported."""
     name = facet[len(XSD) :] if facet.startswith(XSD) else facet
     limit = value_of(bound)
     if name in ('minInclusive', 'maxInclusive', 'minExclusive', 'maxExclusive'):
@@ -363,7 +363,7 @@ def facet_test(facet: str, bound: Literal) -> Test | None:
 
 @cache
 def range_test(data_range: DataRange) -> Test | None:
-    """A predicate on values for a data range; None when the range is not supported."""
+    """Return a predicate on values for a data range; None when the range is not supported."""
     if isinstance(data_range, str):
         return _datatype_test(data_range)
     if isinstance(data_range, DataOneOf):
@@ -387,7 +387,7 @@ def range_test(data_range: DataRange) -> Test | None:
 
 
 def includes(outer: ex.DataRange, inner: ex.DataRange) -> bool:
-    """Whether every value of `inner` is known to be in `outer` (sound, not complete)."""
+    """Tell whether every value of `inner` is known to be in `outer` (sound, not complete)."""
     if outer in (inner, TOP_LITERAL):
         return True
     if isinstance(inner, ex.DatatypeRestriction):

@@ -21,7 +21,7 @@ class Evidence(Protocol):
     """One way in which two individuals can be known to be different."""
 
     def premises(self, x: str, y: str) -> Iterator[Premises]:
-        """Each set of facts by which `x` and `y` differ."""
+        """Return each set of facts by which `x` and `y` differ."""
 
 
 class EvidenceOfValues(Evidence, Protocol):
@@ -51,7 +51,7 @@ class Difference:
         self.through: list[EvidenceOfValues] = []
 
     def clear(self) -> None:
-        """Forgets every stated difference."""
+        """Forget every stated difference."""
         self._own.clear()
         self._merged.clear()
         self._numbers.clear()
@@ -60,7 +60,7 @@ class Difference:
     # --- stated differences ---
 
     def state(self, axiom: DifferentIndividuals) -> None:
-        """Adds a set of individuals all different from each other."""
+        """Add a set of individuals all different from each other."""
         number = self._next = self._next + 1
         self._numbers[axiom] = number
         self._axioms[number] = axiom
@@ -73,7 +73,7 @@ class Difference:
                 numbers.add(number)
 
     def withdraw(self, axiom: DifferentIndividuals) -> None:
-        """Takes such a set away."""
+        """Take such a set away."""
         number = self._numbers.pop(axiom)
         del self._axioms[number]
         for individual in axiom.individuals:
@@ -95,7 +95,7 @@ class Difference:
         self._merged.pop(representative, None)
 
     def stated(self, x: str, y: str) -> bool:
-        """Whether the two are in one all-different set."""
+        """Tell whether the two are in one all-different set."""
         own = self._own
         if self._merged:
             first = self._merged.get(x) or own.get(x)
@@ -105,7 +105,7 @@ class Difference:
         return first is not None and second is not None and not first.isdisjoint(second)
 
     def stating(self, members: Iterable[str], others: Iterable[str]) -> DifferentIndividuals | None:
-        """An axiom by which some member differs from some other."""
+        """Return an axiom by which some member differs from some other."""
         others = tuple(others)
         for x in members:
             for y in others:
@@ -116,7 +116,7 @@ class Difference:
     # --- known differences ---
 
     def different(self, x: str, y: str) -> bool:
-        """Whether two individuals are known to be different."""
+        """Tell whether two individuals are known to be different."""
         if x == y:
             return False
         own = self._own
@@ -133,7 +133,9 @@ class Difference:
         return bool(self.evidence or self.through) and self._follows(x, y)
 
     def _follows(self, x: str, y: str) -> bool:
-        """Whether facts show the difference, of these two or of pairs that it comes down to."""
+        """Tell whether facts show the difference, of these two or of pairs that it comes down
+        to.
+        """
         seen = {(x, y)}
         pending = [(x, y)]
         for pair in pending:
@@ -157,7 +159,9 @@ class Difference:
         return y in stated.get(x, ()) or x in stated.get(y, ())
 
     def premises(self, x: str, y: str) -> Iterator[Premises]:
-        """Each set of facts by which two individuals differ; an empty set where it is stated."""
+        """Yield each set of facts by which two individuals differ; an empty set where it is
+        stated.
+        """
         if x == y:
             return
         if self.stated(x, y):
@@ -238,7 +242,7 @@ class DisjointPropertyEvidence:
 
 
 def _among(predicate: Predicate, x: str, y: str) -> Iterator[Fact]:
-    """Facts that relate the two, or one of them to itself: loops, were they one."""
+    """Yield facts that relate the two, or one of them to itself: loops, were they one."""
     for subject in (x, y):
         values = predicate.succ.get(subject, ())
         for value in (x, y):
@@ -249,7 +253,9 @@ def _among(predicate: Predicate, x: str, y: str) -> Iterator[Fact]:
 def cliques(
     items: list[str], size: int, different: Callable[[str, str], bool], budget: int = 20_000
 ) -> Iterator[list[str]]:
-    """Each choice of `size` items that are pairwise different, until `budget` items were tried."""
+    """Yield each choice of `size` items that are pairwise different, until `budget` items were
+    tried.
+    """
     chosen: list[str] = []
     places = [0]
     while places and budget > 0:
@@ -273,5 +279,5 @@ def cliques(
 
 
 def clique(items: list[str], size: int, different: Callable[[str, str], bool]) -> list[str] | None:
-    """The first of `cliques`; None where there is none."""
+    """Return the first of `cliques`; None where there is none."""
     return next(cliques(items, size, different), None)

@@ -106,7 +106,7 @@ class Engine:
     # --- assertions as facts ---
 
     def value(self, literal: Literal) -> Value:
-        """The literal's value, remembered."""
+        """Return the literal's value, remembered."""
         values = self._values
         value = values.get(literal)
         if value is None:
@@ -118,7 +118,9 @@ class Engine:
         return value
 
     def fact_of(self, axiom: Axiom) -> Fact | None:
-        """The fact an assertion states, in representatives; None for assertions of another kind."""
+        """Return the fact an assertion states, in representatives; None for assertions of another
+        kind.
+        """
         names = self.equality.representative
         kind = type(axiom)
         if kind is DataPropertyAssertion:
@@ -152,7 +154,7 @@ class Engine:
         return None
 
     def current(self, fact: Fact) -> Fact:
-        """The fact with every individual under its representative's name."""
+        """Return the fact with every individual under its representative's name."""
         names = self.equality.representative
         if not names:
             return fact
@@ -162,7 +164,7 @@ class Engine:
         return predicate, names.get(x, x), y if predicate.kind == 'data' else names.get(y, y)
 
     def states(self, axiom: Axiom) -> bool:
-        """Whether an assertion is among those that were made."""
+        """Tell whether an assertion is among those that were made."""
         individuals = axiom.individuals if isinstance(axiom, SameIndividual) else None
         name = next(iter(individuals)) if individuals else next(iter(individuals_of(axiom)))
         return axiom in self.about(name)
@@ -171,7 +173,7 @@ class Engine:
     def needs_of(
         axioms: Iterable[Axiom],
     ) -> tuple[list[ClassExpression], list[tuple[str, str]]]:
-        """The complex classes and the negated properties (kind, IRI) that assertions use."""
+        """Return the complex classes and the negated properties (kind, IRI) that assertions use."""
         expressions: dict[ClassExpression, None] = {}
         negated: dict[tuple[str, str], None] = {}
         for axiom in axioms:
@@ -184,8 +186,8 @@ class Engine:
         return list(expressions), list(negated)
 
     def understands(self, axiom: Axiom) -> bool:
-        """Whether the program was made for a complex class or negated property that an assertion
-        uses.
+        """Tell whether the program was made for a complex class or negated property that an
+        assertion uses.
         """
         if isinstance(axiom, ClassAssertion):
             return isinstance(axiom.cls, str) or axiom.cls in self.program.labels
@@ -196,7 +198,7 @@ class Engine:
         return True
 
     def take_spelling(self, other: Engine) -> None:
-        """Writes derived values as another engine did."""
+        """Write derived values as another engine did."""
         self._values.update(other._values)
         self.spelling.update(other.spelling)
 
@@ -206,7 +208,7 @@ class Engine:
         return not self._nothing.members
 
     def holds(self, axiom: Axiom) -> bool:
-        """Whether an assertion was derived or is asserted."""
+        """Tell whether an assertion was derived or is asserted."""
         if isinstance(axiom, SameIndividual):
             return len({self.equality.find(name) for name in axiom.individuals}) == 1
         if isinstance(axiom, DifferentIndividuals):
@@ -217,7 +219,7 @@ class Engine:
         return fact is not None and bool(fact[0].holds(fact))
 
     def open_cases(self) -> Iterator[str]:
-        """Sentences about what is not derived because it would need reasoning by cases."""
+        """Yield sentences about what is not derived because it would need reasoning by cases."""
         network = self._network
         cases = OpenCases(self.program, network.context, network.lower, network.counters)
         yield from cases.sentences()
@@ -243,7 +245,7 @@ class Engine:
             predicate.on_delete.append(lambda x, y: forget(y))
 
     def _related_by_difference(self, individual: str) -> list[str]:
-        """The individual and those whose difference from others may rest on its own."""
+        """Return the individual and those whose difference from others may rest on its own."""
         found = [individual]
         if self._network.touch_related:
             for one in found:
@@ -297,7 +299,7 @@ class Engine:
                 self._withdraw_conflict(pair)
 
     def _follows(self, fact: Fact) -> bool:
-        """Whether one step derives a fact from what holds."""
+        """Tell whether one step derives a fact from what holds."""
         for support, _ in fact[0].supports:
             for premises in support(*fact[1:]):
                 if all(self._holds(premise) for premise in premises):
@@ -401,7 +403,7 @@ class Engine:
         self._touched[kept] = None
 
     def _split(self, representative: str, fresh: list[Fact]) -> None:
-        """Takes away everything about a class of individuals, and states its members' assertions
+        """Take away everything about a class of individuals, and state its members' assertions
         again.
         """
         if representative not in self.equality.members:
@@ -446,7 +448,7 @@ class Engine:
     # --- updates ---
 
     def update(self, added: Iterable[Axiom], removed: Iterable[Axiom]) -> None:
-        """Applies changed assertions and brings what follows up to date."""
+        """Apply changed assertions and bring what follows up to date."""
         equality, uses_thing = self.equality, self.program.uses_thing
         fresh: list[Fact] = []
         splitting: set[str] = set()
@@ -543,7 +545,7 @@ class Engine:
         self._settle()
 
     def _settle(self) -> None:
-        """Brings back what still follows, and lets the counters look again."""
+        """Bring back what still follows, and let the counters look again."""
         for index in self._network.thresholds:
             index.settle()
         queue, names = self._queue, self.equality.representative
@@ -618,7 +620,7 @@ class Engine:
                     return
 
     def _stop_generating(self, predicate: Predicate) -> None:
-        """Ends a rule that makes a new value of every value; what it made so far stays."""
+        """End a rule that makes a new value of every value; what it made so far stays."""
         text = (
             f'the rules on {local_name(predicate.name)} make values without end:'
             f' stopped after {_MOST_VALUES} in one step'
@@ -640,12 +642,12 @@ class Engine:
 
 
 def individuals_of(axiom: Axiom) -> set[str]:
-    """The individuals that an axiom mentions."""
+    """Return the individuals that an axiom mentions."""
     return {name for kind, name in entities_of(axiom) if kind == 'individual'}
 
 
 def is_about_individuals(axiom: Axiom) -> bool:
-    """Whether an axiom is an assertion; the declaration of an individual is one."""
+    """Tell whether an axiom is an assertion; the declaration of an individual is one."""
     return isinstance(axiom, Assertion) or (
         isinstance(axiom, Declaration) and axiom.kind == 'individual'
     )
@@ -656,7 +658,7 @@ def _individuals_in(fact: Fact) -> tuple[str, ...]:
 
 
 def is_public(predicate: Predicate) -> bool:
-    """Whether a predicate is a named class or property rather than internal."""
+    """Tell whether a predicate is a named class or property rather than internal."""
     return isinstance(predicate.expression, str)
 
 
@@ -667,11 +669,13 @@ class FactView:
         self._engine = engine
 
     def literal(self, value: Value) -> Literal:
-        """A literal for a value: as some assertion writes it, else in its most general datatype."""
+        """Return a literal for a value: as some assertion writes it, else in its most general
+        datatype.
+        """
         return self._engine.spelling.get(value) or literal_of(value)
 
     def public(self, fact: Fact, classes: Classes) -> Iterator[Axiom]:
-        """A stored fact as assertions, one for each combination of names."""
+        """Yield a stored fact as assertions, one for each combination of names."""
         predicate = fact[0]
         name = predicate.expression
         subjects = classes.get(fact[1]) or (fact[1],)
@@ -687,14 +691,14 @@ class FactView:
                     yield ObjectPropertyAssertion(name, subject, target)
 
     def stored(self) -> Iterator[Fact]:
-        """Every stored fact of a named class or property."""
+        """Yield every stored fact of a named class or property."""
         program = self._engine.program
         for table in (program.classes, program.objects, program.datas):
             for predicate in table.values():
                 yield from predicate.facts()
 
     def derived(self) -> Iterator[Axiom]:
-        """Every fact that holds and is not asserted, equality of individuals included."""
+        """Yield every fact that holds and is not asserted, equality of individuals included."""
         engine = self._engine
         classes = engine.equality.members
         if not classes:
@@ -716,7 +720,7 @@ class FactView:
                 yield same
 
     def _derived_values(self, fact: Fact) -> Iterator[Axiom]:
-        """Assertions of a value for the names under which no assertion gives it."""
+        """Yield assertions of a value for the names under which no assertion gives it."""
         engine = self._engine
         predicate, representative, value = fact
         for subject in engine.equality.same(representative):

@@ -41,7 +41,7 @@ class Equality:
         self._used.clear()
 
     def find(self, individual: str) -> str:
-        """The representative."""
+        """Return the representative."""
         return self.representative.get(individual, individual)
 
     def same(self, individual: str) -> Iterable[str]:
@@ -50,7 +50,9 @@ class Equality:
         return self.members.get(representative, (representative,))
 
     def join(self, merge: Merge) -> tuple[str, str]:
-        """Joins two classes; (representative that stays, one that goes), the smaller IRI stays."""
+        """Join two classes; return (representative that stays, one that goes): the smaller IRI
+        stays.
+        """
         kept, gone = sorted((self.find(merge.first), self.find(merge.second)))
         members = self.members.setdefault(kept, {kept})
         joining = self.members.pop(gone, {gone})
@@ -65,7 +67,7 @@ class Equality:
         return kept, gone
 
     def split(self, representative: str) -> set[str]:
-        """Every member of the class stands for itself again; the members."""
+        """Have every member of the class stand for itself again; return the members."""
         members = self.members.pop(representative)
         for individual in members:
             self.representative.pop(individual, None)
@@ -79,7 +81,7 @@ class Equality:
         return members
 
     def dependents(self, fact: Fact) -> set[str]:
-        """Representatives of the classes whose justification uses a fact, or that the fact
+        """Return representatives of the classes whose justification uses a fact, or that the fact
         mentions.
         """
         found: set[str] = set()
@@ -93,7 +95,7 @@ class Equality:
         return {name for name in found if name in self.members}
 
     def _spellings(self, fact: Fact) -> Iterator[Fact]:
-        """The fact with each merged individual in every of its names."""
+        """Yield the fact with each merged individual in every of its names."""
         yield fact
         for position in range(1, len(fact)):
             argument = fact[position]
@@ -105,7 +107,7 @@ class Equality:
                             yield (fact[0], name, other)
 
     def path(self, first: str, second: str) -> list[Merge]:
-        """The merges that lead from one member of a class to another."""
+        """Return the merges that lead from one member of a class to another."""
         merges = self._merges.get(self.find(first), [])
         came: dict[str, Merge | None] = {first: None}
         origin: dict[str, str] = {}

@@ -42,14 +42,16 @@ class Explanation:
     background: tuple[Axiom, ...] = ()
 
     def sources(self) -> tuple[Axiom, ...]:
-        """Every asserted axiom of the derivation, without repeats."""
+        """Return every asserted axiom of the derivation, without repeats."""
         found = dict.fromkeys((*self.axioms, *self.background))
         for premise in self.premises:
             found.update(dict.fromkeys(premise.sources()))
         return tuple(found)
 
     def tree(self) -> str:
-        """The whole derivation, one fact a line, premises indented below what follows from them."""
+        """Return the whole derivation, one fact a line, premises indented below what follows from
+        them.
+        """
         return '\n'.join(self._lines(0))
 
     def _lines(self, depth: int) -> Iterator[str]:
@@ -62,7 +64,7 @@ class Explanation:
             yield f'{"  " * (depth + 1)}{axiom_text(axiom)}  [asserted]'
 
     def sentence(self) -> str:
-        """The fact and its immediate reason in one sentence without a full stop."""
+        """Return the fact and its immediate reason in one sentence without a full stop."""
         if self.kind == 'asserted':
             return f'{self.fact_text} because it is asserted'
         if self.reason:
@@ -109,7 +111,7 @@ class Reasons:
     # --- questions ---
 
     def of_fact(self, axiom: Axiom) -> Explanation | None:
-        """Why an assertion holds; None when it does not."""
+        """Return why an assertion holds; None when it does not."""
         engine = self._engine
         if isinstance(axiom, ax.SameIndividual):
             first, *others = sorted(axiom.individuals)
@@ -143,7 +145,7 @@ class Reasons:
         return self._joined(text, [explanation, *same]) if same else explanation
 
     def of_inconsistency(self) -> Explanation | None:
-        """Why the facts contradict each other; None when they do not."""
+        """Return why the facts contradict each other; None when they do not."""
         engine = self._engine
         nothing = engine.program.nothing
         for name in sorted(nothing.members):
@@ -185,7 +187,7 @@ class Reasons:
         return Explanation(text, 'axiom', because, unique, axioms=named)
 
     def _justify(self, proof: Proof) -> tuple[Axiom, ...]:
-        """The axioms by which a step without one of its own follows from its premises."""
+        """Return the axioms by which a step without one of its own follows from its premises."""
         assumed = [self._stated(premise.fact) for premise in proof.premises]
         goal = self._stated(proof.fact)
         is_clash = proof.fact[0] is self._engine.program.nothing
@@ -195,7 +197,7 @@ class Reasons:
         return self._justification(facts, None if is_clash else goal)
 
     def _stated(self, fact: Fact) -> Axiom | None:
-        """A fact as an assertion, where it can be written as one."""
+        """Return a fact as an assertion, where it can be written as one."""
         predicate = fact[0]
         program = self._engine.program
         if predicate is program.different:
@@ -210,7 +212,7 @@ class Reasons:
         return ax.ObjectPropertyAssertion(name, fact[1], fact[2])
 
     def _premise(self, proof: Proof) -> list[Explanation]:
-        """A premise; an unnamed class in between gives way to its own premises."""
+        """Return a premise; an unnamed class in between gives way to its own premises."""
         expression = proof.fact[0].expression
         unnamed = expression is not None and not isinstance(expression, str)
         if unnamed and proof.premises and not proof.asserted:
@@ -236,7 +238,7 @@ class Reasons:
         return Explanation(text, 'asserted')
 
     def _renamings(self, axiom: Axiom, fact: Fact) -> list[Explanation]:
-        """Why the individuals an assertion names are those of the fact."""
+        """Return why the individuals an assertion names are those of the fact."""
         if isinstance(axiom, ax.ClassAssertion):
             written: tuple[str, ...] = (axiom.individual,)
         elif isinstance(axiom, ax.ObjectPropertyAssertion):
@@ -286,7 +288,7 @@ class Reasons:
     # --- words ---
 
     def text(self, fact: Fact) -> str:
-        """A fact in words."""
+        """Return a fact in words."""
         predicate = fact[0]
         program = self._engine.program
         subject = local_name(fact[1])
@@ -303,7 +305,9 @@ class Reasons:
         return f'{subject} {name} {local_name(fact[2])}'
 
     def _calculation(self, rule: Rule, proof: Proof) -> str:
-        """The rule's built-ins with the values they were applied to, '' for a rule without."""
+        """Return the rule's built-ins with the values they were applied to, '' for a rule
+        without.
+        """
         computed = [atom for atom in rule.body if isinstance(atom, ex.BuiltinAtom)]
         if not computed:
             return ''

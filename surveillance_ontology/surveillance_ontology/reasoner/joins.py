@@ -80,7 +80,7 @@ class _Writer:
         self.depth += 1
 
     def _continue(self) -> None:
-        """Goes on in a further function: Python nests no more than 20 blocks in one."""
+        """Go on in a further function: Python nests no more than 20 blocks in one."""
         self.parts += 1
         name = f'part{self.parts}'
         values = ', '.join([f'v{term}' for term in sorted(self.bound)] + self.kept)
@@ -111,7 +111,7 @@ class _Writer:
         return constant
 
     def bind(self, term: Term, value: str) -> None:
-        """Binds an argument that is given, or checks it where the term is bound already."""
+        """Bind an argument that is given, or checks it where the term is bound already."""
         if self.is_bound(term):
             self.open(f'if {self.text(term)} == {value}:')
         else:
@@ -188,7 +188,7 @@ class _Writer:
             self.bound.add(y)  # type: ignore[arg-type]
 
     def join(self, atoms: Sequence[BodyAtom], early: Callable[[], bool] | None = None) -> None:
-        """Writes all atoms, cheapest first; `early` may write more once it finds its variables
+        """Write all atoms, cheapest first; `early` may write more once it finds its variables
         bound.
         """
         waiting = list(atoms)
@@ -252,7 +252,7 @@ def compile_trigger(
     emit: Callable[[Fact], None],
     present: bool,
 ) -> Callable[..., None]:
-    """A function of the values of `terms` that emits each head of an instance of the body.
+    """Return a function of the values of `terms` that emits each head of an instance of the body.
 
     Args:
         context: The engine's tables.
@@ -307,8 +307,8 @@ def compile_support(
     terms: Sequence[Term],
     outputs: Sequence[Term] = (),
 ) -> Callable[..., Iterator[Any]]:
-    """A generator of the premises of each instance of the body in which `terms` have the given
-    values.
+    """Return a generator of the premises of each instance of the body in which `terms` have the
+    given values.
 
     With `outputs` it yields pairs (values of the outputs, premises).
     """

@@ -58,7 +58,7 @@ class OpenCases:
         ]
 
     def sentences(self) -> Iterator[str]:
-        """One sentence for each axiom, with an individual for which it is open."""
+        """Yield one sentence for each axiom, with an individual for which it is open."""
         for counter in self._lower:
             for z in counter.succ:
                 if z not in counter.head.members and len(counter.related(z)) >= counter.n:
@@ -81,7 +81,7 @@ class OpenCases:
                 yield _sentence(clause.origin, name)
 
     def _may_add(self, existential: Existential, least: AtLeast, z: str) -> bool:
-        """Whether what must exist could complete a count, and is not there by name."""
+        """Tell whether what must exist could complete a count, and is not there by name."""
         known = _related(least.prop, least.inverse, z)
         if not known or len(known) + existential.n < least.n:
             return False

@@ -38,12 +38,14 @@ class ProofSearch:
         self._budget = 0
 
     def reset(self) -> None:
-        """Forgets what was found: the assertions (or who is the same as whom) changed."""
+        """Forget what was found: the assertions (or who is the same as whom) changed."""
         self._proved.clear()
         self._failed.clear()
 
     def proves(self, fact: Fact, depth: int = 4, budget: int = 48) -> bool:
-        """Whether a proof of at most this depth was found within `budget` rule applications."""
+        """Tell whether a proof of at most this depth was found within `budget` rule
+        applications.
+        """
         self._budget = budget
         return self._prove(fact, depth)
 
@@ -68,7 +70,7 @@ class ProofSearch:
         return False
 
     def find(self, fact: Fact, deepest: int = 64, budget: int = 100_000) -> Proof | None:
-        """A shallowest proof; None where there is none within the bounds."""
+        """Return a shallowest proof; None where there is none within the bounds."""
         self._budget = budget
         for depth in range(deepest + 1):
             failed: dict[Fact, int] = {}

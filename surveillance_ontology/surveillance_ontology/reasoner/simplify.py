@@ -38,7 +38,9 @@ def _is_label(predicate: Predicate) -> bool:
 
 
 def _source(clause: Clause) -> PredicateAtom | None:
-    """The body of a clause that only passes members of a class on; None for any other clause."""
+    """Return the body of a clause that only passes members of a class on; None for any other
+    clause.
+    """
     if len(clause.body) != 1:
         return None
     (atom,) = clause.body
@@ -154,7 +156,7 @@ def _prune(program: Program, kept: set[Predicate]) -> None:
 
 
 def drop_implied_atoms(program: Program) -> None:
-    """Leaves out of each body what its other atoms imply."""
+    """Leave out of each body what its other atoms imply."""
     simple: dict[Predicate, list[Clause]] = {}
     for clause in program.clauses:
         facts = [atom for atom in clause.body if isinstance(atom, PredicateAtom)]

@@ -25,8 +25,8 @@ _Solve = Callable[..., Iterable[Value]]
 
 
 def _numbers(values: Iterable[Value]) -> tuple[str, list[_Number]] | None:
-    """The common space ('exact', 'float', 'double') and the numbers promoted to it; None for a
-    non-number.
+    """Return the common space ('exact', 'float', 'double') and the numbers promoted to it; None for
+    a non-number.
     """
     space = 'exact'
     numbers: list[_Number] = []
@@ -279,7 +279,7 @@ def _checking(solve: _Solve) -> Callable[..., bool]:
 
 
 def builtin(name: str, arguments: int) -> tuple[Callable[..., bool], _Solve | None] | None:
-    """The functions of a built-in, by its local name and number of arguments.
+    """Return the functions of a built-in, by its local name and number of arguments.
 
     Returns:
         (holds, solve), `solve` None where the built-in only tests; None when it is not supported.

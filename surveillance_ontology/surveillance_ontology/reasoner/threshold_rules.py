@@ -70,7 +70,7 @@ def _sum(parts: list[tuple[int, Linear]]) -> Linear:
 
 
 def split_rule(clause: Clause) -> ComparisonSplit | None:
-    """Takes a clause apart; None where it is not of this kind."""
+    """Take a clause apart; None where it is not of this kind."""
     head = clause.head
     computed = tuple(atom for atom in clause.body if isinstance(atom, ComputedAtom))
     facts = tuple(atom for atom in clause.body if not isinstance(atom, ComputedAtom))
@@ -222,7 +222,7 @@ class ThresholdIndex:
         head.predicate.supports.append((self.supports, clause.origin))
 
     def clear(self) -> None:
-        """Forgets every row."""
+        """Forget every row."""
         for container in (self._keyed, self._reaching, self._odd_keys, self._odd_reaches):
             container.clear()
         self._keys.clear()
@@ -268,7 +268,7 @@ class ThresholdIndex:
                 self._emit(keyed)
 
     def flush(self) -> None:
-        """Emits what the greatest reach newly covers."""
+        """Emit what the greatest reach newly covers."""
         if not self._reaches:
             return
         reach = self._reaches[-1][0]
@@ -283,7 +283,7 @@ class ThresholdIndex:
         return bool(key < reach if self._strict else key <= reach)
 
     def _place(self, reach: Any) -> int:
-        """How many keys are below a reach."""
+        """Return how many keys are below a reach."""
         return bisect_left(self._keys, (reach,) if self._strict else (reach, _HIGHEST))
 
     def _sort(self) -> None:
@@ -349,7 +349,9 @@ class ThresholdIndex:
                 self._overdelete_head(keyed)
 
     def _proven_reach(self) -> Any:
-        """The greatest remaining reach whose facts have a proof, and so stay whatever goes."""
+        """Return the greatest remaining reach whose facts have a proof, and so stay whatever
+        goes.
+        """
         for reach, row in reversed(self._reaches):
             for premises in self._reach_exists(*row):
                 if all(map(self.proves, premises)):
@@ -389,7 +391,9 @@ class ThresholdIndex:
                         yield premises + others
 
     def _satisfied(self, key_row: Row, reach_row: Row) -> bool:
-        """The comparison as the built-ins define it, for values that are not exact numbers."""
+        """Return the comparison as the built-ins define it, for values that are not exact
+        numbers.
+        """
         values: dict[Term, Any] = dict(zip(self._key_terms, key_row, strict=True))
         values.update(zip(self._reach_terms, reach_row, strict=True))
         pending = list(self._split.computed)
@@ -421,7 +425,9 @@ def _variables(form: Linear) -> tuple[int, ...]:
 
 
 def _evaluator(form: Linear, terms: tuple[int, ...]) -> Callable[[Row], Any]:
-    """The linear form's value for a row, exact; None where a value is not an exact number."""
+    """Return the linear form's value for a row, exact; None where a value is not an exact
+    number.
+    """
     constant = form.get(None, Fraction(0))
     factors = [
         (terms.index(term), factor) for term, factor in form.items() if isinstance(term, int)

@@ -60,7 +60,7 @@ _POSITIVE = (
 
 
 def negated(expression: ClassExpression) -> ClassExpression:
-    """The complement, with negation pushed inwards."""
+    """Return the complement, with negation pushed inwards."""
     if isinstance(expression, str):
         if expression == THING:
             return NOTHING
@@ -107,7 +107,9 @@ def negated(expression: ClassExpression) -> ClassExpression:
 
 
 def normal(expression: ClassExpression) -> ClassExpression:
-    """The expression with complements pushed inwards and no nested intersections or unions."""
+    """Return the expression with complements pushed inwards and no nested intersections or
+    unions.
+    """
     if isinstance(expression, ex.ObjectComplementOf):
         pushed = negated(expression.operand)
         return pushed if pushed == expression else normal(pushed)
@@ -122,7 +124,7 @@ def normal(expression: ClassExpression) -> ClassExpression:
 
 
 def is_positive(expression: ClassExpression) -> bool:
-    """Whether facts that hold can show membership, so that a clause body can state it."""
+    """Tell whether facts that hold can show membership, so that a clause body can state it."""
     if isinstance(expression, str):
         return True
     if isinstance(expression, (ex.ObjectIntersectionOf, ex.ObjectUnionOf)):
@@ -136,7 +138,7 @@ _Directed = tuple[str, bool]
 
 
 def directed(prop: PropertyExpression) -> _Directed:
-    """A property as (IRI, whether inverted)."""
+    """Return a property as (IRI, whether inverted)."""
     return (prop, False) if isinstance(prop, str) else (prop.prop, True)
 
 
@@ -171,7 +173,7 @@ class PropertyHierarchy:
         self._above.setdefault((sub[0], not sub[1]), set()).add((sup[0], not sup[1]))
 
     def above(self, prop: PropertyExpression) -> set[_Directed]:
-        """The property and everything it is included in."""
+        """Return the property and everything it is included in."""
         found = {directed(prop)}
         pending = list(found)
         while pending:
@@ -182,11 +184,11 @@ class PropertyHierarchy:
         return found
 
     def above_role(self, iri: str, inverted: bool) -> set[_Directed]:
-        """A directed property and everything it is included in."""
+        """Return a directed property and everything it is included in."""
         return self.above(ex.ObjectInverseOf(iri) if inverted else iri)
 
     def is_functional(self, prop: PropertyExpression) -> bool:
-        """Whether an individual has at most one value, by this property or one above it."""
+        """Tell whether an individual has at most one value, by this property or one above it."""
         return not self._functional.isdisjoint(self.above(prop))
 
 
@@ -318,14 +320,14 @@ class Translation:
             self.contradict((self._differs(_X, _X),), _X)
 
     def report(self, reason: str) -> None:
-        """Notes a part of the axiom at hand that is not used."""
+        """Note a part of the axiom at hand that is not used."""
         subject = self._context if self._origin is None else axiom_text(self._origin)
         text = f'{subject}: {reason}'
         if text not in self.program.unsupported:
             self.program.unsupported.append(text)
 
     def _attempt(self, add: Callable[..., object], *parts: Any) -> None:
-        """Adds what can be added of an axiom; the rest is reported."""
+        """Add what can be added of an axiom; the rest is reported."""
         try:
             add(*parts)
         except UnsupportedError as reason:
@@ -360,7 +362,7 @@ class Translation:
         return label
 
     def _recognise(self, expression: ClassExpression) -> Predicate:
-        """A label that holds of everything known to belong to the expression."""
+        """Return a label that holds of everything known to belong to the expression."""
         label = self._label(expression)
         if not isinstance(expression, str) and expression not in self._recognised:
             self._recognised.add(expression)
@@ -412,7 +414,7 @@ class Translation:
     # --- antecedents ---
 
     def bodies(self, expression: ClassExpression, x: Term) -> list[Body]:
-        """Bodies each of which makes `x` a member."""
+        """Return the bodies each of which makes `x` a member."""
         expression = normal(expression)
         if isinstance(expression, str):
             if expression == THING:
@@ -447,7 +449,8 @@ class Translation:
         return [(self.property(prop, x, y), *body) for body in self._simple_bodies(filler, y)]
 
     def _simple_bodies(self, expression: ClassExpression, y: Term) -> list[Body]:
-        """Bodies that relate `y` to nothing: restrictions in the expression become labels.
+        """Return the bodies that relate `y` to nothing: restrictions in the expression become
+        labels.
 
         So every clause speaks of one individual and what it is directly related to, which is what
         `classification` needs.
@@ -465,7 +468,9 @@ class Translation:
         return [(PredicateAtom(self._recognise(expression), (y,)),)]
 
     def _intersection(self, operands: tuple[ClassExpression, ...], x: Term) -> list[Body]:
-        """Bodies for what is in every operand, at most one of which is spelt out as a relation."""
+        """Return the bodies for what is in every operand, at most one of which is spelt out as a
+        relation.
+        """
         relating = [operand for operand in operands if isinstance(operand, _RELATING)]
         unions = [operand for operand in operands if isinstance(operand, ex.ObjectUnionOf)]
         parts: list[list[Body]] = []
@@ -486,7 +491,7 @@ class Translation:
         return (atom,) if admitted is None else (atom, _range_atom(admitted, v))
 
     def _labelled_bodies(self, expression: ClassExpression, x: Term) -> list[Body]:
-        """Bodies for an expression that needs a label beside them."""
+        """Return the bodies for an expression that needs a label beside them."""
         functional = self.hierarchy.is_functional
         if isinstance(expression, ex.ObjectMinCardinality):
             if expression.n == 0:
@@ -529,7 +534,7 @@ class Translation:
         return bodies
 
     def _note_partial(self, label: Predicate, expression: ClassExpression) -> None:
-        """Notes an expression whose members cannot all be recognised.
+        """Note an expression whose members cannot all be recognised.
 
         An exact number has members that are in more than what is asked for: enough related ones.
         """
@@ -547,7 +552,7 @@ class Translation:
     def _count(
         self, label: Predicate, expression: ex.ObjectMinCardinality | ex.DataMinCardinality
     ) -> None:
-        """Has a label recognised by counting."""
+        """Have a label recognised by counting."""
         if expression in self._recognised:
             return
         self._recognised.add(expression)
@@ -564,7 +569,7 @@ class Translation:
     # --- consequents ---
 
     def imply(self, body: Body, expression: ClassExpression, x: Term) -> None:
-        """Adds the clauses by which the body makes `x` a member."""
+        """Add the clauses by which the body makes `x` a member."""
         expression = normal(expression)
         if isinstance(expression, str):
             if expression == NOTHING:
@@ -613,7 +618,7 @@ class Translation:
         self.imply(body, positive[0] if positive else NOTHING, x)
 
     def _describe(self, label: Predicate, expression: ClassExpression) -> None:
-        """What membership in a labelled expression implies."""
+        """Add what membership in a labelled expression implies."""
         x, body = _X, (PredicateAtom(label, (_X,)),)
         program = self.program
         if isinstance(expression, (ex.ObjectSomeValuesFrom, ex.ObjectMinCardinality)):
@@ -699,7 +704,7 @@ class Translation:
             second.disjoint.add(first)
 
     def _top_and_bottom(self) -> None:
-        """The properties that OWL itself gives a meaning."""
+        """Add the properties that OWL itself gives a meaning."""
         program = self.program
         for name, table in (('ObjectProperty', program.objects), ('DataProperty', program.datas)):
             bottom = table.get(f'{OWL}bottom{name}')
@@ -713,7 +718,7 @@ class Translation:
         return PredicateAtom(self.program.different, (x, y))
 
     def _negate(self, kind: str, iri: str) -> None:
-        """A predicate for negative assertions, which contradict the positive."""
+        """Add a predicate for negative assertions, which contradict the positive."""
         program = self.program
         prop = program.object(iri) if kind == 'object' else program.data(iri)
         negative = program.negatives[prop] = Predicate(kind, f'not {local_name(iri)}')
@@ -721,7 +726,9 @@ class Translation:
         self.contradict(body, _X)
 
     def required(self, expression: ClassExpression) -> Predicate:
-        """The label of an expression that an individual must belong to, with what that implies."""
+        """Return the label of an expression that an individual must belong to, with what that
+        implies.
+        """
         label = self._label(expression)
         if not isinstance(expression, str) and expression not in self._required:
             self._required.add(expression)
@@ -729,7 +736,7 @@ class Translation:
         return label
 
     def _complement_labels(self) -> None:
-        """What is disjoint from a class belongs to its complement, where the complement is asked
+        """State that what is disjoint from a class belongs to its complement, where that is asked
         for.
         """
         for iri, label in self._complements.items():
@@ -792,7 +799,7 @@ class Translation:
     # --- property axioms ---
 
     def _property_axiom(self, axiom: Axiom) -> None:
-        """Adds the clauses of one property axiom to the self's program."""
+        """Add the clauses of one property axiom to the self's program."""
         program, clause, prop = self.program, self.clause, self.property
         if isinstance(axiom, ax.SubObjectPropertyOf):
             clause((prop(axiom.sub, _X, _Y),), prop(axiom.sup, _X, _Y))
@@ -866,7 +873,7 @@ class Translation:
     # --- rules ---
 
     def _rule(self, rule: ax.Rule) -> None:
-        """Adds the clauses of one rule to the self's program."""
+        """Add the clauses of one rule to the self's program."""
         program, terms = self.program, _Terms(self)
         alternatives: list[list[tuple[BodyAtom, ...]]] = []
         for atom in rule.body:
@@ -896,7 +903,7 @@ class Translation:
             self._heads(rule, self._bound(body, terms), terms)
 
     def _bound(self, body: tuple[BodyAtom, ...], terms: _Terms) -> tuple[BodyAtom, ...]:
-        """The body with owl:Thing for individuals that nothing else binds.
+        """Return the body with owl:Thing for individuals that nothing else binds.
 
         Raises:
             UnsupportedError: A value is bound by nothing.

@@ -56,14 +56,14 @@ class Frame:
 
     @classmethod
     def around(cls, box: Box, columns: int, rows: int) -> Frame:
-        """The largest picture of a box that fits into so many cells, its aspect kept."""
+        """Return the largest picture of a box that fits into so many cells, its aspect kept."""
         left, bottom, right, top = box
         scale = max((right - left) / columns, (top - bottom) / (2 * rows), 1e-6)
         width, height = (math.ceil(side / scale - 1e-6) for side in (right - left, top - bottom))
         return cls(left, top, scale, max(1, width), max(1, (height + 1) // 2))
 
     def pixels(self, points: ArrayLike) -> NDArray[np.intp]:
-        """Row and column of each point's pixel, which may lie outside the picture.
+        """Return the row and column of each point's pixel, which may lie outside the picture.
 
         Args:
             points: Shape (n, 2), metres, map frame.
@@ -75,7 +75,7 @@ class Frame:
 
 @lru_cache(maxsize=4)
 def rasterise(grid: Grid, frame: Frame) -> NDArray[np.uint8]:
-    """What each pixel of a picture shows of a grid: a wall, however thin, before all else.
+    """Return what each pixel of a picture shows of a grid: a wall, however thin, before all else.
 
     Returns:
         Shape (2 * frame.rows, frame.columns), north first; not to be written to.
@@ -116,24 +116,24 @@ class Canvas:
         self._characters: dict[tuple[int, int], tuple[str, Style]] = {}
 
     def dots(self, points: ArrayLike, kind: int) -> None:
-        """Draws points, shape (n, 2), metres."""
+        """Draw points, shape (n, 2), metres."""
         at = self.frame.pixels(points)
         at = at[((at >= 0) & (at < self.pixels.shape)).all(axis=1)]
         self.pixels[at[:, 0], at[:, 1]] = kind
 
     def line(self, start: ArrayLike, end: ArrayLike, kind: int) -> None:
-        """Draws a straight line from one point to another."""
+        """Draw a straight line from one point to another."""
         ends = np.array([start, end], dtype=float)
         steps = 2 + int(2 * np.abs(ends[1] - ends[0]).max() / self.frame.scale)
         self.dots(ends[0] + np.linspace(0.0, 1.0, steps)[:, None] * (ends[1] - ends[0]), kind)
 
     def mark(self, x: float, y: float, character: str, style: Style) -> None:
-        """Puts one character where a point is, over whatever is there."""
+        """Put one character where a point is, over whatever is there."""
         row, column = self.frame.pixels([(x, y)])[0]
         self._characters[row // 2, column] = character, style
 
     def label(self, x: float, y: float, text: str, style: Style) -> None:
-        """Writes beside a point, in the nearest row where it covers nothing, or walls at most.
+        """Write beside a point, in the nearest row where it covers nothing, or walls at most.
 
         Where that would be over another label, or the picture is too narrow, it is left out.
         """
@@ -147,12 +147,12 @@ class Canvas:
             self._characters[best[0], column] = character, style
 
     def arrow(self, pose: Pose, style: Style) -> None:
-        """Draws the robot, as an arrow in one of eight directions."""
+        """Draw the robot, as an arrow in one of eight directions."""
         x, y, yaw = pose
         self.mark(x, y, ARROWS[round(yaw / (math.pi / 4)) % 8], style)
 
     def lines(self, *, colours: bool = True) -> Iterator[list[Segment]]:
-        """The picture, row by row, each as wide as the frame."""
+        """Yield the picture, row by row, each as wide as the frame."""
         for row in range(self.frame.rows):
             upper, lower, ground = (
                 line.tolist()
@@ -180,7 +180,7 @@ class Canvas:
 
 @lru_cache(maxsize=256)
 def _cell(top: int, bottom: int) -> tuple[str, Style]:
-    """One cell's character and colours."""
+    """Return one cell's character and colours."""
     if top == bottom and top <= FREE:
         return ' ', _on(top)
     if top == bottom:

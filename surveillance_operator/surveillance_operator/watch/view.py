@@ -95,7 +95,7 @@ class MissionView:
         self._note = note
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        """The picture: as many lines as the terminal has, each as wide as it is."""
+        """Yield the picture: as many lines as the terminal has, each as wide as it is."""
         width, height = options.max_width, options.height or console.height
         colours = console.color_system is not None and not console.no_color
         body = height - 1
@@ -159,7 +159,7 @@ class MissionView:
 
 
 def header_line(snapshot: Snapshot) -> Text:
-    """Which mission this is, or that there is none."""
+    """Return which mission this is, or that there is none."""
     if not snapshot.nodes:
         text = 'the mission has ended' if snapshot.status else 'no mission yet'
         return Text(f' {text}: waiting on {snapshot.where} ', style=ALARM)
@@ -172,7 +172,7 @@ def header_line(snapshot: Snapshot) -> Text:
 
 
 def state_lines(snapshot: Snapshot) -> list[Text]:
-    """What the state machine does."""
+    """Return what the state machine does."""
     status = snapshot.status
     if status is None:
         return [_nothing(snapshot, 'mission_status')]
@@ -187,7 +187,7 @@ def state_lines(snapshot: Snapshot) -> list[Text]:
 
 
 def battery_line(snapshot: Snapshot, width: int) -> Text:
-    """The battery as a bar."""
+    """Return the battery as a bar."""
     if snapshot.battery is None:
         return _nothing(snapshot, 'battery_level')
     full = round(snapshot.battery / 100 * min(BAR, width - 18))
@@ -199,14 +199,14 @@ def battery_line(snapshot: Snapshot, width: int) -> Text:
 
 
 def decision_lines(snapshot: Snapshot) -> list[Text]:
-    """The present decision and its reason."""
+    """Return the present decision and its reason."""
     if snapshot.decision is None:
         return [_nothing(snapshot, 'decision')]
     return [Text(decision_line(snapshot), style='bold'), Text(snapshot.decision.reason)]
 
 
 def doors_line(snapshot: Snapshot) -> Text:
-    """Which doors are open, and which closed."""
+    """Return which doors are open, and which closed."""
     if snapshot.doors is None:
         return _nothing(snapshot, 'door_states')
     closed = [door for door, is_open in snapshot.doors.items() if not is_open]
@@ -219,7 +219,7 @@ def doors_line(snapshot: Snapshot) -> Text:
 
 
 def decision_page(snapshot: Snapshot) -> list[Text]:
-    """The decision in full, with the score of each candidate."""
+    """Return the decision in full, with the score of each candidate."""
     lines = decision_lines(snapshot)
     decision = snapshot.decision
     if decision is None:
@@ -232,7 +232,7 @@ def decision_page(snapshot: Snapshot) -> list[Text]:
 
 
 def node_page(snapshot: Snapshot) -> list[Text]:
-    """The nodes: up or ended, how often started again, what they report."""
+    """Return the nodes: up or ended, how often started again, what they report."""
     lines = []
     for name in sorted({*snapshot.nodes, *snapshot.ended}):
         up = name in snapshot.nodes
@@ -246,7 +246,7 @@ def node_page(snapshot: Snapshot) -> list[Text]:
 
 
 def event_page(snapshot: Snapshot) -> list[Text]:
-    """The latest events, newest first."""
+    """Return the latest events, newest first."""
     told = [Text.assemble((at, DIM), ' ', text) for at, text in reversed(snapshot.events)]
     return told or [_dim('no events yet')]
 
@@ -259,7 +259,7 @@ PAGES: dict[str, Callable[[Snapshot], list[Text]]] = {
 
 
 def place_lines(snapshot: Snapshot, width: int) -> list[Text]:
-    """Places by the time since their last visit, in as many columns as fit."""
+    """Return places by the time since their last visit, in as many columns as fit."""
     known = snapshot.visited_at
     names = sorted({*known, *snapshot.positions}, key=lambda name: (known.get(name, 0.0), name))
     if not names:
@@ -286,7 +286,9 @@ def place_lines(snapshot: Snapshot, width: int) -> list[Text]:
 
 
 def draw_map(snapshot: Snapshot, columns: int, rows: int, *, colours: bool) -> Lines:
-    """The map with all that is on it, or a sketch of the places; a line for what is missing."""
+    """Return the map with all that is on it, or a sketch of the places; a line for what is
+    missing.
+    """
     notes = []
     if snapshot.grid is None:
         notes.append(_nothing(snapshot, 'map', sketched=bool(snapshot.positions)))
@@ -362,7 +364,7 @@ def _wrapped(console: Console, texts: Sequence[Text], width: int) -> list[Text]:
 def _rendered(
     console: Console, options: ConsoleOptions, lines: Sequence[Text], width: int
 ) -> Lines:
-    """One line of segments for each text, cut to the width with an ellipsis."""
+    """Return one line of segments for each text, cut to the width with an ellipsis."""
     narrow = options.update(width=width, height=None)
     rendered = []
     for line in lines:
@@ -463,7 +465,7 @@ def show_once(see: See, stopping: Interrupt, console: Console, timeout: float) -
 
 
 def _is_complete(snapshot: Snapshot) -> bool:
-    """Whether all that a simulated mission tells has come."""
+    """Tell whether all that a simulated mission tells has come."""
     parts = (snapshot.battery, snapshot.decision, snapshot.grid, snapshot.pose, snapshot.doors)
     placed = snapshot.positions and snapshot.visited_at.keys() <= snapshot.positions.keys()
     return None not in parts and bool(placed and snapshot.mode)

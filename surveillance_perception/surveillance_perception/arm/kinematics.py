@@ -89,13 +89,15 @@ def look_at(arm: Arm, target: Array, start: Array) -> Aim:
 
 
 def direction_of(azimuth: float, elevation: float) -> Array:
-    """Unit vector (3,) of a direction in base_link: azimuth from x towards y, elevation up, rad."""
+    """Return the unit vector (3,) of a direction in base_link: azimuth from x towards y, elevation
+    up, rad.
+    """
     flat = math.cos(elevation)
     return np.array([flat * math.cos(azimuth), flat * math.sin(azimuth), math.sin(elevation)])
 
 
 def in_base(point: Array, frame: str, base: tuple[str, Array] | None) -> Array:
-    """A point (3,) of some frame in base_link, metres.
+    """Return a point (3,) of some frame in base_link, metres.
 
     Args:
         point: (3,) metres.
@@ -158,7 +160,8 @@ def _damped_step(residual: Array, jacobian: Array, towards_posture: Array) -> Ar
 
 
 def _task(arm: Arm, positions: Array, target: Array) -> tuple[Array, Array]:
-    """What is wrong (4,): line of sight less direction of the target, tilt of the image's rows.
+    """Return what is wrong (4,): line of sight less direction of the target, tilt of the image's
+    rows.
 
     Also its change (4, n) with each joint.
     """

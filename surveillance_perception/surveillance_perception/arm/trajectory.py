@@ -70,7 +70,7 @@ class ArmTrajectory:
 
 
 def motion_to(arm: Arm, start: ArmState, goal: Array) -> ArmTrajectory:
-    """The fastest motion to joint positions within the limits of the joints.
+    """Return the fastest motion to joint positions within the limits of the joints.
 
     Raises:
         ArmMotionError: The goal is outside the joints' limits.
@@ -90,7 +90,7 @@ def motion_to(arm: Arm, start: ArmState, goal: Array) -> ArmTrajectory:
 
 
 def motion_to_rest(arm: Arm, start: ArmState) -> ArmTrajectory:
-    """The fastest way to a standstill from a moving state."""
+    """Return the fastest way to a standstill from a moving state."""
     request = _request(arm, start)
     request.control_interface = ruckig.ControlInterface.Velocity
     request.target_velocity = [0.0] * len(arm.joints)

@@ -37,7 +37,7 @@ class View:
 def views_covering(
     horizontal: float, vertical: float, overlap: float, lowest: float, highest: float
 ) -> list[View]:
-    """Views that together show every direction between two elevations, all the way around.
+    """Return views that together show every direction between two elevations, all the way around.
 
     Args:
         horizontal: Field of view along the image's rows, rad.
@@ -142,7 +142,7 @@ def _reach(
 def _seen(
     offset: Array, elevation: Array, view: float, half_width: float, half_height: float
 ) -> npt.NDArray[np.bool_]:
-    """Whether directions lie in the image of a view at azimuth 0."""
+    """Tell whether directions lie in the image of a view at azimuth 0."""
     flat, up = np.cos(elevation), np.sin(elevation)
     depth = flat * np.cos(offset) * math.cos(view) + up * math.sin(view)
     right = flat * np.sin(offset)

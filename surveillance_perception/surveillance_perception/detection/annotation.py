@@ -21,7 +21,7 @@ def annotated(
     detections: Iterable[Detection],
     confirmed: Iterable[int] | None = None,
 ) -> npt.NDArray[np.uint8]:
-    """A BGR copy of an image with outlines and ids.
+    """Return a BGR copy of an image with outlines and ids.
 
     Args:
         image: (height, width) grey or (height, width, 3) BGR.

@@ -83,7 +83,7 @@ class CameraModel:
 
     @classmethod
     def from_field_of_view(cls, width: int, height: int, horizontal: float) -> CameraModel:
-        """A distortion-free camera from its horizontal field of view.
+        """Return a distortion-free camera from its horizontal field of view.
 
         Args:
             width: Image width in pixels.
@@ -112,7 +112,7 @@ class CameraModel:
         return np.asarray(homogeneous[:, :2] / homogeneous[:, 2:])
 
     def scaled_to(self, width: int, height: int) -> CameraModel | None:
-        """The same camera with images of another size; None where their shapes differ."""
+        """Return the same camera with images of another size; None where their shapes differ."""
         across, down = width / self.width, height / self.height
         if abs(across / down - 1.0) > _SAME_SHAPE:
             return None
@@ -127,7 +127,7 @@ class CameraModel:
         return replace(self, width=width, height=height, matrix=matrix)
 
     def rays(self, pixels: Array) -> Array | None:
-        """Where the lines of sight (n, 2) of pixels (n, 2) meet the plane z = 1.
+        """Return where the lines of sight (n, 2) of pixels (n, 2) meet the plane z = 1.
 
         Returns:
             None where the distortion cannot be taken back: coefficients that fit nothing there.

@@ -140,7 +140,7 @@ def quads_around(
 
 
 def distinct(quads: Quads, distance: float) -> npt.NDArray[np.int64]:
-    """Indices of the quads whose middle and size are not those of an earlier one.
+    """Return the indices of the quads whose middle and size are not those of an earlier one.
 
     Args:
         quads: (m, 4, 2) corners in pixels, the best first.
@@ -212,7 +212,9 @@ def _smallest_quad(hull: npt.NDArray[np.int32]) -> list[tuple[float, float]] | N
 def _without_edge(
     corners: list[tuple[float, float]], index: int
 ) -> tuple[float, tuple[float, float]]:
-    """Added area and the new corner when the edge from `index` to the next one is dropped."""
+    """Return the added area and the new corner when the edge from `index` to the next one is
+    dropped.
+    """
     count = len(corners)
     before, start = corners[index - 1], corners[index]
     end, after = corners[(index + 1) % count], corners[(index + 2) % count]
@@ -248,7 +250,7 @@ class BorderCheck:
     def correlation(
         self, pyramid: ImagePyramid, homographies: Array, least_contrast: float
     ) -> Array:
-        """How well white margin and black border correlate with the image.
+        """Return how well white margin and black border correlate with the image.
 
         Args:
             pyramid: The image.

@@ -184,7 +184,9 @@ class MarkerReader:
         return self._fit.cells(patches)
 
     def uneven(self, pyramid: ImagePyramid, homographies: Array) -> npt.NDArray[np.bool_]:
-        """Where (m,) the light makes cells lighter or darker than those of their own colour."""
+        """Return where (m,) the light makes cells lighter or darker than those of their own
+        colour.
+        """
         patches = self._fit.sample(pyramid, homographies, self._fit.levels(homographies))
         local, levels = self._cells(patches), self._fit.cells(patches)
         flat = levels.reshape(len(levels), -1)
@@ -193,7 +195,9 @@ class MarkerReader:
         return np.asarray(((local > 0) != (levels > split)).sum(axis=(1, 2)) >= _UNEVEN_CELLS)
 
     def _nearest(self, cells: Patches) -> tuple[Indices, Indices]:
-        """The code (m,) that fewest of the cells (m, side, side) contradict, and how many do."""
+        """Return the code (m,) that fewest of the cells (m, side, side) contradict, and how many
+        do.
+        """
         seen = np.where(cells[:, 1:-1, 1:-1].reshape(len(cells), -1) > 0, 1.0, -1.0)
         agreement = seen.astype(np.float32) @ self._bits.T
         entries = agreement.argmax(axis=1)
@@ -213,12 +217,12 @@ class MarkerReader:
         return best[:, 1], best[:, 0]
 
     def _white_border(self, cells: Patches) -> Indices:
-        """How many cells of the border (m,) are white."""
+        """Return how many cells of the border (m,) are white."""
         white = cells > 0
         return np.asarray(white.sum(axis=(1, 2)) - white[:, 1:-1, 1:-1].sum(axis=(1, 2)))
 
     def _has_border(self, patches: Patches, homographies: Array) -> npt.NDArray[np.bool_]:
-        """Whether most cells of the border (m,) are black, as far as rough corners show it.
+        """Tell whether most cells of the border (m,) are black, as far as rough corners show it.
 
         Cells too narrow for that are given the benefit of the doubt, but not under uneven light.
         """
@@ -236,7 +240,8 @@ class MarkerReader:
         return inner, wrong.sum(axis=(1, 2)) - inner.sum(axis=(1, 2))
 
     def _glared(self, patches: Patches, rivals: Indices) -> Indices:
-        """The one code (m,) of the rivals (m, j) that fits but for a reflection; -1 where none.
+        """Return the one code (m,) of the rivals (m, j) that fits but for a reflection; -1 where
+        none.
 
         A reflection turns neighbouring black cells white and no white one black, and it is
         brighter than white is elsewhere.
@@ -281,7 +286,7 @@ class MarkerReader:
         correlation: Patches,
         blur: Array,
     ) -> tuple[Indices, Array]:
-        """The best code and blur where stronger blur explains a poor fit better."""
+        """Return the best code and blur where stronger blur explains a poor fit better."""
         entries, correlation, blur = listed[:, 0].copy(), correlation.copy(), blur.copy()
         poor = np.flatnonzero(correlation < _GOOD_CORRELATION)
         if not len(poor):

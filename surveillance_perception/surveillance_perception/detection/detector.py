@@ -262,7 +262,7 @@ def _without_overlaps(found: list[Detection], before: Sequence[Detection] = ()) 
 
 
 def _covered(quads: Quads, found: Sequence[Detection]) -> npt.NDArray[np.bool_]:
-    """Which quads (m,) have their middle in a marker that is read."""
+    """Return which quads (m,) have their middle in a marker that is read."""
     covered = np.zeros(len(quads), bool)
     middles = quads.mean(axis=1)
     for each in found:
@@ -293,7 +293,7 @@ def _sharpened(outline: Array, grey: Grey, side: int) -> Array:
 
 
 def _overlap(first: Array, second: Array) -> bool:
-    """Whether the middle of one outline lies well within the other."""
+    """Tell whether the middle of one outline lies well within the other."""
     reach = min(
         np.linalg.norm(first - first.mean(axis=0), axis=1).mean(),
         np.linalg.norm(second - second.mean(axis=0), axis=1).mean(),

@@ -30,7 +30,7 @@ DICTIONARY_NAMES: tuple[str, ...] = tuple(
 
 
 def dictionary_named(name: str) -> cv2.aruco.Dictionary:
-    """A predefined dictionary by its name, such as `DICT_5X5_100`, or one of the user's own.
+    """Return a predefined dictionary by its name, such as `DICT_5X5_100`, or one of the user's own.
 
     Args:
         name: One of `DICTIONARY_NAMES`, or the path of a YAML or JSON file as OpenCV writes and

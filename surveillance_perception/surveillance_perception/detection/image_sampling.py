@@ -26,7 +26,7 @@ class ImagePyramid:
         self._levels = [image]
 
     def sample(self, homographies: Array, grid: Array, levels: npt.NDArray[np.int64]) -> Patches:
-        """Grey levels under homographies, linearly interpolated.
+        """Return grey levels under homographies, linearly interpolated.
 
         Args:
             homographies: (m, 3, 3).
@@ -71,7 +71,7 @@ def cell_widths(homographies: Array, cells: int) -> Array:
 
 
 def levels_for(homographies: Array, cells: int, cell_pixels: float) -> npt.NDArray[np.int64]:
-    """How often to halve the image so that a cell is at most `cell_pixels` wide."""
+    """Return how often to halve the image so that a cell is at most `cell_pixels` wide."""
     width = cell_widths(homographies, cells)
     level = np.floor(np.log2(np.maximum(width / cell_pixels, 1e-3))) + 1
     return np.asarray(np.clip(level, 0, _LAST_LEVEL), dtype=np.int64)

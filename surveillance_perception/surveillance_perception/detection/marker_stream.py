@@ -196,6 +196,6 @@ class MarkerStream:
         self.statistics.last_error = error
 
     def take_statistics(self) -> Statistics:
-        """The statistics since the last call, which begin anew."""
+        """Return the statistics since the last call, which begin anew."""
         taken, self.statistics = self.statistics, Statistics()
         return taken

@@ -120,7 +120,7 @@ class DetectorParameters:
         self._images = declare_fields(node, self._images, _PICTURES, on_change=self._set_images)
 
     def settings(self) -> StreamSettings:
-        """The settings that the present values make."""
+        """Return the settings that the present values make."""
         return replace(self._watch, detector=self._detector)
 
     @property

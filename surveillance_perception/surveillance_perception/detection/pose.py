@@ -102,7 +102,9 @@ def _from_homography(homography: Array, size: float) -> tuple[Array, Array]:
 
 
 def _tilted_the_other_way(rotation: Array, position: Array) -> Array:
-    """The rotation with which a small flat thing looks nearly the same: mirrored at the sight."""
+    """Return the rotation with which a small flat thing looks nearly the same: mirrored at the
+    sight.
+    """
     sight = position / np.linalg.norm(position)
     normal = rotation[:, 2]
     mirrored = 2.0 * (normal @ sight) * sight - normal

@@ -55,7 +55,7 @@ def prepare(image: npt.NDArray[np.uint8]) -> PreparedImage:
 
 
 def grey_of(image: npt.NDArray[np.uint8]) -> Grey:
-    """Grey levels of a grey or BGR image.
+    """Return grey levels of a grey or BGR image.
 
     Raises:
         ValueError: The image is empty, not of 8 bits, or of another shape.

@@ -81,7 +81,7 @@ class TemplateFit:
         self._sum = self._profile.sum(axis=1)
 
     def levels(self, homographies: Array) -> Indices:
-        """How often to halve the image before each candidate is read."""
+        """Return how often to halve the image before each candidate is read."""
         return levels_for(homographies, self.codes.side, _LEVEL_CELL_PIXELS)
 
     def sample(self, pyramid: ImagePyramid, homographies: Array, levels: Indices) -> Patches:
@@ -90,7 +90,7 @@ class TemplateFit:
         return evenly_lit(patches, self.count, SAMPLES_PER_CELL) if self._even else patches
 
     def cells(self, patches: Patches) -> Patches:
-        """Values (m, side, side) of the marker's cells, their middles counting most."""
+        """Return values (m, side, side) of the marker's cells, their middles counting most."""
         side, step = self.codes.side, SAMPLES_PER_CELL
         square = patches.reshape(-1, self.count, self.count)
         inside = square[:, _MARGIN_SAMPLES:-_MARGIN_SAMPLES, _MARGIN_SAMPLES:-_MARGIN_SAMPLES]
@@ -118,7 +118,7 @@ class TemplateFit:
     def score(
         self, patches: Patches, footprint: Footprint, listed: Indices | None = None
     ) -> tuple[Indices, Patches]:
-        """The most likely codes of each patch and their correlations, the best one first.
+        """Return the most likely codes of each patch and their correlations, the best one first.
 
         Args:
             patches: (m, n) grey levels.
@@ -235,7 +235,9 @@ class TemplateFit:
 
 
 def _profiles(positions: Array, side: int) -> tuple[Patches, Patches]:
-    """How far each cell reaches in each sample (deviations, samples, cells), and its slope."""
+    """Return how far each cell reaches in each sample (deviations, samples, cells), and its
+    slope.
+    """
     edges = np.linspace(-1.0 - 2.0 / side, 1.0 + 2.0 / side, side + 3)
     # the white margin is taken to go on beyond its cell
     edges[0], edges[-1] = -1e3, 1e3

@@ -84,7 +84,7 @@ def image_of_pixels(
     big_endian: bool = False,
     max_pixels: int,
 ) -> ImageArray:
-    """A grey (height, width) or BGR (height, width, 3) image from raw pixels.
+    """Return a grey (height, width) or BGR (height, width, 3) image from raw pixels.
 
     Args:
         encoding: One of `ENCODING_NAMES`.
@@ -134,7 +134,9 @@ def image_of_pixels(
 
 
 def printable(text: str) -> str:
-    """A text from outside in quotes, without control characters, shortened: fit for a log line."""
+    """Return a text from outside in quotes, without control characters, shortened: fit for a log
+    line.
+    """
     shown = text if len(text) <= _LONGEST_NAME else text[:_LONGEST_NAME] + '...'
     return repr(shown)
 

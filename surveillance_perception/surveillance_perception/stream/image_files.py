@@ -34,7 +34,7 @@ class ImageError(ValueError):
 
 
 def decode_image(data: bytes, what: str, max_pixels: int = MAX_PIXELS) -> ImageArray:
-    """A BGR image (height, width, 3) from an encoded one, such as a JPEG.
+    """Return a BGR image (height, width, 3) from an encoded one, such as a JPEG.
 
     The size in the header is looked at first: a small file may say that it is huge.
 
@@ -61,7 +61,7 @@ def decode_image(data: bytes, what: str, max_pixels: int = MAX_PIXELS) -> ImageA
 
 
 def read_image(path: Path, max_pixels: int = MAX_PIXELS) -> ImageArray:
-    """A BGR image (height, width, 3) from a file.
+    """Return a BGR image (height, width, 3) from a file.
 
     Raises:
         ImageError: The file cannot be read, is no image, or a larger one than `max_pixels`.

@@ -29,7 +29,7 @@ class FrameSource(Protocol):
     rate: float
 
     def frames(self) -> Iterator[ImageArray | ImageError]:
-        """Each image (height, width, 3) BGR in turn, or why one cannot be read."""
+        """Return each image (height, width, 3) BGR in turn, or why one cannot be read."""
 
     def close(self) -> None:
         """Let go of the source."""

@@ -135,7 +135,7 @@ def image_of(
     degradation: Degradation,
     generator: np.random.Generator,
 ) -> ImageArray:
-    """A grey image (height, width) of the panels in front of a backdrop."""
+    """Return a grey image (height, width) of the panels in front of a backdrop."""
     scene = backdrop.copy()
     for panel in sorted(panels, key=lambda each: -each.distance):
         _paste(scene, panel, camera, dictionary)
@@ -195,7 +195,7 @@ def _lit(scene: npt.NDArray[np.float32], degradation: Degradation) -> npt.NDArra
 def backdrop_of(
     kind: str, camera: CameraModel, generator: np.random.Generator
 ) -> npt.NDArray[np.float32]:
-    """Grey levels (height, width) of a background without any marker.
+    """Return grey levels (height, width) of a background without any marker.
 
     Args:
         kind: One of `BACKDROPS`, or 'dark': a dark wall.
@@ -238,7 +238,7 @@ def _panel_points(panel: Panel, camera: CameraModel, half: float) -> Array:
 
 
 def _in_camera(panel: Panel, camera: CameraModel, points: Array) -> Array:
-    """Points (n, 3) of the panel, x right, y down, in the optical frame, metres."""
+    """Return points (n, 3) of the panel, x right, y down, in the optical frame, metres."""
     axis = np.array([math.cos(panel.axis), math.sin(panel.axis), 0.0]) * panel.turn
     turned = cv2.Rodrigues(axis)[0] @ cv2.Rodrigues(np.array([0.0, 0.0, panel.roll]))[0]
     principal = np.array([camera.matrix[0, 2], camera.matrix[1, 2]])
@@ -254,7 +254,9 @@ def _in_camera(panel: Panel, camera: CameraModel, points: Array) -> Array:
 
 
 def _curled(points: Array, curl: float, size: float) -> Array:
-    """Points of a sheet bent about its vertical middle line: `curl` radians over the marker."""
+    """Return points of a sheet bent about its vertical middle line: `curl` radians over the
+    marker.
+    """
     if not curl:
         return points
     radius = size / curl

@@ -167,7 +167,9 @@ class _Picture:
                 self._canvas.text(at, door.name, self._size * 0.78, _SOFT, anchor='mm')
 
     def _swings_left(self, door: Door) -> bool:
-        """Whether the leaf opens to the left of the door's direction: into the smaller place."""
+        """Tell whether the leaf opens to the left of the door's direction: into the smaller
+        place.
+        """
         left, right = (
             self._regions.room_at(
                 door.x - side * 0.2 * math.sin(door.yaw), door.y + side * 0.2 * math.cos(door.yaw)

@@ -70,7 +70,7 @@ class Place:
         return self._sides
 
     def neighbours(self, room: str, *, through_closed: bool = False) -> dict[str, str]:
-        """Rooms next to ``room``, each with the (first open) door that leads there."""
+        """Return rooms next to ``room``, each with the (first open) door that leads there."""
         found: dict[str, str] = {}
         for door in self.rooms[room]:
             if door in self.closed and not through_closed:
@@ -81,7 +81,9 @@ class Place:
         return found
 
     def route(self, start: str, goal: str, *, through_closed: bool = False) -> list[str] | None:
-        """Rooms from ``start`` to ``goal`` over the fewest doors, both included; None: no way."""
+        """Return rooms from ``start`` to ``goal`` over the fewest doors, both included; None: no
+        way.
+        """
         came_from: dict[str, str | None] = {start: None}
         queue = deque([start])
         while queue:
@@ -98,7 +100,7 @@ class Place:
         return None
 
     def reachable(self, start: str, *, through_closed: bool = False) -> set[str]:
-        """Rooms that can be reached from ``start``, itself included."""
+        """Return rooms that can be reached from ``start``, itself included."""
         seen = {start}
         queue = [start]
         while queue:
@@ -109,7 +111,7 @@ class Place:
         return seen
 
     def with_room(self, name: str, position: Iterable[float], doors: Sequence[str]) -> Place:
-        """The place with a new room, or with further doors for a room that exists.
+        """Return the place with a new room, or with further doors for a room that exists.
 
         A new door joins two rooms once both have it, so it may lead nowhere for the moment.
 
@@ -139,7 +141,7 @@ class Place:
         return place
 
     def without_room(self, name: str) -> Place:
-        """The place without a room; its doors stay where other rooms have them.
+        """Return the place without a room; its doors stay where other rooms have them.
 
         Raises:
             PlaceError: The room is unknown, holds a charging station, or is the only way to others.
@@ -162,7 +164,7 @@ class Place:
         return replace(left, closed=left.closed & frozenset(left.doors))
 
     def with_door(self, door: str, *, is_open: bool) -> Place:
-        """The place with a door opened or closed.
+        """Return the place with a door opened or closed.
 
         Raises:
             PlaceError: No room has such a door.
@@ -271,7 +273,9 @@ def _member(where: KeyPath, room: Any, rooms: Mapping[str, Any]) -> str:
 
 
 def problem_in_name(kind: str, name: Any) -> str:
-    """What keeps a value from being the name of a room or a door; empty when nothing does."""
+    """Return what keeps a value from being the name of a room or a door; empty when nothing
+    does.
+    """
     if isinstance(name, str) and _NAME.match(name):
         return ''
     hint = '' if isinstance(name, str) else '; quote it'

@@ -51,7 +51,7 @@ DOORS = [f'D{number}' for number in range(1, 8)]
 
 
 def n(name: str) -> str:
-    """The IRI of a name of the map."""
+    """Return the IRI of a name of the map."""
     return f'{IRI}#{name}'
 
 
@@ -64,7 +64,7 @@ def names(iris: Iterable[str]) -> set[str]:
 
 
 def value(prop: str, subject: str, literal: object) -> DataPropertyAssertion:
-    """A data assertion; a number is taken as xsd:long."""
+    """Return a data assertion; a number is taken as xsd:long."""
     return DataPropertyAssertion(
         n(prop), n(subject), literal if isinstance(literal, Literal) else long(literal)
     )
@@ -183,7 +183,9 @@ PLACES_DIFFER, DOORS_DIFFER = different(SEVEN_ROOMS), different(DOORS)
 
 
 def seven_rooms(*more: Axiom, without: Iterable[Axiom] = ()) -> KnowledgeBase:
-    """The seven-room map, everything different and visited within the threshold, reasoned over."""
+    """Return the seven-room map, everything different and visited within the threshold, reasoned
+    over.
+    """
     axioms = [*SCHEMA, *DOOR_FACTS, *ROBOT_FACTS, *VISITS, PLACES_DIFFER, DOORS_DIFFER]
     left = set(without)
     assert left <= set(axioms)
@@ -193,7 +195,7 @@ def seven_rooms(*more: Axiom, without: Iterable[Axiom] = ()) -> KnowledgeBase:
 
 
 def pairs(kb: KnowledgeBase, prop: str) -> set[tuple[str, str]]:
-    """All facts of an object property, by local names."""
+    """Return all facts of an object property, by local names."""
     places = [*SEVEN_ROOMS, 'Robot1', *DOORS]
     return {
         (place, local_name(target))

@@ -60,7 +60,7 @@ class RandomOntology:
         return self.random.choice(CLASSES)
 
     def filler(self, depth: int, right: bool) -> ClassExpression:
-        """What a restriction speaks of: nested to the given depth."""
+        """Return what a restriction speaks of: nested to the given depth."""
         choice = self.random.random()
         if choice < 0.2:
             return THING
@@ -69,7 +69,7 @@ class RandomOntology:
         return self.right(depth) if right else self.left(depth)
 
     def left(self, depth: int = 4) -> ClassExpression:
-        """An expression whose members can be recognised, nested to the given depth."""
+        """Return an expression whose members can be recognised, nested to the given depth."""
         choice = self.random.randrange(12) if depth else 0
         if choice <= 3:
             return self.named()
@@ -95,7 +95,9 @@ class RandomOntology:
         return ex.DataMinCardinality(2, self.random.choice(DATAS), self.data_range())
 
     def right(self, depth: int = 4) -> ClassExpression:
-        """An expression whose membership has Horn consequences, nested to the given depth."""
+        """Return an expression whose membership has Horn consequences, nested to the given
+        depth.
+        """
         choice = self.random.randrange(18) if depth else 0
         if choice <= 4:
             return self.named()

@@ -43,8 +43,8 @@ from tests.ontology.reasoner.random_ontologies import RandomOntology
 
 
 def by_value(axiom: Axiom) -> object:
-    """An axiom, with a literal replaced by its value: derived values may be written in several
-    ways.
+    """Return an axiom, with a literal replaced by its value: derived values may be written in
+    several ways.
     """
     if isinstance(axiom, DataPropertyAssertion):
         return axiom.prop, axiom.subject, value_of(axiom.literal)
@@ -71,7 +71,7 @@ def changeable(kb: KnowledgeBase) -> list[Axiom]:
 
 
 def walk(seed: int) -> None:
-    """A random ontology and random changes, compared after each `reason`; the feed too."""
+    """Compare a random ontology and random changes after each `reason`; the feed too."""
     drawn = RandomOntology(seed)
     rng = drawn.random
     kb = KnowledgeBase('http://example.org/random', drawn.ontology(rng.randrange(1, 10), 12))

@@ -37,7 +37,7 @@ PELLET_ERRS_ON = (AsymmetricObjectProperty, SubPropertyChainOf)
 
 
 def questions() -> Iterator[tuple[Axiom, tuple[str, ...]]]:
-    """Every fact that could follow, and the words that ask for it."""
+    """Yield every fact that could follow, and the words that ask for it."""
     for one in INDIVIDUALS:
         for cls in CLASSES:
             yield ClassAssertion(cls, one), ('class', cls, one)
@@ -55,7 +55,7 @@ def questions() -> Iterator[tuple[Axiom, tuple[str, ...]]]:
 
 
 def settled(axioms: list[Axiom], words: tuple[str, ...], path: Path) -> bool:
-    """Whether HermiT finds that a fact follows, where Pellet says it does not."""
+    """Tell whether HermiT finds that a fact follows, where Pellet says it does not."""
     write_ontology(axioms, 'http://example.org/random', path)
     with JavaReasoner('hermit') as judge:
         judge.ask('load', str(path))
@@ -63,8 +63,8 @@ def settled(axioms: list[Axiom], words: tuple[str, ...], path: Path) -> bool:
 
 
 def needs_cases(axioms: list[Axiom]) -> bool:
-    """Whether completeness would take reasoning by cases: whether two individuals are the same or
-    not.
+    """Tell whether completeness would take reasoning by cases: whether two individuals are the same
+    or not.
     """
     text = ' '.join(map(repr, axioms))
     return 'MinCardinality' in text or 'DifferentIndividualsAtom' in text or 'OneOf' in text

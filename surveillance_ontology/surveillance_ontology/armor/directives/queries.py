@@ -245,7 +245,7 @@ def _at(
 
 
 def _asserted(ref: Reference, wanted: ShortFact) -> Iterable[ShortFact]:
-    """Asserted facts among which those that match a pattern are."""
+    """Return asserted facts among which those that match a pattern are."""
     kb = ref.kb
     axioms: Iterable[Axiom] = kb.facts(derived=False)
     if wanted.predicate not in (ANY, SAME_AS):
@@ -254,7 +254,9 @@ def _asserted(ref: Reference, wanted: ShortFact) -> Iterable[ShortFact]:
 
 
 def _candidates(ref: Reference, wanted: ShortFact) -> Iterable[ShortFact]:
-    """Facts among which those that match a pattern are, without going through all if possible."""
+    """Return facts among which those that match a pattern are, without going through all if
+    possible.
+    """
     name, arguments, kb = wanted.predicate, wanted.arguments, ref.kb
     if ANY not in (name, arguments[0]) and name != SAME_AS:
         predicate, ind = _entity(ref, name), _entity(ref, arguments[0])
@@ -273,7 +275,7 @@ def _candidates(ref: Reference, wanted: ShortFact) -> Iterable[ShortFact]:
 
 
 def _entity(ref: Reference, name: str) -> str:
-    """The entity of a name in a fact; ``<A,B>`` is the local name A,B."""
+    """Return the entity of a name in a fact; ``<A,B>`` is the local name A,B."""
     bracketed = name[0] == '<' and ':' not in name
     return f'{ref.kb.iri}#{name[1:-1]}' if bracketed else parse_entity(name, ref.kb.iri)
 

@@ -317,10 +317,10 @@ GONE = Argument('value', Read.STORED)
 
 
 def text(name: str, default: str | None = None) -> Argument:
-    """An argument that is passed as it came."""
+    """Return an argument that is passed as it came."""
     return Argument(name, Read.TEXT, default)
 
 
 def flag(name: str, default: str | None = None) -> Argument:
-    """An argument that is on for ``true`` in any case and off for anything else."""
+    """Return an argument that is on for ``true`` in any case and off for anything else."""
     return Argument(name, Read.FLAG, default)
