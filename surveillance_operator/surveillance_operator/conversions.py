@@ -6,6 +6,7 @@ A message from the network may hold anything. What cannot be used raises `ValueE
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Iterable
 from typing import Any
 
@@ -15,7 +16,7 @@ from geometry_msgs.msg import Pose as PoseMessage
 from nav_msgs.msg import OccupancyGrid
 from nav_msgs.msg import Path as PathMessage
 from numpy.typing import NDArray
-from sensor_msgs.msg import LaserScan, PointCloud2
+from sensor_msgs.msg import JointState, LaserScan, PointCloud2
 
 from surveillance_interfaces.msg import (
     DoorStates,
@@ -204,16 +205,38 @@ def detections_from(message: MarkerDetectionArray) -> tuple[Detection, ...]:
     )
 
 
+def confirmed_from(message: MarkerDetectionArray) -> dict[int, NDArray[np.float64]]:
+    """Return where the confirmed markers of an image are by id, (3,) metres, optical frame."""
+    found = {}
+    for each in message.detections[:MOST_NAMES]:
+        at = each.pose.position
+        if each.confirmed and all(map(math.isfinite, (at.x, at.y, at.z))):
+            found[int(each.id)] = np.array([at.x, at.y, at.z])
+    return found
+
+
+def joints_from(message: JointState) -> dict[str, float]:
+    """Return the positions of joints by name, rad.
+
+    Raises:
+        ValueError: There are not as many positions as names, or one is not finite.
+    """
+    if len(message.name) != len(message.position):
+        raise ValueError(f'{len(message.position)} positions came for {len(message.name)} joints')
+    if not all(map(math.isfinite, message.position)):
+        raise ValueError('joints whose positions are not finite')
+    return dict(zip(message.name, message.position, strict=True))
+
+
 def health_from(message: DiagnosticArray) -> dict[str, Health]:
     """Return what each part reports, by name."""
-    time = seconds_of(message.header.stamp)
+    heard = time.monotonic()
     return {
         each.name: Health(
             each.level[0] if isinstance(each.level, bytes) else int(each.level),
             each.message,
-            each.hardware_id,
             tuple((value.key, value.value) for value in each.values[:50]),
-            time,
+            heard,
         )
         for each in message.status[:MOST_NAMES]
     }

@@ -16,12 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from surveillance_operator.snapshot import Grid, Snapshot
+from surveillance_behaviour.policy.policies import POLICIES
+from surveillance_operator.regions import OCCUPIED, regions
+from surveillance_operator.snapshot import Grid, Health, Snapshot
 
 Parts = dict[str, Any]
 
-OCCUPIED = 65
-"""From this on a cell is a wall, percent."""
 MOST_TRAIL = 600
 """Points of the trail in a whole frame."""
 
@@ -122,22 +122,48 @@ def _transitions(snapshot: Snapshot) -> Any:
     ]
 
 
-def _health(snapshot: Snapshot) -> Any:
-    nodes = {
-        name: {'up': name in snapshot.nodes, 'restarts': snapshot.restarts.get(name, 0)}
-        for name in sorted({*snapshot.nodes, *snapshot.ended})
-    }
-    reports = {
+def _regions(snapshot: Snapshot) -> Any:
+    if snapshot.grid is None:
+        return {}
+    found = regions(snapshot.grid, snapshot.positions, snapshot.door_lines)
+    return {
         name: {
-            'level': each.level,
-            'message': each.message,
-            'hardware': each.hardware,
-            'values': [list(value) for value in each.values],
-            'time': each.time,
+            'boxes': [[round(edge, 2) for edge in box] for box in each.boxes],
+            'label': [round(value, 2) for value in each.label],
+            'room': round(each.room, 2),
         }
-        for name, each in sorted(snapshot.health.items())
+        for name, each in found.items()
     }
-    return {'nodes': nodes, 'reports': reports, 'silent': dict(snapshot.silent)}
+
+
+def _health(snapshot: Snapshot) -> Any:
+    """Return what is known of each node, with its own reports, and what else is reported."""
+    reports = dict(sorted(snapshot.health.items()))
+    nodes = {}
+    for name in sorted({*snapshot.nodes, *snapshot.ended}):
+        full = f'{snapshot.namespace}/{name}' if snapshot.namespace else name
+        own = [each for each in reports if each == full or each.startswith(f'{full}:')]
+        nodes[name] = {
+            'up': name in snapshot.nodes,
+            'restarts': snapshot.restarts.get(name, 0),
+            'reports': [_report(reports.pop(each)) for each in own],
+        }
+    others = {name: _report(each) for name, each in reports.items()}
+    return {'nodes': nodes, 'others': others, 'silent': dict(snapshot.silent)}
+
+
+def _report(health: Health) -> Any:
+    return {'level': health.level, 'message': health.message}
+
+
+def _figures(snapshot: Snapshot) -> Any:
+    """Return the figures that nodes report of themselves, which change each second."""
+    start = f'{snapshot.namespace}/' if snapshot.namespace else ''
+    return {
+        name.removeprefix(start): dict(each.values)
+        for name, each in sorted(snapshot.health.items())
+        if each.values
+    }
 
 
 def _history(snapshot: Snapshot) -> Any:
@@ -157,6 +183,7 @@ PARTS: Mapping[str, tuple[tuple[str, ...], Callable[[Snapshot], Any]]] = {
             'mode': s.mode,
             'threshold': s.threshold,
             'policy': s.policy,
+            'policies': list(POLICIES),
             'running': bool(s.nodes),
         },
     ),
@@ -168,6 +195,7 @@ PARTS: Mapping[str, tuple[tuple[str, ...], Callable[[Snapshot], Any]]] = {
     ),
     'grid': (('grid',), lambda s: _grid(s.grid)),
     'places': (('positions', 'visited_at', 'urgent'), _places),
+    'regions': (('grid', 'positions', 'door_lines'), _regions),
     'links': (('links',), lambda s: sorted(map(list, s.links))),
     'doors': (
         ('doors', 'door_lines'),
@@ -177,6 +205,10 @@ PARTS: Mapping[str, tuple[tuple[str, ...], Callable[[Snapshot], Any]]] = {
         },
     ),
     'pose': (('pose',), lambda s: None if s.pose is None else [round(v, 3) for v in s.pose]),
+    'others': (
+        ('others',),
+        lambda s: {name: [round(v, 3) for v in pose] for name, pose in s.others.items()},
+    ),
     'plan': (('plan',), lambda s: _points(s.plan)),
     'scan': (('scan',), lambda s: _points(s.scan)),
     'obstacles': (('obstacles',), lambda s: _points(s.obstacles)),
@@ -184,17 +216,19 @@ PARTS: Mapping[str, tuple[tuple[str, ...], Callable[[Snapshot], Any]]] = {
     'active': (('active', 'paused'), lambda s: {'paths': list(s.active), 'paused': s.paused}),
     'transitions': (('transitions',), _transitions),
     'markers': (
-        ('detections', 'scan_progress'),
+        ('detections', 'scan_progress', 'markers'),
         lambda s: {
             'seen': [
                 [each.id, each.known, each.confirmed, round(each.confidence, 2)]
                 for each in s.detections
             ],
             'progress': s.scan_progress,
+            'at': {str(number): list(point) for number, point in sorted(s.markers.items())},
         },
     ),
     'requests': (('requests',), lambda s: dict(s.requests)),
-    'health': (('nodes', 'ended', 'restarts', 'health', 'silent'), _health),
+    'health': (('namespace', 'nodes', 'ended', 'restarts', 'health', 'silent'), _health),
+    'figures': (('namespace', 'health'), _figures),
     'events': (('events',), lambda s: [list(each) for each in s.events]),
     'history': (('history',), _history),
 }

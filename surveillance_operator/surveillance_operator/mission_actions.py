@@ -37,7 +37,7 @@ from surveillance_ontology.armor_client import (
     ArmorServiceInternalError,
 )
 from surveillance_ontology.patrol_ontology import facts_of
-from surveillance_operator.mission_feed import BEHAVIOUR, CONTROLLERS
+from surveillance_operator.topics import BEHAVIOUR, CONTROLLERS
 from surveillance_runtime.node import PatrolNode
 
 _NAME = re.compile(r'[A-Za-z]\w{0,63}\Z', re.ASCII)

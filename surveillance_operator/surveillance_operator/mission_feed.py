@@ -7,99 +7,54 @@ lines of doors, parameters; again when another mission has begun.
 
 from __future__ import annotations
 
+import contextlib
 import math
 import threading
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import partial
 from typing import Any
 
-import numpy as np
-from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseWithCovarianceStamped
-from nav_msgs.msg import OccupancyGrid
-from nav_msgs.msg import Path as PathMessage
-from rcl_interfaces.msg import ParameterEvent
 from rcl_interfaces.srv import GetParameters, ListParameters
-from rclpy.qos import (
-    DurabilityPolicy,
-    QoSCompatibility,
-    QoSProfile,
-    ReliabilityPolicy,
-    qos_check_compatible,
-)
+from rclpy.qos import QoSCompatibility, qos_check_compatible
 from rosgraph_msgs.msg import Clock as ClockMessage
-from sensor_msgs.msg import LaserScan, PointCloud2
-from std_msgs.msg import Bool, String, UInt8
 
-from surveillance_behaviour.conversions import decision_from
 from surveillance_fsm.ros import CallError, ServiceCaller
-from surveillance_interfaces.action import Control, FollowPath, ScanSurroundings
-from surveillance_interfaces.msg import (
-    Decision,
-    DoorStates,
-    FsmStatus,
-    FsmStructure,
-    FsmTransition,
-    MarkerDetectionArray,
-    MissionStatus,
-)
 from surveillance_interfaces.srv import ReferenceName, RoomPosition
 from surveillance_ontology.armor.facts import ShortFact
-from surveillance_ontology.armor_client import ArmorClient, FactSubscription, value_in
+from surveillance_ontology.armor_client import ArmorClient, FactSubscription
 from surveillance_ontology.patrol_ontology import CONNECTIONS, PLACES, URGENT_PLACES, VISITS
 from surveillance_operator import conversions
 from surveillance_operator.polled_subscription import PolledSubscription
-from surveillance_operator.snapshot import NO_POINTS, Change, Pose, Snapshot, follow
-from surveillance_runtime.conversions import seconds_of
+from surveillance_operator.snapshot import Change, Pose, Snapshot, follow
+from surveillance_operator.topics import (
+    BEHAVIOUR,
+    POSE_TOPIC,
+    TOPICS,
+    Topic,
+    behaviour_fields,
+    read_message,
+    with_fact,
+    without,
+)
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 
 LOOK_PERIOD = 0.5
 """Seconds of steady time between two looks at which nodes there are."""
+SILENT_AFTER = 5.0
+"""A node whose last report is older than this counts as silent, seconds of steady time."""
 TIMEOUT = 2.0
 """Deadline of each question, seconds of steady time; then it is asked again."""
-TRAIL_STEP, TRAIL_POINTS = 0.05, 3000
-"""Least distance of two points of the trail, metres, and how many are kept."""
-KEPT_TRANSITIONS = 60
-SAME_MOMENT = 0.03
-"""Most seconds between the stamps of a pose and a scan that belong together."""
 
 BUILDER = 'ontology_map_builder'
 PLANNER = 'planner_controller'
 """The node that knows the doors' lines and the execution mode, as its parameters."""
-BEHAVIOUR = 'robot_behavior'
+POSE_TYPE = 'geometry_msgs/msg/PoseWithCovarianceStamped'
 OBSERVERS = ('mission_', 'console')
 """How the names of nodes begin that only look on."""
-CONTROLLERS = ('battery_controller', 'planner_controller', 'motion_controller', 'arm_controller')
-
-_QUEUE = QoSProfile(
-    depth=200, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
-)
-_STREAM = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-_MANY = QoSProfile(depth=50, reliability=ReliabilityPolicy.RELIABLE)
-
-Fields = dict[str, Any]
-
-
-@dataclass(frozen=True)
-class Topic:
-    """One topic that a snapshot takes from.
-
-    Attributes:
-        name: Relative to the namespace, or absolute.
-        kind: The type of its messages.
-        qos: How it is heard.
-        read: The snapshot's fields that a message changes; raises `ValueError` for one that cannot
-            be used.
-        stream: Whether a view may do without it.
-    """
-
-    name: str
-    kind: Any
-    qos: QoSProfile
-    read: Callable[[Any, Snapshot], Fields]
-    stream: bool = False
 
 
 class MissionFeed:
@@ -125,7 +80,8 @@ class MissionFeed:
         self._on_change = on_change
         namespace = node.get_namespace().strip('/')
         where = f'ROS domain {node.context.get_domain_id()}'
-        self._empty = Snapshot(where=where + (f', namespace {namespace}' if namespace else ''))
+        where += f', namespace {namespace}' if namespace else ''
+        self._empty = Snapshot(where=where, namespace=namespace)
         self._snapshot = self._empty
         self._lock = threading.Lock()
         self._over = False
@@ -137,6 +93,7 @@ class MissionFeed:
             if streams or not topic.stream
         ]
         self._facts = _Facts(node, self.update)
+        self._others = _OtherRobots(node) if streams else None
         self._next_look = 0.0
         node.spawn(self._run, 'mission feed')
 
@@ -190,20 +147,21 @@ class MissionFeed:
             self._clock_time = clock.sec + clock.nanosec / 1e9
         came: list[tuple[Topic, Any]] = []
         for topic, subscription in self._topics:
-            # A scan is shown from the pose of its moment: without a new one it is not wanted.
-            if topic.stream and not any(each.kind is PoseWithCovarianceStamped for each, _ in came):
+            if topic.beside and not any(each.name == topic.beside for each, _ in came):
                 continue
             for _ in range(subscription.qos.depth):
                 if (taken := subscription.take()) is None:
                     break
-                came.append((topic, taken[0]))
-        if not came:
+                # In front: what it stands beside is read with it.
+                came.insert(0 if topic.beside else len(came), (topic, taken[0]))
+        others = self._others.take() if self._others is not None else {}
+        if not came and not others:
             return None
 
         def changed(snapshot: Snapshot) -> Snapshot:
             for topic, message in came:
                 snapshot = read_message(snapshot, topic, message)
-            return snapshot
+            return replace(snapshot, others={**snapshot.others, **others}) if others else snapshot
 
         return changed
 
@@ -231,173 +189,27 @@ class MissionFeed:
             self._over = not nodes and bool(old.nodes)
         if not node.count_publishers('/clock'):
             self._clock_time = None
+        self._note_silent()
         self._facts.ask()
+        if self._others is not None:
+            for robot in self._others.find():
+                self.update(partial(_without_robot, robot=robot))
+
+    def _note_silent(self) -> None:
+        """Mark the nodes whose own reports have ceased."""
+        now = time.monotonic()
+        silent = {
+            name: replace(each, level=3, message=f'silent, last: {each.message}')
+            for name, each in self._snapshot.health.items()
+            if each.level != 3 and now - each.heard > SILENT_AFTER
+        }
+        if silent:
+            self.update(lambda old: replace(old, health={**old.health, **silent}))
 
     def _now(self) -> float:
         if self._clock_time is not None:
             return self._clock_time
         return float(self._node.get_clock().now().nanoseconds) / 1e9
-
-
-def read_message(snapshot: Snapshot, topic: Topic, message: Any) -> Snapshot:
-    """Return the snapshot with what a message says, or why it cannot be used."""
-    try:
-        fields = topic.read(message, snapshot)
-    except (ValueError, TypeError, OverflowError) as error:
-        return replace(snapshot, silent={**snapshot.silent, topic.name: str(error)})
-    return replace(snapshot, **fields) if fields else snapshot
-
-
-def moved(pose: Pose, old: Snapshot) -> Fields:
-    """Return the fields that a new pose changes: the pose, and the trail."""
-    trail = old.trail
-    if not len(trail) or math.dist(trail[-1], pose[:2]) >= TRAIL_STEP:
-        trail = np.vstack([trail[-TRAIL_POINTS:], pose[:2]])
-    return {'pose': pose, 'trail': trail}
-
-
-def _fed_back(point: Any, old: Snapshot) -> Fields:
-    # Where somebody estimates the pose, it is known better than from the drive's feedback.
-    if old.localised and old.mode not in ('RANDOM', 'MANUAL'):
-        return {}
-    x, y = conversions.point_from(point)
-    yaw = 0.0
-    if old.pose is not None:
-        dx, dy = x - old.pose[0], y - old.pose[1]
-        yaw = math.atan2(dy, dx) if dx or dy else old.pose[2]
-    return moved((x, y, yaw), old)
-
-
-def _on_transition(message: FsmTransition, old: Snapshot) -> Fields:
-    transition = conversions.transition_from(message)
-    return {'transitions': (*old.transitions, transition)[-KEPT_TRANSITIONS:]}
-
-
-def _on_pose(message: PoseWithCovarianceStamped, old: Snapshot) -> Fields:
-    at = seconds_of(message.header.stamp)
-    fields = moved(conversions.pose_from(message.pose.pose), old)
-    return {**fields, **_seen(fields['pose'], at, old.lidar), 'localised': True, 'pose_time': at}
-
-
-def _on_scan(message: LaserScan, old: Snapshot) -> Fields:
-    lidar = seconds_of(message.header.stamp), conversions.scan_from(message)
-    return {'lidar': lidar, **_seen(old.pose, old.pose_time, lidar)}
-
-
-def _seen(pose: Pose | None, at: float, lidar: tuple[float, Any] | None) -> Fields:
-    """Return what the lidar sees in the map's frame, where pose and scan are of one moment.
-
-    The lidar is taken to sit in the robot's middle.
-    """
-    if pose is None or lidar is None or abs(lidar[0] - at) > SAME_MOMENT:
-        return {}
-    x, y, yaw = pose
-    turn = np.array([[math.cos(yaw), math.sin(yaw)], [-math.sin(yaw), math.cos(yaw)]])
-    return {'scan': lidar[1] @ turn + (x, y)}
-
-
-def _on_parameters(message: ParameterEvent, _old: Snapshot) -> Fields:
-    if message.node.rsplit('/', 1)[-1] != BEHAVIOUR:
-        return {}
-    changed = {each.name: each.value for each in message.changed_parameters}
-    return _behaviour_fields(changed)
-
-
-def _behaviour_fields(values: dict[str, Any]) -> Fields:
-    fields: Fields = {}
-    threshold = values.get('urgency_threshold')
-    if threshold is not None and threshold.type in (2, 3):
-        seconds = threshold.integer_value if threshold.type == 2 else threshold.double_value
-        fields['threshold'] = float(seconds)
-    if (policy := values.get('policy')) is not None and policy.type == 4:
-        fields['policy'] = policy.string_value
-    return fields
-
-
-def _on_request(controller: str) -> Callable[[String, Snapshot], Fields]:
-    return lambda message, old: {'requests': {**old.requests, controller: message.data}}
-
-
-TOPICS: tuple[Topic, ...] = (
-    Topic(
-        'mission_status',
-        MissionStatus,
-        STATE_QOS,
-        lambda m, _: {'status': conversions.status_from(m)},
-    ),
-    Topic(
-        'decision',
-        Decision,
-        STATE_QOS,
-        lambda m, _: {'decision': decision_from(m), 'number': m.sequence},
-    ),
-    Topic(
-        'battery_level',
-        UInt8,
-        STATE_QOS,
-        lambda m, _: {'battery': conversions.percent_from(m.data)},
-    ),
-    Topic('state/battery_low', Bool, STATE_QOS, lambda m, _: {'battery_low': m.data}),
-    Topic(
-        'map',
-        OccupancyGrid,
-        STATE_QOS,
-        lambda m, _: {'grid': conversions.grid_from(m), 'trail': NO_POINTS},
-    ),
-    Topic('door_states', DoorStates, STATE_QOS, lambda m, _: {'doors': conversions.doors_from(m)}),
-    Topic(
-        'obstacles', PointCloud2, STATE_QOS, lambda m, _: {'obstacles': conversions.cloud_from(m)}
-    ),
-    Topic('amcl_pose', PoseWithCovarianceStamped, STATE_QOS, _on_pose),
-    Topic('plan', PathMessage, STATE_QOS, lambda m, _: {'plan': conversions.path_from(m)}),
-    Topic('scan', LaserScan, _STREAM, _on_scan, stream=True),
-    Topic(
-        'follow_path/_action/feedback',
-        FollowPath.Impl.FeedbackMessage,
-        QoSProfile(depth=1),
-        lambda m, old: _fed_back(m.feedback.position, old),
-    ),
-    Topic(
-        'motion/controller/_action/feedback',
-        Control.Impl.FeedbackMessage,
-        QoSProfile(depth=1),
-        lambda m, old: _fed_back(m.feedback.reached_point, old),
-    ),
-    Topic(
-        'scan_surroundings/_action/feedback',
-        ScanSurroundings.Impl.FeedbackMessage,
-        QoSProfile(depth=1),
-        lambda m, _: {'scan_progress': (m.feedback.view, m.feedback.views)},
-    ),
-    Topic(
-        'aruco_detector/detections',
-        MarkerDetectionArray,
-        QoSProfile(depth=1),
-        lambda m, _: {'detections': conversions.detections_from(m)},
-    ),
-    Topic(
-        f'{BEHAVIOUR}/fsm/structure',
-        FsmStructure,
-        STATE_QOS,
-        lambda m, _: {'containers': conversions.containers_from(m)},
-    ),
-    Topic(
-        f'{BEHAVIOUR}/fsm/status',
-        FsmStatus,
-        STATE_QOS,
-        lambda m, _: {'active': tuple(m.active), 'paused': m.paused},
-    ),
-    Topic(f'{BEHAVIOUR}/fsm/transition', FsmTransition, _QUEUE, _on_transition),
-    *(Topic(f'{name}/announcement', String, STATE_QOS, _on_request(name)) for name in CONTROLLERS),
-    Topic(
-        '/diagnostics',
-        DiagnosticArray,
-        _MANY,
-        lambda m, old: {'health': {**old.health, **conversions.health_from(m)}},
-    ),
-    Topic('/parameter_events', ParameterEvent, _MANY, _on_parameters),
-)
-"""All that a snapshot takes from, with how."""
 
 
 class _Facts:
@@ -473,9 +285,9 @@ class _Facts:
         self._armor = ArmorClient(self._node, self._node.get_name(), name, timeout=TIMEOUT)
         for pattern, callback in (
             (PLACES, self._on_place),
-            (URGENT_PLACES, self._on_urgent),
-            (VISITS, self._on_visit),
-            (CONNECTIONS, self._on_link),
+            (URGENT_PLACES, self._on_fact),
+            (VISITS, self._on_fact),
+            (CONNECTIONS, self._on_fact),
         ):
             FactSubscription(self._node, self._armor, pattern, callback)
 
@@ -505,7 +317,7 @@ class _Facts:
         names = ['urgency_threshold', 'policy']
         request = GetParameters.Request(names=names)
         values = (await self._get_behaviour.call_async(request, TIMEOUT)).values
-        fields = _behaviour_fields(dict(zip(names, values, strict=False)))
+        fields = behaviour_fields(dict(zip(names, values, strict=False)))
         self._update(lambda old: replace(old, **fields))
 
     def _on_place(self, fact: ShortFact, came: bool) -> None:
@@ -513,30 +325,51 @@ class _Facts:
         for places in (self._places, self._without_position):
             (places.add if came else places.discard)(place)
         if not came:
-            self._update(lambda old: replace(old, positions=_without(old.positions, place)))
+            self._update(lambda old: replace(old, positions=without(old.positions, place)))
 
-    def _on_urgent(self, fact: ShortFact, came: bool) -> None:
-        place = frozenset(fact.arguments)
-        self._update(
-            lambda old: replace(old, urgent=old.urgent | place if came else old.urgent - place)
+    def _on_fact(self, fact: ShortFact, came: bool) -> None:
+        self._update(lambda old: with_fact(old, fact, came))
+
+
+class _OtherRobots:
+    """Where the robots of other namespaces are.
+
+    Args:
+        node: The node that watches.
+    """
+
+    def __init__(self, node: PatrolNode) -> None:
+        self._node = node
+        self._own = node.get_namespace().strip('/')
+        self._poses: dict[str, PolledSubscription] = {}
+
+    def find(self) -> frozenset[str]:
+        """Hear the robots that came; return the names of those that went."""
+        for topic, kinds in self._node.get_topic_names_and_types():
+            namespace, _, name = topic.strip('/').rpartition('/')
+            robot = namespace or 'robot'
+            is_other = name == POSE_TOPIC and POSE_TYPE in kinds and namespace != self._own
+            if is_other and robot not in self._poses and self._node.count_publishers(topic):
+                self._poses[robot] = PolledSubscription(
+                    self._node, PoseWithCovarianceStamped, topic, STATE_QOS
+                )
+        gone = frozenset(
+            robot
+            for robot, subscription in self._poses.items()
+            if not self._node.count_publishers(subscription.topic)
         )
+        for robot in gone:
+            self._poses.pop(robot).destroy()
+        return gone
 
-    def _on_visit(self, fact: ShortFact, came: bool) -> None:
-        place, rendered = fact.arguments
-        seconds = float(value_in(rendered))
-
-        def told(old: Snapshot) -> Snapshot:
-            if came:
-                return replace(old, visited_at={**old.visited_at, place: seconds})
-            if old.visited_at.get(place) != seconds:
-                return old
-            return replace(old, visited_at=_without(old.visited_at, place))
-
-        self._update(told)
-
-    def _on_link(self, fact: ShortFact, came: bool) -> None:
-        pair = frozenset({(fact.arguments[0], fact.arguments[1])})
-        self._update(lambda old: replace(old, links=old.links | pair if came else old.links - pair))
+    def take(self) -> dict[str, Pose]:
+        """Return the poses that came."""
+        came = {}
+        for robot, subscription in self._poses.items():
+            while (taken := subscription.take()) is not None:
+                with contextlib.suppress(ValueError):
+                    came[robot] = conversions.pose_from(taken[0].pose.pose)
+        return came
 
 
 def _mismatch(reason: str) -> str:
@@ -550,8 +383,8 @@ def _with_position(place: str, point: tuple[float, float]) -> Callable[[Snapshot
     return lambda old: replace(old, positions={**old.positions, place: point})
 
 
-def _without(values: Any, name: str) -> dict[str, Any]:
-    return {key: value for key, value in values.items() if key != name}
+def _without_robot(snapshot: Snapshot, robot: str) -> Snapshot:
+    return replace(snapshot, others=without(snapshot.others, robot))
 
 
 def _door_line(x: float, y: float, yaw: float, width: float) -> tuple[float, float, float, float]:

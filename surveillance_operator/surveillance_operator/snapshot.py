@@ -130,16 +130,14 @@ class Health:
     Attributes:
         level: 0 is good, 1 a warning, 2 an error, 3 stale.
         message: In words.
-        hardware: The hardware id.
         values: Further figures by name.
-        time: When it came, seconds of the mission's time.
+        heard: When it came, seconds of steady time.
     """
 
     level: int
     message: str
-    hardware: str
     values: tuple[tuple[str, str], ...]
-    time: float
+    heard: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -178,6 +176,7 @@ class Snapshot:
 
     Attributes:
         where: Where the watcher listens, in words.
+        namespace: Of the robot, without slashes.
         now: The mission's time, seconds.
         mode: The controllers' execution mode.
         threshold, policy: The behaviour's parameters.
@@ -199,6 +198,7 @@ class Snapshot:
         localised: Whether somebody estimates that from sensors.
         trail: Where it drove, shape (n, 2), metres, oldest first.
         plan: The planned path, shape (n, 2), metres.
+        others: Where other robots are, by namespace.
         pose_time: The stamp of the pose, seconds.
         lidar: The latest scan: its stamp, and its points in the robot's frame.
         scan: What the lidar sees, shape (n, 2), metres, map frame.
@@ -208,6 +208,9 @@ class Snapshot:
         paused: Whether the machine enters no further state.
         transitions: The latest transitions.
         detections: The markers of the latest image.
+        markers: Where confirmed markers stand by their ids, metres.
+        camera: The transform (4, 4) from the camera's optical frame to the robot.
+        viewpoint: From where the latest image was taken: pose and camera as one vector.
         scan_progress: View and number of views of the arm's scan.
         requests: What each controller in MANUAL mode announced last.
         health: What the nodes report, by name.
@@ -217,6 +220,7 @@ class Snapshot:
     """
 
     where: str = ''
+    namespace: str = ''
     now: float = 0.0
     mode: str = ''
     threshold: float | None = None
@@ -240,6 +244,7 @@ class Snapshot:
     localised: bool = False
     trail: NDArray[np.float64] = field(default_factory=lambda: NO_POINTS)
     plan: NDArray[np.float64] = field(default_factory=lambda: NO_POINTS)
+    others: Mapping[str, Pose] = field(default_factory=dict)
     pose_time: float = 0.0
     lidar: tuple[float, NDArray[np.float64]] | None = None
     scan: NDArray[np.float64] = field(default_factory=lambda: NO_POINTS)
@@ -249,6 +254,9 @@ class Snapshot:
     paused: bool = False
     transitions: tuple[Transition, ...] = ()
     detections: tuple[Detection, ...] = ()
+    markers: Mapping[int, tuple[float, float]] = field(default_factory=dict)
+    camera: NDArray[np.float64] | None = None
+    viewpoint: NDArray[np.float64] | None = None
     scan_progress: tuple[int, int] | None = None
     requests: Mapping[str, str] = field(default_factory=dict)
     health: Mapping[str, Health] = field(default_factory=dict)

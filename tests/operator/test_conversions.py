@@ -14,7 +14,7 @@ from std_msgs.msg import UInt8
 
 from surveillance_interfaces.msg import Decision
 from surveillance_operator import conversions
-from surveillance_operator.mission_feed import TOPICS, read_message
+from surveillance_operator.topics import TOPICS, read_message
 from surveillance_operator.snapshot import Snapshot
 
 TOPIC = {topic.name: topic for topic in TOPICS}

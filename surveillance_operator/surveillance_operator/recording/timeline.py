@@ -19,6 +19,8 @@ from surveillance_operator.recording.bag import RecordingError
 from surveillance_operator.snapshot import Snapshot
 
 NAME = 'timeline.jsonl'
+LEFT_OUT = frozenset({'scan', 'figures'})
+"""Parts that change all the time: they are in the recording itself."""
 WHOLE_PERIOD = 60.0
 """Seconds between two lines that hold everything."""
 _HEAD = re.compile(rb'\{"t":([\d.]+),"k":([01]),"e":"(\w*)"')
@@ -36,8 +38,7 @@ class TimelineWriter:
     def __init__(self, path: Path) -> None:
         _cut_torn_line(path)
         self._file = open(path, 'ab', buffering=0)  # noqa: SIM115 - kept open
-        # The lidar's points come ten times a second: they are in the recording itself.
-        self._framer = Framer(without=frozenset({'scan'}))
+        self._framer = Framer(without=LEFT_OUT)
         self._whole = 0.0
         self._before: Snapshot | None = None
 

@@ -67,6 +67,21 @@ export function lightMachine(svg, paths, transitions) {
   for (const part of svg.querySelectorAll('[data-path]')) part.classList.toggle('on', active.has(part.dataset.path));
   const last = transitions.at(-1);
   const edge = last ? `${last[2]}|${last[3]}|${last[4]}` : '';
-  for (const path of svg.querySelectorAll('[data-edge]')) path.classList.toggle('last', path.dataset.edge === edge);
+  // What may come next: the edges that leave an active state.
+  const leaving = paths.map((path) => path.replace(/\/([^/]+)$/, '|$1|'));
+  for (const path of svg.querySelectorAll('[data-edge]')) {
+    path.classList.toggle('last', path.dataset.edge === edge);
+    path.classList.toggle('next', leaving.some((start) => path.dataset.edge.startsWith(start)));
+  }
   svg.setAttribute('aria-label', paths.length ? `State machine: ${paths.at(-1)} is active` : 'State machine');
+  keepInView(svg, paths.at(-1));
+}
+
+function keepInView(svg, path) {
+  const box = svg.parentElement;
+  const part = path && svg.querySelector(`[data-path="${CSS.escape(path)}"]`);
+  if (!part || box.matches(':hover, :focus')) return;
+  const outer = box.getBoundingClientRect(), inner = part.getBoundingClientRect();
+  if (inner.top < outer.top) box.scrollTop -= outer.top - inner.top + 20;
+  else if (inner.bottom > outer.bottom) box.scrollTop += inner.bottom - outer.bottom + 20;
 }

@@ -4,6 +4,7 @@ import {MapView} from './map.js';
 import {drawMachine, lightMachine} from './machine.js';
 import {drawStrips} from './time.js';
 import {Why} from './why.js';
+import {showHealth} from './health.js';
 import {Hands} from './hands.js';
 import {Replay} from './replay.js';
 
@@ -42,30 +43,30 @@ function header() {
 }
 
 function lists() {
-  const {events, health, markers, transitions} = state;
+  const {events, markers, transitions} = state;
   $('events').replaceChildren(...(events ?? []).toReversed().map(([at, text]) => h('li', {}, h('time', {}, at), text)));
-  const silent = Object.entries(health?.silent ?? {}).map(([topic, reason]) => h('li', {}, `${topic}: ${reason}`));
-  $('nodes').replaceChildren(...Object.entries(health?.nodes ?? {}).map(([name, node]) =>
-    h('li', {class: node.up ? 'up' : 'down'}, h('b', {}, node.up ? '● ' : '✗ '), name, node.up ? '' : ' ended', node.restarts ? ` (started again ${node.restarts}×)` : '')));
-  const words = ['ok', 'WARN', 'ERROR', 'STALE'];
-  $('reports').replaceChildren(...Object.entries(health?.reports ?? {}).map(([name, report]) =>
-    h('li', {class: report.level ? 'warn' : null}, `${words[report.level] ?? '?'} ${name}: ${report.message}`)), ...silent);
   $('markers').replaceChildren(...(markers?.seen ?? []).map(([id, known, confirmed, confidence]) =>
     h('li', {}, `marker ${id}${confirmed ? ', confirmed' : ''}${known ? '' : ', not on the list'}, confidence ${confidence}`)));
+  $('markers').hidden = !markers?.seen?.length;
   set('scan', markers?.progress ? `scan: view ${markers.progress[0]} of ${markers.progress[1]}` : '');
   $('transitions').replaceChildren(...(transitions ?? []).toReversed().slice(0, 12).map((each) =>
     h('li', {}, h('time', {}, `${each[6].toFixed(1)} s`), `${each[3]} –${each[4]}→ ${each[5]}`)));
 }
 
+const MAP_PARTS = ['status', 'grid', 'places', 'regions', 'links', 'doors', 'plan', 'scan', 'obstacles', 'pose', 'trail', 'mission', 'markers', 'others'];
 const SHOW = {
   header: [['status', 'mission', 'battery'], header],
   why: [['decision', 'places'], () => why.show()],
-  lists: [['events', 'health', 'markers', 'transitions'], lists],
+  lists: [['events', 'markers', 'transitions'], lists],
+  health: [['health', 'figures'], () => showHealth(state)],
   machine: [['machine'], () => drawMachine($('machine'), state.machine ?? [])],
-  lit: [['machine', 'active', 'transitions'], () => { lightMachine($('machine'), state.active?.paths ?? [], state.transitions ?? []); $('paused').hidden = !state.active?.paused; }],
+  lit: [['machine', 'active', 'transitions'], () => {
+    lightMachine($('machine'), state.active?.paths ?? [], state.transitions ?? []);
+    $('paused').hidden = !state.active?.paused;
+  }],
   hands: [['places', 'doors', 'mission', 'requests'], () => hands.show()],
   strips: [['history', 'places', 'mission'], () => drawStrips($('strips'), state, now())],
-  map: [['status', 'grid', 'places', 'links', 'doors', 'plan', 'scan', 'obstacles', 'pose', 'trail', 'mission', 'decision'], (parts) => map.show(state, parts, now())],
+  map: [MAP_PARTS, (parts) => map.show(state, parts, now())],
 };
 
 function receive(message) {

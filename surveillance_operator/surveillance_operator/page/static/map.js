@@ -1,61 +1,54 @@
 // The map: what the robot knows of the place, and what it does there. Metres; y points up.
 import {s, age} from './dom.js';
 
+const LAYERS = ['regions', 'grid', 'links', 'driven', 'plan', 'doors', 'lidar', 'obstacles', 'markers', 'places', 'others', 'robot'];
+const ROBOT = 'M.55 0L-.35 .38L-.15 0L-.35 -.38Z';
+
 const line = (points) => points.map(([x, y], i) => `${i ? 'L' : 'M'}${x} ${-y}`).join('');
+const filled = (boxes) => boxes.map(([l, b, r, t]) => `M${l} ${-t}H${r}V${-b}H${l}Z`).join('');
+
+function placeAt(element, [x, y, yaw]) {
+  element.style.transform = `translate(${x}px, ${-y}px) rotate(${-(yaw ?? 0)}rad)`;
+}
 
 export class MapView {
   constructor(svg, onPlace, onPoint) {
     this.svg = svg;
-    this.layers = {};
-    for (const name of ['grid', 'links', 'driven', 'plan', 'doors', 'lidar', 'obstacles', 'places', 'robot']) {
-      this.layers[name] = s('g');
-      svg.append(this.layers[name]);
-    }
+    this.onPlace = onPlace;
+    this.rooms = new Map();
+    this.layers = Object.fromEntries(LAYERS.map((name) => [name, s('g')]));
+    svg.append(...Object.values(this.layers));
     this.driven = s('path', {class: 'driven'});
     this.plan = s('path', {class: 'plan'});
     this.lidar = s('path', {class: 'lidar'});
-    this.robot = s('g', {class: 'robot', visibility: 'hidden'}, s('title', {}, 'the robot'), s('path', {d: 'M.55 0L-.35 .38L-.15 0L-.35 -.38Z'}));
-    this.layers.driven.append(this.driven);
-    this.layers.plan.append(this.plan);
-    this.layers.lidar.append(this.lidar);
-    this.layers.robot.append(this.robot);
-    this.onPlace = onPlace;
+    this.robot = s('g', {class: 'robot', visibility: 'hidden'}, s('title', {}, 'the robot'), s('path', {d: ROBOT}));
+    for (const name of ['driven', 'plan', 'lidar', 'robot']) this.layers[name].append(this[name]);
     svg.addEventListener('click', (event) => {
       const at = new DOMPoint(event.clientX, event.clientY).matrixTransform(svg.getScreenCTM().inverse());
       onPoint([Math.round(at.x * 100) / 100, Math.round(-at.y * 100) / 100]);
     });
-    this.rooms = new Map();
   }
 
   show(state, parts, now) {
-    const {grid, places, doors, links} = state;
-    if ('grid' in parts) {
-      const [l, b, r, t] = grid?.box ?? [0, 0, 0, 0];
-      this.layers.grid.replaceChildren(...(grid ? [s('image', {href: grid.image, x: l, y: -t, width: r - l, height: t - b, preserveAspectRatio: 'none'})] : []));
-    }
-    if ('grid' in parts || 'places' in parts) this.frame(state);
-    if ('links' in parts || 'places' in parts || 'grid' in parts) {
-      const both = (grid ? [] : links ?? []).filter(([a, b]) => places?.[a]?.at && places?.[b]?.at);
-      this.layers.links.replaceChildren(...both.map(([a, b]) => s('path', {class: 'link', d: line([places[a].at, places[b].at])})));
-    }
-    if ('doors' in parts) {
-      this.layers.doors.replaceChildren(...Object.entries(doors ?? {}).filter(([, door]) => door.line).flatMap(([name, door]) => {
-        const [x1, y1, x2, y2] = door.line;
-        const shut = door.open === false;
-        const drawn = s('path', {class: shut ? 'door shut' : 'door', d: line([[x1, y1], [x2, y2]]), 'data-door': name}, s('title', {}, `door ${name} ${shut ? 'closed' : 'open'}`));
-        return shut ? [drawn, s('text', {class: 'cross', x: (x1 + x2) / 2, y: -(y1 + y2) / 2 + .3}, '×')] : [drawn];
-      }));
-    }
-    if ('places' in parts || 'mission' in parts) this.drawPlaces(state, now);
-    if ('plan' in parts) this.plan.setAttribute('d', line(state.plan ?? []));
-    if ('trail' in parts || 'pose' in parts) this.driven.setAttribute('d', line(state.trail ?? []));
-    if ('scan' in parts) this.lidar.setAttribute('d', (state.scan ?? []).map(([x, y]) => `M${x} ${-y}h0`).join(''));
-    if ('obstacles' in parts) this.layers.obstacles.replaceChildren(...(state.obstacles ?? []).map(([x, y]) => s('rect', {class: 'obstacle', x: x - .06, y: -y - .06, width: .12, height: .12})));
-    if ('pose' in parts || ('status' in parts && !state.pose)) {
-      const at = state.pose ?? places?.[state.status?.place]?.at;
-      this.robot.setAttribute('visibility', at ? 'visible' : 'hidden');
-      if (at) this.robot.style.transform = `translate(${at[0]}px, ${-at[1]}px) rotate(${-(at[2] ?? 0)}rad)`;
-    }
+    const came = (...names) => names.some((name) => name in parts);
+    if (came('grid')) this.drawGrid(state.grid);
+    if (came('grid', 'places')) this.frame(state);
+    if (came('links', 'places', 'grid')) this.drawLinks(state);
+    if (came('doors')) this.drawDoors(state.doors);
+    if (came('places', 'regions', 'mission')) this.drawPlaces(state, now);
+    if (came('plan')) this.plan.setAttribute('d', line(state.plan ?? []));
+    if (came('trail', 'pose')) this.driven.setAttribute('d', line(state.trail ?? []));
+    if (came('scan')) this.lidar.setAttribute('d', (state.scan ?? []).map(([x, y]) => `M${x} ${-y}h0`).join(''));
+    if (came('obstacles')) this.drawObstacles(state.obstacles);
+    if (came('markers')) this.drawMarkers(state.markers?.at);
+    if (came('others')) this.drawOthers(state.others);
+    if (came('pose') || (came('status') && !state.pose)) this.drawRobot(state);
+  }
+
+  drawGrid(grid) {
+    const [l, b, r, t] = grid?.box ?? [0, 0, 0, 0];
+    const image = {href: grid?.image, x: l, y: -t, width: r - l, height: t - b, preserveAspectRatio: 'none'};
+    this.layers.grid.replaceChildren(...(grid ? [s('image', image)] : []));
   }
 
   frame({grid, places}) {
@@ -65,52 +58,106 @@ export class MapView {
       const xs = points.map((p) => p[0]), ys = points.map((p) => p[1]);
       box = [Math.min(...xs) - 2, Math.min(...ys) - 2, Math.max(...xs) + 2, Math.max(...ys) + 2];
     }
-    if (box) this.svg.setAttribute('viewBox', `${box[0] - .3} ${-box[3] - .3} ${box[2] - box[0] + .6} ${box[3] - box[1] + .6}`);
+    if (!box) return;
+    const [left, bottom, right, top] = box;
+    this.width = right - left;
+    this.svg.setAttribute('viewBox', `${left - .3} ${-top - .3} ${right - left + .6} ${top - bottom + .6}`);
+  }
+
+  drawLinks({grid, links, places}) {
+    // Only where there is no map to see them on.
+    const both = (grid ? [] : links ?? []).filter(([a, b]) => places?.[a]?.at && places?.[b]?.at);
+    this.layers.links.replaceChildren(...both.map(([a, b]) => s('path', {class: 'link', d: line([places[a].at, places[b].at])})));
+  }
+
+  drawDoors(doors) {
+    const drawn = Object.entries(doors ?? {}).filter(([, door]) => door.line).flatMap(([name, door]) => {
+      const [x1, y1, x2, y2] = door.line;
+      const shut = door.open === false;
+      const path = s('path', {class: shut ? 'door shut' : 'door', d: line([[x1, y1], [x2, y2]]), 'data-door': name},
+        s('title', {}, `door ${name} ${shut ? 'closed' : 'open'}`));
+      return shut ? [path, s('text', {class: 'cross', x: (x1 + x2) / 2, y: -(y1 + y2) / 2 + .3}, '×')] : [path];
+    });
+    this.layers.doors.replaceChildren(...drawn);
+  }
+
+  drawObstacles(obstacles) {
+    this.layers.obstacles.replaceChildren(...(obstacles ?? []).map(([x, y]) =>
+      s('rect', {class: 'obstacle', x: x - .06, y: -y - .06, width: .12, height: .12})));
+  }
+
+  drawMarkers(at) {
+    this.layers.markers.replaceChildren(...Object.entries(at ?? {}).flatMap(([id, [x, y]]) => [
+      s('rect', {class: 'tag', x: x - .17, y: -y - .17, width: .34, height: .34, 'data-marker': id}, s('title', {}, `marker ${id}`)),
+      s('text', {class: 'tag', x, y: -y - .3}, id)]));
+  }
+
+  drawOthers(others) {
+    this.layers.others.replaceChildren(...Object.entries(others ?? {}).map(([name, pose]) => {
+      const robot = s('g', {class: 'robot other', 'data-robot': name}, s('title', {}, name), s('path', {d: ROBOT}));
+      placeAt(robot, pose);
+      return s('g', {}, robot, s('text', {class: 'tag', x: pose[0], y: -pose[1] - .6}, name));
+    }));
+  }
+
+  drawRobot({pose, places, status}) {
+    const at = pose ?? places?.[status?.place]?.at;
+    this.robot.setAttribute('visibility', at ? 'visible' : 'hidden');
+    if (at) placeAt(this.robot, at);
   }
 
   drawPlaces(state, now) {
-    const key = JSON.stringify(Object.entries(state.places ?? {}).map(([name, place]) => [name, place.at]));
-    if (key === this.key) { this.tick(state, now); return; }
-    this.key = key;
-    const focused = document.activeElement?.dataset?.place;
-    this.rooms.clear();
-    const spots = Object.values(state.places ?? {}).map((place) => place.at).filter(Boolean);
-    const taken = [];
-    const free = (x, y, width) => spots.every(([px, py]) => Math.abs(px - x) > width / 2 + .5 || Math.abs(py - y) > .75)
-      && taken.every(([tx, ty, w]) => Math.abs(tx - x) > (w + width) / 2 || Math.abs(ty - y) > .6);
-    const labelAt = ([x, y], name) => {
-      const width = .4 * name.length;
-      const ways = [[x, y + .85], [x + .7 + width / 2, y], [x - .7 - width / 2, y], [x, y - .95]];
-      const [lx, ly] = ways.find(([wx, wy]) => free(wx, wy, width)) ?? ways[0];
-      taken.push([lx, ly, width]);
-      return {x: lx, y: -ly + .2};
-    };
-    this.layers.places.replaceChildren(...Object.entries(state.places ?? {}).filter(([, place]) => place.at).map(([name, {at}]) => {
-      const circle = s('circle', {cx: at[0], cy: -at[1], r: .48});
-      const label = s('text', labelAt(at, name), name);
-      const words = s('text', {class: 'age', x: at[0], y: -at[1] + .18}, '');
-      const choose = () => this.onPlace(name);
-      const room = s('g', {class: 'room', tabindex: 0, role: 'button', 'data-place': name,
-        onclick: choose, onkeydown: (event) => { if (event.key === 'Enter' || event.key === ' ') { event.preventDefault(); choose(); } }}, circle, label, words);
-      this.rooms.set(name, {room, circle, words});
-      return room;
-    }));
-    if (focused) this.rooms.get(focused)?.room.focus();
+    const shown = Object.entries(state.places ?? {}).filter(([, place]) => place.at);
+    const key = JSON.stringify([shown.map(([name, {at}]) => [name, at]), state.regions, this.width]);
+    if (key !== this.key) {
+      this.key = key;
+      const focused = document.activeElement?.dataset?.place;
+      this.rooms.clear();
+      const drawn = shown.map(([name, {at}]) => this.drawPlace(name, at, state.regions?.[name]));
+      this.layers.regions.replaceChildren(...drawn.map((each) => each.floor));
+      this.layers.places.replaceChildren(...drawn.map((each) => each.room));
+      if (focused) this.rooms.get(focused)?.room.focus();
+    }
     this.tick(state, now);
+  }
+
+  drawPlace(name, at, region) {
+    // A place without a region is a disc with its words below.
+    const floor = region ? s('path', {class: 'floor', d: filled(region.boxes)})
+      : s('circle', {class: 'floor', cx: at[0], cy: -at[1], r: .5});
+    const [x, y] = region?.label ?? [at[0], at[1] - 1.1];
+    const readable = (this.width ?? 16) / 24;
+    const fits = region ? 3.2 * region.room / Math.max(4, name.length) : readable;
+    const size = Math.max(readable / 2, Math.min(readable, fits));
+    const label = s('text', {x, y: -y, 'font-size': size}, name);
+    const words = s('text', {class: 'age', x, y: -y + size * .95, 'font-size': size * .8}, '');
+    const choose = () => this.onPlace(name);
+    const onkeydown = (event) => {
+      if (event.key !== 'Enter' && event.key !== ' ') return;
+      event.preventDefault();
+      choose();
+    };
+    const outline = floor.cloneNode();
+    outline.setAttribute('class', 'outline');
+    const room = s('g', {class: 'room', tabindex: 0, role: 'button', 'data-place': name, onclick: choose, onkeydown},
+      outline, s('circle', {class: 'spot', cx: at[0], cy: -at[1], r: .12}), label, words);
+    this.rooms.set(name, {room, floor, words});
+    return {floor, room};
   }
 
   tick(state, now) {
     const threshold = state.mission?.threshold || 120;
-    for (const [name, {room, circle, words}] of this.rooms) {
+    for (const [name, {room, floor, words}] of this.rooms) {
       const place = state.places?.[name];
       if (!place) continue;
       const waited = place.visited === null ? Infinity : now - place.visited;
       const share = Math.round(100 * Math.min(1, Math.max(0, waited / threshold)));
-      circle.style.fill = `color-mix(in srgb, var(--late) ${share}%, var(--fresh))`;
+      floor.style.fill = `color-mix(in srgb, var(--late) ${share}%, var(--fresh))`;
       const late = place.urgent || waited > threshold;
-      const text = (Number.isFinite(waited) ? age(waited) : 'never') + (late ? '!' : '');
+      const text = (Number.isFinite(waited) ? age(waited) : 'never') + (late ? ' !' : '');
       if (words.textContent !== text) words.textContent = text;
-      room.setAttribute('aria-label', `${name}: ${Number.isFinite(waited) ? 'unvisited for ' + age(waited) : 'never visited'}${place.urgent ? ', URGENT' : ''}`);
+      const said = Number.isFinite(waited) ? `unvisited for ${age(waited)}` : 'never visited';
+      room.setAttribute('aria-label', `${name}: ${said}${place.urgent ? ', URGENT' : ''}`);
     }
   }
 }

@@ -1,9 +1,29 @@
-// A strip for each room's idleness and one for the battery, over the last hour.
+// A strip for each place's idleness, one for the battery, one for what happened, over the last hour.
 import {h, s, age} from './dom.js';
 
 const HOUR = 3600, W = 600, H = 30;
 const SIGNS = {recharge: '⚡', failure: '✗', recovery: '↻', help: '?'};
 let names = '';
+
+function build(root, places) {
+  const strip = (name) => s('svg', {viewBox: `0 0 ${W} ${H}`, preserveAspectRatio: 'none', role: 'img', 'data-strip': name, 'aria-label': name});
+  const row = (name, drawn) => [h('span', {}, name), drawn, h('span', {'data-value': name, class: 'n'}, '')];
+  root.replaceChildren(
+    ...places.flatMap((name) => row(name, strip(name))),
+    ...row('battery', strip('battery')),
+    ...row('events', h('div', {class: 'marks', 'data-strip': 'events'})),
+    h('span', {}, ''), h('div', {class: 'axis'}, h('span', {id: 'axis-start'}, ''), h('span', {}, 'now')), h('span', {}, ''),
+    h('p', {class: 'note', id: 'strip-note'}, ''));
+}
+
+function sawtooth(visits, since, now, x, y) {
+  let d = `M0 ${H}`, last = visits[0] ?? since;
+  for (const at of visits) {
+    if (at > since) d += `L${x(Math.max(last, since))} ${y(Math.max(0, since - last))}L${x(at)} ${y(at - last)}L${x(at)} ${H}`;
+    last = at;
+  }
+  return [`${d}L${x(Math.max(last, since))} ${y(Math.max(0, since - last))}L${W} ${y(now - last)}L${W} ${H}Z`, now - last];
+}
 
 export function drawStrips(root, state, now) {
   const history = state.history;
@@ -12,35 +32,36 @@ export function drawStrips(root, state, now) {
   const key = places.join(' ');
   if (key !== names || !root.childElementCount) {
     names = key;
-    root.replaceChildren(...[...places, 'battery', 'events'].flatMap((name) => [
-      h('span', {}, name), s('svg', {viewBox: `0 0 ${W} ${H}`, preserveAspectRatio: 'none', role: 'img', 'data-strip': name, 'aria-label': name}), h('span', {'data-value': name}, '')]));
+    build(root, places);
   }
+  const element = (kind, name) => root.querySelector(`[data-${kind}="${CSS.escape(name)}"]`);
   const first = Math.min(now - 60, ...history.visits.slice(0, 1).map((v) => v[0]), ...history.battery.slice(0, 1).map((b) => b[0]));
   const since = Math.max(now - HOUR, first);
-  const x = (at) => Math.round(10 * W * Math.max(0, (at - since) / (now - since))) / 10;
   const threshold = state.mission?.threshold || 120;
-  const top = threshold * 1.5;
-  const y = (idle) => Math.round(10 * (H - H * Math.min(1, Math.max(0, idle) / top))) / 10;
+  const x = (at) => Math.round(10 * W * Math.max(0, (at - since) / (now - since))) / 10;
+  const y = (idle) => Math.round(10 * (H - H * Math.min(1, Math.max(0, idle) / (threshold * 1.5)))) / 10;
   for (const place of places) {
-    const svg = root.querySelector(`[data-strip="${CSS.escape(place)}"]`);
     const visits = history.visits.filter((v) => v[1] === place).map((v) => v[0]);
     const known = state.places[place].visited;
-    if (known !== null && !visits.includes(known) && !visits.some((v) => Math.abs(v - known) < 1)) visits.push(known);
+    if (known !== null && !visits.some((v) => Math.abs(v - known) < 1)) visits.push(known);
     visits.sort((a, b) => a - b);
-    let d = `M0 ${H}`, last = visits[0] ?? since;
-    for (const at of visits) { if (at > since) { d += `L${x(Math.max(last, since))} ${y(Math.max(0, since - last))}L${x(at)} ${y(at - last)}L${x(at)} ${H}`; } last = at; }
-    d += `L${x(Math.max(last, since))} ${y(Math.max(0, since - last))}L${W} ${y(now - last)}L${W} ${H}Z`;
-    svg.replaceChildren(s('path', {class: 'fill', d}), s('path', {class: 'limit', d: `M0 ${y(threshold)}H${W}`}));
-    const idle = now - last;
-    const value = root.querySelector(`[data-value="${CSS.escape(place)}"]`);
+    const [d, idle] = sawtooth(visits, since, now, x, y);
+    element('strip', place).replaceChildren(s('path', {class: 'fill', d}), s('path', {class: 'limit', d: `M0 ${y(threshold)}H${W}`}));
+    const value = element('value', place);
     value.textContent = visits.length ? age(idle) + (idle > threshold ? ' !' : '') : '–';
     value.classList.toggle('over', idle > threshold);
   }
-  const battery = history.battery;
-  const charge = battery.map(([at, level], i) => `${i ? 'L' : 'M'}${x(at)} ${H - H * level / 100}`).join('') + (battery.length ? `H${W}` : '');
-  root.querySelector('[data-strip=battery]').replaceChildren(s('path', {class: 'charge', d: charge}));
-  root.querySelector('[data-value=battery]').textContent = state.battery ? `${Math.round(state.battery.level)} %` : '–';
-  root.querySelector('[data-strip=events]').replaceChildren(...history.marks.filter((m) => m[0] > since).map(([at, kind, text]) =>
-    s('text', {class: 'mark', x: x(at), y: 20}, SIGNS[kind] ?? '•', s('title', {}, `${kind}: ${text}`))));
-  root.querySelector('[data-value=events]').textContent = `${history.marks.length}`;
+  const level = (percent) => H - 2 - (H - 4) * percent / 100;
+  const charge = history.battery.map(([at, percent], i) => `${i ? 'L' : 'M'}${x(at)} ${level(percent)}`).join('') + (history.battery.length ? `H${W}` : '');
+  element('strip', 'battery').replaceChildren(s('path', {class: 'charge', d: charge}));
+  element('value', 'battery').textContent = state.battery ? `${Math.round(state.battery.level)} %` : '–';
+  const marks = history.marks.filter((mark) => mark[0] > since);
+  element('strip', 'events').replaceChildren(...marks.map(([at, kind, text]) => {
+    const mark = h('span', {title: `${kind}: ${text}`}, SIGNS[kind] ?? '•');
+    mark.style.left = `${100 * x(at) / W}%`;
+    return mark;
+  }));
+  element('value', 'events').textContent = String(marks.length);
+  root.querySelector('#axis-start').textContent = `${age(now - since)} ago`;
+  root.querySelector('#strip-note').textContent = `dashed: threshold ${age(threshold)} · ⚡ recharge · ✗ failure · ↻ recovery · ? help`;
 }

@@ -21,7 +21,7 @@ export class Why {
       $('reason').textContent = decision.reason;
       const rows = decision.scores.toSorted((a, b) => b[1] - a[1]).map(([name, score]) =>
         h('tr', {class: name === decision.place ? 'chosen' : null}, h('td', {}, name === decision.place ? `→ ${name}` : name), h('td', {class: 'n'}, String(score))));
-      $('scores').replaceChildren(h('caption', {class: 'hidden'}, 'Candidates'), h('thead', {}, h('tr', {}, h('th', {scope: 'col'}, 'Candidate'), h('th', {scope: 'col'}, `Score (${decision.policy})`))), h('tbody', {}, ...rows));
+      $('scores').replaceChildren(h('caption', {class: 'hidden'}, 'Candidates'), h('thead', {}, h('tr', {}, h('th', {scope: 'col'}, 'Candidate'), h('th', {scope: 'col', class: 'n'}, `Score (${decision.policy})`))), h('tbody', {}, ...rows));
     }
     const names = Object.keys(places ?? {});
     if (names.join() !== this.names) {
@@ -42,12 +42,12 @@ export class Why {
     const place = $('place').value;
     const found = await ask('facts', {place});
     if (!found.ok) { $('facts').replaceChildren(h('p', {class: 'warn'}, found.text)); return; }
-    $('facts').replaceChildren(h('h3', {}, `What is known of ${place}`), ...found.facts.map(([fact, asserted]) => asserted ? h('p', {}, `${fact} `, h('small', {}, 'asserted')) : this.derived(fact)));
+    $('facts').replaceChildren(h('h3', {}, `What is known of ${place}`), ...found.facts.map(([fact, asserted]) => asserted ? h('p', {class: 'fact'}, fact, h('small', {}, ' asserted')) : this.derived(fact)));
   }
 
   derived(fact) {
     const body = h('div');
-    const box = h('details', {'data-fact': fact}, h('summary', {}, `${fact} `, h('small', {}, 'derived: open for its proof')), body);
+    const box = h('details', {'data-fact': fact}, h('summary', {}, fact, h('small', {}, ' derived: open for its proof')), body);
     box.addEventListener('toggle', async () => {
       if (!box.open || body.childElementCount) return;
       const found = await ask('explain', {fact});

@@ -1,0 +1,302 @@
+"""What each topic tells of a mission: from its messages to the fields of a snapshot.
+
+A running mission (`mission_feed`) and a recording (`recording.conversion`) are read by the same
+table.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PoseWithCovarianceStamped
+from nav_msgs.msg import OccupancyGrid
+from nav_msgs.msg import Path as PathMessage
+from rcl_interfaces.msg import ParameterEvent
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from sensor_msgs.msg import JointState, LaserScan, PointCloud2
+from std_msgs.msg import Bool, String, UInt8
+
+from surveillance_behaviour.conversions import decision_from
+from surveillance_interfaces.action import Control, FollowPath, ScanSurroundings
+from surveillance_interfaces.msg import (
+    Decision,
+    DoorStates,
+    FsmStatus,
+    FsmStructure,
+    FsmTransition,
+    MarkerDetectionArray,
+    MissionStatus,
+)
+from surveillance_ontology.armor.facts import ShortFact, parse_fact
+from surveillance_ontology.armor_client import value_in
+from surveillance_ontology.patrol_ontology import CONNECTIONS, URGENT_PLACES, VISITS
+from surveillance_operator import conversions
+from surveillance_operator.snapshot import NO_POINTS, Pose, Snapshot
+from surveillance_runtime.conversions import seconds_of
+from surveillance_runtime.qos import STATE_QOS
+from surveillance_runtime.robot_arm import ARM
+
+TRAIL_STEP, TRAIL_POINTS = 0.05, 3000
+"""Least distance of two points of the trail, metres, and how many are kept."""
+KEPT_TRANSITIONS = 60
+SAME_MOMENT = 0.03
+"""Most seconds between the stamps of a pose and a scan that belong together."""
+STILL = 0.01
+"""Metres and radians within which robot and camera count as standing still."""
+
+POSE_TOPIC = 'amcl_pose'
+DETECTIONS_TOPIC = 'aruco_detector/detections'
+BEHAVIOUR = 'robot_behavior'
+CONTROLLERS = ('battery_controller', 'planner_controller', 'motion_controller', 'arm_controller')
+
+_QUEUE = QoSProfile(
+    depth=200, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
+)
+_STREAM = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+_MANY = QoSProfile(depth=50, reliability=ReliabilityPolicy.RELIABLE)
+
+Fields = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Topic:
+    """One topic that a snapshot takes from.
+
+    Attributes:
+        name: Relative to the namespace, or absolute.
+        kind: The type of its messages.
+        qos: How it is heard.
+        read: The snapshot's fields that a message changes; raises `ValueError` for one that cannot
+            be used.
+        stream: Whether a view may do without it.
+        beside: Taken only together with a message of this topic, and read before it.
+    """
+
+    name: str
+    kind: Any
+    qos: QoSProfile
+    read: Callable[[Any, Snapshot], Fields]
+    stream: bool = False
+    beside: str = ''
+
+
+def read_message(snapshot: Snapshot, topic: Topic, message: Any) -> Snapshot:
+    """Return the snapshot with what a message says, or why it cannot be used."""
+    try:
+        fields = topic.read(message, snapshot)
+    except (ValueError, TypeError, OverflowError) as error:
+        return replace(snapshot, silent={**snapshot.silent, topic.name: str(error)})
+    return replace(snapshot, **fields) if fields else snapshot
+
+
+def moved(pose: Pose, old: Snapshot) -> Fields:
+    """Return the fields that a new pose changes: the pose, and the trail."""
+    trail = old.trail
+    if not len(trail) or math.dist(trail[-1], pose[:2]) >= TRAIL_STEP:
+        trail = np.vstack([trail[-TRAIL_POINTS:], pose[:2]])
+    return {'pose': pose, 'trail': trail}
+
+
+def _fed_back(point: Any, old: Snapshot) -> Fields:
+    # Where somebody estimates the pose, it is known better than from the drive's feedback.
+    if old.localised and old.mode not in ('RANDOM', 'MANUAL'):
+        return {}
+    x, y = conversions.point_from(point)
+    yaw = 0.0
+    if old.pose is not None:
+        dx, dy = x - old.pose[0], y - old.pose[1]
+        yaw = math.atan2(dy, dx) if dx or dy else old.pose[2]
+    return moved((x, y, yaw), old)
+
+
+def _on_transition(message: FsmTransition, old: Snapshot) -> Fields:
+    transition = conversions.transition_from(message)
+    return {'transitions': (*old.transitions, transition)[-KEPT_TRANSITIONS:]}
+
+
+def _on_pose(message: PoseWithCovarianceStamped, old: Snapshot) -> Fields:
+    at = seconds_of(message.header.stamp)
+    fields = moved(conversions.pose_from(message.pose.pose), old)
+    return {**fields, **_seen(fields['pose'], at, old.lidar), 'localised': True, 'pose_time': at}
+
+
+def _on_scan(message: LaserScan, old: Snapshot) -> Fields:
+    lidar = seconds_of(message.header.stamp), conversions.scan_from(message)
+    return {'lidar': lidar, **_seen(old.pose, old.pose_time, lidar)}
+
+
+def _seen(pose: Pose | None, at: float, lidar: tuple[float, Any] | None) -> Fields:
+    """Return what the lidar sees in the map's frame, where pose and scan are of one moment.
+
+    The lidar is taken to sit in the robot's middle.
+    """
+    if pose is None or lidar is None or abs(lidar[0] - at) > SAME_MOMENT:
+        return {}
+    x, y, yaw = pose
+    turn = np.array([[math.cos(yaw), math.sin(yaw)], [-math.sin(yaw), math.cos(yaw)]])
+    return {'scan': lidar[1] @ turn + (x, y)}
+
+
+def _on_joints(message: JointState, _old: Snapshot) -> Fields:
+    positions = conversions.joints_from(message)
+    if not set(ARM.names) <= positions.keys():
+        return {}
+    return {'camera': ARM.camera_frame([positions[name] for name in ARM.names])}
+
+
+def _on_detections(message: MarkerDetectionArray, old: Snapshot) -> Fields:
+    """Take in the markers of an image, also on the map where the camera has stood still."""
+    fields: Fields = {'detections': conversions.detections_from(message)}
+    if old.pose is None or old.camera is None:
+        return fields
+    viewpoint = np.concatenate([old.pose, old.camera.ravel()])
+    fields['viewpoint'] = viewpoint
+    if old.viewpoint is None or not np.allclose(viewpoint, old.viewpoint, atol=STILL):
+        return fields
+    x, y, yaw = old.pose
+    placed = dict(old.markers)
+    for number, point in conversions.confirmed_from(message).items():
+        ahead, left, _ = old.camera[:3, :3] @ point + old.camera[:3, 3]
+        placed[number] = (
+            round(x + ahead * math.cos(yaw) - left * math.sin(yaw), 2),
+            round(y + ahead * math.sin(yaw) + left * math.cos(yaw), 2),
+        )
+    return {**fields, 'markers': placed} if placed != old.markers else fields
+
+
+def _on_parameters(message: ParameterEvent, _old: Snapshot) -> Fields:
+    if message.node.rsplit('/', 1)[-1] != BEHAVIOUR:
+        return {}
+    changed = (*message.new_parameters, *message.changed_parameters)
+    return behaviour_fields({each.name: each.value for each in changed})
+
+
+def behaviour_fields(values: dict[str, Any]) -> Fields:
+    """Return the fields that parameters of the behaviour change."""
+    fields: Fields = {}
+    threshold = values.get('urgency_threshold')
+    if threshold is not None and threshold.type in (2, 3):
+        seconds = threshold.integer_value if threshold.type == 2 else threshold.double_value
+        fields['threshold'] = float(seconds)
+    if (policy := values.get('policy')) is not None and policy.type == 4:
+        fields['policy'] = policy.string_value
+    return fields
+
+
+def with_fact(snapshot: Snapshot, fact: ShortFact, came: bool) -> Snapshot:
+    """Return the snapshot after a fact of the ontology came or went; most facts change nothing."""
+    if _URGENT.matches(fact):
+        place = frozenset(fact.arguments)
+        return replace(
+            snapshot, urgent=snapshot.urgent | place if came else snapshot.urgent - place
+        )
+    if _CONNECTED.matches(fact):
+        pair = frozenset({(fact.arguments[0], fact.arguments[1])})
+        return replace(snapshot, links=snapshot.links | pair if came else snapshot.links - pair)
+    if _VISITED.matches(fact):
+        name, seconds = fact.arguments[0], float(value_in(fact.arguments[1]))
+        if came:
+            return replace(snapshot, visited_at={**snapshot.visited_at, name: seconds})
+        if snapshot.visited_at.get(name) == seconds:
+            return replace(snapshot, visited_at=without(snapshot.visited_at, name))
+    return snapshot
+
+
+_URGENT, _CONNECTED, _VISITED = map(parse_fact, (URGENT_PLACES, CONNECTIONS, VISITS))
+
+
+def without(values: Mapping[str, Any], name: str) -> dict[str, Any]:
+    """Return a mapping without one name."""
+    return {key: value for key, value in values.items() if key != name}
+
+
+def _on_request(controller: str) -> Callable[[String, Snapshot], Fields]:
+    return lambda message, old: {'requests': {**old.requests, controller: message.data}}
+
+
+TOPICS: tuple[Topic, ...] = (
+    Topic(
+        'mission_status',
+        MissionStatus,
+        STATE_QOS,
+        lambda m, _: {'status': conversions.status_from(m)},
+    ),
+    Topic(
+        'decision',
+        Decision,
+        STATE_QOS,
+        lambda m, _: {'decision': decision_from(m), 'number': m.sequence},
+    ),
+    Topic(
+        'battery_level',
+        UInt8,
+        STATE_QOS,
+        lambda m, _: {'battery': conversions.percent_from(m.data)},
+    ),
+    Topic('state/battery_low', Bool, STATE_QOS, lambda m, _: {'battery_low': m.data}),
+    Topic(
+        'map',
+        OccupancyGrid,
+        STATE_QOS,
+        lambda m, _: {'grid': conversions.grid_from(m), 'trail': NO_POINTS},
+    ),
+    Topic('door_states', DoorStates, STATE_QOS, lambda m, _: {'doors': conversions.doors_from(m)}),
+    Topic(
+        'obstacles', PointCloud2, STATE_QOS, lambda m, _: {'obstacles': conversions.cloud_from(m)}
+    ),
+    Topic(POSE_TOPIC, PoseWithCovarianceStamped, STATE_QOS, _on_pose),
+    Topic('plan', PathMessage, STATE_QOS, lambda m, _: {'plan': conversions.path_from(m)}),
+    Topic('scan', LaserScan, _STREAM, _on_scan, stream=True, beside=POSE_TOPIC),
+    Topic(
+        'follow_path/_action/feedback',
+        FollowPath.Impl.FeedbackMessage,
+        QoSProfile(depth=1),
+        lambda m, old: _fed_back(m.feedback.position, old),
+    ),
+    Topic(
+        'motion/controller/_action/feedback',
+        Control.Impl.FeedbackMessage,
+        QoSProfile(depth=1),
+        lambda m, old: _fed_back(m.feedback.reached_point, old),
+    ),
+    Topic(
+        'scan_surroundings/_action/feedback',
+        ScanSurroundings.Impl.FeedbackMessage,
+        QoSProfile(depth=1),
+        lambda m, _: {'scan_progress': (m.feedback.view, m.feedback.views)},
+    ),
+    Topic(
+        DETECTIONS_TOPIC,
+        MarkerDetectionArray,
+        QoSProfile(depth=1),
+        _on_detections,
+    ),
+    Topic('joint_states', JointState, _STREAM, _on_joints, beside=DETECTIONS_TOPIC),
+    Topic(
+        f'{BEHAVIOUR}/fsm/structure',
+        FsmStructure,
+        STATE_QOS,
+        lambda m, _: {'containers': conversions.containers_from(m)},
+    ),
+    Topic(
+        f'{BEHAVIOUR}/fsm/status',
+        FsmStatus,
+        STATE_QOS,
+        lambda m, _: {'active': tuple(m.active), 'paused': m.paused},
+    ),
+    Topic(f'{BEHAVIOUR}/fsm/transition', FsmTransition, _QUEUE, _on_transition),
+    *(Topic(f'{name}/announcement', String, STATE_QOS, _on_request(name)) for name in CONTROLLERS),
+    Topic(
+        '/diagnostics',
+        DiagnosticArray,
+        _MANY,
+        lambda m, old: {'health': {**old.health, **conversions.health_from(m)}},
+    ),
+    Topic('/parameter_events', ParameterEvent, _MANY, _on_parameters),
+)
+"""All that a snapshot takes from, with how."""
