@@ -39,6 +39,8 @@ from surveillance_runtime.conversions import points_from_cloud, seconds_of
 MOST_CELLS = 16_000_000
 MOST_POINTS = 20_000
 MOST_NAMES = 10_000
+STANDING = 0.01
+"""A joint that is slower stands still, rad/s."""
 MOST_BEAMS = 180
 """Of a scan with more beams every n-th is shown."""
 
@@ -215,8 +217,8 @@ def confirmed_from(message: MarkerDetectionArray) -> dict[int, NDArray[np.float6
     return found
 
 
-def joints_from(message: JointState) -> dict[str, float]:
-    """Return the positions of joints by name, rad.
+def joints_from(message: JointState) -> tuple[dict[str, float], bool]:
+    """Return the positions of joints by name, rad, and whether all stand still.
 
     Raises:
         ValueError: There are not as many positions as names, or one is not finite.
@@ -225,7 +227,8 @@ def joints_from(message: JointState) -> dict[str, float]:
         raise ValueError(f'{len(message.position)} positions came for {len(message.name)} joints')
     if not all(map(math.isfinite, message.position)):
         raise ValueError('joints whose positions are not finite')
-    return dict(zip(message.name, message.position, strict=True))
+    still = all(abs(speed) < STANDING for speed in message.velocity)
+    return dict(zip(message.name, message.position, strict=True)), still
 
 
 def health_from(message: DiagnosticArray) -> dict[str, Health]:

@@ -39,13 +39,12 @@ from surveillance_operator.topics import (
     with_fact,
     without,
 )
+from surveillance_runtime.diagnostics import STALE_AFTER
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 
 LOOK_PERIOD = 0.5
 """Seconds of steady time between two looks at which nodes there are."""
-SILENT_AFTER = 5.0
-"""A node whose last report is older than this counts as silent, seconds of steady time."""
 TIMEOUT = 2.0
 """Deadline of each question, seconds of steady time; then it is asked again."""
 
@@ -201,7 +200,7 @@ class MissionFeed:
         silent = {
             name: replace(each, level=3, message=f'silent, last: {each.message}')
             for name, each in self._snapshot.health.items()
-            if each.level != 3 and now - each.heard > SILENT_AFTER
+            if each.level != 3 and now - each.heard > STALE_AFTER
         }
         if silent:
             self.update(lambda old: replace(old, health={**old.health, **silent}))

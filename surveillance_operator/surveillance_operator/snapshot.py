@@ -209,8 +209,9 @@ class Snapshot:
         transitions: The latest transitions.
         detections: The markers of the latest image.
         markers: Where confirmed markers stand by their ids, metres.
-        camera: The transform (4, 4) from the camera's optical frame to the robot.
-        viewpoint: From where the latest image was taken: pose and camera as one vector.
+        camera: While the arm stands still: its stamp, and the transform (4, 4) from the camera's
+            optical frame to the robot.
+        stands: Whether the robot stood still between its last two poses.
         scan_progress: View and number of views of the arm's scan.
         requests: What each controller in MANUAL mode announced last.
         health: What the nodes report, by name.
@@ -255,8 +256,8 @@ class Snapshot:
     transitions: tuple[Transition, ...] = ()
     detections: tuple[Detection, ...] = ()
     markers: Mapping[int, tuple[float, float]] = field(default_factory=dict)
-    camera: NDArray[np.float64] | None = None
-    viewpoint: NDArray[np.float64] | None = None
+    camera: tuple[float, NDArray[np.float64]] | None = None
+    stands: bool = False
     scan_progress: tuple[int, int] | None = None
     requests: Mapping[str, str] = field(default_factory=dict)
     health: Mapping[str, Health] = field(default_factory=dict)

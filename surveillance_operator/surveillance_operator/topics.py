@@ -46,8 +46,10 @@ TRAIL_STEP, TRAIL_POINTS = 0.05, 3000
 KEPT_TRANSITIONS = 60
 SAME_MOMENT = 0.03
 """Most seconds between the stamps of a pose and a scan that belong together."""
+SAME_VIEW = 0.3
+"""Most seconds between the stamps of an image and of the arm's joints, which stand still."""
 STILL = 0.01
-"""Metres and radians within which robot and camera count as standing still."""
+"""Metres and radians within which the robot counts as standing still between two poses."""
 
 POSE_TOPIC = 'amcl_pose'
 DETECTIONS_TOPIC = 'aruco_detector/detections'
@@ -121,8 +123,14 @@ def _on_transition(message: FsmTransition, old: Snapshot) -> Fields:
 
 def _on_pose(message: PoseWithCovarianceStamped, old: Snapshot) -> Fields:
     at = seconds_of(message.header.stamp)
-    fields = moved(conversions.pose_from(message.pose.pose), old)
-    return {**fields, **_seen(fields['pose'], at, old.lidar), 'localised': True, 'pose_time': at}
+    pose = conversions.pose_from(message.pose.pose)
+    return {
+        **moved(pose, old),
+        **_seen(pose, at, old.lidar),
+        'localised': True,
+        'pose_time': at,
+        'stands': old.pose is not None and np.allclose(pose, old.pose, atol=STILL),
+    }
 
 
 def _on_scan(message: LaserScan, old: Snapshot) -> Fields:
@@ -143,25 +151,25 @@ def _seen(pose: Pose | None, at: float, lidar: tuple[float, Any] | None) -> Fiel
 
 
 def _on_joints(message: JointState, _old: Snapshot) -> Fields:
-    positions = conversions.joints_from(message)
-    if not set(ARM.names) <= positions.keys():
-        return {}
-    return {'camera': ARM.camera_frame([positions[name] for name in ARM.names])}
+    positions, still = conversions.joints_from(message)
+    if not still or not set(ARM.names) <= positions.keys():
+        return {'camera': None}
+    frame = ARM.camera_frame([positions[name] for name in ARM.names])
+    return {'camera': (seconds_of(message.header.stamp), frame)}
 
 
 def _on_detections(message: MarkerDetectionArray, old: Snapshot) -> Fields:
-    """Take in the markers of an image, also on the map where the camera has stood still."""
+    """Take in the markers of an image, also on the map where robot and camera stood still."""
     fields: Fields = {'detections': conversions.detections_from(message)}
-    if old.pose is None or old.camera is None:
+    if old.pose is None or old.camera is None or not old.stands:
         return fields
-    viewpoint = np.concatenate([old.pose, old.camera.ravel()])
-    fields['viewpoint'] = viewpoint
-    if old.viewpoint is None or not np.allclose(viewpoint, old.viewpoint, atol=STILL):
+    at, frame = old.camera
+    if abs(at - seconds_of(message.header.stamp)) > SAME_VIEW:
         return fields
     x, y, yaw = old.pose
     placed = dict(old.markers)
     for number, point in conversions.confirmed_from(message).items():
-        ahead, left, _ = old.camera[:3, :3] @ point + old.camera[:3, 3]
+        ahead, left, _ = frame[:3, :3] @ point + frame[:3, 3]
         placed[number] = (
             round(x + ahead * math.cos(yaw) - left * math.sin(yaw), 2),
             round(y + ahead * math.sin(yaw) + left * math.cos(yaw), 2),

@@ -14,8 +14,8 @@ from std_msgs.msg import UInt8
 
 from surveillance_interfaces.msg import Decision
 from surveillance_operator import conversions
-from surveillance_operator.topics import TOPICS, read_message
 from surveillance_operator.snapshot import Snapshot
+from surveillance_operator.topics import TOPICS, read_message
 
 TOPIC = {topic.name: topic for topic in TOPICS}
 

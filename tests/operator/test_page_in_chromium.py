@@ -3,87 +3,20 @@
 from __future__ import annotations
 
 import os
-import shutil
 import signal
 import socket
-import subprocess
-from collections.abc import Callable, Iterator
-from pathlib import Path
-from typing import Any
+from collections.abc import Iterator
+from importlib.resources import files
 
 import pytest
 
 from tests.launcher.conftest import ROOT, Started
+from tests.operator.browser import CHROMIUM, DESK, DRIVER, MISSING, PHONE, Viewer
 
-CHROMIUM = shutil.which('chromium') or shutil.which('chromium-browser')
-DRIVER = shutil.which('chromedriver')
 pytestmark = [
-    pytest.mark.skipif(
-        not (CHROMIUM and DRIVER),
-        reason='no Chromium: apt-get install chromium chromium-driver',
-    ),
+    pytest.mark.skipif(not (CHROMIUM and DRIVER), reason=MISSING),
     pytest.mark.timeout(180),
 ]
-AXE = 'axe-core@4.10.3'
-PHONE, DESK = (390, 844), (1400, 1000)
-PICTURES = os.environ.get('PAGE_PICTURES')
-"""A folder for screenshots: set it to draw those of the documentation anew."""
-
-
-class Viewer:
-    """A browser on the page."""
-
-    def __init__(self, address: str) -> None:
-        from selenium import webdriver
-        from selenium.webdriver.chrome.service import Service
-
-        options = webdriver.ChromeOptions()
-        options.binary_location = str(CHROMIUM)
-        for argument in ('headless=new', 'no-sandbox', 'disable-gpu', 'disable-dev-shm-usage'):
-            options.add_argument(f'--{argument}')
-        options.set_capability('goog:loggingPrefs', {'browser': 'ALL'})
-        self.driver: Any = webdriver.Chrome(options=options, service=Service(DRIVER))
-        self.size(*DESK)
-        self.address = address
-        self.driver.get(address)
-
-    def size(self, width: int, height: int, *, dark: bool = False) -> None:
-        self.driver.execute_cdp_cmd(
-            'Emulation.setDeviceMetricsOverride',
-            {'width': width, 'height': height, 'deviceScaleFactor': 1, 'mobile': width < 500},
-        )
-        scheme = {'name': 'prefers-color-scheme', 'value': 'dark' if dark else 'light'}
-        self.driver.execute_cdp_cmd('Emulation.setEmulatedMedia', {'features': [scheme]})
-
-    def js(self, script: str, *values: Any) -> Any:
-        return self.driver.execute_script(script, *values)
-
-    def text(self, selector: str) -> str:
-        return str(self.js('return document.querySelector(arguments[0])?.textContent', selector))
-
-    def count(self, selector: str) -> int:
-        return int(self.js('return document.querySelectorAll(arguments[0]).length', selector))
-
-    def attribute(self, selector: str, name: str) -> str:
-        query = 'return document.querySelector(arguments[0])?.getAttribute(arguments[1])'
-        return str(self.js(query, selector, name) or '')
-
-    def until(self, what: Callable[[], Any], seconds: float = 30.0) -> Any:
-        from selenium.webdriver.support.wait import WebDriverWait
-
-        return WebDriverWait(self.driver, seconds, 0.1).until(lambda _: what())
-
-    def click(self, selector: str) -> None:
-        self.js('document.querySelector(arguments[0]).click()', selector)
-
-    def changes(self, look: Callable[[], Any], seconds: float = 30.0) -> None:
-        before = look()
-        self.until(lambda: look() != before, seconds)
-
-    def picture(self, name: str) -> None:
-        if PICTURES:
-            self.js('scrollTo(0, 0)')
-            self.driver.save_screenshot(str(Path(PICTURES) / name))
 
 
 @pytest.fixture(scope='module')
@@ -106,7 +39,7 @@ def viewer(mission: Started) -> Iterator[Viewer]:
     viewer = Viewer(address)
     viewer.until(lambda: viewer.count('[data-place]') == 7, 60)
     yield viewer
-    viewer.driver.quit()
+    viewer.close()
 
 
 def done(viewer: Viewer, words: str) -> None:
@@ -233,7 +166,7 @@ def test_without_the_token_nobody_can_act(viewer: Viewer) -> None:
         """
         assert other.driver.execute_async_script(script) == 403
     finally:
-        other.driver.quit()
+        other.close()
 
 
 @pytest.mark.parametrize('size', [PHONE, DESK], ids=['phone', 'desk'])
@@ -242,7 +175,6 @@ def test_axe_finds_nothing(
     viewer: Viewer, size: tuple[int, int], dark: bool, axe_script: str
 ) -> None:
     viewer.size(*size, dark=dark)
-    viewer.picture(f'page_{"phone" if size == PHONE else "desk"}{"_dark" if dark else ""}.png')
     assert viewer.js('return document.documentElement.scrollWidth') <= size[0]
     viewer.js(axe_script)
     found = viewer.driver.execute_async_script(
@@ -270,20 +202,7 @@ def test_the_browser_has_nothing_to_complain_about(viewer: Viewer) -> None:
 
 
 @pytest.fixture(scope='module')
-def axe_script(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """The accessibility checker, fetched by npm: it is larger than this project's page."""
-    npm = shutil.which('npm')
-    if npm is None:
-        pytest.skip('no npm to fetch axe-core: apt-get install npm')
-    folder = tmp_path_factory.mktemp('axe')
-    try:
-        done = subprocess.run(
-            [npm, 'pack', AXE], cwd=folder, capture_output=True, timeout=60, check=False
-        )
-    except subprocess.TimeoutExpired:
-        pytest.skip(f'npm could not fetch {AXE} within 60 s')
-    archives = list(folder.glob('*.tgz'))
-    if done.returncode or not archives:
-        pytest.skip(f'npm could not fetch {AXE}')
-    shutil.unpack_archive(archives[0], folder, 'gztar')
-    return (folder / 'package/axe.min.js').read_text(encoding='utf-8')
+def axe_script() -> str:
+    """The accessibility checker, which a Python package brings along."""
+    script = files('axe_core_python') / 'axe.min.js'
+    return script.read_text(encoding='utf-8')

@@ -15,8 +15,10 @@ from sensor_msgs.msg import Image as ImageMessage
 from surveillance_operator.polled_subscription import PolledSubscription
 from surveillance_runtime.node import PatrolNode
 
-TOPICS = ('aruco_detector/annotated', 'camera/rgb/image_raw')
-"""The first that has a publisher is shown: with the markers drawn in, where a detector runs."""
+ANNOTATED, RAW = 'aruco_detector/annotated', 'camera/rgb/image_raw'
+"""The image with the markers drawn in, which a detector publishes while it looks; the plain one."""
+PATIENCE = 4.0
+"""The plain image is heard when none with markers came for this time, seconds."""
 IDLE_SECONDS = 5.0
 """After this time without a question nobody listens to the camera any more."""
 MOST_PIXELS = 20_000_000
@@ -33,36 +35,47 @@ class Camera:
     def __init__(self, node: PatrolNode) -> None:
         self._node = node
         self._lock = threading.Lock()
-        self._subscription: PolledSubscription | None = None
-        self._asked = 0.0
+        self._subscriptions: dict[str, PolledSubscription] = {}
+        self._asked = self._annotated_at = 0.0
         self._jpeg: bytes | None = None
 
     def jpeg(self) -> bytes | None:
         """Return the newest image; None where nothing came yet."""
         with self._lock:
-            self._asked = time.monotonic()
-            if self._subscription is None:
-                self._listen()
-            newest = None
-            while self._subscription and (taken := self._subscription.take()) is not None:
-                newest = taken[0]
+            now = time.monotonic()
+            if not self._subscriptions:
+                self._annotated_at = now if self._node.count_publishers(ANNOTATED) else 0.0
+            self._asked = now
+            newest = self._newest(ANNOTATED)
+            if newest is not None:
+                self._annotated_at = now
+                self._leave(RAW)
+            elif now - self._annotated_at > PATIENCE:
+                newest = self._newest(RAW)
             if newest is not None:
                 self._jpeg = jpeg_of(newest)
             return self._jpeg
 
     def rest(self) -> None:
-        """Leave the topic when nobody has asked for a while; call it now and then."""
+        """Leave the topics when nobody has asked for a while; call it now and then."""
         with self._lock:
-            if self._subscription and time.monotonic() - self._asked > IDLE_SECONDS:
-                self._subscription.destroy()
-                self._subscription = self._jpeg = None
+            if time.monotonic() - self._asked > IDLE_SECONDS:
+                self._leave(ANNOTATED)
+                self._leave(RAW)
+                self._jpeg = None
 
-    def _listen(self) -> None:
-        for topic in TOPICS:
-            if self._node.count_publishers(topic):
-                qos = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-                self._subscription = PolledSubscription(self._node, ImageMessage, topic, qos)
-                return
+    def _newest(self, topic: str) -> ImageMessage | None:
+        if topic not in self._subscriptions:
+            qos = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+            self._subscriptions[topic] = PolledSubscription(self._node, ImageMessage, topic, qos)
+        newest = None
+        while (taken := self._subscriptions[topic].take()) is not None:
+            newest = taken[0]
+        return newest
+
+    def _leave(self, topic: str) -> None:
+        if (subscription := self._subscriptions.pop(topic, None)) is not None:
+            subscription.destroy()
 
 
 def jpeg_of(message: Any) -> bytes | None:

@@ -11,22 +11,22 @@ function words({up, reports}) {
   return {text: worst.level ? `${LEVELS[worst.level] ?? '?'} ${text}` : text, bad: worst.level > 0};
 }
 
+function row(name, node, own) {
+  const {text, bad} = words(node);
+  const again = Math.max(node.restarts ?? 0, Number(own.restarts) || 0);
+  const sign = node.up ? (bad ? '▲' : '●') : '✗';
+  return h('tr', {class: node.up ? 'up' : 'down'},
+    h('th', {scope: 'row'}, h('b', {class: bad ? 'warn' : 'ok'}, `${sign} `), name),
+    h('td', {class: bad ? 'warn' : null}, text),
+    h('td', {class: 'n'}, own.memory_mb ?? '–'),
+    h('td', {class: again ? 'n warn' : 'n'}, String(again)));
+}
+
 export function showHealth({health, figures}) {
-  const rows = Object.entries(health?.nodes ?? {}).map(([name, node]) => {
-    const {text, bad} = words(node);
-    const own = figures?.[name] ?? {};
-    const again = Math.max(node.restarts, Number(own.restarts) || 0);
-    const sign = node.up ? (bad ? '▲' : '●') : '✗';
-    return h('tr', {class: node.up ? 'up' : 'down'},
-      h('th', {scope: 'row'}, h('b', {class: bad ? 'warn' : 'ok'}, `${sign} `), name),
-      h('td', {class: bad ? 'warn' : null}, text),
-      h('td', {class: 'n'}, own.memory_mb ?? '–'),
-      h('td', {class: again ? 'n warn' : 'n'}, String(again)));
-  });
+  const others = Object.entries(health?.others ?? {}).map(([name, report]) => [name, {up: true, reports: [report]}]);
+  const rows = [...Object.entries(health?.nodes ?? {}), ...others].map(([name, node]) => row(name, node, figures?.[name] ?? {}));
   $('nodes').tBodies[0].replaceChildren(...rows);
-  const others = Object.entries(health?.others ?? {}).map(([name, report]) =>
-    h('li', {class: report.level ? 'warn' : null}, `${LEVELS[report.level] ?? '?'} ${name}: ${report.message}`));
   const silent = Object.entries(health?.silent ?? {}).map(([topic, reason]) => h('li', {}, `${topic}: ${reason}`));
-  $('reports').replaceChildren(...others, ...silent);
-  $('reports').hidden = !others.length && !silent.length;
+  $('reports').replaceChildren(...silent);
+  $('reports').hidden = !silent.length;
 }

@@ -36,7 +36,7 @@ function layout(container, all, depth) {
     y += height + GAP;
     group.append(part);
   }
-  for (const part of group.children) if (part.classList.contains('leaf')) part.firstChild.setAttribute('width', width);
+  for (const part of group.children) part.firstChild.setAttribute('width', width);
   const right = PAD + width;
   let lanes = 0;
   for (const [from, outcome, to] of container.edges) {

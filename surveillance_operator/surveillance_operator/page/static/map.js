@@ -40,7 +40,7 @@ export class MapView {
     if (came('trail', 'pose')) this.driven.setAttribute('d', line(state.trail ?? []));
     if (came('scan')) this.lidar.setAttribute('d', (state.scan ?? []).map(([x, y]) => `M${x} ${-y}h0`).join(''));
     if (came('obstacles')) this.drawObstacles(state.obstacles);
-    if (came('markers')) this.drawMarkers(state.markers?.at);
+    if (came('markers', 'grid')) this.drawMarkers(state.markers?.at);
     if (came('others')) this.drawOthers(state.others);
     if (came('pose') || (came('status') && !state.pose)) this.drawRobot(state);
   }
@@ -61,6 +61,7 @@ export class MapView {
     if (!box) return;
     const [left, bottom, right, top] = box;
     this.width = right - left;
+    this.top = top;
     this.svg.setAttribute('viewBox', `${left - .3} ${-top - .3} ${right - left + .6} ${top - bottom + .6}`);
   }
 
@@ -89,7 +90,7 @@ export class MapView {
   drawMarkers(at) {
     this.layers.markers.replaceChildren(...Object.entries(at ?? {}).flatMap(([id, [x, y]]) => [
       s('rect', {class: 'tag', x: x - .17, y: -y - .17, width: .34, height: .34, 'data-marker': id}, s('title', {}, `marker ${id}`)),
-      s('text', {class: 'tag', x, y: -y - .3}, id)]));
+      s('text', {class: 'tag', x, y: y > this.top - .7 ? -y + .65 : -y - .3}, id)]));
   }
 
   drawOthers(others) {

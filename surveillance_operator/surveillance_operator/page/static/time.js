@@ -48,7 +48,7 @@ export function drawStrips(root, state, now) {
     const [d, idle] = sawtooth(visits, since, now, x, y);
     element('strip', place).replaceChildren(s('path', {class: 'fill', d}), s('path', {class: 'limit', d: `M0 ${y(threshold)}H${W}`}));
     const value = element('value', place);
-    value.textContent = visits.length ? age(idle) + (idle > threshold ? ' !' : '') : '–';
+    value.textContent = (visits.length ? age(idle) : 'never') + (idle > threshold ? ' !' : '');
     value.classList.toggle('over', idle > threshold);
   }
   const level = (percent) => H - 2 - (H - 4) * percent / 100;
