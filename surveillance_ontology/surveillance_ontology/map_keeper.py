@@ -14,6 +14,10 @@ from surveillance_ontology.patrol_ontology import NEVER, PatrolOntology
 from surveillance_runtime.place import Place, PlaceError
 
 
+MOST_REPLACED = 10
+"""Servers in a row that may lose the ontology while the map is entered, before that is an error."""
+
+
 @dataclass(frozen=True)
 class Reports:
     """Where a `MapKeeper` says what happened; each is called with one line.
@@ -87,7 +91,7 @@ class MapKeeper:
 
     def ensure_built(self) -> None:
         """Build the map unless the server has it; goes on until it is done or the node stops."""
-        told = False
+        told, replaced = False, 0
         while self.place is not None and not self._stopping():
             try:
                 if self.is_built and self._ontology.is_loaded():
@@ -100,8 +104,12 @@ class MapKeeper:
                     self._reports.warn(f'waiting for the armor server: {error}')
                     told = True
             except ArmorServiceInternalError as error:
-                self._reports.failed(f'cannot build the map: {error}')
-                return
+                replaced += 1
+                if not _has_gone(error) or replaced >= MOST_REPLACED:
+                    self._reports.failed(f'cannot build the map: {error}')
+                    return
+                # It was loaded, so this is another server, or somebody dropped it.
+                self._reports.warn(f'the map is built anew: {error}')
             else:
                 self.is_built = True
                 rooms, doors = len(self.place.rooms), len(self.place.doors)
@@ -201,3 +209,7 @@ class MapKeeper:
         if name in self._ontology.robot_places():
             raise PlaceError(('map', name), 'the robot is in it, it cannot be removed')
         return left
+
+
+def _has_gone(error: ArmorServiceInternalError) -> bool:
+    return 'unknown reference' in str(error)

@@ -143,26 +143,54 @@ class Flaky(InProcessTransport):
             raise ArmorServiceCallError('no server')
 
 
+class Replaced(InProcessTransport):
+    """A transport whose server is killed and started anew behind each LOAD, so many times."""
+
+    def __init__(self, times: int) -> None:
+        super().__init__(ArmorService(warn=lambda _: None))
+        self.times = times
+
+    def call(self, request: DirectiveRequest) -> DirectiveResponse:
+        answer = super().call(request)
+        if request.command == 'LOAD' and self.times > 0:
+            self.times -= 1
+            super().__init__(ArmorService(warn=lambda _: None))
+        return answer
+
+
+def keeper_of(
+    ontology: PatrolOntology, path: str, built: list[int]
+) -> tuple[MapKeeper, dict[str, list[str]]]:
+    """A keeper of the seven rooms, and what it says."""
+    said: dict[str, list[str]] = {'info': [], 'warn': [], 'refused': [], 'failed': []}
+    reports = Reports(**{kind: lines.append for kind, lines in said.items()})
+    source = Source(path, IRI)
+    return MapKeeper(
+        ontology, source, seven(), lambda: 100, lambda: False, reports, lambda: built.append(1)
+    ), said
+
+
+def test_a_server_that_is_replaced_behind_the_load_is_loaded_again() -> None:
+    client = ArmorClient('test', 'map', Replaced(2))
+    built: list[int] = []
+    keeper, said = keeper_of(PatrolOntology(client), ONTOLOGY, built)
+    keeper.ensure_built()
+    assert (keeper.is_built, built, said['failed']) == (True, [1], [])
+    assert len(said['warn']) == 2
+    assert "unknown reference 'map'" in said['warn'][0]
+    never_keeps = PatrolOntology(ArmorClient('test', 'map', Replaced(1000)))
+    keeper, said = keeper_of(never_keeps, ONTOLOGY, built)
+    keeper.ensure_built()
+    assert 'unknown reference' in said['failed'][0], 'it ends'
+
+
 def test_the_keeper_goes_on_until_the_server_is_there(tmp_path: Path) -> None:
     service = ArmorService(warn=lambda _: None)
     transport = Flaky(service, away=3)
     client = ArmorClient('test', 'map', transport)
     ontology = PatrolOntology(client)
-    said: dict[str, list[str]] = {'info': [], 'warn': [], 'refused': [], 'failed': []}
     built: list[int] = []
-
-    def keeper(path: str) -> MapKeeper:
-        return MapKeeper(
-            ontology,
-            Source(path, IRI),
-            seven(),
-            lambda: 100,
-            lambda: False,
-            Reports(**{kind: lines.append for kind, lines in said.items()}),
-            lambda: built.append(1),
-        )
-
-    kept = keeper(ONTOLOGY)
+    kept, said = keeper_of(ontology, ONTOLOGY, built)
     kept.ensure_built()
     assert (kept.is_built, built, len(said['warn'])) == (True, [1], 1)
     kept.ensure_built()
@@ -183,6 +211,7 @@ def test_the_keeper_goes_on_until_the_server_is_there(tmp_path: Path) -> None:
     kept.extend([RoomNote('R9', (0, 0, 0), (('R9', 'D9'),))], '')
     assert 'connected to itself' in said['refused'][0]
     client.utils.drop_ref()
-    keeper(str(tmp_path / 'none.owl')).ensure_built()
+    missing, said = keeper_of(ontology, str(tmp_path / 'none.owl'), built)
+    missing.ensure_built()
     assert said['failed'][0].startswith('cannot build the map: path ')
     service.close()
