@@ -13,7 +13,6 @@ from surveillance_ontology.map_building import RoomNote, extended
 from surveillance_ontology.patrol_ontology import NEVER, PatrolOntology
 from surveillance_runtime.place import Place, PlaceError
 
-
 MOST_REPLACED = 10
 """Servers in a row that may lose the ontology while the map is entered, before that is an error."""
 
