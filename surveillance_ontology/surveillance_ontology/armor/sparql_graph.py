@@ -11,7 +11,6 @@ from collections import deque
 from dataclasses import dataclass, field
 
 from surveillance_ontology.armor.reference import Reference
-from surveillance_ontology.documents.writing import ontology_bytes
 from surveillance_ontology.knowledge_base import Changes, KnowledgeBase
 from surveillance_ontology.owl.axioms import (
     Axiom,
@@ -72,6 +71,8 @@ class GraphUpdate:
         return removed, self._written(self.added)
 
     def _written(self, axioms: list[Axiom]) -> bytes:
+        from surveillance_ontology.documents.writing import ontology_bytes
+
         return ontology_bytes(axioms, self.iri, 'ntriples') if axioms else b''
 
 

@@ -16,7 +16,6 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from typing import Any
 
-from surveillance_ontology.documents.writing import ontology_bytes
 from surveillance_ontology.knowledge_base import Changes, Fact, KnowledgeBase
 from surveillance_ontology.owl.axioms import (
     Axiom,
@@ -225,6 +224,8 @@ def infer(kind: str, iri: str, axioms: Iterable[Axiom]) -> frozenset[Axiom] | No
     if why := absent():
         raise JavaReasonerError(f'{kind}: {why}')
     import owlready2
+
+    from surveillance_ontology.documents.writing import ontology_bytes
 
     document = ontology_bytes(axioms, iri, 'ntriples')
     world = owlready2.World()

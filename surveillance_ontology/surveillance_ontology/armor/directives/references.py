@@ -6,8 +6,6 @@ import contextlib
 import ctypes
 import gc
 import threading
-import urllib.error
-import urllib.request
 from collections.abc import Iterator
 from typing import Any
 
@@ -35,7 +33,6 @@ from surveillance_ontology.armor.reference import (
 from surveillance_ontology.armor.rendering import parse_entity, shown
 from surveillance_ontology.armor.session import Session
 from surveillance_ontology.documents.reading import OntologyFileError, read_ontology
-from surveillance_ontology.documents.writing import OntologyWriteError, write_ontology
 from surveillance_ontology.knowledge_base import KnowledgeBase
 from surveillance_ontology.owl.axioms import Axiom
 from surveillance_ontology.reasoner.java_reasoning import JavaKnowledgeBase, JavaReasonerError
@@ -237,6 +234,9 @@ def _write(
         if inferences:
             axioms = list(dict.fromkeys([*axioms, *ref.kb.facts()]))
         origin = ref.origin
+    # Late, as what LOAD WEB needs: a server that starts again is to be back at once.
+    from surveillance_ontology.documents.writing import OntologyWriteError, write_ontology
+
     form = 'ntriples' if target.suffix.lower() == '.nt' else origin.format
     try:
         write_ontology(axioms, ref.kb.iri, target, form, origin.prefixes)
@@ -430,6 +430,9 @@ def _reasoned(base: str, axioms: list[Axiom], reasoner: str, notes: list[str]) -
 
 
 def _fetch(url: str, settings: Settings) -> bytes:
+    import urllib.error
+    import urllib.request
+
     if not settings.allow_web:
         raise DirectiveError('LOAD WEB is not allowed; the parameter allow_web permits it')
     if not url.lower().startswith(('http://', 'https://')):
