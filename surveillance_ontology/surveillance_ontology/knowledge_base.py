@@ -39,6 +39,7 @@ from surveillance_ontology.reasoner.clauses import Fact as StoredFact
 from surveillance_ontology.reasoner.clauses import Predicate
 from surveillance_ontology.reasoner.engine import Engine, FactView, is_public
 from surveillance_ontology.reasoner.explanation import Explanation, Reasons
+from surveillance_ontology.reasoner.program_change import ProgramChange, program_change
 
 
 @dataclass(frozen=True)
@@ -317,9 +318,9 @@ class KnowledgeBase:
     def instances(self, cls: str) -> frozenset[str]:
         """Return individuals of a class, direct and indirect."""
         pending = self._told.added or self._told.removed
-        if not pending and cls in self._snapshots and self._consistent:
-            return self._snapshots[cls]
         engine = self._usable
+        if not pending and cls in self._snapshots and engine and not engine.equality.members:
+            return self._snapshots[cls]
         if engine is None:
             return frozenset(
                 axiom.individual
@@ -547,7 +548,7 @@ class KnowledgeBase:
     def _complete(self, found: Explanation, goal: Axiom | None) -> Explanation:
         """Return the explanation with the axioms that its steps use without saying so."""
         sources = found.sources()
-        schema = [axiom for axiom in self._told.axioms if not is_assertion(axiom)]
+        schema = self._told.schema
         declared = (axiom for axiom in schema if isinstance(axiom, Declaration))
         if follows((*declared, *sources), goal):
             return found
@@ -575,12 +576,11 @@ class KnowledgeBase:
             proof = reasons.of_inconsistency()
         elif not isinstance(fact, SubClassOf):
             proof = reasons.of_fact(fact)
-        schema = [axiom for axiom in self._told.axioms if not is_assertion(axiom)]
-        return justify(self._told.axioms, fact, proof.sources() if proof else (), schema)
+        return justify(self._told.axioms, fact, proof.sources() if proof else (), self._told.schema)
 
     def _schema_axioms(self, assumed: tuple[Axiom, ...], goal: Axiom | None) -> tuple[Axiom, ...]:
         """Return the axioms about classes and properties by which assumptions imply something."""
-        schema = [axiom for axiom in self._told.axioms if not is_assertion(axiom)]
+        schema = self._told.schema
         found = justify([*schema, *assumed], goal, (), schema, assumed)
         return tuple(axiom for axiom in found if axiom not in assumed)
 
@@ -656,17 +656,14 @@ class KnowledgeBase:
         """Bring what is derived up to date; return whether the ontology is consistent."""
         engine, told = self._engine, self._told
         if engine is None or told.schema_changed or not self._fits(engine):
-            before = self._feed.shown_by(engine) if self._feed else set()
-            engine = self._rebuild(engine)
-            if self._feed:
-                self._feed.replaced(before, engine)
-        elif told.added or told.removed:
-            changes = told.settle()
-            if self._feed:
-                self._feed.updating(engine, partial(engine.update, *changes))
+            self._classify()
+            change = self._change_of(engine)
+            if engine is not None and change is not None:
+                self._update(engine, partial(self._adopt, engine, change))
             else:
-                engine.update(*changes)
-            self._consistent = engine.consistent
+                self._rebuild(engine)
+        elif told.added or told.removed:
+            self._update(engine, partial(engine.update, *told.settle()))
         return self._consistent
 
     def _fits(self, engine: Engine) -> bool:
@@ -675,25 +672,53 @@ class KnowledgeBase:
         """
         return all(engine.understands(axiom) for axiom in self._told.added)
 
-    def _rebuild(self, old: Engine | None) -> Engine:
-        axioms = tuple(self._told.axioms)
-        assertions = [axiom for axiom in axioms if is_assertion(axiom)]
-        self._classification = Classification(axioms, *Engine.needs_of(assertions))
+    def _classify(self) -> None:
+        needs = Engine.needs_of(self._told.complex)
+        self._classification = Classification(self._told.schema, *needs)
+
+    def _change_of(self, engine: Engine | None) -> ProgramChange | None:
+        """Return what an engine needs for the new classification; None: it must be made anew."""
+        if engine is None or not engine.consistent or engine.equality.members:
+            return None
+        assert self._classification is not None
+        return program_change(engine.program, self._classification.program)
+
+    def _update(self, engine: Engine, update: Callable[[], None]) -> None:
+        if self._feed:
+            self._feed.updating(engine, update)
+        else:
+            update()
+        self._consistent = engine.consistent
+
+    def _adopt(self, engine: Engine, change: ProgramChange) -> None:
+        added, removed = self._told.settle()
+        engine.update((), removed)
+        engine.adopt(change)
+        engine.update(added, ())
+        self._snapshots.clear()
+
+    def _rebuild(self, old: Engine | None) -> None:
+        before = self._feed.shown_by(old) if self._feed else set()
+        assert self._classification is not None
         engine = self._engine = Engine(self._classification.program, self._told.mentioning)
         if old is not None:
             engine.take_spelling(old)
         self._told.settle()
+        assertions = [axiom for axiom in self._told.axioms if is_assertion(axiom)]
         with uncollected():
             engine.update(assertions, ())
         self._consistent = engine.consistent
         self._snapshots.clear()
         self._watched.clear()
-        return engine
+        if self._feed:
+            self._feed.replaced(before, engine)
 
     def recompute(self) -> bool:
         """Forget what is derived and derive it again; return whether the ontology is consistent."""
         self._told.schema_changed = True
-        return self.reason()
+        self._classify()
+        self._rebuild(self._engine)
+        return self._consistent
 
     # --- whoever listens ---
 

@@ -11,9 +11,12 @@ from surveillance_ontology.owl.axioms import (
     Assertion,
     Axiom,
     AxiomAnnotation,
+    ClassAssertion,
     DataPropertyAssertion,
     Declaration,
     DifferentIndividuals,
+    NegativeDataPropertyAssertion,
+    NegativeObjectPropertyAssertion,
     ObjectPropertyAssertion,
     SameIndividual,
     SubClassOf,
@@ -29,6 +32,9 @@ class Assertions:
     Attributes:
         axioms: All of them, oldest first.
         about: The axioms that mention an entity.
+        schema: Those that are not about individuals, oldest first.
+        complex: Those about individuals that a program must be made for: memberships of complex
+            classes, and negative ones.
         literals: The values asserted for a data property (first) of an individual (second).
         added, removed: What changed about individuals since `settle`.
         schema_changed: Whether anything else that matters to a reasoner changed since `settle`.
@@ -37,6 +43,8 @@ class Assertions:
     def __init__(self) -> None:
         self.axioms: dict[Axiom, None] = {}
         self.about: dict[str, dict[Axiom, None]] = {}
+        self.schema: dict[Axiom, None] = {}
+        self.complex: dict[Axiom, None] = {}
         self.literals: dict[tuple[str, str], dict[Literal, None]] = {}
         self.added: dict[Axiom, None] = {}
         self.removed: dict[Axiom, None] = {}
@@ -73,7 +81,11 @@ class Assertions:
                 del self.removed[axiom]
             else:
                 self.added[axiom] = None
-        elif isinstance(axiom, AxiomAnnotation):
+            if _is_complex(axiom):
+                self.complex[axiom] = None
+            return True
+        self.schema[axiom] = None
+        if isinstance(axiom, AxiomAnnotation):
             self._notes.setdefault(axiom.axiom, {})[axiom] = None
         elif _is_schema(axiom):
             self.schema_changed = True
@@ -103,7 +115,10 @@ class Assertions:
                 del self.added[axiom]
             else:
                 self.removed[axiom] = None
-        elif isinstance(axiom, AxiomAnnotation):
+            self.complex.pop(axiom, None)
+            return True
+        del self.schema[axiom]
+        if isinstance(axiom, AxiomAnnotation):
             notes = self._notes[axiom.axiom]
             del notes[axiom]
             if not notes:
@@ -129,6 +144,13 @@ def is_assertion(axiom: Axiom) -> bool:
     if isinstance(axiom, Declaration):
         return axiom.kind == 'individual'
     return isinstance(axiom, Assertion)
+
+
+def _is_complex(axiom: Axiom) -> bool:
+    kind = type(axiom)
+    if kind is ClassAssertion:
+        return not isinstance(axiom.cls, str)  # type: ignore[attr-defined]
+    return kind is NegativeObjectPropertyAssertion or kind is NegativeDataPropertyAssertion
 
 
 def _is_schema(axiom: Axiom) -> bool:

@@ -33,6 +33,7 @@ from surveillance_ontology.reasoner.difference import Difference
 from surveillance_ontology.reasoner.equality import Equality, Merge
 from surveillance_ontology.reasoner.network import Network
 from surveillance_ontology.reasoner.open_cases import OpenCases
+from surveillance_ontology.reasoner.program_change import ProgramChange
 from surveillance_ontology.reasoner.proofs import ProofSearch
 
 Conflict = tuple[str, str]
@@ -487,6 +488,22 @@ class Engine:
             if fact[0].holds(fact):
                 for fire in fact[0].on_insert:
                     fire(*fact[1:])
+        self._propagate()
+
+    def adopt(self, change: ProgramChange) -> None:
+        """Run another program on the facts that are there; nobody may be the same as another."""
+        program, network = self.program, self._network
+        self.proofs.reset()
+        for clause in change.removed:
+            network.instances(clause, holding=True)
+        for clause in change.removed:
+            network.detach(clause)
+        for clause in change.added:
+            network.attach(clause)
+        self._overdelete([])
+        change.apply(program)
+        for clause in change.added:
+            network.instances(clause, holding=False)
         self._propagate()
 
     def _classes_of(self, axiom: Axiom) -> set[str]:

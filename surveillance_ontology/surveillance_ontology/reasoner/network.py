@@ -4,11 +4,13 @@ them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
 from surveillance_ontology.owl.axioms import Axiom
 from surveillance_ontology.reasoner.cardinality import AtLeastCounter, AtMostCounter, KeyWatcher
 from surveillance_ontology.reasoner.clauses import (
+    BodyAtom,
     Clause,
     Constant,
     DifferentAtom,
@@ -18,6 +20,7 @@ from surveillance_ontology.reasoner.clauses import (
     Premises,
     Program,
     SameAtom,
+    Term,
 )
 from surveillance_ontology.reasoner.context_index import ContextIndex
 from surveillance_ontology.reasoner.difference import (
@@ -76,6 +79,7 @@ class Network:
         self.touch_delete: list[Callable[[str], None]] = []
         self.touch_related: list[Callable[[str], list[str]]] = []
         self.thresholds: list[ThresholdIndex] = []
+        self._hooks: dict[Clause, list[tuple[list[Any], Any]]] = {}
         self.counters: list[AtMostCounter] = []
         program.different.supports.append((difference.premises, None))
         self.lower: list[AtLeastCounter] = []
@@ -96,7 +100,7 @@ class Network:
         for key in program.keys:
             KeyWatcher(key, merge)
         for clause in program.clauses:
-            self._attach(clause)
+            self.attach(clause)
         self._attach_disjoint()
         self._attach_evidence()
         self.contexts: ContextIndex | None = None
@@ -109,7 +113,8 @@ class Network:
 
     # --- clauses ---
 
-    def _attach(self, clause: Clause) -> None:
+    def attach(self, clause: Clause) -> None:
+        """Have a clause run from now on; what follows already is not looked for."""
         head = clause.head
         if isinstance(head, SameAtom):
             self._attach_same(clause, head)
@@ -120,32 +125,52 @@ class Network:
             self.thresholds.append(index)
             return
         context, body = self._context, clause.body
+        hooks = self._hooks[clause] = []
+
+        def hook(place: list[Any], what: Any) -> None:
+            place.append(what)
+            hooks.append((place, what))
+
+        def trigger(
+            given: BodyAtom | None, terms: Sequence[Term], emit: Emit, present: bool
+        ) -> Callable[..., None]:
+            return compile_trigger(context, body, given, terms, head, emit, present)
+
         triggered = False
         for atom in body:
             if isinstance(atom, PredicateAtom):
                 triggered = True
                 predicate = atom.predicate
-                predicate.on_insert.append(
-                    compile_trigger(context, body, atom, atom.terms, head, self._enqueue, False)
-                )
-                predicate.on_delete.append(
-                    compile_trigger(context, body, atom, atom.terms, head, self._overdelete, True)
-                )
+                hook(predicate.on_insert, trigger(atom, atom.terms, self._enqueue, False))
+                hook(predicate.on_delete, trigger(atom, atom.terms, self._overdelete, True))
             elif isinstance(atom, DifferentAtom):
                 for term in atom.terms:
-                    self.touch_insert.append(
-                        compile_trigger(context, body, None, (term,), head, self._enqueue, False)
-                    )
-                    self.touch_delete.append(
-                        compile_trigger(context, body, None, (term,), head, self._overdelete, True)
-                    )
+                    hook(self.touch_insert, trigger(None, (term,), self._enqueue, False))
+                    hook(self.touch_delete, trigger(None, (term,), self._overdelete, True))
         if not triggered or _names_individual(clause):
-            run = compile_trigger(context, body, None, (), head, self._enqueue, False)
-            self.naming.append(run)
+            run = trigger(None, (), self._enqueue, False)
+            hook(self.naming, run)
             if not triggered:
                 self.initial.append(run)
         support = compile_support(context, body, head.terms)
-        head.predicate.supports.append((support, clause.origin))
+        hook(head.predicate.supports, (support, clause.origin))
+
+    def detach(self, clause: Clause) -> None:
+        """End a clause, which is no rule of a sorted index; what it derived stays."""
+        for place, what in self._hooks.pop(clause):
+            place.remove(what)
+
+    def instances(self, clause: Clause, *, holding: bool) -> None:
+        """Look through all facts for instances of a clause's body.
+
+        Args:
+            clause: Not one that makes individuals the same.
+            holding: Overdelete the heads that hold; else enqueue those that do not.
+        """
+        head = clause.head
+        assert isinstance(head, PredicateAtom)
+        emit = self._overdelete if holding else self._enqueue
+        compile_trigger(self._context, clause.body, None, (), head, emit, holding)()
 
     def _attach_same(self, clause: Clause, head: SameAtom) -> None:
         context, body, merge = self._context, clause.body, self._merge

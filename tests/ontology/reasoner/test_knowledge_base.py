@@ -11,6 +11,7 @@ from surveillance_ontology.owl.axioms import (
     Declaration,
     DifferentIndividuals,
     ObjectPropertyAssertion,
+    SameIndividual,
     SubClassOf,
 )
 from surveillance_ontology.owl.expressions import Literal
@@ -195,3 +196,14 @@ def test_an_individual_may_be_named_like_a_property() -> None:
     kb = seven_rooms(ObjectPropertyAssertion(n('hasDoor'), n('hasDoor'), n('D1')))
     assert kb.reason()
     assert n('hasDoor') in kb.instances(n('LOCATION'))
+
+
+def test_who_turns_out_to_be_the_same_as_a_member_is_a_member() -> None:
+    kb = KnowledgeBase(
+        IRI, [ClassAssertion(n('ROOM'), n('R1')), ClassAssertion(n('DOOR'), n('D1'))]
+    )
+    kb.reason()
+    assert kb.instances(n('ROOM')) == {n('R1')}
+    kb.add(SameIndividual(frozenset((n('R1'), n('R0')))))
+    kb.reason()
+    assert kb.instances(n('ROOM')) == {n('R0'), n('R1')}

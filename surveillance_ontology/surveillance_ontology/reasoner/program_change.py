@@ -1,0 +1,207 @@
+"""From a running program to another one: which clauses come and go, where nothing else differs.
+
+An engine that holds 100,000 facts need not derive them anew because one class came below another.
+What is more than clauses (a bound on a number, a key, disjoint classes, ...) is watched by objects
+that count what they saw from the beginning; where such a part differs, the engine is made anew.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Iterable
+from dataclasses import dataclass, fields, replace
+from typing import Any, TypeVar
+
+from surveillance_ontology.reasoner.clauses import (
+    BodyAtom,
+    Clause,
+    ComputedAtom,
+    Existential,
+    HeadAtom,
+    Predicate,
+    PredicateAtom,
+    Program,
+    RangeAtom,
+    SameAtom,
+    Term,
+)
+from surveillance_ontology.reasoner.threshold_rules import split_rule
+
+_Key = Hashable
+_N = TypeVar('_N')
+
+
+@dataclass(frozen=True)
+class ProgramChange:
+    """What turns a running program into another one.
+
+    Attributes:
+        program: The other one; it has predicates of its own.
+        removed: Clauses of the running program that go.
+        clauses: All that it is to have afterwards, in its own predicates.
+        added: Those of them that come.
+        existentials, meetings, partial: As in `Program`, in the running program's predicates.
+        predicate: Gives the running program's predicate for one of the other's.
+    """
+
+    program: Program
+    removed: list[Clause]
+    clauses: list[Clause]
+    added: list[Clause]
+    existentials: list[Existential]
+    meetings: list[Any]
+    partial: list[Any]
+    predicate: Callable[[Predicate], Predicate]
+
+    def apply(self, running: Program) -> None:
+        """Give the running program all that the other one has; predicates with facts stay."""
+        wanted = self.program
+        running.classes = self._table(running.classes, wanted.classes)
+        running.objects = self._table(running.objects, wanted.objects)
+        running.datas = self._table(running.datas, wanted.datas)
+        running.labels = self._table(running.labels, wanted.labels)
+        running.clauses, running.existentials = self.clauses, self.existentials
+        running.meetings, running.partial = self.meetings, self.partial
+        running.unsupported = wanted.unsupported
+
+    def _table(self, mine: dict[_N, Predicate], wanted: dict[_N, Predicate]) -> dict[_N, Predicate]:
+        filled = {name: one for name, one in mine.items() if one.members or one.succ}
+        return {**filled, **{name: self.predicate(one) for name, one in wanted.items()}}
+
+
+def program_change(running: Program, wanted: Program) -> ProgramChange | None:
+    """Return what is to be done to a running program; None where it takes a new engine."""
+    old, new = _Keys(running), _Keys(wanted)
+    if old.rest() != new.rest():
+        return None
+    present: dict[_Key, list[Clause]] = {}
+    for clause in running.clauses:
+        present.setdefault(old.clause(clause), []).append(clause)
+    of_running = _Translation(running, old, new)
+    clauses: list[Clause] = []
+    added: list[Clause] = []
+    for clause in wanted.clauses:
+        same = present.pop(new.clause(clause), None)
+        if same is None:
+            same = [of_running.record(clause)]
+            added += same
+        clauses += same
+    removed = [clause for gone in present.values() for clause in gone]
+    if any(isinstance(c.head, SameAtom) or split_rule(c) is not None for c in (*removed, *added)):
+        return None
+    return ProgramChange(
+        wanted,
+        removed,
+        clauses,
+        added,
+        [of_running.record(existential) for existential in wanted.existentials],
+        [tuple(map(of_running.record, pair)) for pair in wanted.meetings],
+        [
+            (of_running.predicate(label), of_running.predicate(weaker), text)
+            for label, weaker, text in wanted.partial
+        ],
+        of_running.predicate,
+    )
+
+
+class _Keys:
+    """Names the parts of one program so that equal ones of another have equal names."""
+
+    def __init__(self, program: Program) -> None:
+        self._program = program
+        self._fixed: dict[Predicate, _Key] = {
+            program.thing: 'thing',
+            program.nothing: 'nothing',
+            program.different: 'different',
+            program.same: 'same',
+        }
+        for prop, negative in program.negatives.items():
+            self._fixed[negative] = ('not', prop.kind, prop.expression)
+
+    def predicate(self, predicate: Predicate) -> _Key:
+        """Return what the predicate stands for."""
+        return self._fixed.get(predicate) or (predicate.kind, predicate.expression)
+
+    def clause(self, clause: Clause) -> _Key:
+        """Return the clause with its variables numbered as they come; its axiom is part of it."""
+        numbers: dict[int, int] = {}
+
+        def term(term: Term) -> _Key:
+            return numbers.setdefault(term, len(numbers)) if isinstance(term, int) else term
+
+        def atom(atom: BodyAtom | HeadAtom) -> _Key:
+            terms = tuple(map(term, atom.terms))
+            if isinstance(atom, PredicateAtom):
+                return (self.predicate(atom.predicate), terms)
+            if isinstance(atom, RangeAtom):
+                return ('range', atom.values, terms)
+            if isinstance(atom, ComputedAtom):
+                return ('computed', atom.builtin, terms)
+            return (type(atom), terms)
+
+        body = tuple(map(atom, clause.body))
+        return (body, atom(clause.head), clause.origin, clause.named_only)
+
+    def rest(self) -> _Key:
+        """Return all but clauses and what serves the classification alone."""
+        program, predicate = self._program, self.predicate
+        return (
+            program.contexts is None or program.contexts,
+            program.uses_thing,
+            tuple(map(self._record, program.at_least)),
+            tuple(map(self._record, program.at_most)),
+            tuple(map(self._record, program.keys)),
+            tuple(map(predicate, program.irreflexive)),
+            tuple(map(predicate, program.asymmetric)),
+            tuple(map(self._value, program.disjoint_properties)),
+            frozenset(map(predicate, program.negatives.values())),
+            frozenset(
+                (predicate(one), frozenset(map(predicate, one.disjoint)))
+                for one in program.predicates()
+                if one.disjoint
+            ),
+        )
+
+    def _record(self, record: Any) -> _Key:
+        return tuple(self._value(getattr(record, entry.name)) for entry in fields(record))
+
+    def _value(self, value: Any) -> _Key:
+        if isinstance(value, Predicate):
+            return self.predicate(value)
+        if isinstance(value, tuple):
+            return tuple(map(self._value, value))
+        # A test is made anew by each translation; what it admits stands beside it.
+        return 'test' if callable(value) else value
+
+
+class _Translation:
+    """Writes parts of a wanted program in the predicates of the running one."""
+
+    def __init__(self, running: Program, old: _Keys, new: _Keys) -> None:
+        self._known = {old.predicate(one): one for one in _all(running)}
+        self._key = new.predicate
+
+    def predicate(self, predicate: Predicate) -> Predicate:
+        """Return the running program's predicate; where it has none, this one from now on."""
+        return self._known.setdefault(self._key(predicate), predicate)
+
+    def record(self, record: Any) -> Any:
+        """Return a clause, an atom or a condition, rewritten."""
+        changed: dict[str, Any] = {}
+        for entry in fields(record):
+            value = getattr(record, entry.name)
+            if isinstance(value, Predicate):
+                changed[entry.name] = self.predicate(value)
+            elif entry.name == 'body':
+                changed['body'] = tuple(map(self.record, value))
+            elif entry.name == 'head':
+                changed['head'] = self.record(value)
+        return replace(record, **changed) if changed else record
+
+
+def _all(program: Program) -> Iterable[Predicate]:
+    yield program.same
+    yield from program.predicates()
+    for clause in program.clauses:
+        for atom in (*clause.body, clause.head):
+            if isinstance(atom, PredicateAtom):
+                yield atom.predicate
