@@ -14,6 +14,7 @@ from __future__ import annotations
 import json
 import math
 import re
+import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
@@ -401,10 +402,26 @@ def _check_plain(entry: Entry) -> None:
     if kinds == {int, float}:
         kinds = {float}
     if len(kinds) > 1 or not kinds <= {bool, int, float, str}:
+        expected = 'true, false, a number, a text, or a list of one of these'
+    else:
+        values = value if isinstance(value, list) else [value]
+        expected = next(filter(None, map(_what_ros_holds, values)), '')
+    if expected:
+        shown = _short(str(value))
         raise ParameterError(
-            f'{entry.origin}: parameter {entry.name}: got {_short(str(value))}, expected true, '
-            'false, a number, a text, or a list of one of these'
+            f'{entry.origin}: parameter {entry.name}: got {shown}, expected {expected}'
         )
+
+
+def _what_ros_holds(value: Any) -> str:
+    """Return what is expected in place of a value that rcl cannot read; empty for any other."""
+    if isinstance(value, str):
+        fits = all(each != '\0' and not '\ud800' <= each <= '\udfff' for each in value)
+        return '' if fits else 'a text of Unicode characters other than NUL'
+    if isinstance(value, float):
+        fits = not value or not abs(value) < sys.float_info.min
+        return '' if fits else f'0 or a number of at least {sys.float_info.min:.2g}'
+    return '' if -(2**63) <= value < 2**63 else 'an integer of 64 bits'
 
 
 def _short(text: str) -> str:
@@ -421,7 +438,7 @@ def resolved_text(full_name: str, settings: Mapping[str, Setting]) -> str:
     """
     lines = [f'{full_name}:', '  ros__parameters:']
     for name, setting in settings.items():
-        lines.append(f'    {json.dumps(name)}: {_yaml_value(setting.value)}  #@ {setting.origin}')
+        lines.append(f'    {_quoted(name)}: {_yaml_value(setting.value)}  #@ {setting.origin}')
     if not settings:
         lines[-1] += ' {}'
     return '\n'.join(lines) + '\n'
@@ -429,11 +446,21 @@ def resolved_text(full_name: str, settings: Mapping[str, Setting]) -> str:
 
 def _yaml_value(value: Any) -> str:
     if isinstance(value, list):
+        if float in map(type, value):  # rcl refuses a list of both kinds of numbers
+            value = [float(each) for each in value]
         return '[' + ', '.join(map(_yaml_value, value)) + ']'
     if isinstance(value, float):
         # YAML reads 1e+20 as a text.
         return repr(value) if math.isfinite(value) and 'e' not in repr(value) else _exponent(value)
-    return json.dumps(value)
+    return _quoted(value) if isinstance(value, str) else json.dumps(value)
+
+
+def _quoted(text: str) -> str:
+    # Not as JSON has it: rcl's YAML refuses the two halves that JSON writes for one character.
+    plain = ''.join(
+        each if each.isprintable() and each not in '"\\' else f'\\U{ord(each):08x}' for each in text
+    )
+    return f'"{plain}"'
 
 
 def _exponent(value: float) -> str:

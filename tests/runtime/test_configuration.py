@@ -6,12 +6,18 @@ import os
 import time
 
 import pytest
+import rclpy
 import yaml
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
+from rcl_interfaces.msg import ParameterDescriptor
+from rclpy.node import Node
 
 from surveillance_runtime.configuration import (
     Configuration,
+    Entry,
+    Layer,
+    Setting,
     argument_layer,
     file_layer,
     read_schema,
@@ -255,3 +261,53 @@ def test_every_value_takes_effect_or_costs_one_line(tmp_path, pattern, name, cho
     for effect in effects:
         same = [str(chosen).casefold(), str(layer.entries[0].value).casefold()]
         assert effect in (chosen, layer.entries[0].value) or str(effect).casefold() in same
+
+
+@pytest.fixture(scope='module')
+def read_by_ros(tmp_path_factory, ros_domain):
+    """What a node gets for a value of a resolved file."""
+    path = tmp_path_factory.mktemp('resolved') / 'node.yaml'
+    context = rclpy.Context()
+    rclpy.init(context=context, domain_id=ros_domain)
+
+    def read(value):
+        path.write_text(resolved_text('/reader', {'given': Setting(value, 'a test')}))
+        node = Node(
+            'reader',
+            context=context,
+            cli_args=['--ros-args', '--params-file', str(path)],
+            use_global_arguments=False,
+            start_parameter_services=False,
+            enable_rosout=False,
+        )
+        try:
+            node.declare_parameter('given', descriptor=ParameterDescriptor(dynamic_typing=True))
+            read = node.get_parameter('given').value
+        finally:
+            node.destroy_node()
+        return read if isinstance(value, str | bool | int | float) else list(read)
+
+    yield read
+    rclpy.shutdown(context=context)
+
+
+@given(VALUES)
+@example('\U0001f600')  # rcl refused the file: it stood there as two surrogates
+@example('\0')
+@example(5e-324)
+@example('\x85\u2028 "it\\is"\n')
+@settings(max_examples=300, deadline=1000, suppress_health_check=list(HealthCheck))
+def test_a_node_reads_what_was_resolved(read_by_ros, chosen):
+    entry = Entry('/**', 'map.R1', chosen, 'a test')
+    try:
+        merged(Layer('a test', (entry,)))
+    except ParameterError as error:
+        refusal = str(error)
+    else:
+        refusal = ''
+    if refusal:
+        assert '\n' not in refusal
+    elif chosen != []:  # which rcl gives no type
+        numbers = isinstance(chosen, list) and float in map(type, chosen)
+        expected = [float(each) for each in chosen] if numbers else chosen
+        assert repr(read_by_ros(chosen)) == repr(expected)
