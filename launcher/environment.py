@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import fcntl
 import os
-import selectors
 import shutil
 import signal
 import subprocess
@@ -20,7 +19,7 @@ from pathlib import Path
 
 from launcher import system
 from launcher.fingerprint import INTERFACES, Journal, current, requirements
-from launcher.progress import Step
+from launcher.progress import Step, lines_of
 from launcher.system import LaunchError
 
 CHECKOUT = Path(__file__).resolve().parent.parent
@@ -116,8 +115,7 @@ class Environment:
     def _set_up(self, lock: int) -> None:
         journal = Journal.read(self.venv)
         python = current(self.checkout, ()).python
-        # An interrupted pip can leave a package that looks installed and is not.
-        fresh = journal.working == PACKAGES_STEP or not self._usable(journal, python)
+        fresh = not self._usable(journal, python)
         if fresh:
             journal = Journal()
         journal.extras = self._extras(journal)
@@ -126,7 +124,7 @@ class Environment:
         steps: list[tuple[str, Callable[[_Runner], None]]] = []
         if fresh:
             steps.append((VENV_STEP, self._make_venv))
-        if journal.packages != wanted.requirements:
+        if journal.packages != wanted.requirements or journal.working == PACKAGES_STEP:
             needed = requirements(self.checkout, journal.extras)
             steps.append((PACKAGES_STEP, lambda run: self._install_packages(run, needed)))
         if journal.interfaces != wanted.interfaces or journal.working == INTERFACES_STEP:
@@ -156,10 +154,11 @@ class Environment:
         run([_base_python(), '-m', 'venv', '--clear', str(self.venv)])
 
     def _install_packages(self, run: _Runner, packages: list[str]) -> None:
+        self._remove_half_installed()
         run([*self._pip(), *packages])
 
     def _install_interfaces(self, run: _Runner) -> None:
-        self._remove_half_installed(INTERFACES)
+        self._remove_half_installed()
         # -v shows the compiler's steps, which the progress display counts.
         options = ['--no-deps', '--force-reinstall', '-v']
         run([*self._pip(), *options, str(self.checkout / INTERFACES)])
@@ -191,13 +190,17 @@ class Environment:
         lines = [str(self.checkout / package) for package in PACKAGES]
         (self._site_packages() / PATH_FILE).write_text('\n'.join(lines) + '\n', encoding='utf-8')
 
-    def _remove_half_installed(self, package: str) -> None:
-        """Take away the record of a package that was not installed to its end."""
-        for record in self._site_packages().glob(f'{package}-*.dist-info'):
+    def _remove_half_installed(self) -> None:
+        """Take away the records of packages that were not installed to their end.
+
+        pip writes the list of a package's files last. Without that list it would take the package
+        for installed, and with the package's record gone it installs it again.
+        """
+        for record in self._site_packages().glob('*.dist-info'):
             if not (record / 'RECORD').exists():
-                for path in record.iterdir():
-                    path.unlink()
-                record.rmdir()
+                shutil.rmtree(record)
+        for stashed in self._site_packages().glob('~*'):  # what an update had put aside
+            shutil.rmtree(stashed) if stashed.is_dir() else stashed.unlink()
 
     @contextmanager
     def _alone(self) -> Iterator[int]:
@@ -241,7 +244,7 @@ class _Runner:
                 start_new_session=True,
             )
             try:
-                output.extend(_lines(process, self._step))
+                output.extend(lines_of(process, self._step))
                 code = process.wait()
             except BaseException:
                 # With all that it started: compilers would go on without anybody to wait for them.
@@ -286,26 +289,3 @@ def _base_python() -> str:
     venv.
     """
     return str(getattr(sys, '_base_executable', sys.executable))
-
-
-def _lines(process: subprocess.Popen[bytes], step: Step) -> Iterator[str]:
-    """Yield the lines that a process prints, while the step's clock is kept going."""
-    assert process.stdout is not None
-    rest = b''
-    with selectors.DefaultSelector() as selector:
-        selector.register(process.stdout, selectors.EVENT_READ)
-        while True:
-            if not selector.select(timeout=0.25):
-                step.tick()
-                continue
-            chunk = os.read(process.stdout.fileno(), 65536)
-            if not chunk:
-                break
-            *lines, rest = (rest + chunk).split(b'\n')
-            for line in lines:
-                text = line.decode('utf-8', 'replace').rstrip()
-                step.feed(text)
-                yield text
-    if rest:
-        yield rest.decode('utf-8', 'replace')
-    process.stdout.close()

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import re
+import selectors
 import shutil
+import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from types import TracebackType
 from typing import TextIO
 
@@ -14,13 +18,14 @@ _PIP_STEP = re.compile(
     r'(Collecting|Downloading|Building wheels? for|Installing build dependencies|'
     r'Installing collected packages|Getting requirements)\s*:?\s*(\S*)'
 )
+_APT_STEP = re.compile(
+    r'(?:Get:\d+ \S+ \S+ \S+ ([a-z\d][\w.+-]*)|Unpacking (\S+)|Setting up (\S+)) '
+)
 _PLAIN_EVERY = 15.0
 
 
 def describe(line: str) -> str:
-    """Return what a line of pip's or of the build's output says about progress, empty when
-    nothing.
-    """
+    """Return what a line of pip's, apt's or the build's output says of progress; or nothing."""
     if build := _BUILD_STEP.search(line):
         done, total = int(build[1]), int(build[2])
         return f'compiling {done}/{total}'
@@ -35,6 +40,9 @@ def describe(line: str) -> str:
         if verb.startswith('Building'):
             return f'building {step[2]}'
         return 'fetching build tools'
+    if step := _APT_STEP.match(line.strip()):
+        fetched, unpacked, ready = step.groups()
+        return f'downloading {fetched}' if fetched else f'installing {unpacked or ready}'
     return ''
 
 
@@ -92,3 +100,26 @@ class Step:
     def _print(self, text: str) -> None:
         self._stream.write(text + '\n')
         self._stream.flush()
+
+
+def lines_of(process: subprocess.Popen[bytes], step: Step) -> Iterator[str]:
+    """Yield the lines that a process prints, while the step's clock is kept going."""
+    assert process.stdout is not None
+    rest = b''
+    with selectors.DefaultSelector() as selector:
+        selector.register(process.stdout, selectors.EVENT_READ)
+        while True:
+            if not selector.select(timeout=0.25):
+                step.tick()
+                continue
+            chunk = os.read(process.stdout.fileno(), 65536)
+            if not chunk:
+                break
+            *lines, rest = (rest + chunk).split(b'\n')
+            for line in lines:
+                text = line.decode('utf-8', 'replace').rstrip()
+                step.feed(text)
+                yield text
+    if rest:
+        yield rest.decode('utf-8', 'replace')
+    process.stdout.close()

@@ -17,6 +17,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from launcher.progress import Step, lines_of
+
 ROS_PREFIX = Path('/opt/ros/jazzy')
 WHEEL_PYTHONS = ((3, 11), (3, 12), (3, 13))
 
@@ -138,30 +140,38 @@ def install_packages(packages: Sequence[str]) -> None:
     if prefix is None:
         raise LaunchError(
             'a few system packages are missing. Type this, then start again:\n'
-            f'  sudo apt-get install -y {names}'
+            f'  {_as_root(packages)}'
         )
-    print(f'installing system packages: {names}', flush=True)
     environ = {**os.environ, 'DEBIAN_FRONTEND': 'noninteractive'}
-    for command in (['update'], ['install', '-y', '--no-install-recommends', *packages]):
-        done = subprocess.run(
-            [*prefix, 'apt-get', '-q', *command],
-            env=environ,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            errors='replace',
-            check=False,
-        )
+    commands = (['update'], ['install', '-y', '--no-install-recommends', *packages])
+    for number, command in enumerate(commands, 1):
+        title = f'system packages: {names}' if command[0] == 'install' else 'lists of packages'
+        with (
+            Step(number, len(commands), title) as step,
+            subprocess.Popen(
+                [*prefix, 'apt-get', '-q', *command],
+                env=environ,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
+            ) as process,
+        ):
+            output = list(lines_of(process, step))
         # A repository that does not answer is no reason to stop: the packages may come from others.
-        if done.returncode != 0 and command[0] == 'install':
-            tail = '\n'.join(done.stdout.strip().splitlines()[-4:])
+        if process.returncode != 0 and command[0] == 'install':
+            tail = '\n'.join(output[-4:])
             raise LaunchError(
                 f'apt-get could not install {names}:\n{tail}\nInstall them, then start again:\n'
-                f'  sudo apt-get install -y {names}'
+                f'  {_as_root(packages)}'
             )
     # Modules looked for before they were installed are remembered as absent.
     importlib.invalidate_caches()
+
+
+def _as_root(packages: Sequence[str]) -> str:
+    """Return what a person types to install packages."""
+    command = f'apt-get install -y {" ".join(packages)}'
+    return f'sudo {command}' if shutil.which('sudo') else f"su -c '{command}'   (as root)"
 
 
 def _privilege() -> list[str] | None:

@@ -136,15 +136,21 @@ def test_a_set_up_from_nothing_to_an_edit(checkout, start):
     assert following.end()[0] == 0
     assert value(checkout) == '2'
 
-    # Cut off while packages were installed: what is there cannot be trusted and is made anew.
+    # Cut off while packages were installed: what pip had not finished is installed again, and no
+    # more than that.
     journal = json.loads((checkout / '.venv' / JOURNAL).read_text())
     journal['working'] = 'Python packages, ROS 2 Jazzy among them'
     (checkout / '.venv' / JOURNAL).write_text(json.dumps(journal))
-    (checkout / '.venv' / 'left-over').touch()
-    renewed = prepare(checkout)
-    assert '[1/3] virtual environment' in renewed.stdout
-    assert 'ready True' in renewed.stdout
-    assert not (checkout / '.venv' / 'left-over').exists()
+    (checkout / '.venv' / 'kept').touch()
+    (site,) = (checkout / '.venv').glob('lib/*/site-packages')
+    cut_off = site / 'half_installed-1.dist-info'
+    cut_off.mkdir()
+    (cut_off / 'METADATA').write_text('Metadata-Version: 2.1\nName: half_installed\nVersion: 1\n')
+    resumed = prepare(checkout)
+    assert '[1/1] Python packages' in resumed.stdout
+    assert 'ready True' in resumed.stdout
+    assert (checkout / '.venv' / 'kept').exists()
+    assert not cut_off.exists()
 
 
 def test_half_an_environment_without_pip_is_made_anew(tmp_path, checkout):

@@ -23,6 +23,11 @@ class Terminal(io.StringIO):
         ('Installing collected packages: a, b', 'installing'),
         ('Building wheels for collected packages: owlready2', 'building collected'),
         ('  Installing build dependencies: started', 'fetching build tools'),
+        (
+            'Get:3 http://deb/debian trixie/main amd64 g++-14 amd64 14.2.0-19 [26 kB]',
+            'downloading g++-14',
+        ),
+        ('Setting up python3-dev (3.13.5-1) ...', 'installing python3-dev'),
         ('something else', ''),
     ],
 )

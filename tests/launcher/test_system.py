@@ -1,17 +1,28 @@
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
+from launcher import system
 from launcher.environment import clean_environ
-from launcher.system import Machine, no_wheels_advice, note_of_unused_ros, sourced_ros
+from launcher.system import LaunchError, Machine, no_wheels_advice, note_of_unused_ros, sourced_ros
 from tests.launcher.conftest import ROOT
 
 HERE = Machine('Linux', 'x86_64', 'glibc', (3, 12))
 CHECKOUT = Path('/somewhere/surveillance')
+
+
+@pytest.mark.parametrize(('sudo', 'typed'), [(True, 'sudo apt-get'), (False, "su -c 'apt-get")])
+def test_who_may_not_install_is_told_what_this_machine_has(monkeypatch, sudo, typed):
+    there = {'apt-get'} | ({'sudo'} if sudo else set())
+    monkeypatch.setattr(shutil, 'which', lambda name: name if name in there else None)
+    monkeypatch.setattr(system, '_privilege', lambda: None)
+    with pytest.raises(LaunchError, match=f'  {typed} install -y g\\+\\+'):
+        system.install_packages(['g++'])
 
 
 def test_wheels_fit_the_machines_they_were_built_for():
