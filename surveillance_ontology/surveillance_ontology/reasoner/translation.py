@@ -736,9 +736,7 @@ class Translation:
         return label
 
     def _complement_labels(self) -> None:
-        """State that what is disjoint from a class belongs to its complement, where that is asked
-        for.
-        """
+        """State that what is disjoint from a class belongs to its complement, where asked for."""
         for iri, label in self._complements.items():
             for other in self.program.cls(iri).disjoint:
                 if other is not label:
