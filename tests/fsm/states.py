@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import itertools
+import json
 import threading
 from collections.abc import Callable, Iterable
 from typing import Any
 
 import surveillance_fsm as fsm
+from surveillance_fsm import history
+from surveillance_fsm.testing import FakeClock
 
 
 class Answer(fsm.State):
@@ -111,3 +114,26 @@ def chain(
             target = {'done': f'S{number + 1}'} if number + 1 < len(states) else {}
             fsm.StateMachine.add(f'S{number}', state, target)
     return machines[0], machines
+
+
+class CheckpointedWorld:
+    """The same machine, built anew for each process."""
+
+    def __init__(self):
+        self.clock = FakeClock()
+        self.before, self.charge = Answer('done'), Waiter(5.0, progress='charged')
+        self.explore = Waiter(10.0, progress='explored')
+        inner = fsm.StateMachine(['done', 'preempted'])
+        self.root = fsm.StateMachine(['done', 'preempted'])
+        self.root.set_clock(self.clock)
+        with self.root:
+            fsm.StateMachine.add('INNER', inner)
+            with inner:
+                fsm.StateMachine.add('BEFORE', self.before, {'done': 'EXPLORE'})
+                fsm.StateMachine.add('EXPLORE', self.explore)
+        self.inner = inner
+        self.root.add_interrupt('CHARGE', self.charge, priority=5)
+
+
+def through_json(machine):
+    return json.loads(json.dumps(history.capture(machine)))

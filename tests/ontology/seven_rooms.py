@@ -25,6 +25,11 @@ SEVEN_ROOMS = {
 Ask = Callable[..., DirectiveResponse]
 
 
+def iri(name: str) -> str:
+    """Return a name of the patrol's ontology as ARMOR's answers have it."""
+    return f'<{IRI}#{name}>'
+
+
 def asker(service: ArmorService, reference: str = 'map', client: str = 'tester') -> Ask:
     """Return a short way to send directives: ``ask('ADD IND CLASS', 'R1', 'ROOM')``."""
 
@@ -59,3 +64,8 @@ def build_seven_rooms(client: ArmorClient, buffered: bool, lazy: bool) -> None:
     client.manipulation.disj_inds_of_class('DOOR')
     client.manipulation.add_objectprop_to_ind('isIn', 'Robot1', 'E')
     client.utils.sync_buffered_reasoner()
+
+
+def reach(armor: ArmorClient) -> list[str]:
+    """Return the places that the robot can reach, by the ontology."""
+    return armor.query.objectprop_b2_ind('canReach', 'Robot1')

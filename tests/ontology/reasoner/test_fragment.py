@@ -9,12 +9,9 @@ from surveillance_ontology.knowledge_base import KnowledgeBase
 from surveillance_ontology.owl.axioms import (
     AsymmetricObjectProperty,
     Axiom,
-    ClassAssertion,
-    DataPropertyAssertion,
     DataPropertyRange,
     DatatypeDefinition,
     Declaration,
-    DifferentIndividuals,
     DisjointClasses,
     DisjointObjectProperties,
     DisjointUnion,
@@ -28,12 +25,10 @@ from surveillance_ontology.owl.axioms import (
     IrreflexiveObjectProperty,
     NegativeDataPropertyAssertion,
     NegativeObjectPropertyAssertion,
-    ObjectPropertyAssertion,
     ObjectPropertyDomain,
     ObjectPropertyRange,
     ReflexiveObjectProperty,
     Rule,
-    SameIndividual,
     SubClassOf,
     SubDataPropertyOf,
     SubObjectPropertyOf,
@@ -42,7 +37,6 @@ from surveillance_ontology.owl.axioms import (
     TransitiveObjectProperty,
 )
 from surveillance_ontology.owl.expressions import (
-    BuiltinAtom,
     ClassAtom,
     ClassExpression,
     DataAllValuesFrom,
@@ -66,50 +60,36 @@ from surveillance_ontology.owl.expressions import (
     ObjectPropertyAtom,
     ObjectSomeValuesFrom,
     ObjectUnionOf,
-    SameIndividualAtom,
-    Variable,
 )
-from surveillance_ontology.owl.vocabulary import NOTHING, SWRLB, THING, XSD
-from surveillance_ontology.reasoner.datatypes import value_of
+from surveillance_ontology.owl.vocabulary import NOTHING, THING, XSD
 
-A, B, C, D = 'x:A', 'x:B', 'x:C', 'x:D'
-P, Q, R, S, T = 'x:p', 'x:q', 'x:r', 'x:s', 'x:t'
-i, j, k, m = 'x:i', 'x:j', 'x:k', 'x:m'
-X, Y, Z, V, W, U = (Variable(name) for name in 'xyzvwu')
-
-
-def num(value: object, datatype: str = 'integer') -> Literal:
-    return Literal(str(value), XSD + datatype)
-
-
-def base(*axioms: Axiom, consistent: bool = True) -> KnowledgeBase:
-    kb = KnowledgeBase('x:', axioms)
-    assert kb.reason() is consistent
-    assert kb.unsupported == ()
-    return kb
-
-
-def is_a(cls: ClassExpression, individual: str) -> Axiom:
-    return ClassAssertion(cls, individual)
-
-
-def rel(prop: str, one: str, other: str) -> Axiom:
-    return ObjectPropertyAssertion(prop, one, other)
-
-
-def has(prop: str, one: str, value: object) -> Axiom:
-    return DataPropertyAssertion(prop, one, value if isinstance(value, Literal) else num(value))
-
-
-def differ(*individuals: str) -> Axiom:
-    return DifferentIndividuals(frozenset(individuals))
-
-
-def same(*individuals: str) -> SameIndividual:
-    return SameIndividual(frozenset(individuals))
-
-
-# --- classes ---
+from .small_ontologies import (
+    A,
+    B,
+    C,
+    D,
+    P,
+    Q,
+    R,
+    S,
+    T,
+    V,
+    W,
+    X,
+    Y,
+    base,
+    computed,
+    differ,
+    has,
+    i,
+    is_a,
+    j,
+    k,
+    m,
+    num,
+    rel,
+    same,
+)
 
 
 @pytest.mark.parametrize(
@@ -221,9 +201,6 @@ def test_a_class_that_can_have_no_member_is_below_all() -> None:
     assert kb.subclasses(B) == {A}
 
 
-# --- properties ---
-
-
 @pytest.mark.parametrize(
     ('axioms', 'follows'),
     [
@@ -263,9 +240,6 @@ def test_property_axioms(axioms: list[Axiom], follows: Axiom) -> None:
         assert follows in set(kb.facts())
 
 
-# --- difference ---
-
-
 @pytest.mark.parametrize(
     'evidence',
     [
@@ -296,99 +270,6 @@ def test_entailed_difference(evidence: list[Axiom]) -> None:
         assert m in kb.instances(C)
 
 
-# --- rules ---
-
-
-def computed(name: str, *arguments: object) -> BuiltinAtom:
-    terms = [
-        a if isinstance(a, (Variable, Literal)) else Literal(a) if isinstance(a, str) else num(a)
-        for a in arguments
-    ]
-    return BuiltinAtom(SWRLB + name, tuple(terms))
-
-
-TRUE, FALSE = Literal('true', XSD + 'boolean'), Literal('false', XSD + 'boolean')
-
-
-@pytest.mark.parametrize(
-    ('given', 'atoms', 'result'),
-    [
-        (7, [computed('add', W, V, 2, 1)], num(10)),
-        (7, [computed('subtract', W, V, 9)], num(-2)),
-        (7, [computed('multiply', W, V, V)], num(49)),
-        (7, [computed('divide', W, V, 2)], num('3.5', 'decimal')),
-        (7, [computed('integerDivide', W, V, 2)], num(3)),
-        (-7, [computed('mod', W, V, 2)], num(-1)),
-        (7, [computed('pow', W, V, 2)], num(49)),
-        (7, [computed('unaryMinus', W, V)], num(-7)),
-        (-7, [computed('abs', W, V)], num(7)),
-        (num('2.5', 'decimal'), [computed('round', W, V)], num(3)),
-        (num('2.5', 'decimal'), [computed('roundHalfToEven', W, V)], num(2)),
-        (num('2.5', 'decimal'), [computed('ceiling', W, V)], num(3)),
-        (num('2.5', 'decimal'), [computed('floor', W, V)], num(2)),
-        (num('2.5', 'double'), [computed('add', W, V, 1)], num('3.5', 'double')),
-        (7, [computed('subtract', U, V, 2), computed('multiply', W, U, U)], num(25)),
-        (TRUE, [computed('booleanNot', W, V)], FALSE),
-        (Literal('ab'), [computed('stringConcat', W, V, 'c')], Literal('abc')),
-        (Literal('hello'), [computed('substring', W, V, 2, 3)], Literal('ell')),
-        (Literal('hello'), [computed('stringLength', W, V)], num(5)),
-        (Literal(' a  b '), [computed('normalizeSpace', W, V)], Literal('a b')),
-        (Literal('Ab'), [computed('upperCase', W, V)], Literal('AB')),
-        (Literal('Ab'), [computed('lowerCase', W, V)], Literal('ab')),
-        (Literal('bar'), [computed('translate', W, V, 'abc', 'AB')], Literal('BAr')),
-        (Literal('a=b'), [computed('substringBefore', W, V, '=')], Literal('a')),
-        (Literal('a=b'), [computed('substringAfter', W, V, '=')], Literal('b')),
-        (Literal('aab'), [computed('replace', W, V, 'a', 'x')], Literal('xxb')),
-        (Literal('a,b'), [computed('tokenize', W, V, ','), computed('startsWith', W, 'b')], Literal('b')),
-        (7, [computed('equal', W, V), computed('greaterThan', V, 6)], num(7)),
-        (7, [computed('equal', W, V), computed('greaterThan', V, 7)], None),
-        (7, [computed('equal', W, V), computed('greaterThanOrEqual', V, 7)], num(7)),
-        (7, [computed('equal', W, V), computed('lessThan', V, 8)], num(7)),
-        (7, [computed('equal', W, V), computed('lessThanOrEqual', V, 6)], None),
-        (7, [computed('equal', W, V), computed('notEqual', V, 7)], None),
-        (7, [computed('divide', W, V, 0)], None),
-        (Literal('7'), [computed('add', W, V, 1)], None),
-        (Literal('AbC'), [computed('equal', W, V), computed('stringEqualIgnoreCase', V, 'aBc')], Literal('AbC')),
-        (Literal('abc'), [computed('equal', W, V), computed('contains', V, 'bc')], Literal('abc')),
-        (Literal('abc'), [computed('equal', W, V), computed('containsIgnoreCase', V, 'BC')], Literal('abc')),
-        (Literal('abc'), [computed('equal', W, V), computed('endsWith', V, 'bc')], Literal('abc')),
-        (Literal('abc'), [computed('equal', W, V), computed('matches', V, '^a.c$')], Literal('abc')),
-    ],
-)  # fmt: skip
-def test_builtins(given: object, atoms: list[BuiltinAtom], result: Literal | None) -> None:
-    rule = Rule((DataPropertyAtom(S, X, V), *atoms), (DataPropertyAtom(T, X, W),))
-    kb = base(rule, has(S, i, given))
-    found = {value_of(literal) for literal in kb.data_values(T, i)}
-    assert found == (set() if result is None else {value_of(result)})
-    kb.remove(has(S, i, given))
-    kb.reason()
-    assert kb.data_values(T, i) == set()
-
-
-def test_rules_speak_of_named_individuals_only() -> None:
-    rule = Rule((ObjectPropertyAtom(P, X, Y), ClassAtom(B, Y)), (ClassAtom(C, X),))
-    kb = base(SubClassOf(A, ObjectSomeValuesFrom(P, B)), rule, is_a(A, i))
-    assert kb.instances(C) == set()
-
-
-def test_rules_with_same_and_different_atoms() -> None:
-    twins = Rule((ObjectPropertyAtom(P, X, Y), ClassAtom(A, X)), (SameIndividualAtom(X, Y),))
-    apart = Rule(
-        (ObjectPropertyAtom(Q, Z, X), ObjectPropertyAtom(Q, Z, Y), DifferentIndividualsAtom(X, Y)),
-        (ObjectPropertyAtom(R, X, Y),),
-    )
-    kb = base(twins, apart, rel(P, i, j), is_a(A, i), rel(Q, k, i), rel(Q, k, m), differ(j, m))
-    assert same(i, j) in set(kb.facts())
-    assert kb.object_values(R, i) == {m}
-    kb.remove(is_a(A, i))
-    kb.reason()
-    assert same(i, j) not in set(kb.facts())
-    assert kb.object_values(R, i) == set()
-
-
-# --- outside the fragment ---
-
-
 @pytest.mark.parametrize(
     ('axiom', 'words'),
     [
@@ -408,13 +289,3 @@ def test_what_is_not_supported_is_reported(axiom: Axiom, words: str) -> None:
     assert words in kb.unsupported[0]
     if isinstance(axiom, EquivalentClasses):
         assert i in kb.instances(A), 'the direction that is supported still counts'
-
-
-def test_a_rule_that_makes_values_without_end_is_stopped_and_reported() -> None:
-    counting = Rule(
-        (DataPropertyAtom(S, X, V), computed('add', W, V, 1)), (DataPropertyAtom(S, X, W),)
-    )
-    kb = KnowledgeBase('x:', [counting, has(S, i, 1)])
-    assert kb.reason()
-    assert 'without end' in kb.unsupported[0]
-    assert num(2) in kb.data_values(S, i)

@@ -1,19 +1,16 @@
-"""The armor server, its client and the map builder as nodes in a real graph."""
+"""The map builder as a node in a real graph, and a server that comes and goes beside it."""
 
 from __future__ import annotations
 
-import threading
 from pathlib import Path
 from typing import Any
 
 import pytest
-from rclpy.task import Future
 
 from surveillance_fsm.ros import ServiceCaller
 from surveillance_interfaces.msg import OntologyMap, OntologyPlace, RoomConnection
 from surveillance_interfaces.srv import (
     AddRoom,
-    ArmorDirective,
     ReferenceName,
     RemoveRoom,
     RoomPosition,
@@ -21,18 +18,16 @@ from surveillance_interfaces.srv import (
 )
 from surveillance_ontology.armor_client import (
     ArmorClient,
-    ArmorServiceCallError,
     ArmorServiceInternalError,
-    FactSubscription,
 )
 from surveillance_ontology.armor_server_node import ArmorServer
 from surveillance_ontology.conversions import point_to_ros
 from surveillance_ontology.ontology_map_builder_node import OntologyMapBuilder
 from surveillance_ontology.patrol_ontology import PatrolOntology
-from surveillance_runtime.node import PatrolNode, StartError
+from surveillance_runtime.node import StartError
 from surveillance_runtime.qos import STATE_QOS
 
-from .seven_rooms import IRI, ONTOLOGY, SEVEN_ROOMS, build_seven_rooms
+from .seven_rooms import SEVEN_ROOMS, reach
 
 PLACE: dict[str, Any] = {
     **{f'map.{room}': doors for room, doors in SEVEN_ROOMS.items()},
@@ -91,224 +86,6 @@ def connected(armor: ArmorClient) -> list[str]:
         return armor.query.objectprop_b2_ind('connectedTo', 'C1')
     except ArmorServiceInternalError:
         return []
-
-
-def reach(armor: ArmorClient) -> list[str]:
-    return armor.query.objectprop_b2_ind('canReach', 'Robot1')
-
-
-# --- server and client ---
-
-
-def test_directives_travel_both_ways(graph: Any, tmp_path: Path) -> None:
-    graph.add(ArmorServer, {'ontologies_folder': str(tmp_path)})
-    armor = ArmorClient(graph.node, 'test', 'map')
-    build_seven_rooms(armor, True, False)
-    assert reach(armor) == ['C1', 'C2']
-    assert armor.query.dataprop_b2_ind('now', 'Robot1') == ['"1665579740"^^xsd:long']
-    batch = armor.batch([armor.request('ADD IND', 'X'), armor.request('NO SUCH')])
-    assert [row.exit_code for row in batch.responses] == [0, 205]
-    assert armor.query.sparql(f'SELECT ?x {{ <{IRI}#Robot1> <{IRI}#isIn> ?x }}') == [
-        {'x': f'{IRI}#E'}
-    ]
-    armor.utils.save_ref_with_inferences(str(tmp_path / 'saved.owl'))
-    assert (tmp_path / 'saved.owl').stat().st_size > 1000
-    with pytest.raises(ArmorServiceInternalError, match='may not be written'):
-        armor.utils.save('/saved.owl')
-
-
-def test_a_callback_awaits_the_same_methods(graph: Any) -> None:
-    graph.add(ArmorServer)
-    armor = ArmorClient(graph.node, 'test', 'map')
-    found: list[Any] = []
-
-    async def use() -> None:
-        await armor.utils.load_ref_from_file.call_async(ONTOLOGY, IRI)
-        found.append(await armor.query.dataprop_b2_ind.call_async('urgencyThreshold', 'Robot1'))
-
-    armor.utils.get_all_refs()
-    graph.node.executor.create_task(use)
-    graph.until(lambda: found)
-    assert found == [['"7"^^xsd:long']]
-
-
-def test_a_missing_server_is_reported_in_time(graph: Any) -> None:
-    armor = ArmorClient(graph.node, 'test', 'map', timeout=0.1)
-    with pytest.raises(ArmorServiceCallError, match='armor_interface_srv'):
-        armor.query.ind_b2_class('ROOM')
-
-
-def test_a_client_that_nobody_spins_says_so(graph: Any) -> None:
-    graph.add(ArmorServer)
-    lonely = PatrolNode('lonely', context=graph.context, use_global_arguments=False)
-    armor = ArmorClient(lonely, 'test', 'map', timeout=0.3)
-    with pytest.raises(ArmorServiceCallError, match="no thread spins node 'lonely'") as error:
-        armor.utils.get_all_refs()
-    assert 'armor_api' in error.value.msg
-    lonely.destroy_node()
-
-
-def test_a_blocking_call_in_a_callback_says_so(graph: Any) -> None:
-    graph.add(ArmorServer)
-    armor = ArmorClient(graph.node, 'test', 'map', timeout=0.3)
-    armor.utils.get_all_refs()
-    said: list[str] = []
-
-    def callback() -> None:
-        try:
-            armor.utils.get_all_refs()
-        except ArmorServiceCallError as error:
-            said.append(error.msg)
-
-    graph.node.executor.create_task(callback)
-    graph.until(lambda: said)
-    assert 'call_async' in said[0]
-
-
-def test_a_client_beside_a_burst_of_another_is_answered_in_its_turn(graph: Any) -> None:
-    graph.add(ArmorServer)
-    clients = {
-        name: graph.node.create_client(ArmorDirective, 'armor_interface_srv')
-        for name in ('burst', 'good')
-    }
-    order: list[str] = []
-    done = threading.Event()
-
-    def send(name: str) -> None:
-        request = ArmorDirective.Request()
-        request.armor_request.client_name = name
-        request.armor_request.reference_name = 'map'
-        request.armor_request.command = 'MALFORMED'
-        clients[name].call_async(request).add_done_callback(lambda _future: count(name))
-
-    def count(name: str) -> None:
-        order.append(name)
-        if len(order) == 601:
-            done.set()
-
-    def both() -> None:
-        for _ in range(600):
-            send('burst')
-        send('good')
-
-    assert all(client.wait_for_service(5.0) for client in clients.values())
-    graph.node.executor.create_task(both)
-    assert done.wait(20.0), f'{601 - len(order)} of 601 requests were lost'
-    assert order.index('good') < 300
-
-
-def test_a_long_query_keeps_nobody_waiting(graph: Any) -> None:
-    graph.add(ArmorServer, {'sparql_timeout': 3.0})
-    armor = ArmorClient(graph.node, 'test', 'map')
-    armor.utils.load_ref_from_file(ONTOLOGY, IRI)
-    ended: list[str] = []
-
-    async def endless() -> None:
-        pattern = ' . '.join(f'?a{i} ?b{i} ?c{i}' for i in range(8))
-        response = await armor.call.call_async(
-            'QUERY', 'SPARQL', '', [f'SELECT (COUNT(*) AS ?n) {{ {pattern} }}', '1500']
-        )
-        ended.append('stopped' if response.timeout else 'done')
-
-    graph.node.executor.create_task(endless)
-    for _ in range(10):
-        armor.manipulation.add_ind_to_class('X', 'DOOR')
-        assert armor.query.ind_b2_class('DOOR') == ['X']
-    assert armor.batch([armor.request('REASON')]).success
-    assert not ended, 'the others were answered while the query ran'
-    graph.until(lambda: ended)
-    assert ended == ['stopped']
-
-
-def test_parameters_of_the_server(graph: Any, tmp_path: Path) -> None:
-    graph.add(ArmorServer, {'enforce_mount': False, 'narrow_doubles': True})
-    one, two = (ArmorClient(graph.node, name, 'map') for name in ('one', 'two'))
-    one.utils.load_ref_from_file(ONTOLOGY, IRI, mounted=True)
-    two.manipulation.add_dataprop_to_ind('size', 'X', 'DOUBLE', '0.5')
-    assert two.query.dataprop_b2_ind('size', 'X') == ['"0.5"^^xsd:float']
-    (tmp_path / 'file').write_text('')
-    with pytest.raises(StartError, match='parameter store'):
-        graph.add(ArmorServer, {'store': str(tmp_path / 'file' / 'store')})
-
-
-def test_a_stored_ontology_outlives_its_server(graph: Any, tmp_path: Path) -> None:
-    server = graph.add(ArmorServer, {'store': str(tmp_path / 'store')})
-    armor = ArmorClient(graph.node, 'test', 'map')
-    build_seven_rooms(armor, False, True)
-    armor.utils.mount_on_ref()
-    graph.remove(server)
-    graph.add(ArmorServer, {'store': str(tmp_path / 'store')})
-    assert reach(armor) == ['C1', 'C2']
-    assert armor.utils.get_ref_client() == 'test'
-
-
-# --- subscriptions to facts ---
-
-
-def test_facts_come_and_go_at_a_subscriber(graph: Any) -> None:
-    server = graph.add(ArmorServer)
-    armor = ArmorClient(graph.node, 'test', 'map')
-    told: list[tuple[str, bool]] = []
-    urgent = FactSubscription(
-        graph.node, armor, 'URGENT(?)', lambda fact, came: told.append((str(fact), came))
-    )
-    build_seven_rooms(armor, False, True)
-    armor.manipulation.replace_dataprop_b2_ind('visitedAt', 'R3', 'LONG', '1', '1665579740')
-    armor.utils.sync_buffered_reasoner()
-    graph.until(lambda: told)
-    late = FactSubscription(graph.node, armor, 'canReach(Robot1, ?)', lambda _fact, _came: None)
-    graph.until(lambda: len(late.facts) == 2)
-    armor.manipulation.replace_dataprop_b2_ind('visitedAt', 'R3', 'LONG', '1665579740', '1')
-    armor.utils.sync_buffered_reasoner()
-    graph.until(lambda: len(told) == 2)
-    assert told == [('URGENT(R3)', True), ('URGENT(R3)', False)]
-    assert urgent.facts == frozenset()
-    graph.remove(server)
-    graph.add(ArmorServer)
-    graph.until(lambda: not late.facts)
-    build_seven_rooms(armor, False, True)
-    graph.until(lambda: len(late.facts) == 2)
-
-
-class HeldClient:
-    """A client whose questions wait until they are let go."""
-
-    def __init__(self, graph: Any, armor: ArmorClient) -> None:
-        self.reference_name = armor.reference_name
-        self.query = self.facts_by_origin = self
-        self._armor = armor
-        self.go = Future(executor=graph.node.executor)
-        self.asked = 0
-
-    async def call_async(self, pattern: str) -> Any:
-        self.asked += 1
-        await self.go
-        return await self._armor.query.facts_by_origin.call_async(pattern)
-
-
-def test_what_changes_while_the_server_is_asked_is_told_too(graph: Any) -> None:
-    graph.add(ArmorServer)
-    armor = ArmorClient(graph.node, 'test', 'map')
-    build_seven_rooms(armor, False, True)
-    held = HeldClient(graph, armor)
-    told: set[str] = set()
-    visits = FactSubscription(
-        graph.node,
-        held,  # type: ignore[arg-type]
-        'visitedAt(R3, ?)',
-        lambda fact, came: (told.add if came else told.discard)(str(fact)),
-    )
-    graph.until(lambda: held.asked)
-    for before, after in (('1665579740', '5'), ('5', '6'), ('6', '7')):
-        armor.manipulation.replace_dataprop_b2_ind('visitedAt', 'R3', 'LONG', after, before)
-    last = 'visitedAt(R3, "7"^^xsd:long)'
-    graph.until(lambda: last in map(str, visits.facts))
-    graph.node.executor.create_task(held.go.set_result, None)
-    graph.until(lambda: set(map(str, visits.facts)) == {last} and held.asked > 1)
-    assert told == {last}
-
-
-# --- the map builder ---
 
 
 def test_the_builder_waits_for_the_server_and_its_clients_for_the_builder(

@@ -8,106 +8,35 @@ import pytest
 import rclpy
 from action_msgs.msg import GoalStatus
 from geometry_msgs.msg import Point
-from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from rclpy.task import Future
 from std_msgs.msg import Int32
-from std_srvs.srv import SetBool, Trigger
+from std_srvs.srv import SetBool
 
 import surveillance_fsm as fsm
 from surveillance_fsm.ros import (
-    ActionServerWrapper,
     ConditionState,
     GoalAbortedError,
     GoalServer,
     MonitorState,
     ServiceState,
-    SimpleActionState,
     set_preempt_handler,
 )
 from surveillance_interfaces.action import FollowPath
 from surveillance_runtime.node import PatrolNode
 
-from .states import Answer, Background, Waiter, began
-
-SHORT = 0.3
-LONG = 20.0
-
-
-def machine_of(state, userdata=None):
-    machine = fsm.StateMachine(state.get_registered_outcomes())
-    machine.set_name('ROOT')
-    for key, value in (userdata or {}).items():
-        machine.userdata[key] = value
-    with machine:
-        fsm.StateMachine.add('STATE', state)
-    return machine
-
-
-class SilentServer(PatrolNode):
-    """A service that never answers."""
-
-    def __init__(self, **options):
-        super().__init__('silent', **options)
-        self.asked = threading.Event()
-        self.create_service(Trigger, 'trigger', self._serve)
-
-    async def _serve(self, request, response):
-        self.asked.set()
-        await Future()
-        return response
-
-
-class ScriptedActionServer(PatrolNode):
-    """An action server that accepts, refuses or drops as it is told."""
-
-    accept = True
-    cancel = CancelResponse.ACCEPT
-
-    def __init__(self, **options):
-        super().__init__('scripted', **options)
-        self.began = threading.Event()
-        self.cancelled = threading.Event()
-        self._hold = Future()
-        self._server = ActionServer(
-            self,
-            FollowPath,
-            'follow_path',
-            self._execute,
-            goal_callback=lambda _: GoalResponse.ACCEPT if self.accept else GoalResponse.REJECT,
-            cancel_callback=self._cancel,
-        )
-        self.own(self._server)
-
-    def _cancel(self, _handle):
-        self.cancelled.set()
-        return self.cancel
-
-    async def _execute(self, handle):
-        self.began.set()
-        await self._hold
-        return FollowPath.Result()
-
-
-class Refusing(ScriptedActionServer):
-    accept = False
-
-
-class Stubborn(ScriptedActionServer):
-    cancel = CancelResponse.REJECT
-
-
-def service(node, **arguments):
-    return ServiceState(node, 'trigger', Trigger, **{'timeout': LONG, **arguments})
-
-
-def action(node, **arguments):
-    times = {'server_wait_timeout': LONG, 'preempt_timeout': LONG}
-    return SimpleActionState(node, 'follow_path', FollowPath, **{**times, **arguments})
-
-
-# Services.
+from .ros_servers import (
+    LONG,
+    SHORT,
+    Refusing,
+    ScriptedActionServer,
+    SilentServer,
+    Stubborn,
+    action,
+    machine_of,
+    service,
+)
+from .states import Background, Waiter, began
 
 
 def test_a_service_that_is_absent_aborts_in_time(graph, caplog):
@@ -229,9 +158,6 @@ def test_a_wrong_request_or_callback_aborts_with_a_word(graph, caplog, arguments
 def test_wrong_arguments_are_refused_at_construction(graph, arguments):
     with pytest.raises(fsm.InvalidStateError):
         ServiceState(graph.node, 'switch', SetBool, **arguments)
-
-
-# Actions.
 
 
 def test_an_action_server_that_is_absent_aborts_in_time(graph):
@@ -360,9 +286,6 @@ def test_an_aborted_goal_aborts(graph):
     assert machine_of(action(graph.node)).execute() == 'aborted'
 
 
-# Topics and conditions.
-
-
 @pytest.mark.parametrize(
     ('values', 'max_checks', 'expected'), [((50, 3), -1, 'invalid'), ((50,), 3, 'valid')]
 )
@@ -432,82 +355,6 @@ def test_a_preempt_ends_checking_a_condition(graph):
     assert checked.wait(5.0)
     machine.request_preempt()
     assert run.result() == 'preempted'
-
-
-# A machine as an action server, and its end with the node.
-
-
-def wrapped(graph, container, **arguments):
-    server = graph.add(PatrolNode, name='server')
-    wrapper = ActionServerWrapper(
-        server,
-        'follow_path',
-        FollowPath,
-        container,
-        succeeded_outcomes=['done'],
-        aborted_outcomes=['aborted'],
-        preempted_outcomes=['preempted'],
-        **arguments,
-    )
-    wrapper.run_server()
-    return wrapper
-
-
-def container_of(state):
-    container = fsm.StateMachine(
-        ['done', 'aborted', 'preempted'], input_keys=['path'], output_keys=['position']
-    )
-    with container:
-        fsm.StateMachine.add('STATE', state)
-    return container
-
-
-def test_a_machine_serves_an_action(graph):
-    def drive(ud):
-        ud.position = ud.path[-1]
-        return 'done'
-
-    state = fsm.CBState(drive, outcomes=['done'], input_keys=['path'], output_keys=['position'])
-    wrapped(graph, container_of(state), expand_goal_slots=True, pack_result_slots=True)
-    client = machine_of(
-        action(graph.node, goal_slots=['path'], result_slots=['position']),
-        {'path': [Point(x=4.0)]},
-    )
-    for _ in range(2):
-        assert client.execute() == 'succeeded'
-        assert client.userdata.position.x == 4.0
-
-
-@pytest.mark.parametrize(
-    'state', [Answer('aborted'), Answer(RuntimeError('broken'), outcomes=['done'])]
-)
-def test_a_machine_that_fails_aborts_the_goal(graph, state):
-    wrapped(graph, container_of(state), expand_goal_slots=True)
-    assert machine_of(action(graph.node)).execute() == 'aborted'
-
-
-def test_a_cancel_preempts_the_machine_and_the_next_goal_starts_afresh(graph):
-    waiter = Waiter(LONG)
-    wrapped(graph, container_of(waiter), expand_goal_slots=True)
-    for _ in range(2):
-        client = machine_of(action(graph.node))
-        run = Background(client)
-        began(waiter, 10.0)
-        client.request_preempt()
-        assert run.result() == 'preempted'
-
-
-def test_outcomes_of_a_wrapper_are_named_once_and_exist(graph):
-    for outcomes in (['done', 'nix'], ['preempted']):
-        with pytest.raises(fsm.InvalidStateError):
-            ActionServerWrapper(
-                graph.node,
-                'follow_path',
-                FollowPath,
-                container_of(Answer('done')),
-                succeeded_outcomes=outcomes,
-                preempted_outcomes=['preempted'],
-            )
 
 
 def test_a_machine_is_preempted_when_its_node_stops_or_ros_goes_down():

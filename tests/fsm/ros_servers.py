@@ -1,0 +1,92 @@
+"""Servers that do not do what they should, and states that talk to them."""
+
+from __future__ import annotations
+
+import threading
+
+from rclpy.action import ActionServer, CancelResponse, GoalResponse
+from rclpy.task import Future
+from std_srvs.srv import Trigger
+
+import surveillance_fsm as fsm
+from surveillance_fsm.ros import (
+    ServiceState,
+    SimpleActionState,
+)
+from surveillance_interfaces.action import FollowPath
+from surveillance_runtime.node import PatrolNode
+
+SHORT = 0.3
+LONG = 20.0
+
+
+def machine_of(state, userdata=None):
+    machine = fsm.StateMachine(state.get_registered_outcomes())
+    machine.set_name('ROOT')
+    for key, value in (userdata or {}).items():
+        machine.userdata[key] = value
+    with machine:
+        fsm.StateMachine.add('STATE', state)
+    return machine
+
+
+class SilentServer(PatrolNode):
+    """A service that never answers."""
+
+    def __init__(self, **options):
+        super().__init__('silent', **options)
+        self.asked = threading.Event()
+        self.create_service(Trigger, 'trigger', self._serve)
+
+    async def _serve(self, request, response):
+        self.asked.set()
+        await Future()
+        return response
+
+
+class ScriptedActionServer(PatrolNode):
+    """An action server that accepts, refuses or drops as it is told."""
+
+    accept = True
+    cancel = CancelResponse.ACCEPT
+
+    def __init__(self, **options):
+        super().__init__('scripted', **options)
+        self.began = threading.Event()
+        self.cancelled = threading.Event()
+        self._hold = Future()
+        self._server = ActionServer(
+            self,
+            FollowPath,
+            'follow_path',
+            self._execute,
+            goal_callback=lambda _: GoalResponse.ACCEPT if self.accept else GoalResponse.REJECT,
+            cancel_callback=self._cancel,
+        )
+        self.own(self._server)
+
+    def _cancel(self, _handle):
+        self.cancelled.set()
+        return self.cancel
+
+    async def _execute(self, handle):
+        self.began.set()
+        await self._hold
+        return FollowPath.Result()
+
+
+class Refusing(ScriptedActionServer):
+    accept = False
+
+
+class Stubborn(ScriptedActionServer):
+    cancel = CancelResponse.REJECT
+
+
+def service(node, **arguments):
+    return ServiceState(node, 'trigger', Trigger, **{'timeout': LONG, **arguments})
+
+
+def action(node, **arguments):
+    times = {'server_wait_timeout': LONG, 'preempt_timeout': LONG}
+    return SimpleActionState(node, 'follow_path', FollowPath, **{**times, **arguments})

@@ -1,0 +1,141 @@
+"""Rules (SWRL) and their built-ins, each in a small ontology."""
+# ruff: noqa: E501 - tables of cases, one line each
+
+from __future__ import annotations
+
+import pytest
+
+from surveillance_ontology.knowledge_base import KnowledgeBase
+from surveillance_ontology.owl.axioms import (
+    Rule,
+    SubClassOf,
+)
+from surveillance_ontology.owl.expressions import (
+    BuiltinAtom,
+    ClassAtom,
+    DataPropertyAtom,
+    DifferentIndividualsAtom,
+    Literal,
+    ObjectPropertyAtom,
+    ObjectSomeValuesFrom,
+    SameIndividualAtom,
+)
+from surveillance_ontology.owl.vocabulary import XSD
+from surveillance_ontology.reasoner.datatypes import value_of
+
+from .small_ontologies import (
+    A,
+    B,
+    C,
+    P,
+    Q,
+    R,
+    S,
+    T,
+    U,
+    V,
+    W,
+    X,
+    Y,
+    Z,
+    base,
+    computed,
+    differ,
+    has,
+    i,
+    is_a,
+    j,
+    k,
+    m,
+    num,
+    rel,
+    same,
+)
+
+TRUE, FALSE = Literal('true', XSD + 'boolean'), Literal('false', XSD + 'boolean')
+
+
+@pytest.mark.parametrize(
+    ('given', 'atoms', 'result'),
+    [
+        (7, [computed('add', W, V, 2, 1)], num(10)),
+        (7, [computed('subtract', W, V, 9)], num(-2)),
+        (7, [computed('multiply', W, V, V)], num(49)),
+        (7, [computed('divide', W, V, 2)], num('3.5', 'decimal')),
+        (7, [computed('integerDivide', W, V, 2)], num(3)),
+        (-7, [computed('mod', W, V, 2)], num(-1)),
+        (7, [computed('pow', W, V, 2)], num(49)),
+        (7, [computed('unaryMinus', W, V)], num(-7)),
+        (-7, [computed('abs', W, V)], num(7)),
+        (num('2.5', 'decimal'), [computed('round', W, V)], num(3)),
+        (num('2.5', 'decimal'), [computed('roundHalfToEven', W, V)], num(2)),
+        (num('2.5', 'decimal'), [computed('ceiling', W, V)], num(3)),
+        (num('2.5', 'decimal'), [computed('floor', W, V)], num(2)),
+        (num('2.5', 'double'), [computed('add', W, V, 1)], num('3.5', 'double')),
+        (7, [computed('subtract', U, V, 2), computed('multiply', W, U, U)], num(25)),
+        (TRUE, [computed('booleanNot', W, V)], FALSE),
+        (Literal('ab'), [computed('stringConcat', W, V, 'c')], Literal('abc')),
+        (Literal('hello'), [computed('substring', W, V, 2, 3)], Literal('ell')),
+        (Literal('hello'), [computed('stringLength', W, V)], num(5)),
+        (Literal(' a  b '), [computed('normalizeSpace', W, V)], Literal('a b')),
+        (Literal('Ab'), [computed('upperCase', W, V)], Literal('AB')),
+        (Literal('Ab'), [computed('lowerCase', W, V)], Literal('ab')),
+        (Literal('bar'), [computed('translate', W, V, 'abc', 'AB')], Literal('BAr')),
+        (Literal('a=b'), [computed('substringBefore', W, V, '=')], Literal('a')),
+        (Literal('a=b'), [computed('substringAfter', W, V, '=')], Literal('b')),
+        (Literal('aab'), [computed('replace', W, V, 'a', 'x')], Literal('xxb')),
+        (Literal('a,b'), [computed('tokenize', W, V, ','), computed('startsWith', W, 'b')], Literal('b')),
+        (7, [computed('equal', W, V), computed('greaterThan', V, 6)], num(7)),
+        (7, [computed('equal', W, V), computed('greaterThan', V, 7)], None),
+        (7, [computed('equal', W, V), computed('greaterThanOrEqual', V, 7)], num(7)),
+        (7, [computed('equal', W, V), computed('lessThan', V, 8)], num(7)),
+        (7, [computed('equal', W, V), computed('lessThanOrEqual', V, 6)], None),
+        (7, [computed('equal', W, V), computed('notEqual', V, 7)], None),
+        (7, [computed('divide', W, V, 0)], None),
+        (Literal('7'), [computed('add', W, V, 1)], None),
+        (Literal('AbC'), [computed('equal', W, V), computed('stringEqualIgnoreCase', V, 'aBc')], Literal('AbC')),
+        (Literal('abc'), [computed('equal', W, V), computed('contains', V, 'bc')], Literal('abc')),
+        (Literal('abc'), [computed('equal', W, V), computed('containsIgnoreCase', V, 'BC')], Literal('abc')),
+        (Literal('abc'), [computed('equal', W, V), computed('endsWith', V, 'bc')], Literal('abc')),
+        (Literal('abc'), [computed('equal', W, V), computed('matches', V, '^a.c$')], Literal('abc')),
+    ],
+)  # fmt: skip
+def test_builtins(given: object, atoms: list[BuiltinAtom], result: Literal | None) -> None:
+    rule = Rule((DataPropertyAtom(S, X, V), *atoms), (DataPropertyAtom(T, X, W),))
+    kb = base(rule, has(S, i, given))
+    found = {value_of(literal) for literal in kb.data_values(T, i)}
+    assert found == (set() if result is None else {value_of(result)})
+    kb.remove(has(S, i, given))
+    kb.reason()
+    assert kb.data_values(T, i) == set()
+
+
+def test_rules_speak_of_named_individuals_only() -> None:
+    rule = Rule((ObjectPropertyAtom(P, X, Y), ClassAtom(B, Y)), (ClassAtom(C, X),))
+    kb = base(SubClassOf(A, ObjectSomeValuesFrom(P, B)), rule, is_a(A, i))
+    assert kb.instances(C) == set()
+
+
+def test_rules_with_same_and_different_atoms() -> None:
+    twins = Rule((ObjectPropertyAtom(P, X, Y), ClassAtom(A, X)), (SameIndividualAtom(X, Y),))
+    apart = Rule(
+        (ObjectPropertyAtom(Q, Z, X), ObjectPropertyAtom(Q, Z, Y), DifferentIndividualsAtom(X, Y)),
+        (ObjectPropertyAtom(R, X, Y),),
+    )
+    kb = base(twins, apart, rel(P, i, j), is_a(A, i), rel(Q, k, i), rel(Q, k, m), differ(j, m))
+    assert same(i, j) in set(kb.facts())
+    assert kb.object_values(R, i) == {m}
+    kb.remove(is_a(A, i))
+    kb.reason()
+    assert same(i, j) not in set(kb.facts())
+    assert kb.object_values(R, i) == set()
+
+
+def test_a_rule_that_makes_values_without_end_is_stopped_and_reported() -> None:
+    counting = Rule(
+        (DataPropertyAtom(S, X, V), computed('add', W, V, 1)), (DataPropertyAtom(S, X, W),)
+    )
+    kb = KnowledgeBase('x:', [counting, has(S, i, 1)])
+    assert kb.reason()
+    assert 'without end' in kb.unsupported[0]
+    assert num(2) in kb.data_values(S, i)
