@@ -5,6 +5,7 @@ A message from the network may hold anything. What cannot be used raises `ValueE
 
 from __future__ import annotations
 
+import io
 import math
 import time
 from collections.abc import Iterable
@@ -16,7 +17,10 @@ from geometry_msgs.msg import Pose as PoseMessage
 from nav_msgs.msg import OccupancyGrid
 from nav_msgs.msg import Path as PathMessage
 from numpy.typing import NDArray
-from sensor_msgs.msg import JointState, LaserScan, PointCloud2
+from PIL import Image
+from sensor_msgs.msg import CompressedImage, JointState, LaserScan, PointCloud2
+from sensor_msgs.msg import Image as ImageMessage
+from visualization_msgs.msg import MarkerArray
 
 from surveillance_interfaces.msg import (
     DoorStates,
@@ -39,6 +43,11 @@ from surveillance_runtime.conversions import points_from_cloud, seconds_of
 MOST_CELLS = 16_000_000
 MOST_POINTS = 20_000
 MOST_NAMES = 10_000
+MOST_PIXELS = 20_000_000
+JPEG_QUALITY = 75
+JPEG_START = b'\xff\xd8'
+URGENT_MARK = ' URGENT'
+"""Follows the name of a place on `place_markers`."""
 STANDING = 0.01
 """A joint that is slower stands still, rad/s."""
 MOST_BEAMS = 180
@@ -229,6 +238,41 @@ def joints_from(message: JointState) -> tuple[dict[str, float], bool]:
         raise ValueError('joints whose positions are not finite')
     still = all(abs(speed) < STANDING for speed in message.velocity)
     return dict(zip(message.name, message.position, strict=True)), still
+
+
+def jpeg_from(message: ImageMessage | CompressedImage) -> bytes | None:
+    """Return an image as JPEG; None when its encoding or its size cannot be used."""
+    if isinstance(message, CompressedImage):
+        data = bytes(message.data)
+        return data if data.startswith(JPEG_START) else None
+    channels = {'rgb8': 3, 'bgr8': 3, 'mono8': 1}.get(message.encoding)
+    if channels is None or not 0 < message.width * message.height <= MOST_PIXELS:
+        return None
+    pixels = np.frombuffer(bytes(message.data), np.uint8)
+    if message.step < message.width * channels or pixels.size < message.step * message.height:
+        return None
+    rows = pixels[: message.step * message.height].reshape(message.height, message.step)
+    image = rows[:, : message.width * channels].reshape(message.height, message.width, channels)
+    if message.encoding == 'bgr8':
+        image = image[:, :, ::-1]
+    file = io.BytesIO()
+    Image.fromarray(image if channels == 3 else image[:, :, 0]).save(
+        file, 'JPEG', quality=JPEG_QUALITY
+    )
+    return file.getvalue()
+
+
+def places_from(
+    message: MarkerArray,
+) -> tuple[dict[str, tuple[float, float]], dict[str, tuple[float, float, float, float]]]:
+    """Return the places' points and the doors' lines that `place_markers` shows, metres."""
+    positions, lines = {}, {}
+    for each in message.markers[:MOST_NAMES]:
+        if each.ns == 'names':
+            positions[each.text.removesuffix(URGENT_MARK)] = point_from(each.pose.position)
+        elif each.ns == 'doors' and len(each.points) == 2 and each.text:
+            lines[each.text] = (*point_from(each.points[0]), *point_from(each.points[1]))
+    return positions, lines
 
 
 def health_from(message: DiagnosticArray) -> dict[str, Health]:

@@ -17,7 +17,7 @@ from nav_msgs.msg import Path
 from std_msgs.msg import ColorRGBA, String
 from visualization_msgs.msg import Marker, MarkerArray
 
-from surveillance_operator.conversions import MOST_NAMES
+from surveillance_operator.conversions import MOST_NAMES, URGENT_MARK
 from surveillance_operator.mission_feed import MissionFeed
 from surveillance_operator.robot_description import urdf
 from surveillance_operator.snapshot import Snapshot
@@ -98,7 +98,7 @@ def markers_of(snapshot: Snapshot, stamp: Any) -> MarkerArray:
         share = 1.0 if visited is None else min(1.0, max(0.0, (snapshot.now - visited) / threshold))
         mixed = [a + share * (b - a) for a, b in zip(FRESH, LATE, strict=True)]
         disc = _marker('places', number, Marker.CYLINDER, (x, y, 0.02), (0.8, 0.8, 0.04), mixed)
-        urgent = ' URGENT' if name in snapshot.urgent else ''
+        urgent = URGENT_MARK if name in snapshot.urgent else ''
         label = _marker(
             'names', number, Marker.TEXT_VIEW_FACING, (x, y, 0.4), (0, 0, 0.5), (1, 1, 1)
         )
@@ -108,6 +108,7 @@ def markers_of(snapshot: Snapshot, stamp: Any) -> MarkerArray:
         is_open = (snapshot.doors or {}).get(name, True)
         colour = (0.04, 0.5, 0.35) if is_open else (0.7, 0.07, 0.17)
         door = _marker('doors', number, Marker.LINE_LIST, (0, 0, 0.1), (0.12, 0, 0), colour)
+        door.text = name
         door.points = [Point(x=line[0], y=line[1]), Point(x=line[2], y=line[3])]
         found.append(door)
     for each in found:

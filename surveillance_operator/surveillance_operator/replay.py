@@ -1,18 +1,26 @@
-"""Plays the time line of a recording on the page, at any speed, from any moment."""
+"""Plays a recording on the page, at any speed, from any moment.
+
+What the page showed is in the recording's time line, so that a jump reads little; what lidar and
+camera saw comes from the recorded messages. A recording without a time line, by `ros2 bag record`
+for example, gets one while it is shown.
+"""
 
 from __future__ import annotations
 
+import contextlib
 import sys
+import tempfile
 import threading
 import time
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Protocol
 
 from surveillance_operator.page.hub import Hub
 from surveillance_operator.page.server import Action, Page
 from surveillance_operator.recording import timeline
 from surveillance_operator.recording.bag import RecordingError
-from surveillance_operator.recording.runs import find_run, run_parser
+from surveillance_operator.recording.runs import Recording, find_recording, run_parser
 from surveillance_operator.recording.timeline import MARKS, Timeline
 
 EXIT_BAD_INPUT = 2
@@ -20,8 +28,17 @@ EXIT_BAD_INPUT = 2
 SPEEDS = 0.1, 100.0
 PERIOD = 0.05
 """Seconds between two steps."""
+LOOK_PERIOD = 0.2
+"""Seconds between two looks at what lidar and camera saw."""
 MOST_LINES = 400
 """Lines that one step applies; where more have passed, it jumps."""
+
+
+class Sights(Protocol):
+    """What was seen at a moment, seconds since 1970; see `recording.sights`."""
+
+    def scan(self, at: float) -> list[list[float]]: ...
+    def jpeg(self, at: float) -> bytes | None: ...
 
 
 class Player:
@@ -30,11 +47,21 @@ class Player:
     Args:
         line: What is played.
         hub: Where it is shown.
+        sights: What lidar and camera saw; None for nothing.
+        read: Returns which share of the recording is in the time line, 0 to 1.
     """
 
-    def __init__(self, line: Timeline, hub: Hub) -> None:
+    def __init__(
+        self,
+        line: Timeline,
+        hub: Hub,
+        sights: Sights | None = None,
+        read: Callable[[], float] = lambda: 1.0,
+    ) -> None:
         self._line = line
         self._hub = hub
+        self._sights = sights
+        self._read = read
         self._lock = threading.Lock()
         self._time = line.times[0]
         self._number = -1
@@ -46,12 +73,27 @@ class Player:
     def run(self) -> None:
         """Play until `stop`."""
         before = time.monotonic()
+        next_look, seen_at, grows = 0.0, -1.0, True
         while not self._ended.wait(PERIOD):
             now = time.monotonic()
             with self._lock:
                 if self._playing:
                     self._forward((now - before) * self._speed)
+                if grows and now >= next_look:
+                    grows = self._read() < 1.0
+                    self._line.extend()
+                    self._tell({}, None)
+                at = self._time
+            if self._sights is not None and now >= next_look and at != seen_at:
+                seen_at = at
+                self._hub.show_parts({'scan': self._sights.scan(at)}, None, whole=False)
+            if now >= next_look:
+                next_look = now + LOOK_PERIOD
             before = now
+
+    def jpeg(self) -> bytes | None:
+        """Return what the camera saw at this moment of the recording."""
+        return None if self._sights is None else self._sights.jpeg(self._time)
 
     def stop(self) -> None:
         """End `run`."""
@@ -127,6 +169,7 @@ class Player:
             'length': round(self._line.times[-1] - self._line.times[0], 1),
             'playing': self._playing,
             'speed': self._speed,
+            'read': round(self._read(), 2),
             'day': time.strftime('%Y-%m-%d %H:%M:%S', time.localtime(self._time)),
         }
         self._hub.show_parts({**parts, 'replay': replay}, now, whole=whole)
@@ -139,27 +182,66 @@ def main(argv: Sequence[str] | None = None) -> int:
     options = parser.parse_args(argv)
     if not 0 <= options.port <= 65535:
         parser.error(f'--port {options.port}: expected a number from 0 to 65535')
-    hub = Hub()
-    try:
-        folder = find_run(options.run, options.runs)
-        line = Timeline(folder / timeline.NAME)
-        player = Player(line, hub)
-        page = Page(hub, questions={}, actions=player.actions(), port=options.port, replay=True)
-    except (RecordingError, OSError) as error:
-        print(f'replay: {error}', file=sys.stderr)
-        return EXIT_BAD_INPUT
-    thread = threading.Thread(target=player.run, name='replay', daemon=True)
-    thread.start()
-    print(f'{folder} is shown at {page.address} until Ctrl-C', flush=True)
-    try:
-        page.run()
-    except KeyboardInterrupt:
-        pass
-    finally:
-        player.stop()
-        hub.close()
-        thread.join()
+    with contextlib.ExitStack() as stack:
+        try:
+            recording = find_recording(options.run, options.runs)
+            hub = Hub()
+            player = _player(recording, hub, stack)
+            page = Page(
+                hub,
+                questions={},
+                actions=player.actions(),
+                picture=player.jpeg,
+                port=options.port,
+                replay=True,
+            )
+        except (RecordingError, OSError) as error:
+            print(f'replay: {error}', file=sys.stderr)
+            return EXIT_BAD_INPUT
+        thread = threading.Thread(target=player.run, name='replay', daemon=True)
+        thread.start()
+        print(f'{recording.name} is shown at {page.address} until Ctrl-C', flush=True)
+        try:
+            page.run()
+        except KeyboardInterrupt:
+            pass
+        finally:
+            player.stop()
+            hub.close()
+            thread.join()
     return 0
+
+
+def _player(recording: Recording, hub: Hub, stack: contextlib.ExitStack) -> Player:
+    """Return a player of a recording; what it needs ends with the stack."""
+    read: Callable[[], float] = lambda: 1.0  # noqa: E731
+    path = recording.timeline
+    if path is None:
+        assert recording.messages is not None  # one of the two was found
+        # Only here: a recording with a time line is replayed where no ROS is installed.
+        from surveillance_operator.recording.conversion import Conversion
+
+        folder = stack.enter_context(tempfile.TemporaryDirectory(prefix='replay-'))
+        path = Path(folder) / timeline.NAME
+        conversion = Conversion(recording.messages, path)
+        stack.callback(conversion.stop)
+        conversion.start()
+        read = conversion.share
+    line = Timeline(path)
+    stack.callback(line.close)
+    return Player(line, hub, _sights(recording, stack), read)
+
+
+def _sights(recording: Recording, stack: contextlib.ExitStack) -> Sights | None:
+    if recording.messages is None:
+        return None
+    try:
+        from surveillance_operator.recording.sights import RecordedSights
+    except ImportError:  # no ROS: lidar and camera stay dark
+        return None
+    sights = RecordedSights(recording.messages)
+    stack.callback(sights.close)
+    return sights
 
 
 if __name__ == '__main__':

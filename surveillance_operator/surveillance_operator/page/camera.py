@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import io
 import threading
 import time
-from typing import Any
 
-import numpy as np
-from PIL import Image
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import Image as ImageMessage
 
+from surveillance_operator.conversions import jpeg_from
 from surveillance_operator.polled_subscription import PolledSubscription
 from surveillance_runtime.node import PatrolNode
 
@@ -21,8 +18,6 @@ PATIENCE = 4.0
 """The plain image is heard when none with markers came for this time, seconds."""
 IDLE_SECONDS = 5.0
 """After this time without a question nobody listens to the camera any more."""
-MOST_PIXELS = 20_000_000
-QUALITY = 75
 
 
 class Camera:
@@ -53,7 +48,7 @@ class Camera:
             elif now - self._annotated_at > PATIENCE:
                 newest = self._newest(RAW)
             if newest is not None:
-                self._jpeg = jpeg_of(newest)
+                self._jpeg = jpeg_from(newest)
             return self._jpeg
 
     def rest(self) -> None:
@@ -76,20 +71,3 @@ class Camera:
     def _leave(self, topic: str) -> None:
         if (subscription := self._subscriptions.pop(topic, None)) is not None:
             subscription.destroy()
-
-
-def jpeg_of(message: Any) -> bytes | None:
-    """Return an image message as JPEG; None when its encoding or its size cannot be used."""
-    channels = {'rgb8': 3, 'bgr8': 3, 'mono8': 1}.get(message.encoding)
-    if channels is None or not 0 < message.width * message.height <= MOST_PIXELS:
-        return None
-    pixels = np.frombuffer(bytes(message.data), np.uint8)
-    if message.step < message.width * channels or pixels.size < message.step * message.height:
-        return None
-    rows = pixels[: message.step * message.height].reshape(message.height, message.step)
-    image = rows[:, : message.width * channels].reshape(message.height, message.width, channels)
-    if message.encoding == 'bgr8':
-        image = image[:, :, ::-1]
-    file = io.BytesIO()
-    Image.fromarray(image if channels == 3 else image[:, :, 0]).save(file, 'JPEG', quality=QUALITY)
-    return file.getvalue()

@@ -4,10 +4,10 @@ from surveillance_operator.recording.bag import (
     BagWriter,
     RecordingError,
     TopicType,
-    messages,
     prune,
     repair,
 )
+from surveillance_operator.recording.reading import messages
 from surveillance_operator.recording.timeline import Timeline, TimelineWriter
 
 __all__ = [

@@ -12,7 +12,7 @@ import json
 import os
 import shutil
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -178,31 +178,6 @@ def segments(folder: Path) -> list[Path]:
     found = folder.glob(f'{folder.name}_*.mcap')
     numbered = [path for path in found if path.stem.rsplit('_', 1)[1].isdecimal()]
     return sorted(numbered, key=lambda path: int(path.stem.rsplit('_', 1)[1]))
-
-
-def messages(
-    folder: Path, topics: Sequence[str] | None = None, start: int | None = None
-) -> Iterator[tuple[Schema, Channel, Message]]:
-    """Yield the messages of a whole recording in the order in which they were received.
-
-    Args:
-        folder: The recording.
-        topics: Only these; None for all.
-        start: From this time on, nanoseconds since 1970.
-
-    Raises:
-        RecordingError: A segment cannot be read.
-    """
-    for path in segments(folder):
-        try:
-            with open(path, 'rb') as file:
-                for schema, channel, message in make_reader(file).iter_messages(
-                    topics, start_time=start
-                ):
-                    if schema is not None:
-                        yield schema, channel, message
-        except (OSError, McapError) as error:
-            raise RecordingError(f'{path}: cannot be read: {error}') from None
 
 
 def repair(folder: Path) -> list[str]:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NoReturn
 
 from surveillance_operator.recording import timeline
-from surveillance_operator.recording.bag import RecordingError
+from surveillance_operator.recording.bag import NAME, RecordingError
+from surveillance_operator.recording.reading import SUFFIX, files_of
 
 EXIT_BAD_INPUT = 2
 LAST = 'last'
@@ -31,6 +33,40 @@ def find_run(name: str, runs: Path) -> Path:
             return folder
     newest = f', e.g. {known[-1]}, or {LAST}' if known else ''
     raise RecordingError(f'{name}: expected the folder of a run below {runs}{newest}')
+
+
+@dataclass(frozen=True)
+class Recording:
+    """What there is to replay.
+
+    Attributes:
+        name: Where it is.
+        timeline: Its time line, if it has one.
+        messages: The folder or file of its messages, if there are any.
+    """
+
+    name: Path
+    timeline: Path | None
+    messages: Path | None
+
+
+def find_recording(name: str, runs: Path) -> Recording:
+    """Return the recording of a run, or one that another program wrote.
+
+    Raises:
+        RecordingError: There is none.
+    """
+    given = Path(name)
+    if given.suffix == SUFFIX and given.is_file():
+        return Recording(given, None, given)
+    if given.is_dir() and not is_run(given) and not is_run(given.parent):
+        return Recording(given, None, files_of(given)[0].parent)
+    folder = find_run(name, runs)
+    line, recorded = folder / timeline.NAME, folder / NAME
+    has_messages = recorded.is_dir() and any(recorded.glob(f'*{SUFFIX}'))
+    if not line.is_file() and not has_messages:
+        raise RecordingError(f'{folder}: nothing was recorded')
+    return Recording(folder, line if line.is_file() else None, recorded if has_messages else None)
 
 
 def is_run(folder: Path) -> bool:

@@ -108,10 +108,18 @@ class Timeline:
             self._file = open(path, 'rb')  # noqa: SIM115 - kept open
         except OSError as error:
             raise RecordingError(f'{path}: {error.strerror}') from None
-        offset = 0
+        self._offset = 0
+        self.extend()
+        if not self._wholes:
+            raise RecordingError(f'{path}: holds nothing to replay')
+
+    def extend(self) -> None:
+        """Read on in a file that grows."""
+        self._file.seek(self._offset)
         for line in self._file:
-            match = _HEAD.match(line)
-            if match and line.endswith(b'\n'):
+            if not line.endswith(b'\n'):
+                return
+            if match := _HEAD.match(line):
                 at = float(match.group(1))
                 if match.group(2) == b'1':
                     self._wholes.append(len(self.times))
@@ -119,10 +127,8 @@ class Timeline:
                     self.marks[mark].append(at)
                 # A clock that was set back must not hide lines.
                 self.times.append(max(at, self.times[-1] if self.times else at))
-                self._offsets.append(offset)
-            offset += len(line)
-        if not self._wholes:
-            raise RecordingError(f'{path}: holds nothing to replay')
+                self._offsets.append(self._offset)
+            self._offset += len(line)
 
     def at(self, time: float) -> tuple[int, float, Parts]:
         """Return the number of the line that holds at a time, the mission's time, and all parts."""

@@ -107,16 +107,18 @@ function connect() {
 function camera() {
   const image = $('camera');
   const box = $('camera-section').getBoundingClientRect();
-  if (document.hidden || box.top > innerHeight || box.bottom < 0 || replaying) return;
+  if (document.hidden || box.top > innerHeight || box.bottom < 0) return;
   const next = new Image();
-  next.onload = () => { image.src = next.src; image.hidden = false; $('no-camera').hidden = true; };
+  const shown = (there) => { image.hidden = !there; $('no-camera').hidden = there; };
+  next.onload = () => { image.src = next.src; shown(true); };
+  next.onerror = () => { if (replaying) shown(false); };
   next.src = `/camera.jpg?${Date.now()}`;
 }
 
 document.body.classList.toggle('replay', replaying);
 $('replay').hidden = !replaying;
 for (const each of document.querySelectorAll('.hands')) each.hidden = !may || replaying;
-if (replaying) for (const id of ['camera-section', 'asking']) $(id).hidden = true;
+if (replaying) { $('asking').hidden = true; $('no-camera').textContent = 'no image of this moment'; }
 connect();
 setInterval(() => { map.tick(state, now()); drawStrips($('strips'), state, now()); }, 1000);
 setInterval(camera, 700);

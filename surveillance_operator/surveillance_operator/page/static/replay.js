@@ -18,13 +18,14 @@ export class Replay {
     });
   }
 
-  show({at, length, playing, speed, day}) {
+  show({at, length, playing, speed, day, read}) {
     this.playing = playing;
     $('play').textContent = playing ? 'Pause' : 'Play';
     $('slider').max = length;
     if (!this.dragging) $('slider').value = at;
     if (document.activeElement !== $('speed')) $('speed').value = speed;
-    const time = (seconds) => new Date(seconds * 1000).toISOString().slice(11, 19);
-    $('moment').textContent = `${time(at)} of ${time(length)} · ${day}`;
+    const two = (number) => String(Math.floor(number)).padStart(2, '0');
+    const time = (seconds) => `${two(seconds / 3600)}:${two(seconds / 60 % 60)}:${two(seconds % 60)}`;
+    $('moment').textContent = `${time(at)} of ${time(length)} · ${day}${read < 1 ? ` · reading, ${Math.round(100 * read)} %` : ''}`;
   }
 }

@@ -1,0 +1,71 @@
+"""What lidar and camera saw at a moment of a recording, from the recorded messages."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from rclpy.serialization import deserialize_message
+from sensor_msgs.msg import CompressedImage, Image
+
+from surveillance_operator.conversions import jpeg_from
+from surveillance_operator.recording.conversion import namespace_of, read_stored
+from surveillance_operator.recording.reading import Contents, LastMessages
+from surveillance_operator.snapshot import Snapshot
+from surveillance_operator.topics import POSE_TOPIC, TOPICS
+
+RECENT = 2.5
+"""What was seen longer ago is not shown, seconds."""
+IMAGES = ('aruco_detector/annotated', 'camera/rgb/image_raw')
+SCAN_TOPIC = 'scan'
+
+
+class RecordedSights:
+    """Reads what was seen.
+
+    Args:
+        recording: Its folder, or its only file.
+
+    Raises:
+        RecordingError: It cannot be read.
+    """
+
+    def __init__(self, recording: Path) -> None:
+        self._messages = LastMessages(recording)
+        topics = Contents.of(recording).topics
+        namespace = namespace_of(topics)
+        self._prefix = f'/{namespace}/' if namespace else '/'
+        names = [f'{self._prefix}{name}{end}' for name in IMAGES for end in ('', '/compressed')]
+        kinds = {'sensor_msgs/msg/Image': Image, 'sensor_msgs/msg/CompressedImage': CompressedImage}
+        self._images = {name: kinds[topics[name]] for name in names if topics.get(name) in kinds}
+        by_name = {topic.name: topic for topic in TOPICS}
+        self._pose, self._scan = by_name[POSE_TOPIC], by_name[SCAN_TOPIC]
+
+    def scan(self, at: float) -> list[list[float]]:
+        """Return the points that the lidar saw, metres, map frame; none where it was silent."""
+        poses = self._messages.before([self._prefix + POSE_TOPIC], at, RECENT, 1)
+        if not poses:
+            return []
+        known = read_stored(Snapshot(), self._pose, poses[0][1])
+        for _, data in self._messages.before([self._prefix + SCAN_TOPIC], at + 0.1, RECENT):
+            # A scan is shown from the pose of its moment.
+            seen = read_stored(known, self._scan, data).scan
+            if len(seen):
+                points: list[list[float]] = np.round(seen, 2).tolist()
+                return points
+        return []
+
+    def jpeg(self, at: float) -> bytes | None:
+        """Return the image of the camera as JPEG, None where there is none."""
+        if not self._images:
+            return None
+        for topic, data in self._messages.before(list(self._images), at, RECENT, 1):
+            try:
+                return jpeg_from(deserialize_message(data, self._images[topic]))
+            except Exception:  # whatever rmw finds: the bytes may be anything
+                return None
+        return None
+
+    def close(self) -> None:
+        """Close the files."""
+        self._messages.close()

@@ -1,0 +1,185 @@
+"""Replaying what another program recorded: here the library rosbags, as `ros2 bag record` would."""
+
+from __future__ import annotations
+
+import io
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import PoseWithCovarianceStamped
+from PIL import Image
+from rclpy.serialization import serialize_message
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from sensor_msgs.msg import CompressedImage, LaserScan
+from std_msgs.msg import UInt8
+
+from surveillance_interfaces.msg import Decision, FactChange, FactChanges, MissionStatus
+from surveillance_interfaces.msg import Fact as FactMessage
+from surveillance_operator.mission_markers_node import markers_of
+from surveillance_operator.recording.bag import RecordingError
+from surveillance_operator.recording.conversion import Conversion, namespace_of
+from surveillance_operator.recording.reading import LastMessages
+from surveillance_operator.recording.runs import find_recording
+from surveillance_operator.recording.schemas import definition
+from surveillance_operator.recording.sights import RecordedSights
+from surveillance_operator.recording.timeline import Timeline
+from surveillance_operator.snapshot import Snapshot
+
+START = 1_000_000.0
+SECONDS = 20
+
+
+def stamp(at: float) -> Time:
+    return Time(sec=int(at), nanosec=int(at % 1 * 1e9))
+
+
+def pose_at(at: float, x: float) -> PoseWithCovarianceStamped:
+    message = PoseWithCovarianceStamped()
+    message.header.stamp = stamp(at)
+    message.pose.pose.position.x, message.pose.pose.orientation.w = x, 1.0
+    return message
+
+
+def scan_at(at: float) -> LaserScan:
+    ranges = np.array([2.0], dtype=np.float32)
+    message = LaserScan(range_max=8.0, angle_increment=0.1, ranges=ranges)
+    message.header.stamp = stamp(at)
+    return message
+
+
+def image() -> CompressedImage:
+    file = io.BytesIO()
+    Image.new('RGB', (8, 6), 'red').save(file, 'JPEG')
+    return CompressedImage(format='jpeg', data=file.getvalue())
+
+
+def visit(place: str, at: float) -> FactChanges:
+    fact = FactMessage(predicate='visitedAt', arguments=[place, f'"{at:.0f}"^^xsd:long'])
+    return FactChanges(sequence=1, changes=[FactChange(fact=fact, added=True)])
+
+
+def said() -> Iterator[tuple[float, str, Any]]:
+    """Yield what a mission in the namespace `two` said: seconds, topic, message."""
+    places = Snapshot(
+        positions={'A': (0.0, 0.0), 'B': (9.0, 0.0)}, door_lines={'D': (5.0, -1.0, 5.0, 1.0)}
+    )
+    yield 0.0, '/two/place_markers', markers_of(places, Time())
+    for second in range(SECONDS):
+        at = START + second
+        yield (
+            second,
+            '/two/mission_status',
+            MissionStatus(machine='surveillance', state=f'S{second}'),
+        )
+        yield second + 0.01, '/two/battery_level', UInt8(data=90 - second)
+        yield second + 0.02, '/two/amcl_pose', pose_at(at, second / 2)
+        yield second + 0.03, '/two/scan', scan_at(at)
+        yield second + 0.04, '/two/camera/rgb/image_raw/compressed', image()
+        if second == 10:
+            decision = Decision(sequence=7, from_place='A', place='B', rule='URGENT')
+            yield second + 0.05, '/two/decision', decision
+        if second == 15:
+            yield second + 0.06, '/two/fact_changes', visit('B', at)
+
+
+@pytest.fixture(scope='module')
+def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp('foreign') / 'rosbag2_2026'
+    store = get_typestore(Stores.ROS2_JAZZY)
+    with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        connections: dict[str, Any] = {}
+        for at, topic, message in said():
+            kind = f'{type(message).__module__.split(".")[0]}/msg/{type(message).__name__}'
+            if topic not in connections:
+                store.register({
+                    name: fields
+                    for name, fields in get_types_from_msg(definition(kind), kind).items()
+                    if name not in store.fielddefs
+                })  # fmt: skip
+                connections[topic] = writer.add_connection(topic, kind, typestore=store)
+            writer.write(connections[topic], int((START + at) * 1e9), serialize_message(message))
+    return folder
+
+
+def converted(recording: Path, path: Path) -> Timeline:
+    conversion = Conversion(recording, path)
+    conversion.start()
+    conversion._thread.join(60)
+    assert conversion.share() == 1.0
+    return Timeline(path)
+
+
+def test_it_is_replayed_as_a_mission_was(bag: Path, tmp_path: Path) -> None:
+    line = converted(bag, tmp_path / 'timeline.jsonl')
+    assert line.times[0] == pytest.approx(START, abs=1.0)
+    _, now, parts = line.at(START + 12.9)
+    assert now == pytest.approx(START + 12.5, abs=1.0)
+    assert parts['status']['state'] == 'S12'
+    assert parts['battery']['level'] == 78
+    assert parts['pose'][0] == pytest.approx(6.0)
+    assert len(parts['trail']) == 13
+    assert parts['decision']['number'] == 7
+    assert parts['places']['B'] == {'at': [9.0, 0.0], 'visited': None, 'urgent': False}
+    assert parts['doors']['D']['line'] == [5.0, -1.0, 5.0, 1.0]
+    assert parts['mission']['running'] is True
+    assert line.at(START + 19)[2]['places']['B']['visited'] == START + 15
+    assert line.next_mark('decision', START) == pytest.approx(START + 10, abs=1.0)
+
+
+def test_what_lidar_and_camera_saw_is_found(bag: Path) -> None:
+    sights = RecordedSights(bag)
+    assert sights.scan(START + 8.5) == [[6.0, 0.0]]
+    assert sights.scan(START - 5) == []
+    picture = sights.jpeg(START + 8.5)
+    assert picture is not None
+    assert Image.open(io.BytesIO(picture)).size == (8, 6)
+    assert sights.jpeg(START + 100) is None
+    sights.close()
+
+
+def test_a_bag_and_its_file_are_found_by_name(bag: Path, tmp_path: Path) -> None:
+    (file,) = bag.glob('*.mcap')
+    for name in (bag, file):
+        found = find_recording(str(name), tmp_path)
+        assert (found.timeline, found.messages) == (None, name)
+    with pytest.raises(RecordingError, match='expected'):
+        find_recording(str(tmp_path / 'nothing.mcap'), tmp_path)
+
+
+def test_messages_before_a_moment_come_newest_first(bag: Path) -> None:
+    last = LastMessages(bag)
+    topics = ['/two/battery_level']
+    found = [data[4] for _, data in last.before(topics, START + 5.5, 3.0)]
+    assert found == [90 - 5, 90 - 4, 90 - 3]
+    assert len(last.before(topics, START + 5.5, 3.0, 1)) == 1
+    threads = [threading.Thread(target=last.before, args=(topics, START + 5, 5.0)) for _ in 'abcd']
+    for each in threads:
+        each.start()
+    for each in threads:
+        each.join(10)
+    last.close()
+
+
+def test_a_recording_of_something_else_is_refused(tmp_path: Path) -> None:
+    store = get_typestore(Stores.ROS2_JAZZY)
+    folder = tmp_path / 'other'
+    with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        connection = writer.add_connection('/words', 'std_msgs/msg/UInt8', typestore=store)
+        writer.write(connection, 5, serialize_message(UInt8(data=1)))
+    with pytest.raises(RecordingError, match='no topic of a mission'):
+        Conversion(folder, tmp_path / 'timeline.jsonl')
+    (file,) = folder.glob('*.mcap')
+    file.write_bytes(file.read_bytes()[:-20])
+    with pytest.raises(RecordingError, match='cannot be read'):
+        Conversion(folder, tmp_path / 'timeline.jsonl')
+
+
+def test_the_namespace_is_that_of_most_topics() -> None:
+    assert namespace_of(['/decision', '/plan', '/robot/plan']) == ''
+    assert namespace_of(['/a/b/decision', '/a/b/plan', '/tf']) == 'a/b'
