@@ -138,7 +138,7 @@ class LastMessages:
         self._open: dict[Path, tuple[IO[bytes], SeekingReader]] = {}
 
     def before(
-        self, topics: Sequence[str], at: float, within: float, most: int = 5
+        self, topics: Sequence[str], at: float, within: float, most: int = 10
     ) -> list[tuple[str, bytes]]:
         """Return topics and messages, the newest first.
 

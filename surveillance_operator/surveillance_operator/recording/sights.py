@@ -43,16 +43,17 @@ class RecordedSights:
 
     def scan(self, at: float) -> list[list[float]]:
         """Return the points that the lidar saw, metres, map frame; none where it was silent."""
-        poses = self._messages.before([self._prefix + POSE_TOPIC], at, RECENT, 1)
-        if not poses:
-            return []
-        known = read_stored(Snapshot(), self._pose, poses[0][1])
-        for _, data in self._messages.before([self._prefix + SCAN_TOPIC], at + 0.1, RECENT):
+        poses = [
+            read_stored(Snapshot(), self._pose, data)
+            for _, data in self._messages.before([self._prefix + POSE_TOPIC], at, RECENT)
+        ]
+        for _, data in self._messages.before([self._prefix + SCAN_TOPIC], at, RECENT):
             # A scan is shown from the pose of its moment.
-            seen = read_stored(known, self._scan, data).scan
-            if len(seen):
-                points: list[list[float]] = np.round(seen, 2).tolist()
-                return points
+            for known in poses:
+                seen = read_stored(known, self._scan, data).scan
+                if len(seen):
+                    points: list[list[float]] = np.round(seen, 2).tolist()
+                    return points
         return []
 
     def jpeg(self, at: float) -> bytes | None:
