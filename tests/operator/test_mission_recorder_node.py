@@ -15,7 +15,7 @@ from std_msgs.msg import String
 from surveillance_interfaces.action import FollowPath
 from surveillance_interfaces.msg import Decision
 from surveillance_operator.mission_recorder_node import MissionRecorder
-from surveillance_operator.recording.bag import messages
+from surveillance_operator.recording.reading import messages
 from surveillance_operator.recording.timeline import Timeline
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 
