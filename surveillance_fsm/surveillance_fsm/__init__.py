@@ -37,6 +37,7 @@ from surveillance_fsm.state import (
     has_smach_interface,
 )
 from surveillance_fsm.state_machine import Iterator, Sequence, StateMachine
+from surveillance_fsm.timeouts import LimitOptions
 from surveillance_fsm.userdata import Remapper, UserData
 
 __all__ = [
@@ -53,6 +54,7 @@ __all__ = [
     'InvalidTransitionError',
     'InvalidUserCodeError',
     'Iterator',
+    'LimitOptions',
     'MachineFileError',
     'MissingKeyError',
     'Remapper',

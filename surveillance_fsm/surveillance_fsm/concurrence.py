@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable, Mapping
 from collections.abc import Sequence as Labels
-from typing import Any
+from typing import Any, Unpack
 
 from surveillance_fsm import log
 from surveillance_fsm.clock import Interrupt
@@ -40,7 +40,7 @@ from surveillance_fsm.execution import (
     SpecialStep,
 )
 from surveillance_fsm.state import State, structure_version
-from surveillance_fsm.timeouts import make_limits, supervise
+from surveillance_fsm.timeouts import LimitOptions, make_limits, supervise
 from surveillance_fsm.userdata import UserData, raw
 
 Outcomes = dict[str, str | None]
@@ -225,11 +225,7 @@ class Concurrence(Container):
         label: str,
         state: State,
         remapping: Mapping[str, str] | None = None,
-        *,
-        timeout: float | None = None,
-        deadline: float | None = None,
-        retry: int = 0,
-        retry_on: Iterable[str] = ('aborted',),
+        **limits: Unpack[LimitOptions],
     ) -> State:
         """Add a state to the open concurrence.
 
@@ -237,10 +233,7 @@ class Concurrence(Container):
             label: The state's name in the concurrence.
             state: The state.
             remapping: From the state's userdata keys to the concurrence's.
-            timeout: See `StateMachine.add`.
-            deadline: See `StateMachine.add`.
-            retry: See `StateMachine.add`.
-            retry_on: See `StateMachine.add`.
+            **limits: See `LimitOptions`.
 
         Raises:
             InvalidConstructionError: No concurrence is open.
@@ -250,10 +243,7 @@ class Concurrence(Container):
             label,
             state,
             remapping,
-            timeout=timeout,
-            deadline=deadline,
-            retry=retry,
-            retry_on=retry_on,
+            **limits,
         )
 
     def add_state(
@@ -261,18 +251,14 @@ class Concurrence(Container):
         label: str,
         state: State,
         remapping: Mapping[str, str] | None = None,
-        *,
-        timeout: float | None = None,
-        deadline: float | None = None,
-        retry: int = 0,
-        retry_on: Iterable[str] = ('aborted',),
+        **limits: Unpack[LimitOptions],
     ) -> State:
         """Add a state to a concurrence at hand, open or not; for the arguments see `add`."""
         self._check_new(label, state)
         path = self.fsm_path_of(label)
-        limits = make_limits(path, state, {}, timeout, deadline, retry, retry_on)
-        if limits is not None:
-            self.fsm_limits[label] = limits
+        checked = make_limits(path, state, {}, **limits)
+        if checked is not None:
+            self.fsm_limits[label] = checked
         self.fsm_states[label] = state
         if remapping:
             self.fsm_remappings[label] = dict(remapping)

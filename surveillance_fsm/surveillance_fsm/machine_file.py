@@ -44,12 +44,13 @@ from surveillance_fsm.container import Container
 from surveillance_fsm.exceptions import MachineFileError, describe, shown
 from surveillance_fsm.state import CBState, State
 from surveillance_fsm.state_machine import Iterator, Sequence, StateMachine
+from surveillance_fsm.timeouts import LimitOptions
 
 Made = TypeVar('Made')
 
 KINDS = ('StateMachine', 'Sequence', 'Concurrence', 'Iterator')
 
-_LIMITS = {'timeout', 'deadline', 'retry', 'retry_on'}
+_LIMITS = set(LimitOptions.__annotations__)
 _KEYS = {'input_keys', 'output_keys'}
 _CONTAINER = {'machine', 'name', 'outcomes', 'userdata', 'states', 'interrupts', *_KEYS}
 _OF_KIND = {

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from collections.abc import Sequence as Labels
-from typing import Any
+from typing import Any, Unpack
 
 from surveillance_fsm.container import Container
 from surveillance_fsm.exceptions import (
@@ -25,7 +25,7 @@ from surveillance_fsm.execution import (
 from surveillance_fsm.log import logwarn
 from surveillance_fsm.sequential import SequentialFrame
 from surveillance_fsm.state import State, structure_version
-from surveillance_fsm.timeouts import TIMEOUT, make_limits
+from surveillance_fsm.timeouts import TIMEOUT, LimitOptions, make_limits
 from surveillance_fsm.userdata import UserData, raw
 
 Items = Iterable[Any] | Callable[[], Iterable[Any]]
@@ -68,11 +68,7 @@ class StateMachine(Container):
         transitions: Mapping[str, str | None] | None = None,
         remapping: Mapping[str, str] | None = None,
         constants: Mapping[str, Any] | None = None,
-        *,
-        timeout: float | None = None,
-        deadline: float | None = None,
-        retry: int = 0,
-        retry_on: Iterable[str] = ('aborted',),
+        **limits: Unpack[LimitOptions],
     ) -> State:
         """Add a state to the open machine.
 
@@ -82,14 +78,7 @@ class StateMachine(Container):
             transitions: From the state's outcomes to labels or to outcomes of the machine.
             remapping: From the state's userdata keys to the machine's.
             constants: Values for input keys of the state that come from no userdata.
-            timeout: Seconds of the machine's clock after which the state is asked to stop. Its
-                outcome is then ``timeout`` if `transitions` binds that, else ``aborted``, else
-                ``preempted``.
-            deadline: Seconds after which the machine goes on without the state, with the same
-                outcome.
-            retry: How often the state is executed again when it ran out of time or ended with one
-                of `retry_on`.
-            retry_on: See `retry`.
+            **limits: See `LimitOptions`.
 
         Returns:
             The state.
@@ -106,10 +95,7 @@ class StateMachine(Container):
             transitions,
             remapping,
             constants,
-            timeout=timeout,
-            deadline=deadline,
-            retry=retry,
-            retry_on=retry_on,
+            **limits,
         )
 
     @staticmethod
@@ -119,15 +105,14 @@ class StateMachine(Container):
         connector_outcomes: Iterable[str],
         transitions: Mapping[str, str | None] | None = None,
         remapping: Mapping[str, str] | None = None,
-        **limits: Any,
+        **limits: Unpack[LimitOptions],
     ) -> State:
         """Add a state that goes on to the next state added, for each of `connector_outcomes`.
 
         `transitions` that bind one of them have precedence. For the rest see `add`.
         """
-        machine = StateMachine._currently_opened_container()
-        return machine.add_connected(
-            label, state, connector_outcomes, transitions, remapping, limits
+        return StateMachine._currently_opened_container().add_connected(
+            label, state, connector_outcomes, transitions, remapping, **limits
         )
 
     def add_connected(
@@ -137,7 +122,7 @@ class StateMachine(Container):
         connector_outcomes: Iterable[str],
         transitions: Mapping[str, str | None] | None,
         remapping: Mapping[str, str] | None,
-        limits: Mapping[str, Any],
+        **limits: Unpack[LimitOptions],
     ) -> State:
         """Add a state that goes on to the next one, to a machine at hand; see `add_auto`."""
         connectors = list(connector_outcomes)
@@ -159,22 +144,16 @@ class StateMachine(Container):
         transitions: Mapping[str, str | None] | None = None,
         remapping: Mapping[str, str] | None = None,
         constants: Mapping[str, Any] | None = None,
-        *,
-        timeout: float | None = None,
-        deadline: float | None = None,
-        retry: int = 0,
-        retry_on: Iterable[str] = ('aborted',),
+        **limits: Unpack[LimitOptions],
     ) -> State:
         """Add a state to a machine at hand, open or not; for the arguments see `add`."""
         self._check_new(label, state)
         bound = dict(transitions or {})
-        limits = make_limits(
-            self.fsm_path_of(label), state, bound, timeout, deadline, retry, retry_on
-        )
-        declared = {k: v for k, v in bound.items() if limits is None or k != TIMEOUT}
+        checked = make_limits(self.fsm_path_of(label), state, bound, **limits)
+        declared = {k: v for k, v in bound.items() if checked is None or k != TIMEOUT}
         self.check_state_spec(label, state, declared)
-        if limits is not None:
-            self.fsm_limits[label] = limits
+        if checked is not None:
+            self.fsm_limits[label] = checked
         group = self._group_transitions() if self.is_opened() else {}
         for outcome in sorted(state.get_registered_outcomes()):
             bound.setdefault(outcome, group.get(outcome))
@@ -333,7 +312,7 @@ class Sequence(StateMachine):
         transitions: Mapping[str, str | None] | None = None,
         remapping: Mapping[str, str] | None = None,
         constants: Mapping[str, Any] | None = None,
-        **limits: Any,
+        **limits: Unpack[LimitOptions],
     ) -> State:
         """Add a state after the last one; for the arguments see `StateMachine.add`.
 
@@ -349,7 +328,7 @@ class Sequence(StateMachine):
         transitions: Mapping[str, str | None] | None = None,
         remapping: Mapping[str, str] | None = None,
         constants: Mapping[str, Any] | None = None,
-        **limits: Any,
+        **limits: Unpack[LimitOptions],
     ) -> State:
         """Add a state to a sequence at hand, open or not; for the arguments see `add`."""
         last = self._last_added_seq_label
@@ -418,11 +397,7 @@ class Iterator(Container):
         loop_outcomes: Iterable[str] = (),
         break_outcomes: Iterable[str] = (),
         final_outcome_map: Mapping[str, str] | None = None,
-        *,
-        timeout: float | None = None,
-        deadline: float | None = None,
-        retry: int = 0,
-        retry_on: Iterable[str] = ('aborted',),
+        **limits: Unpack[LimitOptions],
     ) -> State:
         """Set the state of the open iterator.
 
@@ -433,10 +408,7 @@ class Iterator(Container):
             break_outcomes: Outcomes that break the loop, all others leading to the next item; if
                 given, they count and `loop_outcomes` do not.
             final_outcome_map: From outcomes that end the iterator to outcomes of the iterator.
-            timeout: See `StateMachine.add`.
-            deadline: See `StateMachine.add`.
-            retry: See `StateMachine.add`.
-            retry_on: See `StateMachine.add`.
+            **limits: See `LimitOptions`.
 
         Raises:
             InvalidStateError: The iterator has a state already.
@@ -448,10 +420,7 @@ class Iterator(Container):
             loop_outcomes,
             break_outcomes,
             final_outcome_map,
-            timeout=timeout,
-            deadline=deadline,
-            retry=retry,
-            retry_on=retry_on,
+            **limits,
         )
 
     def set_state(
@@ -461,11 +430,7 @@ class Iterator(Container):
         loop_outcomes: Iterable[str] = (),
         break_outcomes: Iterable[str] = (),
         final_outcome_map: Mapping[str, str] | None = None,
-        *,
-        timeout: float | None = None,
-        deadline: float | None = None,
-        retry: int = 0,
-        retry_on: Iterable[str] = ('aborted',),
+        **limits: Unpack[LimitOptions],
     ) -> State:
         """Set the state of an iterator at hand, open or not; see `set_contained_state`."""
         path = self.fsm_path_of(label)
@@ -475,11 +440,9 @@ class Iterator(Container):
             )
         self._check_new(label, state)
         loop, breaking = list(loop_outcomes), list(break_outcomes)
-        limits = make_limits(
-            path, state, dict.fromkeys([*loop, *breaking]), timeout, deadline, retry, retry_on
-        )
+        checked = make_limits(path, state, dict.fromkeys([*loop, *breaking]), **limits)
         outcomes = list(state.get_registered_outcomes())
-        if limits is not None and limits.late_outcome == TIMEOUT and TIMEOUT not in outcomes:
+        if checked is not None and checked.late_outcome == TIMEOUT and TIMEOUT not in outcomes:
             outcomes.append(TIMEOUT)
         for outcome in (*loop, *breaking):
             if outcome not in outcomes:
@@ -497,8 +460,8 @@ class Iterator(Container):
         self.fsm_states[label] = state
         self._loop_outcomes, self._break_outcomes = loop, breaking
         self._final_outcome_map = dict(final_outcome_map or {})
-        if limits is not None:
-            self.fsm_limits[label] = limits
+        if checked is not None:
+            self.fsm_limits[label] = checked
         structure_version.changed()
         return state
 

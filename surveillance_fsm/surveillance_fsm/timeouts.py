@@ -11,7 +11,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypedDict
 
 from surveillance_fsm.clock import Interrupt
 from surveillance_fsm.exceptions import InvalidTransitionError
@@ -21,6 +21,26 @@ from surveillance_fsm.state import State, this_thread
 
 TIMEOUT = 'timeout'
 """The outcome of a state that ran out of time, where its transitions bind it."""
+
+
+class LimitOptions(TypedDict, total=False):
+    """What limits a state, as the ``add`` of every container takes it; each may be left out.
+
+    Attributes:
+        timeout: Seconds of the machine's clock after which the state is asked to stop. Its outcome
+            is then ``timeout`` if the transitions bind that, else ``aborted``, else ``preempted``.
+        deadline: Seconds after which the machine goes on without the state, with the same outcome;
+            with a timeout alone it is left to the preempt's bound.
+        retry: How often the state is executed again when it ran out of time or ended with one of
+            `retry_on`.
+        retry_on: Outcomes that count as failures, beside running out of time; ``aborted`` by
+            itself.
+    """
+
+    timeout: float | None
+    deadline: float | None
+    retry: int
+    retry_on: Iterable[str]
 
 
 @dataclass(frozen=True)
@@ -46,10 +66,11 @@ def make_limits(
     path: str,
     state: State,
     transitions: Mapping[str, Any],
-    timeout: float | None,
-    deadline: float | None,
-    retry: int,
-    retry_on: Iterable[str],
+    *,
+    timeout: float | None = None,
+    deadline: float | None = None,
+    retry: int = 0,
+    retry_on: Iterable[str] = ('aborted',),
 ) -> Limits | None:
     """Check limits and settle which outcome running out of time has.
 
@@ -57,10 +78,10 @@ def make_limits(
         path: The state's path, for errors.
         state: The state.
         transitions: Its transitions; ``timeout`` may be among them without being declared.
-        timeout: See `Limits`.
-        deadline: See `Limits`; None with a timeout leaves it to the preempt's bound.
-        retry: See `Limits`.
-        retry_on: Outcomes that count as failures, beside running out of time.
+        timeout: See `LimitOptions`, as the rest.
+        deadline: Seconds.
+        retry: How often.
+        retry_on: Outcomes.
 
     Raises:
         InvalidTransitionError: There is no outcome for running out of time, or a number is wrong.
