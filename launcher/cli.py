@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import io
-import json
 import os
 import signal
 import sys
@@ -12,7 +11,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
-from launcher import node_table, system
+from launcher import node_table, package_commands, system
 from launcher.environment import CHECKOUT, Environment, clean_environ
 from launcher.instance_lock import claim
 
@@ -35,27 +34,6 @@ RUNS = runs_folder()
 EXIT_BAD_INPUT = 2
 DEFAULT_KEEP = 20.0
 EXIT_INTERRUPTED = 130
-
-# Commands that belong to a package: module and function, which takes the arguments and returns
-# the exit code.
-PACKAGE_COMMANDS = {
-    'watch': ('surveillance_operator.watch_command', 'show a running mission in this terminal'),
-    'console': (
-        'surveillance_operator.console_command',
-        'one prompt for a running mission: answers, doors, rooms, why, go',
-    ),
-    'replay': ('surveillance_operator.replay', 'show a recorded mission in a browser'),
-    'report': ('surveillance_operator.report', 'write what a mission did into one HTML file'),
-    'map': ('surveillance_operator.map_command', 'check a place and draw it as a picture'),
-    'detect': ('surveillance_perception.detect_command', 'find ArUco markers in pictures'),
-    'check-behaviour': (
-        'surveillance_behaviour.check_command',
-        'check the state machines and draw them',
-    ),
-}
-
-PACKAGE_HELP = CHECKOUT / 'launcher' / 'package_help.json'
-"""What each of them says to --help: it is said at once, and without a set-up."""
 
 _DESCRIPTION = """\
 Patrols, with every node as a process of its own, until Ctrl-C; or does what COMMAND says. What the
@@ -181,7 +159,7 @@ def _shared_options() -> argparse.ArgumentParser:
 def make_parser(*, help_too: bool = True) -> argparse.ArgumentParser:
     """Return the parser of the whole command line."""
     package_lines = ''.join(
-        f'  {name:<25} {purpose}\n' for name, (_, purpose) in PACKAGE_COMMANDS.items()
+        f'  {name:<25} {purpose}\n' for name, (_, purpose) in package_commands.COMMANDS.items()
     )
     parser = Parser(
         prog='launch.py',
@@ -322,10 +300,10 @@ def _dispatch(argv: list[str]) -> int:
     }
     if argv and argv[0] in commands:
         return commands[argv[0]](argv[1:])
-    if argv and argv[0] in PACKAGE_COMMANDS:
+    if argv and argv[0] in package_commands.COMMANDS:
         return _package_command(argv[0], argv[1:])
     if argv and not argv[0].startswith('-'):
-        known = ', '.join((*commands, *PACKAGE_COMMANDS))
+        known = ', '.join((*commands, *package_commands.COMMANDS))
         raise ValueError(f'unknown command {argv[0]!r}: expected one of {known}')
     return _run(argv)
 
@@ -506,14 +484,11 @@ def _lint(argv: list[str]) -> int:
 
 
 def _package_command(name: str, argv: list[str]) -> int:
-    if argv in (['-h'], ['--help']) and PACKAGE_HELP.exists():
-        print(json.loads(PACKAGE_HELP.read_text(encoding='utf-8')).get(name, ''), end='')
+    if argv in (['-h'], ['--help']) and (said := package_commands.help_of(name)):
+        print(said, end='')
         return 0
     _enter([name, *argv])
-    import importlib
-
-    module = importlib.import_module(PACKAGE_COMMANDS[name][0])
-    return int(module.main(argv) or 0)
+    return package_commands.main_of(name)(argv)
 
 
 def _environment(extras: Sequence[str]) -> Environment | None:

@@ -6,9 +6,7 @@ the schema that `surveillance_runtime.configuration` checks with, and docs/param
 
 from __future__ import annotations
 
-import contextlib
 import importlib
-import io
 import json
 import math
 import os
@@ -17,9 +15,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
-from unittest import mock
 
-from launcher import node_table
+from launcher import node_table, package_commands
 from launcher.environment import CHECKOUT
 from surveillance_runtime.configuration import (
     SCHEMA,
@@ -192,33 +189,14 @@ def _shown(value: Any) -> str:
     return f'`{json.dumps(value, ensure_ascii=False)}`'
 
 
-def package_helps() -> dict[str, str]:
-    """Return what the packages' commands say to `--help`, by command."""
-    from launcher.cli import PACKAGE_COMMANDS
-
-    helps = {}
-    for name, (module, _) in PACKAGE_COMMANDS.items():
-        said = io.StringIO()
-        with (
-            mock.patch.dict(os.environ, COLUMNS='80', NO_COLOR='1'),
-            contextlib.redirect_stdout(said),
-            contextlib.suppress(SystemExit),
-        ):
-            importlib.import_module(module).main(['--help'])
-        helps[name] = said.getvalue()
-    return helps
-
-
 def write(checkout: Path) -> list[Path]:
     """Write schema and page anew; returns the files."""
     SCHEMA.write_text(as_json(collect()), encoding='utf-8')
     read_schema.cache_clear()
     page = checkout / 'docs' / 'parameters.md'
     page.write_text(as_markdown(read_schema()), encoding='utf-8')
-    from launcher.cli import PACKAGE_HELP
-
-    PACKAGE_HELP.write_text(as_json(package_helps()), encoding='utf-8')
-    return [SCHEMA, page, PACKAGE_HELP]
+    package_commands.HELP.write_text(as_json(package_commands.all_helps()), encoding='utf-8')
+    return [SCHEMA, page, package_commands.HELP]
 
 
 Printer = Callable[[str], None]

@@ -7,8 +7,8 @@ import shutil
 import subprocess
 import sys
 
-from launcher.cli import PACKAGE_HELP
-from launcher.parameter_tables import as_markdown, package_helps
+from launcher.package_commands import HELP, all_helps
+from launcher.parameter_tables import as_markdown
 from surveillance_runtime.configuration import SCHEMA, read_schema
 from tests.launcher.conftest import ROOT
 
@@ -45,7 +45,7 @@ def test_params_prints_each_value_with_its_source():
 
 def test_the_helps_of_the_packages_commands_are_theirs():
     hint = 'write them anew: python3 launch.py params --write'
-    assert json.loads(PACKAGE_HELP.read_text()) == package_helps(), hint
+    assert json.loads(HELP.read_text()) == all_helps(), hint
 
 
 def test_every_help_is_said_soon_and_needs_no_set_up(tmp_path):

@@ -1,0 +1,63 @@
+"""The commands that belong to packages: where their code is, and what they say to `--help`.
+
+Their help is kept in a file (`launch.py params --write` writes it), so that it is said at once and
+without a set-up.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import io
+import json
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+COMMANDS = {
+    'watch': ('surveillance_operator.watch_command', 'show a running mission in this terminal'),
+    'console': (
+        'surveillance_operator.console_command',
+        'one prompt for a running mission: answers, doors, rooms, why, go',
+    ),
+    'replay': ('surveillance_operator.replay', 'show a recorded mission in a browser'),
+    'report': ('surveillance_operator.report', 'write what a mission did into one HTML file'),
+    'map': ('surveillance_operator.map_command', 'check a place and draw it as a picture'),
+    'detect': ('surveillance_perception.detect_command', 'find ArUco markers in pictures'),
+    'check-behaviour': (
+        'surveillance_behaviour.check_command',
+        'check the state machines and draw them',
+    ),
+}
+"""Module, whose `main` takes the arguments and returns the exit code, and purpose; by name."""
+HELP = Path(__file__).with_name('package_help.json')
+
+
+def main_of(name: str) -> Callable[[list[str]], int]:
+    """Return what carries a command out; imports its module."""
+    module = importlib.import_module(COMMANDS[name][0])
+    return lambda argv: int(module.main(argv) or 0)
+
+
+def help_of(name: str) -> str:
+    """Return what a command says to `--help`, empty where nobody has written that down."""
+    if not HELP.exists():
+        return ''
+    return str(json.loads(HELP.read_text(encoding='utf-8')).get(name, ''))
+
+
+def all_helps() -> dict[str, str]:
+    """Return what each command says to `--help` now, by name; imports all of them."""
+    from unittest import mock  # here: `--help` of the launcher is to be quick
+
+    helps = {}
+    for name in COMMANDS:
+        said = io.StringIO()
+        with (
+            mock.patch.dict(os.environ, COLUMNS='80', NO_COLOR='1'),
+            contextlib.redirect_stdout(said),
+            contextlib.suppress(SystemExit),
+        ):
+            main_of(name)(['--help'])
+        helps[name] = said.getvalue()
+    return helps
