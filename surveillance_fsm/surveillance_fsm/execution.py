@@ -434,7 +434,7 @@ class Run:
         chatty: Transitions are worth a line in the log.
         paused: No further state is entered.
         steps: States that may be entered although paused.
-        sleeps_on_clock: Somebody watches time limits, asleep on the machine's clock.
+        sleeps_on_clock: A thread watches time limits and waits on the machine's clock.
         left_behind: Paths of the states the machine went on without, and the work that hangs.
         threads: The logical threads that are at work.
     """

@@ -194,7 +194,7 @@ class TransitionFeed:
             with self._drained:
                 self._asleep = True
                 self._drained.notify_all()
-            # Asleep first, then a last look: the machine does it the other way round.
+            # It says first that it waits, then looks once more: the machine does the reverse.
             if not queue and not self._closing:
                 self._wakeup.wait()
             self._asleep = False

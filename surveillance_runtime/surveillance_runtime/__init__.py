@@ -1,4 +1,4 @@
-"""Shared ground of the packages: what rclpy nodes stand on, parameters, a place's description.
+"""What all packages share: the base of nodes, parameters, the description of a place.
 
 What others may use, by module:
 

@@ -1,1 +1,37 @@
-"""Stand-in for robot hardware and Gazebo: camera, arm, base, lidar and time."""
+"""Stand-in for robot hardware and Gazebo: camera, arm, base, lidar and time. No ROS in what is here.
+
+    from surveillance_simulation import Robot, read_world
+
+    robot = Robot(read_world('config/seven_rooms.yaml'))
+    robot.base.command(0.5, 0.0)  # m/s, rad/s
+    robot.advance(0.1)  # seconds
+    robot.scan()  # (360,) metres
+
+The node `simulator` has it on ROS topics (`feeds`, `conversions`), at a rate of its own
+(`clock_rate`).
+"""
+
+from __future__ import annotations
+
+from surveillance_simulation.camera.model import Camera, Conditions
+from surveillance_simulation.camera.rendering import Renderer
+from surveillance_simulation.robot.base import Base, BaseModel
+from surveillance_simulation.robot.lidar import LidarModel
+from surveillance_simulation.robot.robot import Robot
+from surveillance_simulation.world.people import PeopleModel
+from surveillance_simulation.world.world import Obstacle, Panel, World, read_world
+
+__all__ = [
+    'Base',
+    'BaseModel',
+    'Camera',
+    'Conditions',
+    'LidarModel',
+    'Obstacle',
+    'Panel',
+    'PeopleModel',
+    'Renderer',
+    'Robot',
+    'World',
+    'read_world',
+]

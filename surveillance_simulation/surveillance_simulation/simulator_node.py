@@ -104,7 +104,7 @@ class Simulator(PatrolNode):
         with self._changing:
             passed = self._rate.due(self.robot.time, time.monotonic(), moving=self.robot.is_moving)
             if self._rate.is_waiting:
-                # The answer wakes it: ticks in vain would take the time that the answer needs.
+                # The answer wakes it: useless ticks would take the time that the answer needs.
                 self._timer.cancel()
             if not passed:
                 return

@@ -1,1 +1,6 @@
-"""Whom the machines talk to: the ports, and what stands behind them on the robot."""
+"""Whom the machines talk to, without ROS (`ports`) and on the robot.
+
+- `ports`: what the machines need, as interfaces; `Ports` holds them, `PeerError` is what they raise;
+- `ros_ports`: services and actions behind them; `armor_knowledge`: the ontology behind its port;
+- `announcing`: what the mission publishes; `decision_services`: `why_not` and `go_to`.
+"""

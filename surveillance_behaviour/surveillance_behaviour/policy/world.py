@@ -84,7 +84,7 @@ class World:
 
 @dataclass(frozen=True)
 class Score:
-    """What a policy thinks of one candidate.
+    """The score that a policy gives one candidate.
 
     Attributes:
         value: The higher the better.

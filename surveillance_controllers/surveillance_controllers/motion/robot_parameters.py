@@ -20,7 +20,7 @@ _PLANNING = {
     'radius': Described(_RADIUS, 0.0, 20.0, name='robot_radius'),
     'margin': Described('SIMULATED: Kept beyond the radius, m.', 0.0, 20.0),
     'comfort': Described('SIMULATED: Room that a path prefers, m.', 0.0, 20.0),
-    'aversion': Described('SIMULATED: How much dearer a path near obstacles is.', 0.0, 20.0),
+    'aversion': Described('SIMULATED: How much more a path near obstacles costs.', 0.0, 20.0),
 }
 _DRIVE = {
     'radius': Described(_RADIUS, 0.01, 20.0, name='robot_radius'),

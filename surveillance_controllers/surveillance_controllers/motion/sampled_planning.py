@@ -38,7 +38,7 @@ class SamplingParameters:
         reverse: Top speed backwards, m/s.
         speed_spread: Standard deviation of the speeds drawn, m/s.
         turn_spread: Of the turning speeds, rad/s.
-        temperature: Sequences dearer than the best by much more than this do not count.
+        temperature: Sequences that cost much more than this above the best do not count.
         reach: Nothing further away than this is looked at, metres.
         cell: Of the grid of distances to what stands, metres.
         gap: Wanted between the robot and what moves, metres;

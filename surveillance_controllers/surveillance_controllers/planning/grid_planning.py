@@ -4,7 +4,7 @@ The free cells are those whose centre keeps the robot's radius and a margin from
 not free. Among them, cells near obstacles cost more, so that a path keeps to the middle of a
 passage where there is room. The search is scikit-image's `MCP_Geometric` (Dijkstra's algorithm with
 the cost of a step its length times the mean cost of its two cells), which finds the cheapest path
-over the eight neighbours. Straight shortcuts that are no dearer replace the steps of the grid, and
+over the eight neighbours. Straight shortcuts that cost no more replace the steps of the grid, and
 corners are rounded as far as the free space allows.
 
 Dijkstra's algorithm is kept in favour of a faster A* such as pyastar2d's: that one takes a diagonal
@@ -48,7 +48,7 @@ class PlanningParameters:
         margin: What a path keeps beyond the radius, metres; at least 0.71 cells, so that a
             diagonal step between two free cells grazes nothing.
         comfort: Beyond radius and margin, room up to this distance makes a cell cheaper, metres.
-        aversion: How many times dearer than an open cell one at the margin is, minus one.
+        aversion: How many times what an open cell costs one at the margin costs, minus one.
         escape: A start that is not free may be left over at most this distance, metres.
         goal_shift: A goal on which an obstacle stands is moved by at most this distance, metres.
         corner: Longest part of a straight line that rounding a corner may take, metres.
@@ -287,7 +287,7 @@ class GridPlanner:
         return np.asarray(search.traceback(goal), dtype=np.intp)
 
     def _shortened(self, path: Points) -> Points:
-        """Replace steps of the grid by straight lines that are free and no dearer."""
+        """Replace steps of the grid by straight lines that are free and cost no more."""
         path = path[_corners(path)]
         dear = np.array([self._price(first, last) for first, last in pairwise(path)])
         dear = np.concatenate(([0.0], np.cumsum(dear)))

@@ -33,7 +33,7 @@ DISCOVERY_PERIOD = 0.02
 
 
 SERVER_PERIOD = 0.1
-"""Seconds between two looks whether the server that owes an answer is still there."""
+"""Seconds between two looks whether a server that has not answered yet is still there."""
 
 
 class CallError(Exception):
@@ -112,7 +112,7 @@ class ServiceCaller:
             raise
 
     def _look_for_loss(self) -> Callable[[], None]:
-        """Return a look that raises `UnavailableError` once the server owes an answer for ever."""
+        """Return a look that raises `UnavailableError` once the server will never answer."""
         servers, lost = self._count_servers(), ''
 
         def look() -> None:

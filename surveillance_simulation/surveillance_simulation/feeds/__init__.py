@@ -1,1 +1,1 @@
-"""The simulated sensors as ROS topics, and the fault services."""
+"""The simulation on ROS topics: `sensor_feed`, `camera_feed`, and the `fault_services`."""

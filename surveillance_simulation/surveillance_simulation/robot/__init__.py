@@ -1,1 +1,1 @@
-"""The simulated robot: base, lidar, arm."""
+"""The simulated robot: `robot` moves `base`, `lidar` and `arm_motion` on in time as one."""

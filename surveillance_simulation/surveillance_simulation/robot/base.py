@@ -1,4 +1,4 @@
-"""A round robot on two driven wheels: how it moves, what stops it, and where it believes it is.
+"""A round robot on two driven wheels: how it moves, what stops it, and where its odometry has it.
 
 The base follows its velocity command within limits of speed and acceleration, on exact arcs. It is
 a disc that nothing passes through: it stops where it touches a wall, and can turn or back away.

@@ -182,7 +182,7 @@ class _Ways:
         return self._grid.contains(row, column) and bool(self._free[row, column])
 
     def left(self, goal: str, at: Point) -> float:
-        """Return how much of the way to a room is left, metres; dearer near walls."""
+        """Return how much of the way to a room is left, metres; a way near walls counts more."""
         row, column = self._grid.cell_of(*at)
         return _CELL * float(self._to(goal).left[row, column])
 
