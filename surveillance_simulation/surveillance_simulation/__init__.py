@@ -1,4 +1,4 @@
-"""Stand-in for robot hardware and Gazebo: camera, arm, base, lidar and time. No ROS in what is here.
+"""Stand-in for robot hardware and Gazebo: camera, arm, base, lidar and time.
 
     from surveillance_simulation import Robot, read_world
 
@@ -7,8 +7,8 @@
     robot.advance(0.1)  # seconds
     robot.scan()  # (360,) metres
 
-The node `simulator` has it on ROS topics (`feeds`, `conversions`), at a rate of its own
-(`clock_rate`).
+None of that needs ROS. The node `simulator` has it on ROS topics (`feeds`, `conversions`), at a
+rate of its own (`clock_rate`).
 """
 
 from __future__ import annotations
