@@ -3,6 +3,7 @@
 
     .venv/bin/python benchmarks/campaign.py --quick
     .venv/bin/python benchmarks/campaign.py --hours 1 --seed 3 --behaviour patrol
+    .venv/bin/python benchmarks/campaign.py --network --cuts 4
 
 `python3 launch.py` runs the mission as it does for a user, in a ROS domain of its own. One or two
 nodes at a time get SIGKILL, SIGSTOP or SIGTERM; now and then the launcher is killed with all it
@@ -49,6 +50,7 @@ from rclpy.node import Node  # noqa: E402
 from rclpy.qos import qos_profile_sensor_data  # noqa: E402
 from std_msgs.msg import UInt32  # noqa: E402
 
+from benchmarks.link_campaign import LinkCampaign  # noqa: E402
 from surveillance_interfaces.srv import ArmorDirective  # noqa: E402
 from surveillance_runtime.place import read_place  # noqa: E402
 from surveillance_runtime.qos import STATE_QOS  # noqa: E402
@@ -397,6 +399,12 @@ def main(words: Sequence[str] | None = None) -> int:
     parser.add_argument('--behaviour', choices=tuple(PLACES), default='surveillance')
     parser.add_argument('--pause', type=float, default=8.0, help='longest pause between hits, s')
     parser.add_argument('--restarts', type=float, default=0.1, help='share of hits on everything')
+    parser.add_argument(
+        '--network',
+        action='store_true',
+        help='the mission on two hosts whose link fails; root only',
+    )
+    parser.add_argument('--cuts', type=int, default=2, help='with --network: cuts of 120 s')
     parser.add_argument('--quick', action='store_true', help='25 s of hits')
     parser.add_argument('--keep', type=Path, default=ROOT / 'runs', help='folder for the log')
     chosen = parser.parse_args(words)
@@ -405,6 +413,8 @@ def main(words: Sequence[str] | None = None) -> int:
     chosen.keep.mkdir(parents=True, exist_ok=True)
     scratch = chosen.keep / time.strftime('campaign-%Y%m%d-%H%M%S')
     scratch.mkdir()
+    if chosen.network:
+        return run_on_two_hosts(chosen, scratch)
     campaign = Campaign(chosen, scratch)
     try:
         campaign.run(chosen.hours * 3600.0)
@@ -427,10 +437,31 @@ def main(words: Sequence[str] | None = None) -> int:
             *(sum(pair[side] for pair in results.growth.values()) for side in (0, 1)))),
         ('log', str(scratch)),
     ]  # fmt: skip
+    show(rows)
+    return 1 if results.away or results.lost or results.invented else 0
+
+
+def run_on_two_hosts(chosen: argparse.Namespace, scratch: Path) -> int:
+    """Run the campaign on a failing link, print its table, return the exit code."""
+    seconds, cuts, cut_seconds = (20.0, 0, 0.0) if chosen.quick else (120.0, chosen.cuts, 120.0)
+    campaign = LinkCampaign(
+        scratch,
+        chosen.seed,
+        lambda folder: [event for path in records(folder) for event in _events(path)],
+    )
+    try:
+        results = campaign.run(seconds, cuts, cut_seconds)
+    finally:
+        campaign.close()
+    show([*results.rows(), ('log', str(scratch))])
+    return 0 if results.passed() else 1
+
+
+def show(rows: Sequence[tuple[str, str]]) -> None:
+    """Print a table of two columns."""
     width = max(len(title) for title, _ in rows)
     for title, figure in rows:
         print(f'{title:{width}}  {figure}')
-    return 1 if results.away or results.lost or results.invented else 0
 
 
 def _named(what: Sequence[str]) -> str:

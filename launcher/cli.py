@@ -185,6 +185,7 @@ def make_parser(*, help_too: bool = True) -> argparse.ArgumentParser:
     parser.add_argument(
         '--only',
         type=_names,
+        action='extend',
         default=[],
         metavar='NODE,...',
         help='start these nodes and no others: the rest runs elsewhere',
@@ -192,6 +193,7 @@ def make_parser(*, help_too: bool = True) -> argparse.ArgumentParser:
     parser.add_argument(
         '--without',
         type=_names,
+        action='extend',
         default=[],
         metavar='NODE,...',
         help='start all but these nodes, which run elsewhere',

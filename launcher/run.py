@@ -59,6 +59,9 @@ COMPOSED_SHARE = 3
 MEMORY = 2048
 """Megabytes that a node may hold, unless the command line says otherwise."""
 BEHAVIOUR_NODE = 'robot_behavior'
+NOTHING_RECORDED = 'Mission: nothing was recorded.'
+EXIT_NOTHING_DONE = 1
+"""The exit code of a run that had all its time and in which the mission did not begin."""
 HELP = 'waiting for help: '
 """What the behaviour says when it needs somebody."""
 _NAMESPACE = re.compile(r'/?[A-Za-z]\w*(/[A-Za-z]\w*)*\Z', re.ASCII)
@@ -152,9 +155,9 @@ class Run:
         return (node_table.find(node_table.CONSOLE), *chosen) if asks else chosen
 
     def observers(self) -> tuple[node_table.Node, ...]:
-        """The nodes that only look on; they start last."""
+        """The nodes that only look on; they start last. `only` starts no other ones."""
         names = []
-        if self.record != NOT_RECORDED:
+        if self.record != NOT_RECORDED and not self.only:
             names += [RECORDER, MARKERS]
         if self.web or self.web_control:
             names.append(PAGE)
@@ -562,7 +565,10 @@ def run_mission(run: Run, config: Path, runs: Path, resume: Path | None = None) 
         if console is not None:
             console.stop()
     if any(node.name == BEHAVIOUR_NODE for node in nodes):
-        log.plain(summary(folder / RECORD))
+        done = summary(folder / RECORD)
+        log.plain(done)
+        if supervisor.time_is_over and done == NOTHING_RECORDED:
+            code = code or EXIT_NOTHING_DONE
     for line in what_to_look_at(folder):
         log.plain(line)
     log.close()
@@ -598,7 +604,7 @@ def watch_command(run: Run) -> str:
 def summary(record: Path) -> str:
     """The mission's summary as text; says so when there is none."""
     if not record.exists():
-        return 'Mission: nothing was recorded.'
+        return NOTHING_RECORDED
     try:
         return str(mission_log.summarize(mission_log.read(record)))
     except mission_log.MissionLogError as error:

@@ -109,6 +109,9 @@ class Supervisor:
         at_once: how many may come up at the same time; default: one more than there are
             processors, for each waits at times.
         on_trouble: called with one line when a program dies again and again.
+
+    Attributes:
+        time_is_over: whether it stopped because the time that was asked for was over.
     """
 
     def __init__(
@@ -129,6 +132,7 @@ class Supervisor:
         self._selector = selectors.DefaultSelector()
         self._stopping_since: float | None = None
         self._code = 0
+        self.time_is_over = False
 
     def read_from(self, descriptor: int, on_line: Callable[[str], None]) -> None:
         """Call `on_line` for each line that can be read from a descriptor until its end."""
@@ -424,6 +428,7 @@ class Supervisor:
             self.stop()
         if end is not None and now >= end and self._stopping_since is None:
             self._log.say('the time is over: stopping')
+            self.time_is_over = True
             self.stop()
         for child in self.children.values():
             if child.restart_at is not None and now >= child.restart_at:

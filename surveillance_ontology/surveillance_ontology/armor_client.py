@@ -85,6 +85,10 @@ class RosTransport:
         self._interrupt = interrupt
         self.timeout = timeout
 
+    def is_ready(self) -> bool:
+        """Tell whether the server is there now."""
+        return self._single.is_ready() and self._serial.is_ready()
+
     def call(self, request: DirectiveRequest) -> DirectiveResponse:
         """Carry out one directive and block until the answer."""
         answer = self._blocking(self._single, _one(request))

@@ -51,6 +51,9 @@ _EMPTY = {
 _FEWER_SERVICES = (Parameter('start_type_description_service', value=False),)
 """rcl's service logs what a peer asks for as it came, line breaks too, and no tool needs it."""
 
+MOST_WAITING = 200
+"""How many requests to one service may wait at a time: rclpy's executor looks at each in each
+round, and one whose client is gone waits as well."""
 JOIN_SECONDS = 2.0
 """How long a stopping node waits for each of its threads, seconds."""
 
@@ -256,12 +259,20 @@ class PatrolNode(Node):  # type: ignore[misc]
             return _refusal(type(response)(), request, error)
 
         if inspect.iscoroutinefunction(callback):
+            waiting = 0
 
             async def answer_later(request: Any, response: Any) -> Any:
+                nonlocal waiting
+                if waiting >= MOST_WAITING:
+                    error = RuntimeError(f'{waiting} requests wait for their answers already')
+                    return empty(error, request, response)
+                waiting += 1
                 try:
                     return await callback(request, response)
                 except Exception as error:
                     return empty(error, request, response)
+                finally:
+                    waiting -= 1
 
             return answer_later
 

@@ -51,6 +51,34 @@ def test_a_peer_that_is_away_is_waited_for_at_once(machine: str) -> None:
     assert world.arrivals
 
 
+def test_the_return_of_a_peer_ends_the_pause(machine: str) -> None:
+    world = World()
+    right, tries = world.plan_path, []
+
+    def plan(*args: object) -> object:
+        tries.append(world.clock.time)
+        if is_back():
+            return right(*args)  # type: ignore[arg-type]
+        raise AwayError('plan', 'no server', is_back)
+
+    def is_back() -> bool:
+        return not 60.0 < world.clock.time < 180.0
+
+    world.plan_path = plan  # type: ignore[method-assign, assignment]
+    Run(machine, world).until(400.0)
+    assert len([at for at in tries if 60.0 < at < 180.0]) < 10
+    exploring = 2.0
+    assert 180.0 <= min(at for at in tries if at >= 180.0) < 180.5 + exploring
+
+
+def test_a_peer_that_is_there_and_fails_has_the_whole_pause(machine: str) -> None:
+    world = World()
+    world.faults = fails('plan', 4, 'no answer', lambda *said: AwayError(*said, lambda: True))
+    Run(machine, world).until(200.0)
+    assert len([cry for cry in world.cries if 'no answer' in cry]) == 4
+    assert min(time for time, _ in world.arrivals) > 2.0 + 4.0 + 8.0 + 16.0
+
+
 WRONG_PATHS: list[tuple[list[Point], str]] = [
     ([], 'the path has no points'),
     ([(math.nan, 0.0, 0.0)], 'a point that is not finite'),

@@ -14,6 +14,9 @@ from launcher.cli import CONFIG, make_parser, wanted_run
 from launcher.log_merge import MergedLog
 from launcher.node_table import DEFAULT_MODE
 from launcher.run import (
+    MARKERS,
+    PAGE,
+    RECORDER,
     LaunchError,
     Run,
     alarm_caller,
@@ -243,6 +246,15 @@ def test_the_options_of_the_command_line_become_a_run():
         seconds=3.0,
         record=None,
     )
+
+
+def test_only_starts_what_is_named_and_may_be_repeated():
+    options = make_parser().parse_args(['--only', 'planner_controller', '--only', 'armor_server'])
+    run = wanted_run(options)
+    assert {node.name for node in run.nodes()} == {'planner_controller', 'armor_server'}
+    assert run.observers() == ()
+    assert [node.name for node in Run(record=None).observers()] == [RECORDER, MARKERS]
+    assert [node.name for node in replace(run, web=True).observers()] == [PAGE]
 
 
 def test_the_hint_to_watch_leads_to_this_run(monkeypatch):

@@ -8,13 +8,16 @@ import pytest
 from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.msg import ParameterValue
 from rcl_interfaces.srv import SetParameters, SetParametersAtomically
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.qos import QoSProfile
 from std_msgs.msg import Int32
 from std_srvs.srv import Trigger
 
 from surveillance_fsm.ros import ServiceCaller
+from surveillance_fsm.ros.waiting import CLIENT_QOS
 from surveillance_runtime.logging import LONGEST, Allowance, clean
-from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.node import MOST_WAITING, PatrolNode
+from surveillance_runtime.waiting import AwaitedEvent
 
 
 class Failing(PatrolNode):
@@ -59,6 +62,30 @@ def test_a_service_whose_callback_fails_answers_all_the_same(graph, service):
     graph.add(Failing)
     response = ServiceCaller(graph.node, Trigger, service).call(Trigger.Request(), 10.0)
     assert not response.success
+
+
+def test_requests_that_wait_for_their_answers_are_bounded(graph):
+    class Slow(PatrolNode):
+        def __init__(self, **options):
+            super().__init__('slow', **options)
+            self.event, self.open = AwaitedEvent(self), False
+            group = ReentrantCallbackGroup()
+            self.create_service(Trigger, 'slow', self.on_request, callback_group=group)
+
+        async def on_request(self, request, response):
+            await self.event.wait_for(lambda: self.open)
+            response.success = True
+            return response
+
+    node = graph.add(Slow)
+    client = graph.node.create_client(Trigger, 'slow', qos_profile=CLIENT_QOS)
+    graph.until(client.service_is_ready)
+    asked = [client.call_async(Trigger.Request()) for _ in range(MOST_WAITING + 50)]
+    graph.until(lambda: sum(each.done() for each in asked) == 50)
+    node.open = True
+    node.event.happen()
+    graph.until(lambda: all(each.done() for each in asked))
+    assert sum(each.result().success for each in asked) == MOST_WAITING
 
 
 @pytest.mark.parametrize('kind', [SetParameters, SetParametersAtomically])

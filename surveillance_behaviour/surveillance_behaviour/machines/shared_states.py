@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import surveillance_fsm as fsm
@@ -53,7 +53,7 @@ class MissionState(fsm.State):
                 return self._preempted()
             return self.interrupted(ud)
         except AwayError as error:
-            self.mission.failed(self.task, str(error))
+            self.mission.failed(self.task, str(error), is_over=error.is_back)
             return FAILED
         except (PeerError, NowhereToGoError) as error:
             self.mission.failed(self.task, str(error), self.goal(ud), charging=self.charging)
@@ -110,15 +110,22 @@ WORDS = {
 }
 
 
+LOOK_PERIOD = 0.2
+"""Seconds between two looks whether a peer that was away has come back."""
+
+
 class WaitForHelp(fsm.State):
-    """Says what is wrong and waits; then everything is tried anew, with longer pauses each time."""
+    """Says what is wrong and waits; then everything is tried anew, with longer pauses each time.
+
+    The return of a peer that was away ends the pause.
+    """
 
     def __init__(self, mission: Mission) -> None:
         super().__init__(['try_again', PREEMPTED])
         self.mission = mission
 
     def execute(self, ud: Any) -> str:
-        """Wait for one pause."""
+        """Wait for one pause, or until the peer that was away is back."""
         mission = self.mission
         failure = mission.failure
         reason = 'nothing works' if failure is None else f'{failure.what} failed: {failure.reason}'
@@ -127,11 +134,27 @@ class WaitForHelp(fsm.State):
             f'{reason} (in {mission.place or "an unknown place"}, {mission.battery.level_text()}; '
             f'trying again in {seconds:g} s)'
         )
-        if not self.wait(seconds):
+        if not self._wait(seconds, failure.is_over if failure is not None else None):
             self.service_preempt()
             return PREEMPTED
         mission.ports.announcer.waiting_for_help('')
         return 'try_again'
+
+    def _wait(self, seconds: float, is_over: Callable[[], bool] | None) -> bool:
+        """Wait; return False when a preempt ended it."""
+        if is_over is None:
+            return self.wait(seconds)
+        was_over = True
+        while seconds > 0.0:
+            over = is_over()
+            # One that is there all the time does not answer: that takes the whole pause.
+            if over and not was_over:
+                return True
+            was_over = over
+            if not self.wait(min(LOOK_PERIOD, seconds)):
+                return False
+            seconds -= LOOK_PERIOD
+        return True
 
 
 def add(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from surveillance_behaviour.charging import BatteryMonitor
@@ -184,10 +184,16 @@ class Mission:
         self.say(f'charged in {self.place} to {self.battery.level_text()}')
 
     def failed(
-        self, what: str, reason: str, goal: str | None = None, *, charging: bool = False
+        self,
+        what: str,
+        reason: str,
+        goal: str | None = None,
+        *,
+        charging: bool = False,
+        is_over: Callable[[], bool] | None = None,
     ) -> None:
         """Remember, record and say what did not work; see :class:`Failure`."""
-        self.failure = Failure(what, reason, goal, charging)
+        self.failure = Failure(what, reason, goal, charging, is_over)
         self.pending = None
         self.ports.decisions.disturbed()
         self.note('failure', what=what, reason=reason)

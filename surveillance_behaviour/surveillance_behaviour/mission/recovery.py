@@ -10,6 +10,7 @@ after each the steps begin anew.
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import StrEnum
 
@@ -57,12 +58,15 @@ class Failure:
         reason: One line.
         goal: The place that was not reached; None: the failure has nothing to do with a place.
         charging: The place was reached, but the battery is not charged there.
+        is_over: Whether what failed may work again, as when a peer has come back; None: only
+            another try tells.
     """
 
     what: str
     reason: str
     goal: str | None = None
     charging: bool = False
+    is_over: Callable[[], bool] | None = None
 
 
 @dataclass

@@ -96,6 +96,7 @@ class ArmorKnowledge:
         whereabouts: Where the robot is.
         patience: How long an ontology that was just built, or contradicts itself, may take until it
             knows where the robot is, seconds of steady time.
+        is_back: Whether a server that was away is there again; None: nobody can tell.
     """
 
     def __init__(
@@ -106,7 +107,9 @@ class ArmorKnowledge:
         reference: Callable[[fsm.Interrupt], str],
         whereabouts: Whereabouts | None = None,
         patience: float = 0.0,
+        is_back: Callable[[], bool] | None = None,
     ) -> None:
+        self._is_back = is_back
         self._armor = ArmorClient(client_id, '', transport)
         self._ontology = PatrolOntology(self._armor)
         self._wake = wake
@@ -167,8 +170,9 @@ class ArmorKnowledge:
         except (ArmorServiceCallError, OntologyNotReadyError) as error:
             if interrupt.is_set():
                 raise InterruptedWaitError from None
-            kind = AwayError if isinstance(error, ArmorServiceCallError) else PeerError
-            raise kind('armor', str(error)) from None
+            if isinstance(error, ArmorServiceCallError):
+                raise AwayError('armor', str(error), self._is_back) from None
+            raise PeerError('armor', str(error)) from None
         except ArmorServiceInternalError as error:
             # A server that was started anew does not know the ontology yet.
             self._armor.reference_name = ''

@@ -8,7 +8,7 @@ did not do what was asked - within a deadline that the port knows.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -35,7 +35,16 @@ class PeerError(Exception):
 
 
 class AwayError(PeerError):
-    """A peer is not there, or went away: no other path or place helps, only its return."""
+    """A peer is not there, or went away: no other path or place helps, only its return.
+
+    Args:
+        peer, reason: As for `PeerError`.
+        is_back: Whether it is there again; None: nobody can tell.
+    """
+
+    def __init__(self, peer: str, reason: str, is_back: Callable[[], bool] | None = None) -> None:
+        super().__init__(peer, reason)
+        self.is_back = is_back
 
 
 class UnknownPlaceError(PeerError):

@@ -97,7 +97,13 @@ def ros_ontology(node: PatrolNode, deadlines: Deadlines) -> ArmorKnowledge:
         STATE_QOS,
     )
     return ArmorKnowledge(
-        node.get_name(), transport, wake, reference, whereabouts, deadlines.answer
+        node.get_name(),
+        transport,
+        wake,
+        reference,
+        whereabouts,
+        deadlines.answer,
+        transport.is_ready,
     )
 
 
@@ -368,7 +374,7 @@ def call(
     except CallInterruptedError:
         raise InterruptedWaitError from None
     except CallError as error:
-        raise _peer_error(caller.name, error) from None
+        raise _peer_error(caller, error) from None
 
 
 def ask(
@@ -424,12 +430,14 @@ def run(
     except CallInterruptedError:
         raise InterruptedWaitError from None
     except CallError as error:
-        raise _peer_error(caller.name, error) from None
+        raise _peer_error(caller, error) from None
     if end.status != 'succeeded':
         raise PeerError(caller.name, f'the goal was {end.status}')
     return end.result
 
 
-def _peer_error(name: str, error: CallError) -> PeerError:
-    kind = AwayError if isinstance(error, UnavailableError) else PeerError
-    return kind(name, str(error).partition(f'{name}: ')[2] or str(error))
+def _peer_error(caller: ServiceCaller | GoalCaller, error: CallError) -> PeerError:
+    reason = str(error).partition(f'{caller.name}: ')[2] or str(error)
+    if isinstance(error, UnavailableError):
+        return AwayError(caller.name, reason, caller.is_ready)
+    return PeerError(caller.name, reason)

@@ -165,7 +165,9 @@ class GoalServer:
             if self._current is run:
                 self._current = None
         if error is not None:
-            self._node.get_logger().error(f'{self.name}: {error}')
+            log = self._node.get_logger()
+            # Whoever takes a goal back wants it to end.
+            (log.info if run.interrupt.is_set() else log.error)(f'{self.name}: {error}')
         if handle.is_cancel_requested:
             handle.canceled()
         elif error is not None or run.interrupt.is_set():
