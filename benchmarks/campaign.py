@@ -402,7 +402,7 @@ def main(words: Sequence[str] | None = None) -> int:
     parser.add_argument(
         '--network',
         action='store_true',
-        help='the mission on two hosts whose link fails; root only',
+        help='two hosts whose link fails; root only',
     )
     parser.add_argument('--cuts', type=int, default=2, help='with --network: cuts of 120 s')
     parser.add_argument('--quick', action='store_true', help='25 s of hits')
