@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from surveillance_behaviour.decision import Rules
+from surveillance_behaviour.decision import DecisionSettings, Rules, decide
+from surveillance_behaviour.policy.battery_reserve import Battery
 from surveillance_behaviour.policy.graph import PatrolGraph, graph_of_places
 from surveillance_behaviour.policy.leg_times import LegTimes
 from surveillance_behaviour.policy.rule_bound import rule_bound
 from surveillance_behaviour.policy.simulation import Patrol
+from surveillance_behaviour.policy.world import PolicyMemory, World
 
 from .worlds import seven_rooms
 
@@ -77,6 +79,38 @@ def test_the_plan_comes_within_a_twentieth_of_the_bound_that_knows_the_rules(
     bound = rule_bound(graph, threshold)
     assert bound == pytest.approx(least * graph.tour.length, rel=0.01)
     assert settled(graph, 'tour', threshold) <= 1.05 * bound
+
+
+def test_places_that_the_ontology_calls_urgent_at_the_start_are_visited_first() -> None:
+    graph = seven_rooms()
+    memory, visited_at = PolicyMemory(), {'E': 0.0}
+    place, now = 'E', 0.0
+    while now < graph.tour.length + 5.0:
+        reachable = tuple(sorted(graph.legs[place]))
+        kinds = {
+            name: {'ROOM', *(['CORRIDOR'] if len(graph.legs[name]) > 1 else [])}
+            | ({'URGENT'} if name not in visited_at else set())
+            for name in graph.places
+        }
+        decision = decide(
+            World(
+                place=place,
+                now=now,
+                reachable=reachable,
+                classes={name: frozenset(kind) for name, kind in kinds.items()},
+                visited_at=dict(visited_at),
+                graph=graph,
+                threshold=240.0,
+                rules=Rules().classes,
+                memory=memory,
+            ),
+            Battery(),
+            DecisionSettings(),
+        )
+        now += graph.seconds(place, decision.place)
+        place = decision.place
+        visited_at[place] = now
+    assert set(visited_at) == set(graph.places)
 
 
 def test_a_map_that_is_too_large_has_no_exhaustive_bound() -> None:

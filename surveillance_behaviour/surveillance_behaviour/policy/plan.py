@@ -1,49 +1,69 @@
-"""Plans a patrol ahead within the rules: looks for a round that leaves the least waiting.
+"""Plans a patrol ahead within the rules, and keeps the plan up to date at each choice.
 
-A course says how the robot chooses among the places that the rules allow: it goes towards the
-next target of a round (an order of all places, which skips targets that were visited lately), or
-to the place that went unvisited longest, or looks ahead. A rollout follows a course over several
-periods, with the rules applied at each step as they will be on the robot, and gives the longest
-time from visit to visit. A period is the shortest tour, or the threshold where that is longer.
+A plan follows a course: a round that the rules let a robot walk again and again (see `rounds`), or
+one of the simple policies `oldest` and `lookahead` where those do better from where the robot is.
+Every course is judged by following it ahead from a state of the patrol (see `rollout`) until it
+comes back to itself, so its longest wait is known for ever. A course is given up only for one that
+leaves less waiting from there.
 
-The plan begins with the best of a portfolio (the shortest tour in both senses with several ways
-to skip, `oldest`, `lookahead`) and is improved by local search: part of the round is turned round
-or moved, and what leaves less waiting is kept. At each choice a little more is tried from where
-the robot is then, so that a change of course is never for the worse. All of it is counted in
-steps, not in time, so the same world gives the same mission.
+What is thought at one choice is bounded, in work that is counted: the same world gives the same
+mission. On a machine that is too slow for that, the time is bounded, too. What does not fit into
+one choice goes on at the next: a trial compares courses from where the robot will be some moves
+later, and the course is changed when it comes there.
 """
 
 from __future__ import annotations
 
 import math
 import random
-from collections.abc import Sequence
+import time
+from collections.abc import Generator, Iterator
+from copy import copy
 from dataclasses import dataclass, replace
 
-import numpy as np
-
+from surveillance_behaviour.policy.rollout import (
+    HALF_OPEN,
+    URGENT,
+    Guide,
+    Lookahead,
+    Oldest,
+    Outcome,
+    RuleMap,
+    State,
+    roll_out,
+    rule_map,
+)
+from surveillance_behaviour.policy.rounds import Round, RoundChanges, RoundSearch
 from surveillance_behaviour.policy.world import World
 
-URGENT = 'URGENT'
-"""The class whose members change by waiting; all others are taken to stay as they are."""
-SKIPS = (0.0, 0.3, 0.5, 0.65, 0.8, 0.9)
-"""Targets of a round visited more lately than this are skipped, in periods."""
-PULLS = (0.0, 0.02)
-"""How many seconds of a way a second of waiting outweighs."""
-PERIODS = 7
-"""How many periods a rollout follows a course."""
-LARGE_PERIODS = 1.5
-"""The same on maps that are not searched."""
-FIRST_STEPS = 60_000
-"""Steps of rollouts before the first choice (about 5 microseconds each)."""
-MORE_STEPS = 1_000
-"""Steps of rollouts at each later choice."""
-ALL_STEPS = 2_000_000
-"""Steps of rollouts for one map and threshold in all."""
-SEARCHED_UP_TO = 300
-"""The largest map, in places, on which rounds are improved by local search."""
-GOOD_ENOUGH = 1.005
-"""A longest wait of so many periods is not improved any further."""
+FIRST_WORK, MORE_WORK, ALL_WORK = 360_000.0, 1_500.0, 20e6
+"""Work before the first choice of a plan, at each later one, in all: about microseconds."""
+FULL_UP_TO = 300.0
+"""Larger maps, in places, have less work before the first choice: knowing them takes its time."""
+FIRST_SECONDS, MORE_SECONDS = 0.4, 0.004
+"""Time of the processor for the first two at most."""
+WARM_WORK = 50_000.0
+"""Work before the first choice of a plan that takes the place of another."""
+SLICE_WORK = 500.0
+"""Work between two looks at the clock."""
+LEG_CHANGE = 0.1
+"""Times of legs that differ by less than this part keep the plan."""
+MOVE_WORK = 3.0
+"""Work of a move that is followed ahead."""
+HORIZON = 12.0
+"""How many periods a course is followed ahead at most."""
+TRIED = 8
+"""How many courses a trial between two choices has the time for."""
+GOOD_ENOUGH = 1.004
+"""A longest wait of so many bounds is not improved any further."""
+SKIPS = (0.0, 0.3, 0.6)
+"""Targets visited more lately than this may be skipped, in lengths of the round."""
+SIMPLE_UP_TO = 200
+"""The largest map, in places, on which `oldest` and `lookahead` are tried."""
+
+
+UNKNOWN = Outcome(1e12, 1e12)
+"""What nothing is known of."""
 
 
 @dataclass(frozen=True)
@@ -52,51 +72,77 @@ class Course:
 
     Attributes:
         kind: ``round``, ``oldest`` or ``lookahead``.
-        order: The targets of a round, as indices of places.
-        skip: Targets visited more lately than this are skipped, in periods.
-        pull: Seconds of way that a second of waiting outweighs.
+        targets: The targets of a round.
+        position: Of the target that it heads for first.
+        skip: Targets visited more lately than this are skipped, seconds.
+        patience: A target that may be entered only when it is URGENT is waited for so long, else
+            skipped, seconds.
     """
 
     kind: str
-    order: tuple[int, ...] = ()
+    targets: tuple[int, ...] = ()
+    position: int = 0
     skip: float = 0.0
-    pull: float = 0.0
+    patience: float = 0.0
 
 
-@dataclass(frozen=True, order=True)
-class Worth:
-    """What a course is worth; less is better.
-
-    Attributes:
-        grade: The longest time from visit to visit, in whole hundredths of a period, rounded up.
-        first: The longest time including that until the first visit, likewise.
-        fourths: The sum of all waits to the fourth power; compares courses of the same grades.
-        longest: The longest time from visit to visit, seconds.
-    """
-
-    grade: int
-    first: int
-    fourths: float
-    longest: float
-
-
-@dataclass
-class State:
-    """Where a rollout begins.
+class RoundGuide:
+    """Goes towards the targets of a round, one after the other.
 
     Attributes:
-        place: Index of the place.
-        now: Seconds.
-        seen: When each place was visited last, seconds.
-        target: Position in the round.
-        settled: Whether waits before a place's first visit count, too.
+        position: Of the present target.
     """
 
+    def __init__(self, rules: RuleMap, course: Course) -> None:
+        self._rules, self._course = rules, course
+        self.position = course.position
+
+    def next(self, state: State) -> int:
+        """Return the neighbour; see `rollout.Guide`."""
+        rules = self._rules
+        target = self._target(state)
+        allowed = rules.allowed(state)
+        if not allowed:
+            return state.place
+        hop = rules.hop(state.place, target)
+        if hop in allowed:
+            return hop
+        legs, away = rules.legs[state.place], rules.away
+        return min(allowed, key=lambda o: (legs[o] + away[o][target], state.seen[o], o))
+
+    def _target(self, state: State) -> int:
+        """Move on to the next target that is not to be skipped, and return it."""
+        rules, course = self._rules, self._course
+        targets, place = course.targets, state.place
+        count, position = len(targets), self.position
+        for _ in range(count):
+            target = targets[position]
+            idle = state.now - state.seen[target]
+            if target != place and idle >= course.skip and target not in state.avoided:
+                gate = rules.gates[target]
+                if gate < 0 or rules.threshold - idle - rules.away[place][gate] <= course.patience:
+                    break
+            position = position + 1 if position + 1 < count else 0
+        self.position = position
+        target = targets[position]
+        return target if target != place else targets[(position + 1) % count]
+
+
+@dataclass(frozen=True)
+class Switch:
+    """A better course, and where it is to be taken.
+
+    Attributes:
+        moves: How many moves the robot has made then.
+        place: Where it is then.
+        course: The course.
+        outcome: What it comes to from there.
+    """
+
+    moves: int
     place: int
-    now: float
-    seen: list[float]
-    target: int = 0
-    settled: bool = True
+    course: Course
+    outcome: Outcome
 
 
 class Plan:
@@ -104,273 +150,247 @@ class Plan:
 
     Args:
         world: Where it begins.
+        before: A plan for the same places that this one takes the place of.
     """
 
-    def __init__(self, world: World) -> None:
-        self._draw = random.Random(0)
-        self._steps = 0
-        self._met: set[int] = set()
-        self.target = 0
-        self._take_map(world)
-        state = self._state(world)
-        state.settled = False
-        found = self._portfolio(state)
-        self.worth, self.course = min(found, key=lambda entry: entry[0])
-        rounds = [entry for entry in found if entry[1].kind == 'round']
-        self._round_worth, self._round = min(rounds, key=lambda entry: entry[0])
-        self._search(state, FIRST_STEPS)
+    _met: list[bool]
 
-    def _take_map(self, world: World) -> None:
-        graph = world.graph
-        self._graph, self._threshold = graph, world.threshold
-        self.period = max(graph.tour.length, world.threshold, 1e-6)
-        index = graph.index
-        self._neighbours = [
-            [(index[other], seconds + graph.dwell) for other, seconds in sorted(ways.items())]
-            for ways in (graph.legs[place] for place in graph.places)
-        ]
-        # Seconds from every place to a target: the target's column.
-        self._to: list[list[float]] = graph.distances.T.tolist()
-        self._rules = rules = world.rules
-        self._urgent = rules.index(URGENT) if URGENT in rules else len(rules)
-        self._ranks = _ranks(world)
+    def __init__(self, world: World, before: Plan | None = None) -> None:
+        self._key = world.threshold, world.rules
+        self._rules = rules = rule_map(world)
+        self._met = before._met if before else [False] * rules.count
+        self._moves, self._work = 0, 0.0
+        self._draw = random.Random(0)
+        self._trial: Generator[None] | None = None
+        self._switch: Switch | None = None
+        self._course = Course('none')
+        self._guide: Guide = Oldest(rules)
+        self._outcome = UNKNOWN
+        self._state = self._state_of(world)
+        order = before.targets if before else world.graph.tour.order
+        self._search = RoundSearch(rules, order)
+        self._offered: tuple[int, ...] = ()
+        work = FIRST_WORK * min(1.0, FULL_UP_TO / rules.count)
+        self._think(min(work, WARM_WORK) if before else work, FIRST_SECONDS, lead=0)
 
     def fits(self, world: World) -> bool:
         """Return whether the plan is for this map, threshold and rules.
 
-        Other times of the legs, or another threshold, keep the course and go on from there.
+        Times of legs that differ a little keep the plan.
         """
-        if world.graph is self._graph and world.threshold == self._threshold:
-            return world.rules == self._rules
-        if world.graph.places != self._graph.places or world.rules != self._rules:
+        planned, graph = self._rules.graph, world.graph
+        if self._key != (world.threshold, world.rules):
             return False
-        self._take_map(world)
-        self._steps = min(self._steps, ALL_STEPS // 2)
-        return True
-
-    def advance(self, world: World) -> int | None:
-        """Return the index of the place that the course heads for; None: it has no target.
-
-        Before, a little more is tried than was.
-        """
-        state = self._state(world)
-        self._met.add(state.place)
-        if self._steps < ALL_STEPS and len(self._graph.places) <= SEARCHED_UP_TO:
-            state.settled = len(self._met) == len(self._graph.places)
-            self.worth = self._rollout(self.course, state)
-            same = self.course is self._round
-            self._round_worth = self.worth if same else self._rollout(self._round, state)
-            self._search(state, MORE_STEPS)
-        if self.course.kind != 'round':
-            return None
-        order = self.course.order
-        position = self._next(order, self.target, state, self.course.skip * self.period)
-        avoided = {self._graph.index.get(place) for place in world.avoided}
-        for _ in order:
-            if order[position] not in avoided:
-                break
-            position = (position + 1) % len(order)
-        self.target = position
-        return order[position]
-
-    def cost(self, world: World, place: str, target: int) -> float:
-        """Return what going to ``place`` on the way to a target costs, seconds."""
-        index = self._graph.index[place]
-        away = self._to[target][index] + self._graph.seconds(world.place, place)
-        return away - self.course.pull * world.unvisited(place)
-
-    def _state(self, world: World) -> State:
-        graph = self._graph
-        seen = [world.visited_at.get(place, world.since) for place in graph.places]
-        return State(graph.index[world.place], world.now, seen, self.target)
-
-    @staticmethod
-    def _next(order: Sequence[int], position: int, state: State, skip: float) -> int:
-        """The position of the next target that is not visited lately."""
-        for _ in order:
-            target = order[position]
-            if target != state.place and state.now - state.seen[target] >= skip:
-                break
-            position = (position + 1) % len(order)
-        return position
-
-    # The search.
-
-    def _portfolio(self, state: State) -> list[tuple[Worth, Course]]:
-        """The courses that are known to be good somewhere, with their worth."""
-        large = len(self._graph.places) > SEARCHED_UP_TO
-        tour = self._graph.tour.order
-        begin = tour.index(state.place)
-        way = tour[begin + 1 :] + tour[: begin + 1]
-        rounds = (way, (*way[-2::-1], way[-1]))
-        courses = [
-            Course('round', order, skip, pull)
-            for order in rounds
-            for skip in (SKIPS[1:4:2] if large else SKIPS)
-            for pull in (PULLS[:1] if large else PULLS)
-        ]
-        courses += [Course('oldest'), Course('lookahead')]
-        return [(self._rollout(course, state), course) for course in courses]
-
-    def _search(self, state: State, steps: int) -> None:
-        """Try changes of the best round for so many steps; take it once it is the best course."""
-        count = len(self._graph.places)
-        end = min(self._steps + steps, ALL_STEPS)
-        if not 3 <= count <= SEARCHED_UP_TO:
-            return
-        enough = GOOD_ENOUGH * self.period
-        while self._steps < end and self.worth.longest > enough:
-            course = self._changed(self._round)
-            begin = replace(state, target=course.order.index(self._round.order[self.target]))
-            stop = self._round_worth.longest + self.period / 100.0
-            worth = self._rollout(course, begin, stop)
-            self._steps += 1
-            if worth <= self._round_worth:
-                self._round_worth, self._round = worth, course
-                self.target = state.target = begin.target
-                if self.course.kind == 'round' or worth < self.worth:
-                    self.worth, self.course = worth, course
-
-    def _changed(self, course: Course) -> Course:
-        """The course with one random change."""
-        draw, order = self._draw, list(course.order)
-        count, choice = len(order), draw.random()
-        first = draw.randrange(count)
-        last = min(count, first + 1 + int(draw.expovariate(1.0 / max(2.0, count / 8.0))))
-        if choice < 0.3:
-            order[first:last] = order[first:last][::-1]
-        elif choice < 0.75:
-            last = last if choice < 0.45 else min(count, first + 1 + draw.randrange(3))
-            moved = order[first:last]
-            del order[first:last]
-            where = draw.randrange(len(order) + 1)
-            order[where:where] = moved if draw.random() < 0.5 else moved[::-1]
-        elif choice < 0.9:
-            skip = min(0.97, max(0.0, course.skip + draw.uniform(-0.15, 0.15)))
-            return replace(course, skip=skip)
-        else:
-            other = draw.randrange(count)
-            order[first], order[other] = order[other], order[first]
-        return replace(course, order=tuple(order))
-
-    # Rollouts.
-
-    def _rollout(self, course: Course, state: State, stop: float = math.inf) -> Worth:
-        """Follow a course; give up once a wait is longer than ``stop``."""
-        periods = PERIODS if len(self._graph.places) <= SEARCHED_UP_TO else LARGE_PERIODS
-        horizon = periods * self.period
-        if course.kind != 'round':
-            return self._follow(course, state, horizon)
-        neighbours, ranks, urgent = self._neighbours, self._ranks, self._urgent
-        threshold, order, count = self._threshold, course.order, len(course.order)
-        skip, pull, position = course.skip * self.period, course.pull, state.target
-        seen, place, now = state.seen.copy(), state.place, state.now
-        met = [state.settled] * count
-        longest = first = fourths = 0.0
-        end, steps = now + horizon, 0
-        while now < end:
-            for _ in range(count):
-                target = order[position]
-                if target != place and now - seen[target] >= skip:
-                    break
-                position = position + 1 if position + 1 < count else 0
-            away = self._to[order[position]]
-            least, best, taken, cost, oldest = len(ranks) + 9, place, horizon, math.inf, math.inf
-            for other, seconds in neighbours[place]:
-                last = seen[other]
-                rank = ranks[other]
-                if urgent < rank and now - last > threshold:
-                    rank = urgent
-                if rank > least:
-                    continue
-                value = seconds + away[other] - pull * (now - last)
-                if rank < least or value < cost - 1e-9 or (value < cost + 1e-9 and last < oldest):
-                    least, best, taken, cost, oldest = rank, other, seconds, value, last
-            now += taken
-            steps += 1
-            wait = now - seen[best]
-            if met[best]:
-                if wait > longest:
-                    longest = wait
-                    if wait > stop:
-                        break
-                fourths += wait**4
-            elif wait > first:
-                first = wait
-            met[best] = True
-            seen[best] = now
-            place = best
-        self._steps += steps
-        return self._worth(max(longest, now - min(seen)), first, fourths)
-
-    def _worth(self, longest: float, first: float, fourths: float) -> Worth:
-        grain = self.period / 100.0
-        grade, whole = (math.ceil(wait / grain - 1e-6) for wait in (longest, max(longest, first)))
-        return Worth(grade, whole, fourths, longest)
-
-    def _follow(self, course: Course, state: State, horizon: float) -> Worth:
-        """Follow `oldest` or `lookahead`."""
-        distances = self._graph.distances
-        seen, place, now = np.array(state.seen), state.place, state.now
-        met = np.full(len(seen), state.settled)
-        longest = first = fourths = 0.0
-        end = now + horizon
-        while now < end:
-            ranks = [
-                min(self._ranks[other], self._urgent)
-                if now - seen[other] > self._threshold
-                else self._ranks[other]
-                for other, _ in self._neighbours[place]
-            ]
-            if not ranks:
-                break
-            least = min(ranks)
-            allowed = [
-                way
-                for way, rank in zip(self._neighbours[place], ranks, strict=True)
-                if rank == least
-            ]
-            best, taken = allowed[0]
-            if len(allowed) > 1 and course.kind == 'oldest':
-                best, taken = min(allowed, key=lambda way: (seen[way[0]], way[0]))
-            elif len(allowed) > 1:
-                idle = now - seen
-                idle[place] = -np.inf
-                best, taken = max(
-                    allowed,
-                    key=lambda way: (
-                        round(float((idle - distances[way[0]]).max()) - way[1], 6),
-                        -seen[way[0]],
-                        -way[0],
-                    ),
+        return graph is planned or (
+            graph.places == planned.places
+            and all(
+                ways.keys() == graph.legs[place].keys()
+                and all(
+                    abs(graph.legs[place][other] - seconds) <= LEG_CHANGE * seconds
+                    for other, seconds in ways.items()
                 )
-            now += taken
-            self._steps += 1
-            wait = now - float(seen[best])
-            if met[best]:
-                longest = max(longest, wait)
-                fourths += wait**4
-            else:
-                first = max(first, wait)
-            met[best] = True
-            seen[best] = now
-            place = best
-        return self._worth(max(longest, now - float(seen.min())), first, fourths)
+                for place, ways in planned.legs.items()
+            )
+        )
 
+    def advance(self, world: World) -> tuple[int, int] | None:
+        """Think on, and return the place to go to and the target that it leads to, as indices.
 
-def _ranks(world: World) -> list[int]:
-    """The position of each place's best class in the rules, URGENT left aside."""
-    ranks = []
-    for place in world.graph.places:
-        classes = world.classes.get(place, frozenset()) - {URGENT}
-        positions = [rank for rank, name in enumerate(world.rules) if name in classes]
-        ranks.append(min(positions, default=len(world.rules)))
-    return ranks
+        None: the simple policy `kind` is to be followed.
+        """
+        place = self._state.place
+        self._state = self._state_of(world)
+        if self._state.place != place:
+            self._moves += 1
+            self._met[self._state.place] = self._state.met[self._state.place] = True
+        self._take_switch()
+        if not self._finished():
+            self._think(MORE_WORK, MORE_SECONDS, lead=self._lead())
+        if not isinstance(self._guide, RoundGuide):
+            return None
+        place = self._guide.next(self._state)
+        return place, self._course.targets[self._guide.position]
+
+    @property
+    def kind(self) -> str:
+        """How the robot chooses: ``round``, ``oldest`` or ``lookahead``."""
+        return self._course.kind
+
+    @property
+    def places(self) -> tuple[str, ...]:
+        """The places of the map."""
+        return self._rules.graph.places
+
+    @property
+    def targets(self) -> tuple[int, ...]:
+        """The best round that was found."""
+        return self._course.targets or self._search.best.targets
+
+    @property
+    def longest(self) -> float:
+        """The longest wait from visit to visit that the course leaves, seconds."""
+        return self._outcome.settled
+
+    @property
+    def _bound(self) -> float:
+        """The longest wait that cannot be helped, as far as is known, seconds."""
+        return max(self._search.best.length, self._rules.least_period, 1e-6)
+
+    def _state_of(self, world: World) -> State:
+        graph, seen = world.graph, []
+        for place in graph.places:
+            last = world.visited_at.get(place, world.since)
+            if world.now - last <= world.threshold and URGENT in world.classes.get(place, ()):
+                # The ontology knows better: it was never visited.
+                last = world.now - world.threshold - HALF_OPEN
+            seen.append(last)
+        avoided = frozenset(graph.index[name] for name in world.avoided if name in graph.index)
+        return State(graph.index[world.place], world.now, seen, self._met.copy(), avoided)
+
+    # Thinking.
+
+    def _finished(self) -> bool:
+        if self._work + self._search.work >= ALL_WORK:
+            return True
+        return self._search.finished and self._outcome.settled <= GOOD_ENOUGH * self._bound
+
+    def _lead(self) -> int:
+        """How many choices a trial takes."""
+        trial = TRIED * MOVE_WORK * self._outcome.steps
+        return 2 + math.ceil(2.0 * trial / MORE_WORK)
+
+    def _think(self, work: float, seconds: float, lead: int) -> None:
+        """Search rounds, and try courses from where the robot will be ``lead`` moves on."""
+        deadline = time.thread_time() + seconds
+        end = self._search.work + work / 2.0
+        while self._search.work < end and not self._search.finished:
+            self._search.improve(SLICE_WORK)
+            if time.thread_time() > deadline - seconds / 2.0:
+                break
+        end = self._work + work / 2.0
+        while self._work < end and time.thread_time() < deadline:
+            if self._trial is None:
+                if self._switch is not None:
+                    break
+                self._trial = self._tried(lead, max(lead, 1) * work / 2.0)
+            if next(self._trial, self) is self:
+                self._trial = None
+                if lead == 0:
+                    break
+        if lead == 0:
+            self._trial = None
+        self._take_switch()
+
+    def _take_switch(self) -> None:
+        """Change the course where that was planned."""
+        switch = self._switch
+        if switch is None or self._moves < switch.moves:
+            return
+        self._switch = None
+        if (self._moves, self._state.place) == (switch.moves, switch.place):
+            self._course, self._outcome = switch.course, switch.outcome
+            self._guide = self._guide_of(switch.course)
+
+    def _tried(self, lead: int, work: float) -> Generator[None]:
+        """Compare other courses with the present one from ``lead`` moves on."""
+        rules, state, guide = self._rules, self._state.copy(), copy(self._guide)
+        for _ in range(lead):
+            place = guide.next(state)
+            state.enter(place, rules.legs[state.place].get(place, 0.0))
+            state.met[place] = True
+        moves, end = self._moves + lead, self._work + work
+        best = present = replace(self._course, position=guide.position)
+        outcome = UNKNOWN
+        if self._course.kind != 'none':
+            outcome = self._outcome = yield from self._followed(present, state, math.inf)
+        courses = self._portfolio(state, guide.position)
+        best_round, least = present, outcome
+        while self._work < end and outcome.settled > GOOD_ENOUGH * self._bound:
+            course = next(courses, None) or self._changed(best_round, least)
+            if course is None:
+                self._work += MOVE_WORK
+                continue
+            found = yield from self._followed(course, state, 1.01 * least.settled)
+            grade = found.grade(self._bound)
+            if course.kind == 'round' and (
+                best_round.kind != 'round' or grade < least.grade(self._bound)
+            ):
+                best_round, least = course, found
+            if grade < outcome.grade(self._bound):
+                best, outcome = course, found
+                self._switch = Switch(moves, state.place, best, outcome)
+        if best.kind == 'round' and self._search.best.targets == self._offered != best.targets:
+            # That round cannot be come to from this one: look for one that is more like it.
+            self._search = RoundSearch(rules, best.targets, self._search.work)
+
+    def _followed(
+        self, course: Course, state: State, stop: float
+    ) -> Generator[None, None, Outcome]:
+        """Follow a course ahead; what it comes to."""
+        horizon = HORIZON * max(self._bound, self._rules.threshold)
+        moves = roll_out(self._rules, self._guide_of(course), state, horizon, stop)
+        while True:
+            try:
+                self._work += MOVE_WORK * next(moves)
+            except StopIteration as end:
+                outcome: Outcome = end.value
+                return outcome
+            yield
+
+    def _guide_of(self, course: Course) -> Guide:
+        if course.kind == 'round':
+            return RoundGuide(self._rules, course)
+        return (Oldest if course.kind == 'oldest' else Lookahead)(self._rules)
+
+    def _portfolio(self, state: State, position: int) -> Iterator[Course]:
+        """The best round that was found since the last trial, in several ways, and the policies."""
+        targets = self._search.best.targets
+        if targets == self._offered and self._course.kind == 'round':
+            return
+        first, self._offered = not self._offered, targets
+        rules = self._rules
+        length = rules.length(targets)
+        wait = max(0.0, rules.least_period - length)
+        slack = wait + 2.0 * rules.mean_leg
+        oldest = min(range(rules.count), key=state.seen.__getitem__)
+        heads = [oldest]
+        if self._course.kind == 'round':
+            heads.append(self._course.targets[position])
+        phases = [k for k, target in enumerate(targets) if targets[k - 1] == state.place]
+        phases += [targets.index(head) for head in heads]
+        for phase in dict.fromkeys(phases):
+            yield Course('round', targets, phase, 0.0, slack)
+        if first and rules.count <= SIMPLE_UP_TO:
+            yield Course('oldest')
+            yield Course('lookahead')
+        for skip in SKIPS:
+            for patience in (0.0, slack, math.inf):
+                yield Course('round', targets, phases[0], skip * length, patience)
+
+    def _changed(self, course: Course, outcome: Outcome) -> Course | None:
+        """The course of a round with one random change."""
+        if course.kind != 'round':
+            return None
+        draw, rules = self._draw, self._rules
+        choice = draw.random()
+        if choice < 0.1:
+            skip = max(0.0, course.skip + draw.uniform(-0.2, 0.2) * self._bound)
+            return replace(course, skip=skip)
+        if choice < 0.2:
+            return replace(course, patience=draw.random() ** 2 * self._bound)
+        changes = RoundChanges(rules, Round(course.targets, 0.0), draw)
+        limit = 1.1 * min(outcome.settled, 1.5 * self._bound)
+        targets = changes.doubled(limit) if choice < 0.4 else changes.one(limit)
+        if targets is None:
+            return None
+        head = course.targets[course.position]
+        return replace(course, targets=targets, position=targets.index(head))
 
 
 def plan_of(world: World) -> Plan:
     """Return the plan that the policy remembers, or a new one."""
     plan = world.memory.plan
     if not isinstance(plan, Plan) or not plan.fits(world):
-        plan = world.memory.plan = Plan(world)
+        same = isinstance(plan, Plan) and plan.places == world.graph.places
+        plan = world.memory.plan = Plan(world, plan if same else None)
     return plan

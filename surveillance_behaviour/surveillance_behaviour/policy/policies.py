@@ -89,21 +89,25 @@ def lookahead(world: World, allowed: Sequence[str]) -> Scores:
 
 
 def tour(world: World, allowed: Sequence[str]) -> Scores:
-    """How near each place is to the next target of the plan; see the module `plan`.
+    """The next place of the plan, then by how near each place is to its target; see `plan`.
 
     Where `oldest` or `lookahead` does better than every round that was found, it is followed.
     """
     plan = plan_of(world)
-    target = plan.advance(world)
-    if target is None:
-        return (oldest if plan.course.kind == 'oldest' else lookahead)(world, allowed)
-    name = world.graph.places[target]
+    step = plan.advance(world)
+    if step is None:
+        return (oldest if plan.kind == 'oldest' else lookahead)(world, allowed)
+    graph = world.graph
+    next_place, target = (graph.places[index] for index in step)
+    words = (
+        f'which {world.wait_in_words(target)}; '
+        f'this round leaves no place longer than {plan.longest:.1f} s'
+    )
     return {
         place: Score(
-            -plan.cost(world, place, target),
-            name,
-            f'{_heads_for(place, name)}, which {world.wait_in_words(name)}; '
-            f'this round leaves no place longer than {plan.worth.longest:.1f} s',
+            0.0 if place == next_place else -1.0 - graph.seconds(place, target),
+            target,
+            f'{_heads_for(place, target)}, {words}',
         )
         for place in allowed
     }
