@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from textwrap import wrap
 from typing import Protocol
 
 from surveillance_controllers.manual.commands import (
@@ -183,15 +184,29 @@ class Answer:
     ends: bool = False
 
 
-def help_text() -> str:
-    """Return every command with its arguments and what it does, one a line."""
+def help_text(columns: int = 1000) -> str:
+    """Return every command with its arguments and what it does, in lines of that many columns."""
     usages = [
         *((command.usage, command.description) for command in GRAMMAR.commands),
         (WHY.usage, WHY.description),
         (EXIT_NODE, 'Stop one controller.'),
     ]
     width = max(len(usage) for usage, _ in usages)
-    return '\n'.join(f'  {usage:<{width}}  {text}' for usage, text in sorted(usages))
+    lines = []
+    for usage, text in sorted(usages):
+        first, *rest = wrap(text, max(20, columns - width - 4))
+        lines += [f'  {usage:<{width}}  {first}', *(' ' * (width + 4) + line for line in rest)]
+    return '\n'.join(lines)
+
+
+def wrapped(text: str, columns: int) -> str:
+    """Return a text in lines of that many columns; what is indented stays so."""
+    lines = []
+    for line in text.splitlines():
+        indent = ' ' * (len(line) - len(line.lstrip()))
+        further = indent + '    '
+        lines += wrap(line, columns, subsequent_indent=further, break_on_hyphens=False) or ['']
+    return '\n'.join(lines)
 
 
 def completions(text: str) -> list[str]:
@@ -203,13 +218,16 @@ def completions(text: str) -> list[str]:
     return GRAMMAR.completions(text)
 
 
-def answer(line: str, actions: Actions, why: Callable[[], str]) -> list[Answer]:
+def answer(
+    line: str, actions: Actions, why: Callable[[], str], columns: int = 1000
+) -> list[Answer]:
     """Do what a line says, and return what came of it.
 
     Args:
         line: As it was typed.
         actions: Does it.
         why: The present decision in words.
+        columns: Of the terminal.
     """
     words = line.split()
     if [word.lower() for word in words] == ['why']:
@@ -223,7 +241,7 @@ def answer(line: str, actions: Actions, why: Callable[[], str]) -> list[Answer]:
     if command is None:
         return []
     if command.name == HELP.name:
-        return [Answer(help_text())]
+        return [Answer(help_text(columns))]
     if command.name == EXIT.name:
         return [Answer('', ends=True)]
     if command.name == STATUS.name:

@@ -6,6 +6,7 @@ why. What the controllers announce is shown with the controller's name in front.
 
 from __future__ import annotations
 
+import shutil
 import sys
 from collections.abc import Sequence
 from functools import partial
@@ -14,7 +15,13 @@ from typing import Any, TextIO
 from std_msgs.msg import String
 
 from surveillance_controllers.manual.prompt import Console
-from surveillance_operator.console_commands import CONTROLLED, answer, completions, help_text
+from surveillance_operator.console_commands import (
+    CONTROLLED,
+    answer,
+    completions,
+    help_text,
+    wrapped,
+)
 from surveillance_operator.mission_actions import MissionActions
 from surveillance_operator.mission_feed import MissionFeed
 from surveillance_operator.snapshot import Snapshot, decision_line
@@ -53,7 +60,7 @@ class ConsoleNode(PatrolNode):
         )
         self.stopping.subscribe(self._console.stop)
         if self._console.on_terminal:
-            _tell('You can type these commands:\n' + help_text())
+            _tell('You can type these commands:\n' + help_text(_columns()))
         self.spawn(self._read)
 
     def _status(self) -> str:
@@ -67,7 +74,7 @@ class ConsoleNode(PatrolNode):
             self.finish()
 
     def _on_line(self, line: str) -> None:
-        for each in answer(line, self._actions, self._why):
+        for each in answer(line, self._actions, self._why, _columns()):
             if each.ends:
                 self.finish()
             elif each.text:
@@ -92,7 +99,13 @@ def status_line(snapshot: Snapshot) -> str:
 
 def _tell(text: str, controller: str = '') -> None:
     head = f'[{controller}] ' if controller else ''
-    print('\n'.join(head + line for line in text.splitlines()), file=sys.stdout, flush=True)
+    said = '\n'.join(head + line for line in text.splitlines())
+    print(wrapped(said, _columns()), file=sys.stdout, flush=True)
+
+
+def _columns() -> int:
+    """Return how many columns the terminal has; elsewhere lines are as long as they are."""
+    return shutil.get_terminal_size().columns if sys.stdout.isatty() else 10_000
 
 
 def main(args: Sequence[str] | None = None) -> int:
