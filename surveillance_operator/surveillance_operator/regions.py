@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from surveillance_operator.snapshot import Box, Grid
 
@@ -48,6 +47,9 @@ def regions(
         positions: A point in each place, metres.
         doors: The doors' openings: x1, y1, x2, y2, metres.
     """
+    # Only here: most processes never draw a map and need not wait for the import.
+    from scipy import ndimage
+
     free, side = _free(grid)
     for line in doors.values():
         free[_cells_along(line, grid, side, free.shape)] = False
@@ -102,6 +104,8 @@ def _nearest(mask: NDArray[np.bool_], points: list[tuple[float, float]]) -> NDAr
 def _region(
     mask: NDArray[np.bool_], point: tuple[float, float], origin: tuple[float, float], side: float
 ) -> Region:
+    from scipy import ndimage
+
     inside = ndimage.distance_transform_edt(np.pad(mask, 1))[1:-1, 1:-1]
     rows, columns = np.indices(mask.shape)
     # The robot stops at the point and would hide a name there; above it is better than below.

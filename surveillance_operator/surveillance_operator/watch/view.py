@@ -83,7 +83,7 @@ class MissionView:
         snapshot: What is known.
         whole: Fill the terminal, down to its last line.
         page: What to show, one of the values of `KEYS`.
-        note: Stands at the end of the first line.
+        note: Stands in the last line.
     """
 
     def __init__(
@@ -98,7 +98,7 @@ class MissionView:
         """Yield the picture: as many lines as the terminal has, each as wide as it is."""
         width, height = options.max_width, options.height or console.height
         colours = console.color_system is not None and not console.no_color
-        body = height - 1
+        body = height - (2 if self._note else 1)
         if self._page != 'map':
             lines = _wrapped(console, PAGES[self._page](self._snapshot), width)
             rows = _rendered(console, options, lines[:body], width)
@@ -114,13 +114,12 @@ class MissionView:
             picture = draw_map(self._snapshot, width, max(3, body // 2), colours=colours)
             rows = [*picture, *self._panel(console, options, width, max(0, body - len(picture)))]
         title = header_line(self._snapshot)
-        if self._note:
-            title.append(f'· {self._note} ')
         title.pad_right(max(0, width - len(title)))
-        header = _rendered(console, options, [title], width)
-        rows = [*header, *rows][:height]
+        rows = [*_rendered(console, options, [title], width), *rows][: body + 1]
         if self._whole:
-            rows += [[] for _ in range(height - len(rows))]
+            rows += [[] for _ in range(body + 1 - len(rows))]
+        if self._note:
+            rows += _rendered(console, options, [_dim(f' {self._note}')], width)
         for number, row in enumerate(rows):
             if number:
                 yield Segment.line()
