@@ -497,9 +497,19 @@ class KnowledgeBase:
             if isinstance(axiom, stated):
                 yield axiom
         if derived:
-            for axiom in visible(self._engine):
-                if axiom not in self._told.removed and axiom not in self._told.axioms:
-                    yield axiom  # type: ignore[misc]
+            yield from self.derived_facts()
+
+    def derived_facts(self) -> Iterator[Fact]:
+        """Yield the facts about individuals that follow and are not asserted."""
+        engine, told = self._usable, self._told
+        if engine is None:
+            return
+        if not self.stale and not engine.equality.members:
+            yield from FactView(engine).derived()  # type: ignore[misc]
+            return
+        for axiom in visible(engine):
+            if axiom not in told.removed and axiom not in told.axioms:
+                yield axiom  # type: ignore[misc]
 
     def holds(self, fact: Axiom) -> bool:
         """Tell whether a fact is asserted or was derived: what `explain` explains."""

@@ -17,9 +17,11 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
-from surveillance_ontology.armor.sparql_graph import GraphUpdate, Version
+if TYPE_CHECKING:
+    # Not in the processes, which need nothing else of the package.
+    from surveillance_ontology.armor.sparql_graph import GraphUpdate, Version
 
 MEMORY = 2 * 1024**3
 """Bytes that a query's process may use."""
@@ -30,7 +32,7 @@ OUT_OF_MEMORY = 3
 IDLE = 2
 """Processes that are kept for the next query."""
 
-Update = Callable[[Version | None], GraphUpdate | None]
+Update: TypeAlias = 'Callable[[Version | None], GraphUpdate | None]'
 """Gives what brings a process with a graph of a version, or none, up to date; None: it is."""
 
 

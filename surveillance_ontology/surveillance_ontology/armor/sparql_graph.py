@@ -14,6 +14,7 @@ from surveillance_ontology.armor.reference import Reference
 from surveillance_ontology.knowledge_base import Changes, KnowledgeBase
 from surveillance_ontology.owl.axioms import (
     Axiom,
+    AxiomAnnotation,
     ClassAssertion,
     DataPropertyAssertion,
     Declaration,
@@ -22,10 +23,12 @@ from surveillance_ontology.owl.axioms import (
     SubClassOf,
 )
 from surveillance_ontology.owl.entities import entities_of
-from surveillance_ontology.owl.vocabulary import THING
+from surveillance_ontology.owl.vocabulary import NOTHING, THING
 
 KEPT = 5000
 """Facts that changed and are kept; a process whose graph is older gets the whole one."""
+
+_BUILT_IN = (THING, NOTHING)
 
 Fact = ClassAssertion | ObjectPropertyAssertion | DataPropertyAssertion | SubClassOf
 
@@ -65,15 +68,30 @@ class GraphUpdate:
 
     def triples(self) -> tuple[bytes, bytes]:
         """Return what goes and what comes as N-Triples; needs no lock, and may take long."""
-        lines = self._written(self.removed).splitlines(keepends=True)
-        # The header comes first, and the declarations of what the facts name come last.
-        removed = b''.join(lines[1 : 1 + len(self.removed)])
-        return removed, self._written(self.added)
+        from surveillance_ontology.documents.writing import fact_line, ontology_bytes
 
-    def _written(self, axioms: list[Axiom]) -> bytes:
-        from surveillance_ontology.documents.writing import ontology_bytes
-
-        return ontology_bytes(axioms, self.iri, 'ntriples') if axioms else b''
+        removed = ''.join(map(fact_line, self.removed)).encode()
+        annotated = {axiom.axiom for axiom in self.added if isinstance(axiom, AxiomAnnotation)}
+        lines: list[str] = []
+        rest: list[Axiom] = []
+        named: dict[tuple[str, str], None] = {}
+        for axiom in self.added:
+            line = '' if annotated and axiom in annotated else fact_line(axiom)
+            if line:
+                lines.append(line)
+                kind = type(axiom)
+                if kind is ClassAssertion:
+                    named['class', axiom.cls] = None  # type: ignore[attr-defined]
+                elif kind is ObjectPropertyAssertion:
+                    named['object_property', axiom.prop] = None  # type: ignore[attr-defined]
+                elif kind is DataPropertyAssertion:
+                    named['data_property', axiom.prop] = None  # type: ignore[attr-defined]
+                else:
+                    named.update((entity, None) for entity in entities_of(axiom))
+            else:
+                rest.append(axiom)
+        rest += (Declaration(*entity) for entity in named if entity[1] not in _BUILT_IN)
+        return removed, ''.join(lines).encode() + ontology_bytes(rest, self.iri, 'ntriples')
 
 
 @dataclass
@@ -167,8 +185,9 @@ def _holds(kb: KnowledgeBase, fact: Fact, derived: bool) -> bool:
 def _whole(ref: Reference, derived: bool) -> list[Axiom]:
     axioms: list[Axiom] = list(ref.kb.axioms())
     if derived:
-        axioms += ref.kb.facts()
-        axioms += _hierarchy(axioms, ref)
+        hierarchy = _hierarchy(axioms, ref)
+        axioms += ref.kb.derived_facts()
+        axioms += hierarchy
     return axioms
 
 

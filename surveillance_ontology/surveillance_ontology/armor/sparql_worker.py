@@ -38,12 +38,12 @@ def serve(requests: BinaryIO, answers: BinaryIO) -> None:
         if 'whole' in request:
             if request['whole']:
                 store, forms = pyoxigraph.Store(), WrittenForms()
-            removed = _quads(requests.read(request['removed']))
-            added = _quads(requests.read(request['added']))
-            for quad in removed:
+            removed = requests.read(request['removed'])
+            added = requests.read(request['added'])
+            for quad in _quads(removed):
                 store.remove(quad)
-            store.bulk_extend(added)
-            forms.change(added, removed)
+            store.bulk_load(added, format=pyoxigraph.RdfFormat.N_TRIPLES)
+            forms.change(_rewritten(added), _rewritten(removed))
             answer: dict[str, Any] = {}
         else:
             # The kernel ends this process if the one that asked is not there to do it.
@@ -56,6 +56,12 @@ def serve(requests: BinaryIO, answers: BinaryIO) -> None:
 
 def _quads(triples: bytes) -> list[Any]:
     return list(pyoxigraph.parse(triples, format=pyoxigraph.RdfFormat.N_TRIPLES))
+
+
+def _rewritten(triples: bytes) -> list[Any]:
+    """Return the quads whose values a store may give back in another form."""
+    lines = triples.splitlines(keepends=True)
+    return _quads(b''.join(line for line in lines if _VALUE in line and not line.endswith(_TEXT)))
 
 
 def _answer(store: pyoxigraph.Store, forms: WrittenForms, query: str, most: int) -> dict[str, Any]:
@@ -90,6 +96,12 @@ def _term(term: Any) -> tuple[str, str, str]:
 
 
 _XSD = 'http://www.w3.org/2001/XMLSchema#'
+_VALUE = f'"^^<{_XSD}'.encode()
+_TEXT = f'"^^<{_XSD}string> .\n'.encode()
+_INTEGER = pyoxigraph.NamedNode(_XSD + 'integer')
+_WHOLE = {_XSD + name for name in ('integer', 'long', 'int', 'short', 'byte')}
+"""Datatypes whose values are all kept as integers, where they are written as those are."""
+_CANONICAL = re.compile('0|-?[1-9][0-9]{0,17}')
 _COMPUTED = re.compile(r'\bAS\s+[?$](\w+)', re.IGNORECASE)
 _PREFIX = re.compile(r'\bPREFIX\s+([\w.-]*):\s*<([^<>]*)>', re.IGNORECASE)
 _NAME = re.compile(r'<([^<>\s]*)>|([\w.-]*):([\w.-]*\w)')
@@ -109,9 +121,8 @@ class WrittenForms:
         self._forms: _Forms = {}
 
     def change(self, added: Iterable[Any], removed: Iterable[Any] = ()) -> None:
-        """Take in quads that came and went, as they were parsed."""
-        gone = [quad for quad in removed if _may_be_rewritten(quad.object)]
-        come = [quad for quad in added if _may_be_rewritten(quad.object)]
+        """Take in quads that came and went whose values may be rewritten, as they were parsed."""
+        gone, come = list(removed), list(added)
         kept = _kept_forms({quad.object for quad in (*gone, *come)})
         for quad in gone:
             written = self._forms.get(kept[quad.object], {})
@@ -188,23 +199,23 @@ def _narrowed(forms: dict[Any, _Places], fits: Any) -> dict[Any, _Places]:
 
 
 def _kept_forms(literals: Iterable[Any]) -> dict[Any, Any]:
-    """For each literal the form in which a store gives it back."""
-    numbered = list(literals)
+    """Return for each literal the form in which a store gives it back."""
+    found: dict[Any, Any] = {}
+    others: list[Any] = []
+    for literal in literals:
+        datatype = literal.datatype.value
+        if datatype in _WHOLE and _CANONICAL.fullmatch(literal.value):
+            found[literal] = pyoxigraph.Literal(literal.value, datatype=_INTEGER)
+        else:
+            others.append(literal)
     store, mark = pyoxigraph.Store(), pyoxigraph.NamedNode('urn:mark')
     store.bulk_extend(
         pyoxigraph.Quad(pyoxigraph.NamedNode(f'urn:number:{number}'), mark, literal)
-        for number, literal in enumerate(numbered)
+        for number, literal in enumerate(others)
     )
-    return {numbered[int(quad.subject.value.rpartition(':')[2])]: quad.object for quad in store}
-
-
-def _may_be_rewritten(term: Any) -> bool:
-    return (
-        isinstance(term, pyoxigraph.Literal)
-        and not term.language
-        and term.datatype.value.startswith(_XSD)
-        and term.datatype.value != _XSD + 'string'
-    )
+    for quad in store:
+        found[others[int(quad.subject.value.rpartition(':')[2])]] = quad.object
+    return found
 
 
 def _iri(term: Any) -> str:

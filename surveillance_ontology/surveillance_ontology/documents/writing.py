@@ -11,7 +11,13 @@ from xml.sax.saxutils import escape, quoteattr
 
 from surveillance_ontology.documents.rdf_xml import Node, Triple
 from surveillance_ontology.documents.triples import triples_of
-from surveillance_ontology.owl.axioms import Axiom
+from surveillance_ontology.owl.axioms import (
+    Axiom,
+    ClassAssertion,
+    DataPropertyAssertion,
+    ObjectPropertyAssertion,
+    SubClassOf,
+)
 from surveillance_ontology.owl.expressions import Literal
 from surveillance_ontology.owl.vocabulary import OWL, RDF, RDFS, SWRL, XSD
 
@@ -89,6 +95,8 @@ def ontology_bytes(
 
 
 def _escaped(text: str) -> str:
+    if text.isalnum():
+        return text
     for plain, escaped in (('\\', '\\\\'), ('"', '\\"'), ('\n', '\\n'), ('\r', '\\r')):
         text = text.replace(plain, escaped)
     return text
@@ -104,6 +112,25 @@ def _term(node: Node) -> str:
 
 def _ntriple(triple: Triple) -> str:
     return f'{_term(triple[0])} <{triple[1]}> {_term(triple[2])} .\n'
+
+
+def fact_line(axiom: Axiom) -> str:
+    """Return an axiom that is one triple as a line of N-Triples; empty for any other axiom.
+
+    `ontology_bytes` writes these too, three times slower, and what annotates them.
+    """
+    kind = type(axiom)
+    if kind is ObjectPropertyAssertion:
+        subject, target = _term(axiom.subject), _term(axiom.object)  # type: ignore[attr-defined]
+        return f'{subject} <{axiom.prop}> {target} .\n'  # type: ignore[attr-defined]
+    if kind is DataPropertyAssertion:
+        subject, target = _term(axiom.subject), _term(axiom.literal)  # type: ignore[attr-defined]
+        return f'{subject} <{axiom.prop}> {target} .\n'  # type: ignore[attr-defined]
+    if isinstance(axiom, ClassAssertion) and isinstance(axiom.cls, str):
+        return f'{_term(axiom.individual)} <{RDF}type> <{axiom.cls}> .\n'
+    if isinstance(axiom, SubClassOf) and isinstance(axiom.sub, str) and isinstance(axiom.sup, str):
+        return f'<{axiom.sub}> <{RDFS}subClassOf> <{axiom.sup}> .\n'
+    return ''
 
 
 # --- RDF/XML ---

@@ -177,12 +177,11 @@ class JavaKnowledgeBase(KnowledgeBase):
         more = {a.prop for a in self._of(DataPropertyAssertion) if a.subject == individual}
         return super().data_properties_of(individual) | more
 
-    def facts(self, derived: bool = True) -> Iterator[Fact]:
-        """Every fact about individuals; the asserted ones alone when `derived` is False."""
-        yield from super().facts(derived)
-        if derived:
-            for kind in (ClassAssertion, ObjectPropertyAssertion, DataPropertyAssertion):
-                yield from self._of(kind)
+    def derived_facts(self) -> Iterator[Fact]:
+        """Yield the facts about individuals that follow and are not asserted."""
+        yield from super().derived_facts()
+        for kind in (ClassAssertion, ObjectPropertyAssertion, DataPropertyAssertion):
+            yield from self._of(kind)
 
     def explain(self, fact: Axiom) -> Explanation | None:
         """Why a fact holds; of what only the Java reasoner derives no more is known than that."""
