@@ -17,7 +17,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import TypeAlias
 
-from surveillance_ontology.owl.assertions import Assertions, is_assertion, uncollected
+from surveillance_ontology.memory import uncollected
+from surveillance_ontology.owl.assertions import Assertions, is_assertion
 from surveillance_ontology.owl.axiom_text import axiom_text
 from surveillance_ontology.owl.axioms import (
     Annotation,

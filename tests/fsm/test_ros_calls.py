@@ -17,6 +17,7 @@ from surveillance_fsm.ros import (
     GoalServer,
     ServiceCaller,
     UnavailableError,
+    calls,
 )
 from surveillance_interfaces.action import FollowPath
 from surveillance_runtime.node import PatrolNode
@@ -116,6 +117,19 @@ def test_service_call_notices_that_another_server_took_the_place_of_one_that_was
     never_answers(graph.add(PatrolNode, name='restarted'))
     with pytest.raises(UnavailableError, match='service ask: another server took the place'):
         end()
+
+
+def test_service_call_does_not_wait_long_where_one_of_several_servers_may_be_gone(
+    graph, server, monkeypatch
+):
+    monkeypatch.setattr(calls, 'DOUBTFUL_SECONDS', 0.1)
+    never_answers(server)
+    never_answers(graph.add(PatrolNode, name='restarted'))
+    caller = ServiceCaller(graph.node, Trigger, 'ask')
+    name = f'{graph.node.get_namespace().rstrip("/")}/ask'
+    assert graph.until(lambda: graph.node.count_services(name) == 2)
+    with pytest.raises(UnavailableError, match='service ask: no answer, and one of 2 servers'):
+        caller.call(Trigger.Request(), 60.0)
 
 
 def test_service_call_has_a_patience_of_its_own_for_finding_the_server(graph):

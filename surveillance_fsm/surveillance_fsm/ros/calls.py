@@ -32,6 +32,12 @@ DISCOVERY_PERIOD = 0.02
 """Seconds between two looks for a server; rclpy offers no event for its appearance."""
 
 
+DOUBTFUL_SECONDS = 2.0
+"""How long an answer is waited for where several servers are known.
+
+One that was killed stays known for 20 s. Its successor may not know this client yet: it then drops
+the request, or its answer, and nothing tells."""
+
 SERVER_PERIOD = 0.1
 """Seconds between two looks whether a server that has not answered yet is still there."""
 
@@ -114,6 +120,7 @@ class ServiceCaller:
     def _look_for_loss(self) -> Callable[[], None]:
         """Return a look that raises `UnavailableError` once the server will never answer."""
         servers, lost = self._count_servers(), ''
+        doubtful = time.monotonic() + DOUBTFUL_SECONDS if servers > 1 else math.inf
 
         def look() -> None:
             nonlocal servers, lost
@@ -125,6 +132,8 @@ class ServiceCaller:
                 lost = 'the server went away before it answered'
             elif servers > before:
                 lost = 'another server took the place of the one that was asked'
+            elif time.monotonic() > doubtful:
+                lost = f'no answer, and one of {servers} servers may be gone'
 
         return look
 

@@ -15,6 +15,7 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
+from surveillance_ontology import memory
 from surveillance_ontology.armor.access import Settings
 from surveillance_ontology.armor.directives import Directive, Kind, look_up
 from surveillance_ontology.armor.protocol import (
@@ -58,8 +59,10 @@ class ArmorService:
         self.session = Session(settings or Settings(), screen, warn, store, clock)
         self._store = store
         if store:
-            for ref in store.recover(self.settings.history):
-                self.session.register(ref)
+            with memory.uncollected():
+                for ref in store.recover(self.settings.history):
+                    self.session.register(ref)
+                    memory.settle(len(ref.kb))
             for note in store.notes:
                 warn(note)
 

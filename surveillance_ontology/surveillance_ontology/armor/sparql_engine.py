@@ -19,6 +19,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+from surveillance_ontology.memory import uncollected
+
 if TYPE_CHECKING:
     # Not in the processes, which need nothing else of the package.
     from surveillance_ontology.armor.sparql_graph import GraphUpdate, Version
@@ -179,14 +181,17 @@ class _Worker:
 
     def prepare(self, update: Update, deadline: float) -> None:
         """Have the process hold the graph as it is now."""
-        wanted = update(self.version)
-        if wanted is None:
-            return
+        with uncollected():
+            wanted = update(self.version)
+            if wanted is None:
+                return
+            version, whole = wanted.version, wanted.whole
+            removed, added = wanted.triples()
+            del wanted  # Its axioms are many: gone before a collection sees them.
         self.version = None
-        removed, added = wanted.triples()
-        sizes = {'whole': wanted.whole, 'removed': len(removed), 'added': len(added)}
+        sizes = {'whole': whole, 'removed': len(removed), 'added': len(added)}
         self._exchange(sizes, deadline, removed + added)
-        self.version = wanted.version
+        self.version = version
 
     def ask(self, query: str, deadline: float, rows: int) -> Any:
         """Return the process's answer to a query on the graph that it holds."""

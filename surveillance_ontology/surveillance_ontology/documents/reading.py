@@ -12,7 +12,7 @@ from surveillance_ontology.documents.functional_syntax import FunctionalSyntax, 
 from surveillance_ontology.documents.mapping import Mapping
 from surveillance_ontology.documents.ntriples import parse_ntriples
 from surveillance_ontology.documents.rdf_xml import Graph, RdfSyntaxError, parse_rdf_xml
-from surveillance_ontology.owl.assertions import uncollected
+from surveillance_ontology.memory import uncollected
 from surveillance_ontology.owl.axioms import Axiom, Import
 from surveillance_ontology.owl.vocabulary import local_name
 

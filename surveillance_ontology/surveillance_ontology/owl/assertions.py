@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import gc
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 
 from surveillance_ontology.owl.axioms import (
     Annotation,
@@ -157,16 +155,3 @@ def _is_schema(axiom: Axiom) -> bool:
     if isinstance(axiom, SubClassOf):
         return axiom.sup != THING
     return not isinstance(axiom, Declaration | Annotation)
-
-
-@contextmanager
-def uncollected() -> Iterator[None]:
-    """Switch the cyclic garbage collector off for a while, where it is on."""
-    if not gc.isenabled():
-        yield
-        return
-    gc.disable()
-    try:
-        yield
-    finally:
-        gc.enable()

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import contextlib
-import ctypes
-import gc
 import threading
 from collections.abc import Iterator
 from typing import Any
 
+from surveillance_ontology import memory
 from surveillance_ontology.armor.access import (
     LOG_ENDINGS,
     ONTOLOGY_ENDINGS,
@@ -37,8 +36,6 @@ from surveillance_ontology.knowledge_base import KnowledgeBase
 from surveillance_ontology.owl.axioms import Axiom
 from surveillance_ontology.reasoner.java_reasoning import JavaKnowledgeBase, JavaReasonerError
 
-LARGE = 10_000
-"""Axioms from which on the memory of a dropped ontology is given back at once."""
 RELEASE_AFTER = 0.2
 WRITTEN = {'turtle': 'ntriples', 'owlxml': 'rdfxml'}
 """What SAVE writes for formats that are only read: N-Triples is Turtle as well."""
@@ -128,9 +125,11 @@ def _load(
         return again
     with session.loading:
         if name not in session.references:
-            ref, notes = _read_document(
-                name, source, iri, reasoner, session.paths, session.settings, web=web
-            )
+            with memory.uncollected():
+                ref, notes = _read_document(
+                    name, source, iri, reasoner, session.paths, session.settings, web=web
+                )
+                memory.settle(len(ref.kb))
             ref.buffered_manipulation, ref.buffered_reasoner = buffered, lazy
             ref.history = History(session.clock(), session.settings.history)
             if session.store:
@@ -181,7 +180,7 @@ def _drop(session: Session, request: DirectiveRequest) -> DirectiveResponse:
                 session.store.dropped(ref.name)
             session.references.remove(ref)
             session.tell(ref.name, None)
-            if len(ref.kb) > LARGE:
+            if len(ref.kb) > memory.LARGE:
                 # Not yet: this directive and those that wait for the lock still refer to it.
                 release = threading.Timer(RELEASE_AFTER, _release, args=(session,))
                 release.daemon = True
@@ -190,11 +189,9 @@ def _drop(session: Session, request: DirectiveRequest) -> DirectiveResponse:
 
 
 def _release(session: Session) -> None:
-    """Give the memory of a large ontology back to the system."""
+    """Give back the memory of a large ontology, also of the processes that know its graph."""
     session.sparql.forget()
-    gc.collect()  # Axioms and rules refer to each other in cycles.
-    with contextlib.suppress(OSError, AttributeError):  # Not glibc: it decides itself.
-        ctypes.CDLL('libc.so.6').malloc_trim(0)
+    memory.release()
 
 
 @utility(
@@ -224,6 +221,7 @@ def _save_inference(session: Session, request: DirectiveRequest, path: str) -> D
     return _write(session, request, path, inferences=True)
 
 
+@memory.uncollected()
 def _write(
     session: Session, request: DirectiveRequest, path: str, *, inferences: bool
 ) -> DirectiveResponse:

@@ -1,0 +1,43 @@
+"""The garbage collector leaves large ontologies alone until they are dropped."""
+
+from __future__ import annotations
+
+import gc
+import weakref
+
+from surveillance_ontology import memory
+
+
+class Ring:
+    """An object in a cycle, as axioms and rules are."""
+
+    def __init__(self) -> None:
+        self.itself = self
+
+
+def test_the_collector_is_off_inside_and_as_before_outside() -> None:
+    assert gc.isenabled()
+    with memory.uncollected():
+        assert not gc.isenabled()
+        with memory.uncollected():
+            pass
+        assert not gc.isenabled(), 'the outer one is not over'
+    assert gc.isenabled()
+
+
+def test_what_settled_is_looked_at_again_when_something_was_dropped() -> None:
+    ring = Ring()
+    gone = weakref.ref(ring)
+    memory.settle(memory.LARGE + 1)
+    del ring
+    gc.collect()
+    assert gone() is not None, 'the collector does not look at it'
+    memory.release()
+    assert gone() is None
+    gc.unfreeze()
+
+
+def test_small_ontologies_stay_with_the_collector() -> None:
+    before = gc.get_freeze_count()
+    memory.settle(10)
+    assert gc.get_freeze_count() == before
