@@ -3,7 +3,8 @@
 `speed` is simulated seconds per real second; 0 means as fast as the robot's programs keep up. Then
 a ceiling bounds the rate, and time stands still while a program is at work on its answer:
 
-- a controller on the next command, while the base is under command;
+- a controller on the next command, while the base is under command or a drive is executed: each
+  measurement has its command before the next one is made;
 - a localisation on the next estimate of the pose;
 - whoever writes the robot's place into the ontology, while a place was told and not written;
 - a planner on a path, while one of its goals is executed;
@@ -44,7 +45,7 @@ class ClockRateModel:
     ceiling: float = 100.0
     step: float = 0.1
     idle_step: float = 0.5
-    window: float = 0.15
+    window: float = 0.05
     estimate_window: float = 0.45
     patience: float = 1.0
 
@@ -133,17 +134,25 @@ class ClockRate:
         self._place_written = self._place_late_since = None
         return False
 
-    def goals(self, action: str, *, executed: bool) -> None:
-        """Note whether an action's goal is executed, for `PLANNING` and `DRIVING` actions."""
+    def goals(self, action: str, simulated: float, *, executed: bool) -> None:
+        """Note whether an action's goal is executed at a simulated time, seconds.
+
+        Those of `PLANNING` and `DRIVING` count.
+        """
+        if executed and action in DRIVING and not self._is_driving:
+            self._commands.note(simulated)
         self._executed[action] = executed
+
+    @property
+    def _is_driving(self) -> bool:
+        return any(self._executed.get(action) for action in DRIVING)
 
     def _mission_is_late(self, simulated: float, steady: float) -> bool:
         """Return whether time must wait for the mission, or for a planner that it waits for."""
         if self._mission_waits_until is None:
             return False
         planning = any(self._executed.get(action) for action in PLANNING)
-        driving = any(self._executed.get(action) for action in DRIVING)
-        if not planning and (driving or simulated < self._mission_waits_until - 1e-9):
+        if not planning and (self._is_driving or simulated < self._mission_waits_until - 1e-9):
             self._mission_late_since = None
             return False
         if self._mission_late_since is None:
@@ -155,7 +164,7 @@ class ClockRate:
 
     def command(self, moving: bool, simulated: float) -> None:
         """Note a command: whether it moves the base, and the simulated time when it came."""
-        if moving:
+        if moving or self._is_driving:
             self._commands.note(simulated)
         else:
             self._commands.end()

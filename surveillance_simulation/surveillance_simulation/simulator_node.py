@@ -154,7 +154,7 @@ class Simulator(PatrolNode):
 
     def _on_goals(self, action: str, message: GoalStatusArray) -> None:
         executed = any(goal.status in _UNDER_WAY for goal in message.status_list)
-        self._rate.goals(action, executed=executed)
+        self._rate.goals(action, self.robot.time, executed=executed)
         self._go_on()
 
     def _on_trajectory(self, message: JointTrajectory) -> None:

@@ -97,13 +97,29 @@ def test_time_stands_at_the_end_of_the_mission_s_wait_until_it_waits_again() -> 
 def test_a_drive_takes_time_and_a_plan_takes_none() -> None:
     rate = ClockRate(ClockRateModel(speed=0.0), 0.0)
     rate.mission_waits(1.0)
-    rate.goals('compute_path', executed=True)
+    rate.goals('compute_path', 1.0, executed=True)
     assert rate.due(1.0, 0.01, moving=False) == 0.0
-    rate.goals('compute_path', executed=False)
-    rate.goals('follow_path', executed=True)
+    rate.goals('compute_path', 1.0, executed=False)
+    rate.goals('follow_path', 1.0, executed=True)
     assert rate.due(1.0, 0.02, moving=False) == pytest.approx(0.1)
-    rate.goals('follow_path', executed=False)
+    rate.command(True, 1.1)
+    rate.goals('follow_path', 1.1, executed=False)
     assert rate.due(1.1, 0.03, moving=False) == 0.0
+
+
+def test_a_drive_has_its_command_at_every_step_also_while_the_robot_stands() -> None:
+    rate = ClockRate(ClockRateModel(speed=0.0), 0.0)
+    rate.goals('follow_path', 0.0, executed=True)
+    assert rate.due(0.0, 0.01, moving=False) > 0.0
+    assert rate.due(0.1, 0.02, moving=False) == 0.0, 'the first command is waited for'
+    rate.command(False, 0.1)
+    assert rate.due(0.1, 0.03, moving=False) > 0.0
+    assert rate.due(0.2, 0.04, moving=False) == 0.0, 'the robot is told to stand, and again'
+    rate.command(False, 0.2)
+    rate.goals('follow_path', 0.2, executed=False)
+    rate.command(False, 0.2)
+    assert rate.due(0.2, 0.05, moving=False) > 0.0
+    assert rate.due(0.7, 0.06, moving=False) > 0.0, 'nobody drives'
 
 
 def test_a_mission_that_died_does_not_stop_time_for_good() -> None:
