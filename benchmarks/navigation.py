@@ -1,6 +1,6 @@
 """Navigation measured: planning beside its peers, one step of control, and the whole stack's speed.
 
-    python benchmarks/navigation.py [--quick] [planning] [control] [people] [stack] [pace]
+    python benchmarks/navigation.py [--quick] [planning] [control] [people] [silence] [stack] [pace]
 
 Without a section's name all are run. Every figure stands beside its peer's from the same run.
 """
@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import itertools
 import logging
+import math
 import os
 import signal
 import statistics
@@ -20,14 +21,17 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import median
+from types import SimpleNamespace
 from typing import Any
 
 import networkx
 import numpy as np
 import numpy.typing as npt
+from geometry_msgs.msg import Twist
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 from skimage.graph import MCP_Geometric
@@ -344,6 +348,63 @@ def people(*, quick: bool) -> None:
     )
 
 
+def silence(*, quick: bool) -> None:
+    """Time and way from the last message of a sensor until the robot stands, in real time."""
+    rows = []
+    for topic in ('scan', 'odom'):
+        with stack_at_speed() as patrol:
+            rows.append((f'motion_controller, {topic}', *stops_after_silence(patrol, topic)))
+    nodes = ('simulator', 'collision_monitor')
+    with stack_at_speed({'simulator': {'command_topic': 'cmd_vel_monitored'}}, nodes) as patrol:
+        commands = patrol.observer.create_publisher(Twist, 'cmd_vel', 1)
+        command = Twist()
+        command.linear.x = 0.6
+        patrol.observer.create_timer(0.05, lambda: commands.publish(command))
+        rows.append(
+            ('foreign cmd_vel, collision_monitor, scan', *stops_after_silence(patrol, 'scan'))
+        )
+    table(
+        'A sensor falls silent at full speed, real time; braking from 0.6 m/s alone takes the base '
+        '0.60 s and 0.18 m.',
+        ('who, what', 'm/s', 'until it brakes, s', 'until it stands, s', 'way, m'),
+        rows,
+    )
+
+
+@contextmanager
+def stack_at_speed(
+    parameters: dict[str, dict[str, Any]] | None = None, nodes: Sequence[str] = ()
+) -> Iterator[Stack]:
+    """A stack in real time."""
+    given = {'simulator': {}, **(parameters or {})}
+    given['simulator']['speed'] = 1.0
+    patrol = Stack(ROOT / 'config' / 'seven_rooms.yaml', given, nodes)
+    patrol.start()
+    try:
+        yield patrol
+    finally:
+        patrol.close()
+
+
+def stops_after_silence(patrol: Stack, topic: str) -> tuple[str, str, str, str]:
+    """Silence a sensor at full speed; return speed, time to brake and stand, and the way."""
+    base = patrol.robot.base
+    _await(lambda: base.speed > 0.55, 60.0)
+    sensors = patrol.nodes['simulator']._sensors
+    name = {'scan': '_scan', 'odom': '_odometry'}[topic]
+    setattr(sensors, name, SimpleNamespace(publish=lambda _: None, get_subscription_count=int))
+    begun, driven, speed = patrol.robot.time, base.travelled, base.speed
+    braked = math.nan
+    while base.speed > 0.0:
+        time.sleep(0.002)
+        if math.isnan(braked) and base.speed < speed - 0.02:
+            braked = patrol.robot.time - begun
+        if patrol.robot.time - begun > 5.0:
+            raise SystemExit(f'{topic}: the robot does not stop')
+    stands = patrol.robot.time - begun
+    return f'{speed:.2f}', f'{braked:.2f}', f'{stands:.2f}', f'{base.travelled - driven:.2f}'
+
+
 def stack(*, quick: bool) -> None:
     """Return the simulated seconds per real second of the whole patrol."""
     seconds = 5.0 if quick else 30.0
@@ -517,6 +578,7 @@ SECTIONS: dict[str, Callable[..., None]] = {
     'planning': planning,
     'control': control,
     'people': people,
+    'silence': silence,
     'stack': stack,
     'pace': pace,
 }

@@ -18,7 +18,7 @@ from sensor_msgs.msg import LaserScan
 
 from surveillance_controllers import conversions
 from surveillance_controllers.geometry import Points
-from surveillance_controllers.motion.base_interface import Transforms
+from surveillance_controllers.motion.base_interface import Transforms, share_of_speed
 from surveillance_controllers.motion.path_following import Velocity, room_ahead
 from surveillance_controllers.motion.robot_parameters import lidar_mount
 from surveillance_runtime.node import PatrolNode
@@ -54,7 +54,9 @@ _SETTINGS = {
     'margin': Described('Kept free beside the robot, m.', 0.0, 20.0),
     'deceleration': Described('With which the base brakes, m/s^2.', 0.01, 20.0),
     'longest_silence': Described(
-        'The robot stands when scan or cmd_vel is older, s of ROS time.', 0.05, 10.0
+        'The robot stands when scan or cmd_vel is older, and is slower before, s of ROS time.',
+        0.05,
+        10.0,
     ),
 }
 
@@ -123,22 +125,25 @@ class CollisionMonitor(PatrolNode):
             self._pass_on()
 
     def _on_time(self) -> None:
-        if self._wanted != Velocity() and self._silent():
+        if self._wanted != Velocity() and self._share()[0] < 1.0:
             self._pass_on()
 
-    def _silent(self) -> str:
-        now, longest = self._now(), self._settings.longest_silence
-        return next((topic for topic, at in self._heard.items() if now - at > longest), '')
+    def _share(self) -> tuple[float, str]:
+        """Return the part of the speed that the age of what was heard leaves, and the topic."""
+        now = self._now()
+        age, topic = max((now - at, topic) for topic, at in self._heard.items())
+        return share_of_speed(age, self._settings.longest_silence), topic
 
     def _pass_on(self) -> None:
-        silent = self._silent()
-        if silent or self._seen is None:
-            velocity, why = Velocity(), f'nothing on the topic {silent or "scan"}'
+        share, topic = self._share()
+        if share == 0.0 or self._seen is None:
+            velocity, why = Velocity(), f'nothing on the topic {topic}'
         else:
             velocity = allowed(self._wanted, self._seen, self._settings)
             near = abs(velocity.speed) < 0.5 * abs(self._wanted.speed)
             why = 'something is in the way' if near else ''
-        if silent == 'cmd_vel':
+            velocity = Velocity(share * velocity.speed, share * velocity.turn)
+        if share == 0.0 and topic == 'cmd_vel':
             self._wanted, why = Velocity(), ''
         if why != self._stands_for:
             self._stands_for = why

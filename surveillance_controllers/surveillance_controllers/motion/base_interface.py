@@ -32,8 +32,8 @@ from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 from surveillance_runtime.waiting import Interrupt
 
 LONGEST_SILENCE = 0.25
-"""A robot whose lidar or odometry has been silent for longer stands, seconds of ROS time; scans
-come at 10 Hz."""
+"""A robot whose lidar or odometry has been silent for longer is told to stand, seconds of ROS time;
+scans come at 10 Hz."""
 BASE_FRAMES = ('base_link', 'base_footprint', '')
 """Frames at the robot's centre."""
 WATCH_PERIOD = 0.05
@@ -46,6 +46,18 @@ try:
     from tf2_msgs.msg import TFMessage
 except ImportError:
     TFMessage = None
+
+
+def share_of_speed(age: float, longest: float = LONGEST_SILENCE) -> float:
+    """Return the part of its speed that a robot may keep by the age of what it saw, 0 to 1.
+
+    One message may be late: the part falls from 1 at 0.6 of the longest silence to 0 at its end.
+
+    Args:
+        age: Of what was heard last, seconds.
+        longest: Age from which on the robot stands, seconds.
+    """
+    return min(max((longest - age) / (0.4 * longest), 0.0), 1.0)
 
 
 class RobotBase:
@@ -84,7 +96,7 @@ class RobotBase:
         self._tf = Transforms(node)
         self._mount = mount
         self._heard = {'scan': -math.inf, 'odom': -math.inf}
-        self._moving = False
+        self._wanted = Velocity()
         self._silent = ''
         node.create_timer(WATCH_PERIOD, self._watch)
         node.create_subscription(OccupancyGrid, 'map', self._on_map, STATE_QOS)
@@ -230,7 +242,7 @@ class RobotBase:
             before = self.place
             self._heard['scan'] = self._now()
             velocity = self._navigator.see(scan, measured)
-            if velocity is not None and self._navigator.task is not None and not self._unheard():
+            if velocity is not None and self._navigator.task is not None and not self._is_blind():
                 self._command(velocity)
             self._publish_pose(measured, stamp)
             if self.place != before:
@@ -250,27 +262,42 @@ class RobotBase:
     # --- a robot that sees nothing stands ---
 
     def _command(self, velocity: Velocity) -> None:
-        self._moving = velocity != Velocity()
+        self._wanted = velocity
+        self._publish_command(1.0)
+
+    def _publish_command(self, share: float) -> None:
+        wanted = self._wanted
+        velocity = Velocity(share * wanted.speed, share * wanted.turn)
         self._commands.publish(conversions.twist_from(velocity))
 
     def _now(self) -> float:
         return float(self._node.get_clock().now().nanoseconds) / 1e9
 
-    def _unheard(self) -> str:
-        """Return the topic that has been silent for too long to drive on; empty: none."""
+    def _oldest(self) -> tuple[float, str]:
+        """Return the age of what was heard longest ago, seconds, and its topic."""
         now = self._now()
-        return next((t for t, at in self._heard.items() if now - at > LONGEST_SILENCE), '')
+        return max((now - at, topic) for topic, at in self._heard.items())
+
+    def _is_blind(self) -> bool:
+        return self._oldest()[0] > LONGEST_SILENCE
 
     def _watch(self) -> None:
         with self._lock:
-            topic = self._unheard() if self._moving or self._silent else ''
-            if topic and self._moving:
-                self._command(Velocity())
-            if topic != self._silent:
-                self._silent = topic
-                if topic:
+            moving = self._wanted != Velocity()
+            if not (moving or self._silent):
+                return
+            age, topic = self._oldest()
+            share = share_of_speed(age)
+            if moving and share < 1.0:
+                self._publish_command(share)
+            silent = topic if share == 0.0 else ''
+            if silent:
+                self._wanted = Velocity()
+            if silent != self._silent:
+                self._silent = silent
+                if silent:
                     self._node.get_logger().warn(
-                        f'nothing on the topic {topic} for {LONGEST_SILENCE:g} s: the robot stands'
+                        f'nothing on the topic {silent} for {LONGEST_SILENCE:g} s: the robot stands'
                     )
 
     def _publish_pose(self, measured: float, stamp: Any) -> None:
