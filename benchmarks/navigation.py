@@ -94,7 +94,7 @@ def planning(*, quick: bool) -> None:
     for side in (100, 300, 1000) if quick else (100, 200, 500, 1000, 1500, 2000):
         grid, start, goal = grid_of(side)
         planner = GridPlanner(grid)
-        cost = planner._costs.cost
+        cost = planner.cost.copy()
         first, last = (tuple(int(i) for i in grid.cells_of(p)[0]) for p in (start, goal))
 
         def search(cost: Any = cost, first: Any = first, last: Any = last) -> Any:
@@ -106,6 +106,14 @@ def planning(*, quick: bool) -> None:
         ours = median_ms(lambda p=planner, s=start, g=goal: p.plan(s, g), budget)
         library = median_ms(search, budget)
         path = planner.plan(start, goal)
+        spots = itertools.cycle([path[len(path) // 2], path[len(path) // 3], path[0] + 9.0])
+
+        def again(p: GridPlanner = planner, s: Any = start, g: Any = goal, at: Any = spots) -> Any:
+            p.set_obstacles([next(at)])
+            return p.plan(s, g)
+
+        anew = median_ms(again, budget)
+        planner.set_obstacles([])
         shortest = GridPlanner(grid, PlanningParameters(aversion=0.0)).plan(start, goal)
         free = cost > 0
         peer = '-'
@@ -122,6 +130,7 @@ def planning(*, quick: bool) -> None:
                 f'{ours:.1f}',
                 f'{library:.1f}',
                 f'{ours / library:.2f}',
+                f'{anew:.1f}',
                 peer,
                 f'{geometry.length(path):.2f}',
                 f'{geometry.length(shortest):.2f}',
@@ -130,10 +139,22 @@ def planning(*, quick: bool) -> None:
             )
         )
     table(
-        'Planning from corner to corner, median CPU time. Length in metres: ours, which keeps away '
+        'Planning from corner to corner, median CPU time; obstacle: with one that is new.\n'
+        'Length in metres: ours, which keeps away '
         'from walls;\nwith `aversion` 0; of the bare search on the same costs; the optimum over 32 '
         'directions.',
-        ('cells', 'ours ms', 'MCP ms', 'ratio', 'nx ms', 'ours', 'short', 'MCP', 'optimum'),
+        (
+            'cells',
+            'ours ms',
+            'MCP ms',
+            'ratio',
+            'obstacle',
+            'nx ms',
+            'ours',
+            'short',
+            'MCP',
+            'optimum',
+        ),
         rows,
     )
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
@@ -182,3 +184,21 @@ def test_distances_and_lines_on_a_grid() -> None:
 def test_maps_that_are_none_are_refused(cells: np.ndarray, resolution: float, text: str) -> None:
     with pytest.raises(ValueError, match=text):
         GridMap(cells, resolution, (0, 0))
+
+
+def test_what_comes_and_goes_leaves_the_costs_as_a_fresh_planner_has_them(flat: Any) -> None:
+    door = {'D1': flat.DOOR}
+    planner = GridPlanner(flat.grid)
+    untouched = planner.cost.copy()
+    rng = np.random.default_rng(4)
+    for closed in (door, {}, door):
+        points = rng.uniform((0.3, 0.3), (6.8, 3.0), (12, 2))
+        planner.set_closed(closed)
+        planner.set_obstacles(points)
+        fresh = GridPlanner(flat.grid)
+        fresh.set_obstacles(points)
+        fresh.set_closed(closed)
+        np.testing.assert_allclose(planner.cost, fresh.cost, atol=1e-5)
+    planner.set_closed({})
+    planner.set_obstacles([])
+    np.testing.assert_allclose(planner.cost, untouched, atol=1e-5)

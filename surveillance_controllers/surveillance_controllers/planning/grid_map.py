@@ -109,6 +109,14 @@ def distance_to(mask: NDArray[np.bool_], resolution: float) -> NDArray[np.float3
     return np.asarray(away * np.float32(resolution), dtype=np.float32)
 
 
+def points_on(line: ArrayLike, spacing: float) -> Points:
+    """Points at most `spacing` metres apart on a segment x1, y1, x2, y2; shape (n, 2), n from 2."""
+    x1, y1, x2, y2 = np.asarray(line, dtype=float)
+    steps = max(2, int(np.ceil(np.hypot(x2 - x1, y2 - y1) / spacing)) + 1)
+    share = np.linspace(0.0, 1.0, steps)[:, None]
+    return np.asarray((1 - share) * (x1, y1) + share * (x2, y2))
+
+
 def drawn_lines(grid: GridMap, lines: ArrayLike) -> NDArray[np.bool_]:
     """Return the cells that line segments run through.
 
@@ -117,14 +125,14 @@ def drawn_lines(grid: GridMap, lines: ArrayLike) -> NDArray[np.bool_]:
         lines: Segments x1, y1, x2, y2, shape (n, 4), metres.
 
     Returns:
-        Shape of the map; a line is at least one cell wide and has no gaps.
+        Shape of the map; a line is at least one cell wide and has no gaps. What lies outside of
+        the map is left out.
     """
     mask = np.zeros(grid.cells.shape, dtype=np.bool_)
-    for x1, y1, x2, y2 in np.asarray(lines, dtype=float).reshape(-1, 4):
-        length = float(np.hypot(x2 - x1, y2 - y1))
-        steps = max(2, int(np.ceil(2 * length / grid.resolution)) + 1)
-        share = np.linspace(0.0, 1.0, steps)[:, None]
-        mask |= marked(grid, (1 - share) * (x1, y1) + share * (x2, y2))
+    for line in np.asarray(lines, dtype=float).reshape(-1, 4):
+        cells = grid.cells_of(points_on(line, grid.resolution / 2))
+        cells = cells[grid.contains(cells)]
+        mask[cells[:, 0], cells[:, 1]] = True
     return mask
 
 
@@ -133,12 +141,3 @@ def with_walls(grid: GridMap, lines: ArrayLike) -> GridMap:
     cells = grid.cells.copy()
     cells[drawn_lines(grid, lines)] = OCCUPIED
     return GridMap(cells, grid.resolution, grid.origin)
-
-
-def marked(grid: GridMap, points: ArrayLike) -> NDArray[np.bool_]:
-    """Return the cells that points lie in; points outside of the map are left out."""
-    mask = np.zeros(grid.cells.shape, dtype=np.bool_)
-    cells = grid.cells_of(points)
-    inside = cells[grid.contains(cells)]
-    mask[inside[:, 0], inside[:, 1]] = True
-    return mask

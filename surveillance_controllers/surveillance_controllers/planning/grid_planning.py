@@ -2,13 +2,9 @@
 
 The free cells are those whose centre keeps the robot's radius and a margin from everything that is
 not free. Among them, cells near obstacles cost more, so that a path keeps to the middle of a
-passage where there is room. The search is scikit-image's `MCP_Geometric` (Dijkstra's algorithm with
-the cost of a step its length times the mean cost of its two cells), which finds the cheapest path
-over the eight neighbours. Straight shortcuts that cost no more replace the steps of the grid, and
-corners are rounded as far as the free space allows.
-
-Dijkstra's algorithm is kept in favour of a faster A* such as pyastar2d's: that one takes a diagonal
-step for as long as a straight one, so that its paths are longer and ignore the room beside them.
+passage where there is room. `grid_search` finds the cheapest way over the eight neighbours.
+Straight shortcuts that are no dearer replace the steps of the grid, and corners are rounded as far
+as the free space allows. A door or an obstacle that comes or goes changes the costs near it alone.
 """
 
 from __future__ import annotations
@@ -16,7 +12,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
 from itertools import pairwise
 
 import cv2
@@ -26,7 +21,8 @@ from skimage.graph import MCP_Geometric
 
 from surveillance_controllers import geometry
 from surveillance_controllers.geometry import Points
-from surveillance_controllers.planning.grid_map import GridMap, distance_to, drawn_lines, marked
+from surveillance_controllers.planning.grid_map import GridMap, distance_to, points_on
+from surveillance_controllers.planning.grid_search import GridSearch
 
 Lines = Mapping[str, tuple[float, float, float, float]]
 """Named segments x1, y1, x2, y2, metres."""
@@ -64,18 +60,6 @@ class PlanningParameters:
 
 
 @dataclass
-class _Costs:
-    clearance: NDArray[np.float32]
-    cost: NDArray[np.float32]
-    regions: NDArray[np.int32]
-
-    @cached_property
-    def search(self) -> MCP_Geometric:
-        # It copies the costs into its own layout, which takes about as long as a short search.
-        return MCP_Geometric(self.cost)
-
-
-@dataclass
 class GridPlanner:
     """Finds paths on one map, with doors closed and obstacles seen since; one call at a time.
 
@@ -88,11 +72,17 @@ class GridPlanner:
     parameters: PlanningParameters = field(default_factory=PlanningParameters)
     _closed: Lines = field(default_factory=dict, init=False)
     _obstacles: Points = field(default_factory=lambda: np.zeros((0, 2)), init=False)
-    _costs: _Costs = field(init=False)
+    _extra: set[tuple[int, int]] = field(default_factory=set, init=False)
 
     def __post_init__(self) -> None:
+        p, shape = self.parameters, self.grid.cells.shape
         self._static = self._distance(~self.grid.free)
-        self._update()
+        self._reach = math.ceil((p.radius + p.margin + p.comfort) / self.grid.resolution) + 1
+        self._clearance = self._static.copy()
+        self._cost = np.empty(shape, np.float32)
+        self._price_cells(np.s_[:, :])
+        self._search = GridSearch(self._cost)
+        self._divide()
 
     def set_closed(self, doors: Lines) -> None:
         """Close doors: nothing leads across their segments. Replaces what was closed before."""
@@ -110,14 +100,14 @@ class GridPlanner:
     @property
     def cost(self) -> NDArray[np.float32]:
         """What the search works on: each cell's cost, -1 where the robot cannot be."""
-        return self._costs.cost
+        return self._cost
 
     def clearance(self, points: ArrayLike) -> Points:
         """Return how far points are from everything that is not free, shape (n,), metres.
 
         A lower bound, to within a part of a cell: what is not free fills its cells.
         """
-        return self.grid.interpolated(self._costs.clearance, points)
+        return self.grid.interpolated(self._clearance, points)
 
     def is_free(self, path: ArrayLike) -> bool:
         """Tell whether the robot can go along a path, shape (n, 2), without touching anything."""
@@ -143,15 +133,15 @@ class GridPlanner:
         end: Points = np.asarray(goal, dtype=float)[:2]
         goal_cell = self._cell('the goal', end)
         start_cell = self._free_cell_near(begin)
-        if self._costs.regions[goal_cell] == 0:
+        if self._regions[goal_cell] == 0:
             goal_cell = self._cell_beside(end, goal_cell, start_cell)
             end = self.grid.centres_of(goal_cell)[0]
-        if self._costs.regions[start_cell] != self._costs.regions[goal_cell]:
+        if self._regions[start_cell] != self._regions[goal_cell]:
             raise NoPathError(
                 f'no path from {_shown(begin)} to {_shown(end)}: '
                 f'{self._what_blocks(start_cell, goal_cell)}'
             )
-        cells = self._search(start_cell, goal_cell)
+        cells = self._search.way(start_cell, goal_cell)
         path = self.grid.centres_of(cells)
         path[0] = begin if self._is_free_at(begin) else path[0]
         path[-1] = end
@@ -164,19 +154,49 @@ class GridPlanner:
         return np.asarray(away - np.float32(self.grid.resolution / 2), dtype=np.float32)
 
     def _update(self) -> None:
+        """Take the doors and obstacles into account that came or went."""
+        lines = [points_on(line, self.grid.resolution / 2) for line in self._closed.values()]
+        cells = self.grid.cells_of(np.concatenate([*lines, self._obstacles]))
+        extra = {(int(row), int(rank)) for row, rank in cells[self.grid.contains(cells)]}
+        changed = np.array(sorted(extra ^ self._extra), dtype=np.intp).reshape(-1, 2)
+        self._extra = extra
+        if not len(changed):
+            return
+        # What is further away than this from a change costs what it did.
+        rows, columns = self.grid.cells.shape
+        top, left = np.maximum(changed.min(axis=0) - self._reach, 0)
+        bottom, right = np.minimum(changed.max(axis=0) + self._reach + 1, (rows, columns))
+        self._measure(int(top), int(bottom), int(left), int(right))
+        self._price_cells(np.s_[top:bottom, left:right])
+        self._search.changed(int(top), int(bottom), int(left), int(right))
+        self._divide()
+
+    def _measure(self, top: int, bottom: int, left: int, right: int) -> None:
+        """Measure the clearance in a window; exact up to `_reach`, no less than that beyond."""
+        north, south = max(top - self._reach, 0), bottom + self._reach
+        west, east = max(left - self._reach, 0), right + self._reach
+        around = np.zeros(self._static[north:south, west:east].shape, np.bool_)
+        near = [
+            (r - north, c - west) for r, c in self._extra if north <= r < south and west <= c < east
+        ]
+        if near:
+            at = np.array(near)
+            around[at[:, 0], at[:, 1]] = True
+        inside = np.s_[top - north : bottom - north, left - west : right - west]
+        self._clearance[top:bottom, left:right] = np.minimum(
+            self._static[top:bottom, left:right], self._distance(around)[inside]
+        )
+
+    def _price_cells(self, window: tuple[slice, slice]) -> None:
         p = self.parameters
-        clearance = self._static
-        extra = drawn_lines(self.grid, list(self._closed.values()))
-        extra |= marked(self.grid, self._obstacles)
-        if extra.any():
-            clearance = np.minimum(clearance, self._distance(extra))
-        spare = clearance - np.float32(p.radius + p.margin)
-        free = spare >= 0
+        spare = self._clearance[window] - np.float32(p.radius + p.margin)
         crowded = np.clip(1 - spare / np.float32(max(p.comfort, 1e-6)), 0, 1)
         price = 1 + np.float32(p.aversion) * crowded * crowded
-        cost = np.where(free, price, np.float32(-1))
-        _, regions = cv2.connectedComponents(free.astype(np.uint8), connectivity=8)
-        self._costs = _Costs(clearance, cost, regions)
+        self._cost[window] = np.where(spare >= 0, price, np.float32(-1))
+
+    def _divide(self) -> None:
+        free = (self._cost > 0).astype(np.uint8)
+        self._regions = cv2.connectedComponents(free, connectivity=8)[1]
 
     def _cell(self, what: str, point: Points) -> tuple[int, int]:
         cell = self.grid.cells_of(point)
@@ -196,13 +216,13 @@ class GridPlanner:
 
     def _free_cell_near(self, start: Points) -> tuple[int, int]:
         row, column = self._cell('the start', start)
-        if self._costs.regions[row, column] != 0:
+        if self._regions[row, column] != 0:
             return row, column
         if not self.grid.free[row, column]:
             raise NoPathError(f'the start {_shown(start)} {self._why_not_free(start)}')
         reach = int(np.ceil(self.parameters.escape / self.grid.resolution))
         first_row, first_column = max(0, row - reach), max(0, column - reach)
-        window = self._costs.regions[first_row : row + reach + 1, first_column : column + reach + 1]
+        window = self._regions[first_row : row + reach + 1, first_column : column + reach + 1]
         found = np.argwhere(window > 0) + np.array([first_row, first_column])
         gaps = np.hypot(*(found - (row, column)).T)
         for index in np.argsort(gaps, kind='stable'):
@@ -222,10 +242,10 @@ class GridPlanner:
         if self._static[cell] >= needed:
             reach = int(self.parameters.goal_shift / self.grid.resolution)
             first_row, first_column = max(0, cell[0] - reach), max(0, cell[1] - reach)
-            window = self._costs.regions[
+            window = self._regions[
                 first_row : cell[0] + reach + 1, first_column : cell[1] + reach + 1
             ]
-            found = np.argwhere(window == self._costs.regions[start])
+            found = np.argwhere(window == self._regions[start])
             found += np.array([first_row, first_column])
             gaps = np.hypot(*(found - np.array(cell)).T)
             if len(gaps) and gaps.min() <= reach:
@@ -246,7 +266,7 @@ class GridPlanner:
         if not self.grid.free[row, column]:
             return 'lies where the map is unknown'
         needed = self.parameters.radius + self.parameters.margin
-        near = f'{max(0.0, float(self._costs.clearance[row, column])):.2f} m from '
+        near = f'{max(0.0, float(self._clearance[row, column])):.2f} m from '
         if self._static[row, column] < needed:
             what = 'a wall'
         else:
@@ -269,7 +289,7 @@ class GridPlanner:
     def _what_blocks(self, start: tuple[int, int], goal: tuple[int, int]) -> str:
         """Name what lies on the path that would be taken if doors and obstacles were not there."""
         needed = np.float32(self.parameters.radius + self.parameters.margin)
-        cost = np.where(self._costs.cost > 0, self._costs.cost, np.float32(_THROUGH))
+        cost = np.where(self._cost > 0, self._cost, np.float32(_THROUGH))
         cost = np.where(self._static >= needed, cost, np.float32(-1))
         search = MCP_Geometric(cost)
         try:
@@ -278,13 +298,8 @@ class GridPlanner:
         except ValueError:
             return 'walls lie between them, with no opening wide enough'
         path = self.grid.centres_of(cells)
-        blocked = path[self._costs.cost[cells[:, 0], cells[:, 1]] < 0]
+        blocked = path[self._cost[cells[:, 0], cells[:, 1]] < 0]
         return self._nearest_extra(blocked[len(blocked) // 2]) + ' is in the way'
-
-    def _search(self, start: tuple[int, int], goal: tuple[int, int]) -> NDArray[np.intp]:
-        search = self._costs.search
-        search.find_costs([start], [goal])
-        return np.asarray(search.traceback(goal), dtype=np.intp)
 
     def _shortened(self, path: Points) -> Points:
         """Replace steps of the grid by straight lines that are free and cost no more."""
@@ -323,7 +338,7 @@ class GridPlanner:
         west, south = self.grid.origin
         columns = (((x - west) + share * dx) * scale).astype(np.intp)
         rows = (((y - south) + share * dy) * scale).astype(np.intp)
-        costs = self._costs.cost[rows, columns]
+        costs = self._cost[rows, columns]
         # The ends are the start's and the goal's own, which may be nearer to something.
         if count > 2 and costs[1:-1].min() < 0:
             return math.inf
@@ -348,7 +363,7 @@ class GridPlanner:
             share = np.arange(count)[:, None] / (count - 1)
             curve = (1 - share) ** 2 * entry + 2 * share * (1 - share) * corner + share**2 * leave
             cells = ((curve - self.grid.origin) / self.grid.resolution).astype(np.intp)
-            if self._costs.cost[cells[:, 1], cells[:, 0]].min() > 0:
+            if self._cost[cells[:, 1], cells[:, 0]].min() > 0:
                 step = max(1, count // 6)
                 return np.vstack([curve[:-1:step], curve[-1:]])
             arms = [arm / 2 for arm in arms]
