@@ -1,7 +1,7 @@
 """The node `mission_recorder`: writes all topics of a mission to a recording, and its time line.
 
 It takes serialised messages as they came and never looks into them. Topics are found as they
-appear. Images are left out unless asked for: they are 300 times as much as all the rest.
+appear. Of images only a few are taken, see `recording.images`, unless all are asked for.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from surveillance_operator.recording.bag import (
     prune,
     repair,
 )
+from surveillance_operator.recording.images import IMAGES, ImageRecorder
 from surveillance_operator.recording.schemas import UnknownTypeError, definition, message_class
 from surveillance_operator.recording.timeline import TimelineWriter
 from surveillance_runtime.node import PatrolNode, StartError
@@ -34,7 +35,6 @@ DRAIN_PERIOD, SEAL_PERIOD, FEED_PERIOD = 0.15, 0.6, 0.4
 PRUNE_PERIOD = 60.0
 QUEUE = 2000
 """Messages of one topic that may come within `DRAIN_PERIOD`; a latched topic brings its own."""
-IMAGES = ('sensor_msgs/msg/Image', 'sensor_msgs/msg/CompressedImage')
 
 
 class MissionRecorder(PatrolNode):
@@ -45,7 +45,17 @@ class MissionRecorder(PatrolNode):
         folder: str = self.parameter(
             'folder', 'recording', 'Folder of the recording.', read_only=True
         )
-        images = self.parameter('images', False, 'Record images, too.', read_only=True)
+        self._all_images = self.parameter(
+            'images', False, 'Record every image as it came.', read_only=True
+        )
+        image_period = self.parameter(
+            'image_period',
+            1.0,
+            'Seconds between two images, compressed, of each topic that somebody looks at.',
+            minimum=0.1,
+            maximum=86_400.0,
+            read_only=True,
+        )
         self._keep = self.parameter(
             'keep',
             20.0,
@@ -54,13 +64,13 @@ class MissionRecorder(PatrolNode):
         )
         megabytes = self.parameter('segment_size', 128.0, 'Megabytes of a file.', minimum=0.1)
         seconds = self.parameter('segment_age', 3600.0, 'Seconds of a file.', minimum=1.0)
-        self._left_out = frozenset(() if images else IMAGES)
         path = Path(folder)
         try:
             self._bag = BagWriter(path, segment_bytes=int(megabytes * 1e6), segment_seconds=seconds)
             self._timeline = TimelineWriter(path.with_name(timeline.NAME))
         except (RecordingError, OSError) as error:
             raise StartError(str(error)) from error
+        self._images = ImageRecorder(self, self._bag, image_period)
         self._subscriptions_by_topic: dict[str, PolledSubscription] = {}
         self._unknown: set[str] = set()
         self._feed = MissionFeed(self, FEED_PERIOD)
@@ -92,6 +102,7 @@ class MissionRecorder(PatrolNode):
                     next_seal = now + SEAL_PERIOD
                     self._bag.seal()
                     self._find_topics()
+                    self._images.attend()
                 if now >= next_prune and self._bag.folder.name == NAME:
                     next_prune = now + PRUNE_PERIOD
                     prune(self._bag.folder.resolve().parents[1], self._keep * 1e9)
@@ -104,6 +115,7 @@ class MissionRecorder(PatrolNode):
             self._timeline.close()
 
     def _drain(self) -> None:
+        self._images.drain()
         for topic, subscription in self._subscriptions_by_topic.items():
             while (taken := subscription.take()) is not None:
                 data, stamps = taken
@@ -124,8 +136,8 @@ class MissionRecorder(PatrolNode):
                 self._follow(topic, types[0], offers)
 
     def _follow(self, topic: str, kind: str, offers: Sequence[Any]) -> None:
-        if kind in self._left_out:
-            self._unknown.add(topic)
+        if kind in IMAGES and not self._all_images:
+            self._images.offer(topic, kind)
             return
         profiles = [each.qos_profile for each in offers]
         reliable = all(each.reliability == ReliabilityPolicy.RELIABLE for each in profiles)

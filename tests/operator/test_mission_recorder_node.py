@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from nav_msgs.msg import OccupancyGrid
+from PIL import Image as PictureFile
 from rclpy.serialization import deserialize_message
 from rosbags.highlevel import AnyReader
-from sensor_msgs.msg import Image, LaserScan
+from sensor_msgs.msg import CompressedImage, Image, LaserScan
 from std_msgs.msg import String
 
 from surveillance_interfaces.action import FollowPath
@@ -65,3 +67,30 @@ def test_every_message_comes_back_as_it_was_published(graph: Any, tmp_path: Path
             if connection.topic == '/follow_path/_action/feedback':
                 assert read.feedback.position.x == 2.5
     assert Timeline(timeline).at(1e12)[2]['decision']['place'] == 'R3'
+
+
+def test_an_image_a_second_is_kept_where_somebody_looks(graph: Any, tmp_path: Path) -> None:
+    folder = tmp_path / 'recording'
+    seen, unseen = (graph.node.create_publisher(Image, name, 1) for name in ('/seen', '/unseen'))
+    looks = graph.listen(Image, '/seen')
+    parameters = {'folder': str(folder), 'image_period': 0.1}
+    recorder = graph.add(MissionRecorder, parameters=parameters)
+    picture = Image(width=4, height=2, step=12, encoding='rgb8', data=bytes(24))
+    picture.header.frame_id = 'camera'
+    graph.until(lambda: seen.get_subscription_count() == 2)
+
+    def recorded() -> bool:
+        seen.publish(picture)
+        return bool(looks) and '/seen/compressed' in recorder._bag._topics
+
+    graph.until(recorded)
+    assert unseen.get_subscription_count() == 0
+    graph.remove(recorder)
+    kept = [
+        deserialize_message(message.data, CompressedImage)
+        for _, channel, message in messages(folder)
+        if channel.topic == '/seen/compressed'
+    ]
+    assert kept[0].header.frame_id == 'camera'
+    assert PictureFile.open(io.BytesIO(bytes(kept[0].data))).size == (4, 2)
+    assert not [c for _, c, _ in messages(folder) if c.topic in ('/seen', '/unseen')]
