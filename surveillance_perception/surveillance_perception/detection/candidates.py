@@ -34,6 +34,9 @@ _LEAST_CORRELATION = 0.55
 _LEAST_SIDE, _WORST_SIDE = 0.15, 0.5
 _LEAST_INNER_DEVIATION = 0.18
 _CELL_PIXELS = 6.0
+# an outline runs through the middles of the outermost dark pixels, and blur makes dark smaller
+_INSET = 0.65
+_LEAST_SINE = 0.3
 
 
 def dark_masks(
@@ -135,8 +138,9 @@ def quads_around(
                 quads.append(quad)
         if quads:
             # a pixel's middle has whole coordinates, in a halved image as well
-            found.append((np.array(quads) + 0.5) * scale - 0.5)
-    return _clockwise(np.concatenate(found)) if found else np.zeros((0, 4, 2))
+            grown = _grown(_clockwise(np.array(quads)), _INSET)
+            found.append((grown + 0.5) * scale - 0.5)
+    return np.concatenate(found) if found else np.zeros((0, 4, 2))
 
 
 def distinct(quads: Quads, distance: float) -> npt.NDArray[np.int64]:
@@ -175,6 +179,17 @@ def _clockwise(quads: Quads) -> Quads:
     reversed_ = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0] < 0
     quads[reversed_] = quads[reversed_, ::-1]
     return quads
+
+
+def _grown(quads: Quads, distance: float) -> Quads:
+    """Quads (n, 4, 2), clockwise, with each side moved outwards by a distance in pixels."""
+    along = np.roll(quads, -1, axis=1) - quads
+    along /= np.maximum(np.linalg.norm(along, axis=2, keepdims=True), 1e-9)
+    before = np.roll(along, 1, axis=1)
+    sine = before[..., 0] * along[..., 1] - before[..., 1] * along[..., 0]
+    # where both moved sides meet; a corner nearly straight or sharp is not moved without bound
+    shift = (before - along) / np.maximum(sine, _LEAST_SINE)[..., None]
+    return np.asarray(quads + distance * shift)
 
 
 def _area(corners: Sequence[tuple[float, float]]) -> float:
