@@ -30,9 +30,9 @@ _SAME_SIZE = 0.06
 _SAME_BOX = 3
 _PER_SIDE = 6
 _INNER = 5
-_LEAST_CORRELATION = 0.55
+_LEAST_CORRELATION = 0.68
 _LEAST_SIDE, _WORST_SIDE = 0.15, 0.5
-_LEAST_INNER_DEVIATION = 0.18
+_LEAST_INNER_DEVIATION, _MOST_INNER_DEVIATION = 0.2, 1.1
 _CELL_PIXELS = 6.0
 # an outline runs through the middles of the outermost dark pixels, and blur makes dark smaller
 _INSET = 0.65
@@ -280,7 +280,7 @@ class BorderCheck:
         values = pyramid.sample(homographies, self._grid, levels).astype(float)
         count = 4 * _PER_SIDE
         near, far, border = (values[:, k * count : (k + 1) * count] for k in range(3))
-        inner = values[:, 3 * count :]
+        deviation = values[:, 3 * count :].std(axis=1)
         # a white margin may be thinner than half a cell
         thin = near.mean(axis=1) > far.mean(axis=1)
         margin = np.where(thin[:, None], near, far)
@@ -293,7 +293,8 @@ class BorderCheck:
             & (correlation > _LEAST_CORRELATION)
             & (by_side[:, 1] > _LEAST_SIDE * contrast)
             & (by_side[:, 0] > -_WORST_SIDE * contrast)
-            & (inner.std(axis=1) > _LEAST_INNER_DEVIATION * contrast)
+            & (deviation > _LEAST_INNER_DEVIATION * contrast)
+            & (deviation < _MOST_INNER_DEVIATION * contrast)
         )
         return np.where(passed, correlation, -1.0)
 

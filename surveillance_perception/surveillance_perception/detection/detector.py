@@ -178,8 +178,8 @@ class MarkerDetector:
                 quads = quads[self._reader.uneven(pyramid, homographies_of(quads))]
             self.left_out += max(0, len(quads) - most)
             quads = quads[:most]
-            found += _without_overlaps(self._read(read, pyramid, quads, prepared.grey), found)
-        return found
+            found += self._read(read, pyramid, quads, prepared.grey)
+        return _best(found)
 
     def _read(
         self,
@@ -239,13 +239,10 @@ class MarkerDetector:
         accepted = (correlated & (plausible | clear)) | (plausible & right) | glared
         confidence = readings.correlation * (1.0 - 1.0 / np.maximum(readings.lead, 1.0))
         chosen = np.flatnonzero(accepted)
-        chosen = chosen[np.argsort(-confidence[chosen])]
         corners = corners_of(readings.homographies)
         detections: list[Detection] = []
         for index in chosen:
             outline = np.roll(corners[index], -int(codes.turns[entries[index]]), axis=0)
-            if any(_overlap(outline, other.corners) for other in detections):
-                continue
             outline = _sharpened(outline, grey, codes.side)
             detections.append(
                 Detection(int(ids[index]), outline, float(confidence[index]), bool(known[index]))
@@ -253,23 +250,32 @@ class MarkerDetector:
         return detections
 
 
-def _without_overlaps(found: list[Detection], before: Sequence[Detection] = ()) -> list[Detection]:
-    kept: list[Detection] = []
-    for each in sorted(found, key=lambda detection: -detection.confidence):
-        if not any(_overlap(each.corners, other.corners) for other in [*before, *kept]):
-            kept.append(each)
-    return kept
+def _best(found: Sequence[Detection]) -> list[Detection]:
+    """The surest of detections that lie on each other."""
+    if len(found) < 2:
+        return list(found)
+    order = sorted(found, key=lambda detection: -detection.confidence)
+    outlines = np.array([each.corners for each in order])
+    middles = outlines.mean(axis=1)
+    reach = np.linalg.norm(outlines - middles[:, None], axis=2).mean(axis=1)
+    apart = np.linalg.norm(middles[:, None] - middles[None], axis=2)
+    same = apart < _SAME_MARKER * np.minimum(reach[:, None], reach[None])
+    kept: list[int] = []
+    for index in range(len(order)):
+        if not same[index, kept].any():
+            kept.append(index)
+    return [order[index] for index in kept]
 
 
 def _covered(quads: Quads, found: Sequence[Detection]) -> npt.NDArray[np.bool_]:
     """Return which quads (m,) have their middle in a marker that is read."""
-    covered = np.zeros(len(quads), bool)
-    middles = quads.mean(axis=1)
-    for each in found:
-        middle = each.corners.mean(axis=0)
-        reach = np.linalg.norm(each.corners - middle, axis=1).mean()
-        covered |= np.linalg.norm(middles - middle, axis=1) < _COVER * reach
-    return covered
+    if not found:
+        return np.zeros(len(quads), bool)
+    outlines = np.array([each.corners for each in found])
+    middles = outlines.mean(axis=1)
+    reach = np.linalg.norm(outlines - middles[:, None], axis=2).mean(axis=1)
+    apart = np.linalg.norm(quads.mean(axis=1)[:, None] - middles[None], axis=2)
+    return np.asarray((apart < _COVER * reach).any(axis=1))
 
 
 def _sharpened(outline: Array, grey: Grey, side: int) -> Array:
@@ -290,12 +296,3 @@ def _sharpened(outline: Array, grey: Grey, side: int) -> Array:
     sharp = outline.copy()
     sharp[inside] = np.where(moved[:, :, None] < cell / 2.0, refined, start).reshape(-1, 2)
     return sharp
-
-
-def _overlap(first: Array, second: Array) -> bool:
-    """Tell whether the middle of one outline lies well within the other."""
-    reach = min(
-        np.linalg.norm(first - first.mean(axis=0), axis=1).mean(),
-        np.linalg.norm(second - second.mean(axis=0), axis=1).mean(),
-    )
-    return bool(np.linalg.norm(first.mean(axis=0) - second.mean(axis=0)) < _SAME_MARKER * reach)
