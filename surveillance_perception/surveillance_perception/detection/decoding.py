@@ -26,7 +26,7 @@ _ROUGH_ITERATIONS = 5
 _FINE_ITERATIONS = 3
 _HYPOTHESES = 2
 _RIVALS = 6
-_ROUGH_BORDER, _ROUGH_BORDER_EVEN = 0.6, 0.4
+_ROUGH_BORDER, _ROUGH_BORDER_EVEN, _NARROW_BORDER = 0.6, 0.4, 0.85
 _NARROW_CELL = 2.5
 _UNEVEN_CELLS = 2
 _PLAIN_WRONG = 1
@@ -37,8 +37,7 @@ _GLARED_CELLS = 4
 _GLARED_BORDER = 3
 _GLARE_LEAD = 2
 _HYPOTHESIS_RATIO = 1.7
-_LEAST_FIRST_CORRELATION = 0.5
-_CLEAR_FIRST_CORRELATION = 0.7
+_LEAST_FIRST_CORRELATION, _LEAST_FIRST_EVEN = 0.45, 0.6
 _LEAST_ROUGH_CORRELATION = 0.7
 _GOOD_CORRELATION = 0.98
 _STRONGER_BLURS = np.array([[1.6, 1.6], [2.4, 2.4], [0.8, 2.4], [2.4, 0.8]])
@@ -136,9 +135,9 @@ class MarkerReader:
         fit = self._fit
         blur = np.full((len(homographies), 2), self._blur)
         entries, correlation, patches, _ = self._score(pyramid, homographies, blur, None)
-        likely = correlation[:, 0] > _LEAST_FIRST_CORRELATION
-        sure = correlation[likely, 0] > _CLEAR_FIRST_CORRELATION
-        likely[likely] = sure | self._has_border(patches[likely], homographies[likely])
+        least = _LEAST_FIRST_EVEN if self._even else _LEAST_FIRST_CORRELATION
+        likely = correlation[:, 0] > least
+        likely[likely] = self._has_border(patches[likely], homographies[likely])
         homographies, entries = homographies[likely], entries[likely]
         correlation, blur = correlation[likely], blur[likely]
         if not len(homographies):
@@ -227,10 +226,9 @@ class MarkerReader:
         Cells too narrow for that are given the benefit of the doubt, but not under uneven light.
         """
         narrow = cell_widths(homographies, self.codes.side) < _NARROW_CELL
-        count = self._white_border(self._cells(patches))
-        share = _ROUGH_BORDER_EVEN if self._even else _ROUGH_BORDER
-        black = count <= share * 4 * (self.codes.side - 1)
-        return np.asarray(black & ~narrow if self._even else black | narrow)
+        share = _ROUGH_BORDER_EVEN if self._even else np.where(narrow, _NARROW_BORDER, _ROUGH_BORDER)
+        black = self._white_border(self._cells(patches)) <= share * 4 * (self.codes.side - 1)
+        return np.asarray(black & ~narrow if self._even else black)
 
     def _wrong(self, cells: Patches, entries: Indices) -> tuple[npt.NDArray[np.bool_], Indices]:
         """Cells of the codes (m, bits, bits) and number of border cells (m,) read otherwise."""

@@ -42,10 +42,10 @@ _SAME_QUAD = 2.0
 _SAME_MARKER = 0.5
 _LARGE_CELL = 8.0
 _BATCH = 64
-_CAREFUL = 96
+_CAREFUL = 400
 _COVER = 0.7
 _CLEAR, _CLEAR_KNOWN = 1.8, 1.3
-_WRONG = 0.2
+_WRONG, _AGREED = 0.2, 0.12
 _WRONG_BORDER = 0.3
 _CONTRADICTED = 0.6
 _RIGHT_BORDER = 3
@@ -221,14 +221,17 @@ class MarkerDetector:
         plausible = (readings.wrong <= _WRONG * codes.bits**2) & (
             readings.wrong_border <= _WRONG_BORDER * 4 * (codes.side - 1)
         )
-        correlated = (
-            (readings.correlation > settings.least_correlation)
-            & (readings.inner > settings.least_inner_correlation)
-            & (readings.lead > lead)
-        )
         # how much a code says beyond telling the dictionary's markers apart
         spare = codes.bits**2 - np.log2(len(codes.ids))
         strict = _STRICT if spare < _FEW_SPARE_BITS else 1.0
+        # where nearly all votes are the code's, its own cells may speak for a short lead
+        agreed = (readings.wrong <= _AGREED * codes.bits**2) & (spare >= _FEW_SPARE_BITS)
+        joint_lead = np.sqrt(readings.lead * np.maximum(readings.inner_lead, readings.lead))
+        correlated = (
+            (readings.correlation > settings.least_correlation)
+            & (readings.inner > settings.least_inner_correlation)
+            & (np.where(agreed, joint_lead, readings.lead) > lead)
+        )
         right = (readings.wrong_border <= _RIGHT_BORDER) & (
             ((readings.wrong == 0) & (readings.inner_lead > _RIGHT_LEAD * strict))
             | ((readings.wrong <= min(1, codes.correction)) & (readings.inner_lead > lead * strict))
