@@ -226,7 +226,9 @@ class MarkerReader:
         Cells too narrow for that are given the benefit of the doubt, but not under uneven light.
         """
         narrow = cell_widths(homographies, self.codes.side) < _NARROW_CELL
-        share = _ROUGH_BORDER_EVEN if self._even else np.where(narrow, _NARROW_BORDER, _ROUGH_BORDER)
+        share = (
+            _ROUGH_BORDER_EVEN if self._even else np.where(narrow, _NARROW_BORDER, _ROUGH_BORDER)
+        )
         black = self._white_border(self._cells(patches)) <= share * 4 * (self.codes.side - 1)
         return np.asarray(black & ~narrow if self._even else black)
 
