@@ -192,7 +192,7 @@ class Campaign:
 
 @contextmanager
 def campaign(seed: int) -> Iterator[Campaign]:
-    """The clients on a domain of their own, and the server."""
+    """Provide the clients on a domain of their own, and the server."""
     import rclpy
 
     from surveillance_runtime.process import ExecutorThread
@@ -216,7 +216,7 @@ def campaign(seed: int) -> Iterator[Campaign]:
 
 
 def import_seconds() -> float:
-    """How long a process takes that imports rclpy and does nothing else."""
+    """Return how long a process takes that imports rclpy and does nothing else."""
     begin = time.monotonic()
     subprocess.run([sys.executable, '-c', 'import rclpy'], check=True)
     return time.monotonic() - begin

@@ -66,7 +66,7 @@ class Result:
 
 
 def askable(axiom: Axiom) -> bool:
-    """Whether `holds` can be asked for an axiom: a fact about named individuals or classes."""
+    """Tell whether `holds` can be asked for an axiom: a fact about named individuals or classes."""
     if isinstance(axiom, SubClassOf):
         return isinstance(axiom.sub, str) and isinstance(axiom.sup, str)
     if isinstance(axiom, ClassAssertion) and not isinstance(axiom.cls, str):
@@ -75,7 +75,7 @@ def askable(axiom: Axiom) -> bool:
 
 
 def reasoned(source: bytes | Path) -> tuple[KnowledgeBase, bool, list[str], float]:
-    """The document reasoned over: (knowledge, consistent, unsupported, seconds)."""
+    """Return the document reasoned over: (knowledge, consistent, unsupported, seconds)."""
     document = read_ontology(source, BASE)
     kb = KnowledgeBase(document.iri or BASE, document.axioms)
     start = time.perf_counter()
@@ -89,7 +89,7 @@ def reasoned(source: bytes | Path) -> tuple[KnowledgeBase, bool, list[str], floa
 
 
 def judge_case(case: dict[str, Any]) -> list[Result]:
-    """One result for the consistency and one for each entailment that a case tests."""
+    """Return one result for the consistency and one for each entailment that a case tests."""
     name, kinds = case['name'], case['kinds']
     kb, consistent, unsupported, _ = reasoned(case['premise'].encode())
     missing = 'named' if unsupported else 'silent miss'
@@ -122,7 +122,7 @@ def judge_case(case: dict[str, Any]) -> list[Result]:
 
 
 def work(path: Path, place: int) -> list[Result]:
-    """The results of one case, or of one ontology where `place` is negative."""
+    """Return the results of one case, or of one ontology where `place` is negative."""
     name = path.name
     try:
         if place >= 0:
@@ -151,7 +151,7 @@ def apart(path: Path, place: int, limit: float) -> list[Result]:
 
 
 def cases_in(folder: Path, most: int | None) -> Iterator[tuple[Path, int]]:
-    """Every test case, spread evenly where there are more than `most`."""
+    """Yield every test case, spread evenly where there are more than `most`."""
     for path in sorted(folder.rglob('*.json')):
         records = json.loads(path.read_text())
         if isinstance(records, list) and all('premise' in record for record in records):
@@ -164,7 +164,7 @@ def ontologies_in(folder: Path) -> list[Path]:
 
 
 def run_cases(places: list[tuple[Path, int]], limit: float) -> None:
-    """Runs the test cases and prints what became of them."""
+    """Run the test cases and print what became of them."""
     counts: Counter[str] = Counter()
     wrong: list[Result] = []
     for path, place in places:
@@ -183,7 +183,7 @@ def run_cases(places: list[tuple[Path, int]], limit: float) -> None:
 
 
 def verdicts(path: Path, java: list[str], limit: float) -> dict[str, str]:
-    """What the Java reasoners say of an ontology's consistency."""
+    """Return what the Java reasoners say of an ontology's consistency."""
     found = {}
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder) / 'ontology.owl'
@@ -214,7 +214,7 @@ def run_ontologies(paths: list[Path], limit: float, java: list[str]) -> None:
 
 
 def main() -> None:
-    """Reads the arguments and prints the tables."""
+    """Read the arguments and print the tables."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument('folder', type=Path, help='where the ontologies and test cases are')
     parser.add_argument('--quick', action='store_true', help=f'about {QUICK} of the test cases')

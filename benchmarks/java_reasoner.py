@@ -18,7 +18,7 @@ class JavaReasonerError(Exception):
 
 
 def absent() -> str:
-    """Why no Java reasoner can run here; '' when one can."""
+    """Return why no Java reasoner can run here; '' when one can."""
     if shutil.which('java') is None or shutil.which('javac') is None:
         return 'no Java development kit'
     if importlib.util.find_spec('owlready2') is None:
@@ -59,7 +59,7 @@ class JavaReasoner:
         )
 
     def ask(self, *words: str) -> str:
-        """Sends a command; its answer."""
+        """Send a command and return its answer."""
         process = self._process
         assert process.stdin is not None
         assert process.stdout is not None
@@ -78,7 +78,7 @@ class JavaReasoner:
         return answer
 
     def close(self) -> None:
-        """Ends the JVM."""
+        """End the JVM."""
         self._process.kill()
         self._process.wait()
 

@@ -118,7 +118,7 @@ class Run:
     fresh: bool = False
 
     def check(self) -> None:
-        """Looks at everything that can be wrong before a process is started.
+        """Look at everything that can be wrong before a process is started.
 
         Raises:
             LaunchError: a value cannot be used.
@@ -155,7 +155,7 @@ class Run:
         return (node_table.find(node_table.CONSOLE), *chosen) if asks else chosen
 
     def observers(self) -> tuple[node_table.Node, ...]:
-        """The nodes that only look on; they start last. `only` starts no other ones."""
+        """Return the nodes that only look on; they start last. `only` starts no other ones."""
         names = []
         if self.record != NOT_RECORDED and not self.only:
             names += [RECORDER, MARKERS]
@@ -165,7 +165,7 @@ class Run:
 
 
 def parameter_files(config: Path, run: Run) -> list[Path]:
-    """The files that every node gets, in ROS's order: a later one wins."""
+    """Return the files that every node gets, in ROS's order: a later one wins."""
     place = run.place or config / PLACES[run.behaviour]
     files = [config / 'parameters.yaml', place]
     if run.parameters is not None:
@@ -218,7 +218,7 @@ def _merged(
 
 
 def _folders_of(folder: Path) -> Iterator[Entry]:
-    """Where the nodes of a run write, if the user's file names no other place."""
+    """Yield where the nodes of a run write, if the user's file names no other place."""
     for name, part in (('ontologies_folder', ONTOLOGIES), ('store', STORE)):
         yield Entry('/**/armor_server', name, str(folder / part), 'this run')
     for node in ('battery_controller', 'motion_controller'):
@@ -226,7 +226,7 @@ def _folders_of(folder: Path) -> Iterator[Entry]:
 
 
 def _option_entries(run: Run, folder: Path | None) -> Iterator[Entry]:
-    """What the options say as parameters, for the nodes that they concern."""
+    """Yield what the options say as parameters, for the nodes that they concern."""
     node = f'/**/{BEHAVIOUR_NODE}'
     if run.behaviour != 'surveillance':
         yield Entry(node, 'behaviour', run.behaviour, f'--behaviour {run.behaviour}')
@@ -336,7 +336,7 @@ def parameters_in_memory(name: str, settings: Mapping[str, Setting]) -> Path:
 
 
 def ros_arguments(files: Sequence[Path], run: Run) -> list[str]:
-    """The ROS arguments of a node of a run."""
+    """Return the ROS arguments of a node of a run."""
     arguments = ['--ros-args']
     for path in files:
         arguments += ['--params-file', str(path)]
@@ -348,7 +348,7 @@ def ros_arguments(files: Sequence[Path], run: Run) -> list[str]:
 
 
 def ros_domain(run: Run) -> str:
-    """The ROS domain of a run: as asked for, else as the environment says.
+    """Return the ROS domain of a run: as asked for, else as the environment says.
 
     Raises:
         LaunchError: what the environment says is no domain.
@@ -365,7 +365,7 @@ def ros_domain(run: Run) -> str:
 
 
 def node_environ(run: Run, logs: Path | None = None) -> dict[str, str]:
-    """The environment of a node's process."""
+    """Return the environment of a node's process."""
     environ = dict(os.environ)
     if run.domain is not None:
         environ['ROS_DOMAIN_ID'] = str(run.domain)
@@ -385,7 +385,9 @@ def node_environ(run: Run, logs: Path | None = None) -> dict[str, str]:
 
 
 def command(nodes: Sequence[node_table.Node], arguments: Sequence[str], parent: int) -> list[str]:
-    """The command of one process that holds `nodes`; it ends with `parent`, unless that is 0."""
+    """Return the command of one process that holds `nodes`; it ends with `parent`, unless that
+    is 0.
+    """
     # Nodes of one process are stopped from the last to the first: the one that uses the others
     # comes last.
     ordered = sorted(nodes, key=lambda node: node.name == BEHAVIOUR_NODE)
@@ -440,7 +442,7 @@ def resumed(run: Run, usual: Run, runs: Path, name: str) -> tuple[Run, Path]:
 
 
 def _chosen_folder(run: Run, runs: Path, resume: Path | None) -> tuple[Path, str]:
-    """The folder to work in, and what there is to say about it."""
+    """Return the folder to work in, and what there is to say about it."""
     if resume is not None:
         return resume, f'going on with {_short(resume)}'
     found = run_folder.latest(runs) if not run.fresh else None
@@ -453,7 +455,7 @@ def _chosen_folder(run: Run, runs: Path, resume: Path | None) -> tuple[Path, str
 
 
 def alarm_caller(alarm: str, log: MergedLog) -> Callable[[str], None]:
-    """What calls somebody: runs the command of the user's choice with one line as its argument."""
+    """Return what calls somebody: it runs the user's command with one line as its argument."""
 
     def call(text: str) -> None:
         if not alarm:
@@ -473,18 +475,7 @@ def alarm_caller(alarm: str, log: MergedLog) -> Callable[[str], None]:
 
 
 def run_mission(run: Run, config: Path, runs: Path, resume: Path | None = None) -> int:
-    """Starts the nodes, supervises them until the end, prints the summary; returns the exit code.
-
-    Args:
-        run: what to run.
-        config: the folder with the parameter files.
-        runs: where the run gets a folder of its own for its log, parameters and record.
-        resume: the folder of the run to go on with; None: a new one, or that of a launcher of the
-            same options that was killed.
-
-    Raises:
-        LaunchError: what was asked for cannot be run.
-    """
+    """Start the nodes, supervise them to the end, print the summary; return the exit code."""
     run.check()
     merged = configuration(config, run)  # before anything is written
     run = with_mode_of(run, merged)
@@ -592,7 +583,7 @@ def what_to_look_at(folder: Path) -> list[str]:
 
 
 def watch_command(run: Run) -> str:
-    """What to type in another terminal to see this run."""
+    """Return what to type in another terminal to see this run."""
     words = ['python3', 'launch.py', 'watch']
     if ros_domain(run) != '0':
         words += ['--domain', ros_domain(run)]
@@ -602,7 +593,7 @@ def watch_command(run: Run) -> str:
 
 
 def summary(record: Path) -> str:
-    """The mission's summary as text; says so when there is none."""
+    """Return the mission's summary as text, also when there is none."""
     if not record.exists():
         return NOTHING_RECORDED
     try:

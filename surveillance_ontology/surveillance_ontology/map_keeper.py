@@ -199,7 +199,7 @@ class MapKeeper:
         return ''
 
     def without_room(self, place: Place, name: str) -> Place:
-        """The place without a room, as a change for `edit`.
+        """Return the place without a room, as a change for `edit`.
 
         Raises:
             PlaceError: The room cannot be removed; the robot's room never.

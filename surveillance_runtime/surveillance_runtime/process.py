@@ -236,7 +236,7 @@ class _Ending:
             pass
 
     def ignore_signals(self) -> None:
-        """The process is ending: signals change nothing any more."""
+        """Note that the process is ending: signals change nothing any more."""
         for number in STOP_SIGNALS:
             signal.signal(number, signal.SIG_IGN)
         signal.set_wakeup_fd(-1)
@@ -317,7 +317,7 @@ def _close_tasks(executor: SingleThreadedExecutor) -> None:
 
 
 def _node_of(error: BaseException) -> Node | None:
-    """The node in whose code an exception was raised, if it can be told."""
+    """Return the node in whose code an exception was raised, if it can be told."""
     found = None
     step = error.__traceback__
     while step is not None:

@@ -161,7 +161,7 @@ class Replaced(InProcessTransport):
 def keeper_of(
     ontology: PatrolOntology, path: str, built: list[int]
 ) -> tuple[MapKeeper, dict[str, list[str]]]:
-    """A keeper of the seven rooms, and what it says."""
+    """Return a keeper of the seven rooms, and what it says."""
     said: dict[str, list[str]] = {'info': [], 'warn': [], 'refused': [], 'failed': []}
     reports = Reports(**{kind: lines.append for kind, lines in said.items()})
     source = Source(path, IRI)

@@ -203,6 +203,6 @@ def test_the_browser_has_nothing_to_complain_about(viewer: Viewer) -> None:
 
 @pytest.fixture(scope='module')
 def axe_script() -> str:
-    """The accessibility checker, which a Python package brings along."""
+    """Provide the accessibility checker, which a Python package brings along."""
     script = files('axe_core_python') / 'axe.min.js'
     return script.read_text(encoding='utf-8')

@@ -265,7 +265,7 @@ def test_every_value_takes_effect_or_costs_one_line(tmp_path, pattern, name, cho
 
 @pytest.fixture(scope='module')
 def read_by_ros(tmp_path_factory, ros_domain):
-    """What a node gets for a value of a resolved file."""
+    """Return what a node gets for a value of a resolved file."""
     path = tmp_path_factory.mktemp('resolved') / 'node.yaml'
     context = rclpy.Context()
     rclpy.init(context=context, domain_id=ros_domain)

@@ -255,7 +255,7 @@ class Plan:
         return self._search.finished and self._outcome.settled <= GOOD_ENOUGH * self._bound
 
     def _lead(self) -> int:
-        """How many choices a trial takes."""
+        """Return how many choices a trial takes."""
         trial = TRIED * MOVE_WORK * self._outcome.steps
         return 2 + math.ceil(2.0 * trial / MORE_WORK)
 
@@ -343,7 +343,9 @@ class Plan:
         return (Oldest if course.kind == 'oldest' else Lookahead)(self._rules)
 
     def _portfolio(self, state: State, position: int) -> Iterator[Course]:
-        """The best round that was found since the last trial, in several ways, and the policies."""
+        """Yield the best round that was found since the last trial, in several ways, and the
+        policies.
+        """
         targets = self._search.best.targets
         if targets == self._offered and self._course.kind == 'round':
             return
@@ -368,7 +370,7 @@ class Plan:
                 yield Course('round', targets, phases[0], skip * length, patience)
 
     def _changed(self, course: Course, outcome: Outcome) -> Course | None:
-        """The course of a round with one random change."""
+        """Return the course of a round with one random change."""
         if course.kind != 'round':
             return None
         draw, rules = self._draw, self._rules

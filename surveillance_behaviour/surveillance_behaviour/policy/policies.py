@@ -41,7 +41,7 @@ class Policy(Protocol):
     """Scores the allowed places."""
 
     def __call__(self, world: World, allowed: Sequence[str]) -> Scores:
-        """A score for each of ``allowed``, which is not empty."""
+        """Return a score for each of ``allowed``, which is not empty."""
 
 
 def make_policy(name: str) -> Policy:
@@ -62,7 +62,7 @@ def by_chance(world: World, allowed: Sequence[str]) -> Scores:
 
 
 def oldest(world: World, allowed: Sequence[str]) -> Scores:
-    """The time each place went unvisited."""
+    """Return the time each place went unvisited."""
     scores = {}
     for place in allowed:
         seconds = world.unvisited(place)
@@ -71,7 +71,7 @@ def oldest(world: World, allowed: Sequence[str]) -> Scores:
 
 
 def lookahead(world: World, allowed: Sequence[str]) -> Scores:
-    """The best (time unvisited - time to get there) of all places, by way of each candidate."""
+    """Return the best (time unvisited - time to get there) of all places, by way of each candidate."""
     graph = world.graph
     scores = {}
     for place in allowed:
@@ -89,7 +89,7 @@ def lookahead(world: World, allowed: Sequence[str]) -> Scores:
 
 
 def tour(world: World, allowed: Sequence[str]) -> Scores:
-    """The next place of the plan, then by how near each place is to its target; see `plan`.
+    """Return the next place of the plan, then by how near each place is to its target; see `plan`.
 
     Where `oldest` or `lookahead` does better than every round that was found, it is followed.
     """
@@ -178,7 +178,7 @@ def _idle_ways(
 
 
 def cycle(world: World, allowed: Sequence[str]) -> Scores:
-    """How soon each candidate comes on the closed tour, from where the robot is on it.
+    """Return how soon each candidate comes on the closed tour, from where the robot is on it.
 
     The tour may pass a place several times: the pass that the robot is on is remembered. A robot
     that is elsewhere than the tour goes on takes the pass whose next steps have waited longest.
@@ -202,7 +202,7 @@ def cycle(world: World, allowed: Sequence[str]) -> Scores:
 
 
 def _seconds_by_way_of(world: World, place: str) -> NDArray[np.float64]:
-    """Seconds to each place when the robot first goes to ``place``, shape (n,)."""
+    """Return the seconds to each place when the robot first goes to ``place``, shape (n,)."""
     graph = world.graph
     seconds: NDArray[np.float64] = graph.distances[graph.index[place]]
     return seconds + graph.seconds(world.place, place)

@@ -39,7 +39,7 @@ class JavaReasonerError(Exception):
 
 
 def absent() -> str:
-    """Why no Java reasoner can run here; empty when one can."""
+    """Return why no Java reasoner can run here; empty when one can."""
     if importlib.util.find_spec('owlready2') is None:
         return 'owlready2 is not installed'
     if shutil.which('java') is None:
@@ -109,7 +109,7 @@ class JavaKnowledgeBase(KnowledgeBase):
         return end
 
     def _further(self) -> frozenset[Axiom] | None:
-        """What holds beyond the native derivations; None: there is a contradiction."""
+        """Return what holds beyond the native derivations; None: there is a contradiction."""
         found = infer(self._kind, self.iri, self.axioms())
         if found is None:
             return None
@@ -132,7 +132,7 @@ class JavaKnowledgeBase(KnowledgeBase):
         return ()
 
     def instances(self, cls: str) -> frozenset[str]:
-        """Individuals of a class, direct and indirect."""
+        """Return individuals of a class, direct and indirect."""
         more = (a.individual for a in self._of(ClassAssertion) if a.cls == cls)
         return super().instances(cls) | frozenset(more)
 
@@ -150,7 +150,7 @@ class JavaKnowledgeBase(KnowledgeBase):
         return super().superclasses(cls) | self._linked(cls, 'sub', 'sup')
 
     def object_values(self, prop: str, individual: str) -> set[str]:
-        """What an individual is related to by an object property."""
+        """Return what an individual is related to by an object property."""
         return super().object_values(prop, individual) | {
             a.object
             for a in self._of(ObjectPropertyAssertion)
@@ -158,7 +158,7 @@ class JavaKnowledgeBase(KnowledgeBase):
         }
 
     def data_values(self, prop: str, individual: str) -> set[Literal]:
-        """Values of a data property."""
+        """Return values of a data property."""
         found = super().data_values(prop, individual)
         values = {value_of(literal) for literal in found}
         return found | {
@@ -168,12 +168,12 @@ class JavaKnowledgeBase(KnowledgeBase):
         }
 
     def object_properties_of(self, individual: str) -> set[str]:
-        """Object properties with at least one value for the individual."""
+        """Return object properties with at least one value for the individual."""
         more = {a.prop for a in self._of(ObjectPropertyAssertion) if a.subject == individual}
         return super().object_properties_of(individual) | more
 
     def data_properties_of(self, individual: str) -> set[str]:
-        """Data properties with at least one value for the individual."""
+        """Return data properties with at least one value for the individual."""
         more = {a.prop for a in self._of(DataPropertyAssertion) if a.subject == individual}
         return super().data_properties_of(individual) | more
 
@@ -184,7 +184,9 @@ class JavaKnowledgeBase(KnowledgeBase):
             yield from self._of(kind)
 
     def explain(self, fact: Axiom) -> Explanation | None:
-        """Why a fact holds; of what only the Java reasoner derives no more is known than that."""
+        """Return why a fact holds; of what only the Java reasoner derives no more is known than
+        that.
+        """
         explanation = super().explain(fact)
         if explanation is None and fact in self._java:
             text = f'{self._kind} infers it'

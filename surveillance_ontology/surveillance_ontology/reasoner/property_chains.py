@@ -31,7 +31,7 @@ _X, _Y = 0, 1
 
 
 def spell_out_chains(program: Program) -> None:
-    """Adds the steps of every chain to a program's clauses."""
+    """Add the steps of every chain to a program's clauses."""
     _Chains(program).run()
 
 
@@ -50,7 +50,7 @@ class _Chains:
                 self._read(clause)
 
     def _read(self, clause: Clause) -> None:
-        """Takes a clause that implies a property from properties alone."""
+        """Take a clause that implies a property from properties alone."""
         head = clause.head
         if not isinstance(head, PredicateAtom) or head.predicate.kind != 'object':
             return
@@ -183,7 +183,7 @@ class _Chains:
         above: tuple[Role, ...],
         fresh: count[int],
     ) -> None:
-        """Adds the steps between two states of a role's own that its chains make.
+        """Add the steps between two states of a role's own that its chains make.
 
         Raises:
             _IrregularError: The role's chains use a role that depends on it.
@@ -221,7 +221,7 @@ class _Chains:
         above: tuple[Role, ...],
         fresh: count[int],
     ) -> None:
-        """Leads from one state to another along a role, through states of its own."""
+        """Lead from one state to another along a role, through states of its own."""
         if not self._is_complex(role):
             if role in above:
                 raise _IrregularError
@@ -253,6 +253,6 @@ class _Chains:
 
 
 def _moved(atom: BodyAtom, old: Term, new: Term) -> BodyAtom:
-    """The atom with a variable renamed."""
+    """Return the atom with a variable renamed."""
     terms = tuple(new if term == old else term for term in atom.terms)
     return replace(atom, terms=terms)  # type: ignore[arg-type]

@@ -222,7 +222,7 @@ class ValueSet:
     # --- questions ---
 
     def contains(self, value: Value) -> bool:
-        """Whether a value is in the set."""
+        """Tell whether a value is in the set."""
         return not (self & point(value)).is_empty
 
     @property
@@ -255,7 +255,7 @@ class ValueSet:
         return found
 
     def within(self, other: ValueSet) -> bool:
-        """Whether every value is in another set."""
+        """Tell whether every value is in another set."""
         return (self & ~other).is_empty
 
     @property
@@ -277,7 +277,7 @@ class ValueSet:
 
 
 def _count(layer: str, low: _End, high: _End) -> float:
-    """How many values of a layer lie between two ends."""
+    """Return how many values of a layer lie between two ends."""
     if low.key is None or high.key is None:
         return math.inf
     if layer == 'whole':
@@ -319,7 +319,7 @@ NONE = ValueSet({}, {})
 
 
 def point(value: Value) -> ValueSet:
-    """The set of one value."""
+    """Return the set of one value."""
     _, key = comparable(value)
     if isinstance(value, (int, Fraction)):
         return ValueSet({_layer_of(value): ((_End(key, -1), _End(key, 1)),)}, {})
@@ -392,7 +392,9 @@ def _facet(datatype: str, facet: str, bound: ex.Literal) -> ValueSet | None:
 
 @cache
 def value_set(data_range: DataRange) -> ValueSet | None:
-    """The values of a data range without defined datatypes; None where it is not supported."""
+    """Return the values of a data range without defined datatypes; None where it is not
+    supported.
+    """
     if isinstance(data_range, str):
         return _datatype(data_range)
     if isinstance(data_range, ex.DataOneOf):

@@ -29,7 +29,7 @@ A, B, C, P, Q = (IRI + name for name in 'ABCpq')
 
 @pytest.fixture
 def made(monkeypatch: pytest.MonkeyPatch) -> list[Engine]:
-    """The engines that are made during the test."""
+    """Provide the engines that are made during the test."""
     engines: list[Engine] = []
     init = Engine.__init__
 
@@ -46,12 +46,12 @@ def schema_of(kb: KnowledgeBase) -> list[Axiom]:
 
 
 def sentence_of(text: str) -> str:
-    """A sentence of `unsupported` without the individual that it names as an example."""
+    """Return a sentence of `unsupported` without the individual that it names as an example."""
     return text.partition(': for ')[0]
 
 
 def walk(seed: int) -> None:
-    """A random ontology, whose schema and assertions change at random; the feed too."""
+    """Draw a random ontology, whose schema and assertions change at random; the feed too."""
     drawn = RandomOntology(seed)
     rng = drawn.random
     kb = KnowledgeBase('http://example.org/random', drawn.ontology(rng.randrange(1, 6), 12))
