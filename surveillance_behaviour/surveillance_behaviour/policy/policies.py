@@ -71,7 +71,7 @@ def oldest(world: World, allowed: Sequence[str]) -> Scores:
 
 
 def lookahead(world: World, allowed: Sequence[str]) -> Scores:
-    """Return the best (time unvisited - time to get there) of all places, by way of each candidate."""
+    """Return the best of (time unvisited - time to get there), by way of each candidate."""
     graph = world.graph
     scores = {}
     for place in allowed:
