@@ -396,7 +396,7 @@ def silence(*, quick: bool) -> None:
 def stack_at_speed(
     parameters: dict[str, dict[str, Any]] | None = None, nodes: Sequence[str] = ()
 ) -> Iterator[Stack]:
-    """A stack in real time."""
+    """Provide a stack in real time."""
     given = {'simulator': {}, **(parameters or {})}
     given['simulator']['speed'] = 1.0
     patrol = Stack(ROOT / 'config' / 'seven_rooms.yaml', given, nodes)
@@ -536,7 +536,7 @@ def _await(condition: Callable[[], Any], patience: float) -> None:
 
 
 def pace(*, quick: bool) -> None:
-    """Simulated seconds of the same legs and stops: at full speed beside real time."""
+    """Measure the simulated seconds of the same legs and stops: at full speed beside real time."""
     seconds = 35.0 if quick else 240.0
     measured = [legs_and_stops(speed, seconds) for speed in (0.0, 1.0)]
     rows = []

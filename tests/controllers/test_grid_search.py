@@ -17,7 +17,7 @@ def _small_grids_are_large(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def price(cost: np.ndarray, cells: np.ndarray) -> float:
-    """What a way costs, by the definition."""
+    """Return what a way costs, by the definition."""
     steps = np.diff(cells, axis=0)
     assert np.abs(steps).max() == 1, 'from neighbour to neighbour'
     at = cost[cells[:, 0], cells[:, 1]]
