@@ -254,7 +254,7 @@ class MarkerDetector:
 
 
 def _best(found: Sequence[Detection]) -> list[Detection]:
-    """The surest of detections that lie on each other."""
+    """Return the surest of detections that lie on each other."""
     if len(found) < 2:
         return list(found)
     order = sorted(found, key=lambda detection: -detection.confidence)
