@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 
 import pytest
 from geometry_msgs.msg import Point
@@ -19,6 +20,7 @@ from surveillance_fsm.ros import (
     UnavailableError,
     calls,
 )
+from surveillance_fsm.ros.calls import RoundTrips
 from surveillance_interfaces.action import FollowPath
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.waiting import ClockWait, Interrupt
@@ -93,6 +95,54 @@ def test_service_call_ends_by_interrupt_and_by_deadline(graph, server):
         end()
     with pytest.raises(CallTimeoutError):
         caller.call(Trigger.Request(), timeout=0.2)
+
+
+def test_a_deadline_grows_with_the_round_trips_and_is_bounded():
+    trips = RoundTrips()
+    assert trips.deadline(5.0) == 5.0
+    trips.note(2.0)  # RFC 6298, 2.2: smoothed 2, variation 1
+    assert trips.deadline(5.0) == 6.0
+    trips.note(4.0)  # 2.3: variation 0.75 * 1 + 0.25 * 2, smoothed 0.875 * 2 + 0.125 * 4
+    assert trips.smoothed == pytest.approx(2.25)
+    assert trips.deadline(5.0) == pytest.approx(2.25 + 4.0 * 1.25)
+    assert trips.deadline(0.5) == 2.0, 'at most four times as long'
+    for _ in range(100):
+        trips.note(0.01)
+    assert trips.deadline(5.0) == 5.0
+
+
+def test_a_deadline_doubles_with_each_answer_missed_until_one_comes():
+    trips = RoundTrips()
+    for expected in (2.0, 4.0, 4.0):
+        trips.note_missed()
+        assert trips.deadline(1.0) == expected
+    trips.note(0.1)
+    assert trips.deadline(1.0) == 1.0
+
+
+def test_calls_take_the_time_that_the_link_needs(graph, server, monkeypatch):
+    allowed = []
+    monkeypatch.setattr(
+        calls, 'block_on', lambda _f, deadline, *_a: allowed.append(deadline - time.monotonic())
+    )
+    never_answers(server)
+    caller = ServiceCaller(graph.node, Trigger, 'ask')
+    caller.round_trips.note(20.0)
+    caller.call(Trigger.Request(), timeout=10.0)
+    assert 30.0 < allowed[0] <= 40.0
+    caller.call(Trigger.Request(), timeout=10.0, discovery=5.0)
+    assert allowed[1] <= 10.0, 'it waits for work, not for the link'
+
+
+def test_a_missed_answer_is_noted_and_shown(graph, server):
+    never_answers(server)
+    caller = ServiceCaller(server, Trigger, 'ask')
+    with pytest.raises(CallTimeoutError):
+        caller.call(Trigger.Request(), timeout=0.05)
+    assert caller.round_trips.deadline(1.0) == 2.0
+    graph.add(PatrolNode, name='quick').create_service(Trigger, 'other', lambda _q, a: a)
+    ServiceCaller(server, Trigger, 'other').call(Trigger.Request(), timeout=5.0)
+    assert float(server.health.figures()['other_ms']) > 0.0
 
 
 def test_service_call_notices_that_its_server_went_away(graph, server):

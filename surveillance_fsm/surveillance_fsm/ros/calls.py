@@ -5,7 +5,7 @@ callback (`call_async`); a goal is sent from a worker thread (`GoalCaller.run`).
 callback would stop the executor that brings the answer.
 
 Deadlines here are steady time: how long a peer may take to answer has nothing to do with
-simulated time.
+simulated time. They grow with what the link to the peer gives (`RoundTrips`).
 """
 
 from __future__ import annotations
@@ -38,6 +38,9 @@ DOUBTFUL_SECONDS = 2.0
 One that was killed stays known for 20 s. Its successor may not know this client yet: it then drops
 the request, or its answer, and nothing tells."""
 
+MOST_GROWTH = 4.0
+"""By how much a deadline may grow at most on a slow link."""
+
 SERVER_PERIOD = 0.1
 """Seconds between two looks whether a server that has not answered yet is still there."""
 
@@ -58,6 +61,40 @@ class CallInterruptedError(CallError):
     """The caller's interrupt ended the wait."""
 
 
+class RoundTrips:
+    """Lengthens a peer's deadline by what its answers have taken, as TCP's timer does (RFC 6298).
+
+    An answer that comes too late is not seen, so the deadline doubles with each one that is missed,
+    until one comes and tells how long they take.
+
+    Attributes:
+        smoothed: The smoothed round-trip time, seconds; None before the first answer.
+    """
+
+    def __init__(self) -> None:
+        self.smoothed: float | None = None
+        self._variation = 0.0
+        self._doubled = 1.0
+
+    def note(self, seconds: float) -> None:
+        """Take the time that an answer took into account (RFC 6298, 2.2 and 2.3)."""
+        if self.smoothed is None:
+            self.smoothed, self._variation = seconds, seconds / 2.0
+        else:
+            self._variation = 0.75 * self._variation + 0.25 * abs(self.smoothed - seconds)
+            self.smoothed = 0.875 * self.smoothed + 0.125 * seconds
+        self._doubled = 1.0
+
+    def note_missed(self) -> None:
+        """Note that no answer came in time (RFC 6298, 5.5)."""
+        self._doubled = min(2.0 * self._doubled, MOST_GROWTH)
+
+    def deadline(self, timeout: float) -> float:
+        """Return how long to wait, seconds: from `timeout` to `MOST_GROWTH` times as long."""
+        usual = 0.0 if self.smoothed is None else self.smoothed + 4.0 * self._variation
+        return min(self._doubled * max(timeout, usual), MOST_GROWTH * timeout)
+
+
 class ServiceCaller:
     """Calls one service.
 
@@ -73,6 +110,7 @@ class ServiceCaller:
             srv_type, name, callback_group=ReentrantCallbackGroup(), qos_profile=CLIENT_QOS
         )
         self.name = name
+        self.round_trips = RoundTrips()
 
     def is_ready(self) -> bool:
         """Tell whether the server is there now."""
@@ -93,10 +131,11 @@ class ServiceCaller:
 
         Args:
             request: The request message.
-            timeout: Seconds for finding the server and for its answer together.
+            timeout: Seconds for finding the server and for its answer together; on a slow link
+                the answer may take longer, see `RoundTrips`.
             interrupt: Ends the wait early.
-            discovery: Seconds for finding the server, where an answer may take much longer;
-                default: `timeout`.
+            discovery: Seconds for finding the server, where the answer takes long because there is
+                much to do. The timeout is then kept to; default: `timeout`.
 
         Returns:
             The response message.
@@ -110,12 +149,21 @@ class ServiceCaller:
         found_by = deadline if discovery is None else time.monotonic() + min(discovery, timeout)
         what = f'service {self.name}'
         await_ready(self.is_ready, found_by, interrupt, what)
+        asked = time.monotonic()
+        if discovery is None:
+            deadline += self.round_trips.deadline(timeout) - timeout
         future = self._client.call_async(request)
         try:
-            return block_on(future, deadline, interrupt, what, self._look_for_loss())
-        except CallError:
+            answer = block_on(future, deadline, interrupt, what, self._look_for_loss())
+        except CallError as error:
+            if isinstance(error, CallTimeoutError):
+                self.round_trips.note_missed()
             self._client.remove_pending_request(future)
             raise
+        if discovery is None:
+            self.round_trips.note(time.monotonic() - asked)
+            _show(self._node, self.name, self.round_trips)
+        return answer
 
     def _look_for_loss(self) -> Callable[[], None]:
         """Return a look that raises `UnavailableError` once the server will never answer."""
@@ -150,6 +198,7 @@ class ServiceCaller:
         """
         if not self.is_ready():
             raise UnavailableError(f'service {self.name}: no server')
+        timeout, asked = self.round_trips.deadline(timeout), time.monotonic()
         future = self._client.call_async(request)
         executor = self._node.executor
         late = threading.Event()
@@ -168,7 +217,10 @@ class ServiceCaller:
             timer.cancel()
         if late.is_set() and not future.done():
             self._client.remove_pending_request(future)
+            self.round_trips.note_missed()
             raise CallTimeoutError(f'service {self.name}: no answer within {timeout:g} s')
+        self.round_trips.note(time.monotonic() - asked)
+        _show(self._node, self.name, self.round_trips)
         return response
 
 
@@ -231,6 +283,13 @@ def block_on(
     if interrupt is not None and interrupt.is_set():
         raise CallInterruptedError(f'{what}: interrupted')
     raise CallTimeoutError(f'{what}: no answer in time')
+
+
+def _show(node: Node, name: str, round_trips: RoundTrips) -> None:
+    """Have a node that reports its health tell how long a peer's answers take."""
+    health = getattr(node, 'health', None)
+    if health is not None and round_trips.smoothed is not None:
+        health.figure(f'{name}_ms', f'{1e3 * round_trips.smoothed:.1f}')
 
 
 PROBE_PERIOD = 0.5
@@ -331,6 +390,7 @@ class GoalCaller:
             event_callbacks=SubscriptionEventCallbacks(matched=self._on_matched),
         )
         self.name = name
+        self.round_trips = RoundTrips()
 
     def is_ready(self) -> bool:
         """Tell whether the server is there now."""
@@ -349,7 +409,8 @@ class GoalCaller:
 
         Args:
             goal: The goal message.
-            accept_timeout: Seconds for finding the server and for its yes or no.
+            accept_timeout: Seconds for finding the server and for its yes or no; on a slow link
+                that may take longer, see `RoundTrips`.
             result_timeout: Seconds for the result after that; None waits as long as the server
                 lives. When it passes, the goal is cancelled.
             interrupt: Ends the wait early; the goal is cancelled on the server.
@@ -374,14 +435,20 @@ class GoalCaller:
         # From before the goal is sent: a server that goes right after its yes is seen going.
         wake = Interrupt()
         watch = self._watch = _ServerWatch(wake)
+        asked = time.monotonic()
+        deadline += self.round_trips.deadline(accept_timeout) - accept_timeout
         sent = self._client.send_goal_async(goal, feedback_callback=feedback)
         try:
             handle = block_on(sent, deadline, interrupt, what)
-        except CallError:
+        except CallError as error:
+            if isinstance(error, CallTimeoutError):
+                self.round_trips.note_missed()
             self._watch = None
             # The goal may be accepted yet; it must not run on unseen.
             sent.add_done_callback(_cancel_when_accepted)
             raise
+        self.round_trips.note(time.monotonic() - asked)
+        _show(self._node, self.name, self.round_trips)
         if not handle.accepted:
             self._watch = None
             return GoalEnd('rejected', None)
