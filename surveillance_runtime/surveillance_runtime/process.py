@@ -81,7 +81,7 @@ def run_nodes(
         words = [argv[0], *arguments.rest]
         rclpy.init(args=words, signal_handler_options=SignalHandlerOptions.NO)
     except Exception as error:
-        print(f'cannot start: {_one_line(error)}', file=sys.stderr)
+        print(f'cannot start: {_one_line(error)}{_about_security()}', file=sys.stderr)
         return EXIT_CANNOT_START
     give_arguments(arguments)
     nodes: list[PatrolNode] = []
@@ -326,6 +326,17 @@ def _node_of(error: BaseException) -> Node | None:
                 found = value
         step = step.tb_next
     return found
+
+
+def _about_security() -> str:
+    """What rcl does not say where SROS2 is asked for: what that needs."""
+    if os.environ.get('ROS_SECURITY_ENABLE', '').lower() != 'true':
+        return ''
+    keystore = os.environ.get('ROS_SECURITY_KEYSTORE') or 'not set'
+    return (
+        f'. ROS_SECURITY_ENABLE is true (ROS_SECURITY_KEYSTORE: {keystore}): expected a ROS with '
+        'DDS security, which the one from PyPI has not'
+    )
 
 
 def _one_line(error: BaseException) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 
@@ -24,6 +25,31 @@ def test_nodes_compute_on_one_thread_whatever_was_imported_before() -> None:
         [sys.executable, '-c', PROGRAM], capture_output=True, text=True, timeout=60
     )
     assert "{'blas': 1" in done.stdout, done
+
+
+SECURED = """
+import sys
+from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.process import run_node
+
+sys.exit(run_node(lambda: PatrolNode('secured'), []))
+"""
+
+
+def test_a_ros_without_dds_security_says_so_in_one_line() -> None:
+    secured = {
+        **os.environ,
+        'ROS_SECURITY_ENABLE': 'true',
+        'ROS_SECURITY_STRATEGY': 'Enforce',
+        'ROS_SECURITY_KEYSTORE': '',
+    }
+    done = subprocess.run(
+        [sys.executable, '-c', SECURED], capture_output=True, text=True, timeout=60, env=secured
+    )
+    assert done.returncode == 2
+    assert len(done.stderr.splitlines()) == 1
+    assert done.stderr.startswith('cannot start: ')
+    assert 'expected a ROS with DDS security' in done.stderr
 
 
 LEFT_BEHIND = """
