@@ -329,7 +329,7 @@ def _node_of(error: BaseException) -> Node | None:
 
 
 def _about_security() -> str:
-    """What rcl does not say where SROS2 is asked for: what that needs."""
+    """Return what SROS2 needs, which rcl does not say, where it is asked for."""
     if os.environ.get('ROS_SECURITY_ENABLE', '').lower() != 'true':
         return ''
     keystore = os.environ.get('ROS_SECURITY_KEYSTORE') or 'not set'
