@@ -28,7 +28,7 @@ from typing import Any
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
-from benchmarks.java_reasoner import KINDS, JavaFailed, JavaReasoner, absent  # noqa: E402
+from benchmarks.java_reasoner import KINDS, JavaReasonerError, JavaReasoner, absent  # noqa: E402
 from surveillance_ontology import (  # noqa: E402
     KnowledgeBase,
     OntologyFileError,
@@ -195,7 +195,7 @@ def verdicts(path: Path, java: list[str], limit: float) -> dict[str, str]:
             with JavaReasoner(kind, timeout=limit) as reasoner:
                 try:
                     found[kind] = reasoner.ask('load', str(copy))
-                except JavaFailed as error:
+                except JavaReasonerError as error:
                     found[kind] = str(error)[:40]
     return found
 

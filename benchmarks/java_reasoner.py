@@ -59,12 +59,20 @@ class JavaReasoner:
         )
 
     def ask(self, *words: str) -> str:
-        """Send a command and return its answer."""
+        """Sends a command; its answer."""
+        return self._exchange('\t'.join(words) + '\n')
+
+    def ask_all(self, questions: list[tuple[str, ...]]) -> str:
+        """Sends questions; a letter for each: t(rue), f(alse) or e(rror)."""
+        lines = ''.join('\t'.join(words) + '\n' for words in questions)
+        return self._exchange(f'all\t{len(questions)}\n{lines}')
+
+    def _exchange(self, text: str) -> str:
         process = self._process
         assert process.stdin is not None
         assert process.stdout is not None
         try:
-            process.stdin.write('\t'.join(words) + '\n')
+            process.stdin.write(text)
             process.stdin.flush()
         except BrokenPipeError:
             raise JavaReasonerError('the JVM ended') from None

@@ -4,6 +4,7 @@
 //   load PATH                      -> ok | inconsistent | error MESSAGE
 //   class C X                      -> true | false        (by refutation)
 //   object P X Y, data P X LEXICAL DATATYPE, same X Y, different X Y, subclass C D
+//   all N                          -> for each of the N questions on the next lines a letter: t, f, or e for an error
 //   visit ROBOT FROM TO NOW_OLD NOW_NEW VISIT_OLD VISIT_NEW
 //                                  -> NANOSECONDS of replacing and checking consistency, NANOSECONDS of the queries
 
@@ -38,13 +39,27 @@ public class ResidentReasoner {
         for (String line = in.readLine(); line != null; line = in.readLine()) {
             String answer;
             try {
-                answer = resident.answer(line.split("\t"));
+                String[] words = line.split("\t");
+                answer = words[0].equals("all") ? resident.all(in, Integer.parseInt(words[1])) : resident.answer(words);
             } catch (Throwable error) {
                 answer = "error " + (error.getClass().getName() + ": " + error.getMessage()).replaceAll("\\s+", " ");
             }
             out.println(answer);
             out.flush();
         }
+    }
+
+    String all(BufferedReader in, int number) throws Exception {
+        StringBuilder letters = new StringBuilder();
+        for (int question = 0; question < number; question++) {
+            String[] words = in.readLine().split("\t", -1);
+            try {
+                letters.append(reasoner.isEntailed(axiom(words)) ? 't' : 'f');
+            } catch (Throwable error) {
+                letters.append('e');
+            }
+        }
+        return letters.toString();
     }
 
     String answer(String[] words) throws Exception {
@@ -85,7 +100,10 @@ public class ResidentReasoner {
     }
 
     OWLAxiom value(String property, String individual, String lexical, String datatype) {
-        OWLLiteral literal = factory.getOWLLiteral(lexical, factory.getOWLDatatype(IRI.create(datatype)));
+        // A file's strings come in as plain literals.
+        OWLLiteral literal = datatype.endsWith("#string")
+            ? factory.getOWLLiteral(lexical, "")
+            : factory.getOWLLiteral(lexical, factory.getOWLDatatype(IRI.create(datatype)));
         return factory.getOWLDataPropertyAssertionAxiom(data(property), individual(individual), literal);
     }
 

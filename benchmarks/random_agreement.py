@@ -1,0 +1,182 @@
+"""How far the reasoner agrees with HermiT and Pellet on random ontologies.
+
+    python benchmarks/random_agreement.py [--number 1000] [--first 0] [--cases 0.2] [--kind hermit]
+
+Each ontology is drawn by `tests/ontology/reasoner/wide_ontologies.py` from its number as seed: every construct
+of OWL 2 DL, nested to depth 4; `--cases` says how likely a union, an enumeration or a complement is
+drawn. The Java reasoner (a copy that owlready2 brings) stays in one JVM and is asked by refutation:
+types of individuals, values of properties, same and different, subclasses. `unsound` are facts
+derived here and refuted there, `silent` those that follow there, are not derived here, and whose
+ontology has nothing in `unsupported`; `named` those where something is reported.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT))
+
+from benchmarks.java_reasoner import KINDS, JavaReasoner, JavaReasonerError, absent  # noqa: E402
+from surveillance_ontology import KnowledgeBase, write_ontology  # noqa: E402
+from surveillance_ontology.owl.axioms import (  # noqa: E402
+    Axiom,
+    ClassAssertion,
+    DataPropertyAssertion,
+    DifferentIndividuals,
+    ObjectPropertyAssertion,
+    SameIndividual,
+    SubClassOf,
+)
+from surveillance_ontology.owl.vocabulary import NOTHING  # noqa: E402
+from tests.ontology.reasoner.wide_ontologies import (  # noqa: E402
+    CLASSES,
+    INDIVIDUALS,
+    OBJECTS,
+    WideOntology,
+)
+
+IRI = 'http://example.org/wide'
+COLUMNS = ('ontologies', 'refused', 'no answer', 'inconsistent', 'questions', 'right')
+FAULTS = ('named', 'silent', 'unsound', 'false inconsistency', 'crash')
+
+
+def questions(axioms: list[Axiom]) -> Iterator[tuple[Axiom, tuple[str, ...]]]:
+    """Every fact that could follow, and the words that ask for it."""
+    values = {(a.prop, a.literal) for a in axioms if isinstance(a, DataPropertyAssertion)}
+    for one in INDIVIDUALS:
+        for cls in CLASSES:
+            yield ClassAssertion(cls, one), ('class', cls, one)
+        for prop, value in sorted(values, key=repr):
+            words = ('data', prop, one, value.lexical, value.datatype)
+            yield DataPropertyAssertion(prop, one, value), words
+        for other in INDIVIDUALS:
+            for prop in OBJECTS:
+                yield ObjectPropertyAssertion(prop, one, other), ('object', prop, one, other)
+            if one < other:
+                pair = frozenset((one, other))
+                yield SameIndividual(pair), ('same', one, other)
+                yield DifferentIndividuals(pair), ('different', one, other)
+    for sub in CLASSES:
+        for sup in (*CLASSES, NOTHING):
+            if sub != sup:
+                yield SubClassOf(sub, sup), ('subclass', sub, sup)
+
+
+class Comparison:
+    """Compares one ontology after the other, and counts.
+
+    Args:
+        kind: The Java reasoner.
+        seconds: Its longest time for an ontology.
+    """
+
+    def __init__(self, kind: str, seconds: float) -> None:
+        self._kind, self._seconds = kind, seconds
+        self._java: JavaReasoner | None = None
+        self.counts: Counter[str] = Counter()
+        self.time = 0.0
+
+    def compare(self, seed: int, axioms: list[Axiom], path: Path) -> Iterator[str]:
+        """Counts one ontology; yields a line for every fault."""
+        counts = self.counts
+        counts['ontologies'] += 1
+        write_ontology(axioms, IRI, path)
+        kb = KnowledgeBase(IRI, axioms)
+        start = time.perf_counter()
+        try:
+            consistent = kb.reason()
+            reported = bool(kb.unsupported)
+        except Exception as error:
+            counts['crash'] += 1
+            yield f'{seed}: crash: {type(error).__name__}: {error}'
+            return
+        finally:
+            took = time.perf_counter() - start
+            self.time += took
+        if took > 2.0:
+            yield f'{seed}: slow: {took:.1f} s'
+        asked = list(questions(axioms))
+        try:
+            theirs, answers = self._answers(path, [words for _, words in asked])
+        except JavaReasonerError as error:
+            late = 'no answer' in str(error)
+            counts['no answer' if late else 'refused'] += 1
+            if late:
+                self.close()
+            return
+        missing = 'named' if reported else 'silent'
+        if not theirs:
+            counts['inconsistent'] += 1
+        if consistent and not theirs:
+            counts[missing] += 1
+            if not reported:
+                yield f'{seed}: silent: no contradiction found'
+        elif theirs and not consistent:
+            counts['false inconsistency'] += 1
+            yield f'{seed}: false inconsistency: {kb.explain_inconsistency()}'
+        elif theirs:
+            for (axiom, _), answer in zip(asked, answers, strict=True):
+                if answer == 'e':
+                    continue
+                counts['questions'] += 1
+                ours = kb.holds(axiom)
+                if ours == (answer == 't'):
+                    counts['right'] += 1
+                elif ours:
+                    counts['unsound'] += 1
+                    yield f'{seed}: unsound: {axiom}'
+                else:
+                    counts[missing] += 1
+                    if not reported:
+                        yield f'{seed}: silent: {axiom}'
+
+    def _answers(self, path: Path, asked: list[tuple[str, ...]]) -> tuple[bool, str]:
+        if self._java is None:
+            self._java = JavaReasoner(self._kind, timeout=self._seconds)
+        if self._java.ask('load', str(path)) != 'ok':
+            return False, ''
+        return True, self._java.ask_all(asked)
+
+    def close(self) -> None:
+        """Ends the JVM; the next comparison starts another one."""
+        if self._java is not None:
+            self._java.close()
+            self._java = None
+
+
+def main() -> None:
+    """Reads the arguments and prints the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument('--number', type=int, default=1000, help='how many ontologies')
+    parser.add_argument('--first', type=int, default=0, help='the first seed')
+    parser.add_argument('--cases', type=float, default=0.2, help='share of disjunctive classes')
+    parser.add_argument('--kind', choices=KINDS, default='hermit')
+    parser.add_argument('--seconds', type=float, default=30.0, help='longest time for an ontology')
+    parser.add_argument('--quick', action='store_true', help='40 ontologies')
+    arguments = parser.parse_args()
+    if why := absent():
+        parser.exit(1, f'{why}\n')
+    number = 40 if arguments.quick else arguments.number
+    comparison = Comparison(arguments.kind, arguments.seconds)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / 'random.owl'
+        for seed in range(arguments.first, arguments.first + number):
+            drawn = WideOntology(seed, arguments.cases)
+            axioms = drawn.ontology(drawn.random.randrange(1, 9), drawn.random.randrange(3, 12))
+            for line in comparison.compare(seed, axioms, path):
+                print(line, flush=True)
+    comparison.close()
+    for name in (*COLUMNS, *FAULTS):
+        print(f'{name:20} {comparison.counts[name]:8}')
+    print(f'{"seconds here":20} {comparison.time:8.1f}')
+
+
+if __name__ == '__main__':
+    main()

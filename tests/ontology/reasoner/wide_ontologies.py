@@ -1,0 +1,259 @@
+"""Random ontologies with every construct of OWL 2 DL, from one seed each.
+
+They keep OWL 2 DL's restrictions (only simple properties are counted, chains are regular), so that
+HermiT and Pellet take them.
+"""
+
+from __future__ import annotations
+
+import random
+
+from surveillance_ontology.owl import axioms as ax
+from surveillance_ontology.owl import expressions as ex
+from surveillance_ontology.owl.axioms import Axiom
+from surveillance_ontology.owl.expressions import ClassExpression, DataRange, Literal
+from surveillance_ontology.owl.vocabulary import NOTHING, OWL, THING, TOP_LITERAL, XSD
+
+BASE = 'http://example.org/wide#'
+CLASSES = [BASE + name for name in 'ABCDEF']
+SIMPLE = [BASE + name for name in ('p', 'q', 'r')]
+LONG = [BASE + name for name in ('t', 'u')]
+"""Properties that may be transitive or implied by chains, later ones above earlier ones."""
+OBJECTS = [*SIMPLE, *LONG]
+DATAS = [BASE + name for name in ('d', 'e')]
+INDIVIDUALS = [BASE + name for name in 'ijkl']
+_NUMBERS = ('integer', 'int', 'byte', 'nonNegativeInteger', 'positiveInteger', 'decimal')
+_FACETS = ('minInclusive', 'maxInclusive', 'minExclusive', 'maxExclusive')
+_DATATYPES = (
+    *(XSD + name for name in (*_NUMBERS, 'string', 'boolean', 'float', 'double', 'dateTime')),
+    *(XSD + name for name in ('anyURI', 'hexBinary', 'token', 'unsignedByte', 'negativeInteger')),
+    *(OWL + 'real', OWL + 'rational', TOP_LITERAL),
+)
+
+
+class WideOntology:
+    """Draws axioms.
+
+    Args:
+        seed: Equal seeds draw equal axioms.
+        cases: How likely a class expression is drawn whose consequences may need reasoning by
+            cases: a union, an enumeration or a complement, wherever it stands.
+    """
+
+    def __init__(self, seed: int, cases: float = 0.2) -> None:
+        self.random = random.Random(seed)
+        self._cases = cases
+
+    # --- values ---
+
+    def literal(self) -> Literal:
+        draw = self.random
+        number = draw.randrange(-1, 4)
+        return draw.choices(
+            [
+                Literal(str(number), XSD + 'integer'),
+                Literal(str(abs(number)), XSD + draw.choice(['int', 'byte', 'unsignedByte'])),
+                Literal(f'{number}.{draw.choice("05")}', XSD + 'decimal'),
+                Literal(draw.choice(['', 'a', 'ab', 'b c']), XSD + 'string'),
+                Literal(draw.choice(['true', 'false', '1']), XSD + 'boolean'),
+                Literal(f'{number}.5', XSD + draw.choice(['float', 'double'])),
+                Literal(f'200{abs(number)}-01-01T00:00:00Z', XSD + 'dateTime'),
+                Literal('http://example.org/', XSD + 'anyURI'),
+            ],
+            [8, 3, 3, 3, 2, 2, 2, 1],
+        )[0]
+
+    def data_range(self, depth: int = 2) -> DataRange:
+        draw = self.random
+        choice = draw.randrange(10) if depth else draw.randrange(6)
+        if choice <= 1:
+            return draw.choice(_DATATYPES)
+        if choice <= 4:
+            kind = draw.random()
+            facet = XSD + draw.choice(_FACETS)
+            if kind < 0.6:
+                datatype = XSD + draw.choice(_NUMBERS)
+                bound = Literal(str(draw.randrange(1, 4)), datatype)
+                facets = [(facet, bound)]
+                if draw.random() < 0.4:
+                    bound = Literal(str(draw.randrange(1, 5)), datatype)
+                    facets.append((XSD + draw.choice(_FACETS), bound))
+            elif kind < 0.75:
+                datatype = XSD + draw.choice(['float', 'double'])
+                facets = [(facet, Literal(f'{draw.randrange(3)}.5', datatype))]
+            elif kind < 0.88:
+                datatype = XSD + 'string'
+                size = Literal(str(draw.randrange(3)), XSD + 'nonNegativeInteger')
+                name = draw.choice(['length', 'minLength', 'maxLength', 'pattern'])
+                facets = [(XSD + name, Literal('a.*') if name == 'pattern' else size)]
+            else:
+                datatype = XSD + 'dateTime'
+                moment = f'200{draw.randrange(4)}-01-01T00:00:00Z'
+                facets = [(facet, Literal(moment, datatype))]
+            return ex.DatatypeRestriction(datatype, tuple(facets))
+        if choice == 5:
+            number = draw.choice([1, 1, 2, 3])
+            return ex.DataOneOf(tuple(dict.fromkeys(self.literal() for _ in range(number))))
+        if choice == 6:
+            return ex.DataComplementOf(self.data_range(depth - 1))
+        kind = draw.choice([ex.DataIntersectionOf, ex.DataUnionOf])
+        return kind((self.data_range(depth - 1), self.data_range(depth - 1)))
+
+    # --- classes ---
+
+    def named(self) -> str:
+        return self.random.choice(CLASSES)
+
+    def simple(self) -> ex.PropertyExpression:
+        name = self.random.choice(SIMPLE)
+        return ex.ObjectInverseOf(name) if self.random.random() < 0.25 else name
+
+    def prop(self) -> ex.PropertyExpression:
+        name = self.random.choice(OBJECTS)
+        return ex.ObjectInverseOf(name) if self.random.random() < 0.25 else name
+
+    def expression(self, depth: int = 4) -> ClassExpression:
+        """A class expression, nested to the given depth."""
+        draw = self.random
+        if not depth or draw.random() < 0.3:
+            return self._leaf()
+        less = depth - draw.choice([1, 1, 2, depth])
+        if draw.random() < self._cases:
+            choice = draw.randrange(4)
+            if choice == 0:
+                return ex.ObjectComplementOf(self.expression(less))
+            if choice == 1:
+                members = draw.sample(INDIVIDUALS, draw.choice([1, 2, 2, 3]))
+                return ex.ObjectOneOf(tuple(members))
+            return ex.ObjectUnionOf((self.expression(less), self.expression(depth - 1)))
+        choice = draw.randrange(16)
+        if choice <= 1:
+            return ex.ObjectIntersectionOf((self.expression(less), self.expression(depth - 1)))
+        if choice <= 4:
+            return ex.ObjectSomeValuesFrom(self.prop(), self.expression(depth - 1))
+        if choice <= 6:
+            return ex.ObjectAllValuesFrom(self.prop(), self.expression(depth - 1))
+        if choice == 7:
+            return ex.ObjectHasValue(self.prop(), draw.choice(INDIVIDUALS))
+        if choice == 8:
+            return ex.ObjectHasSelf(draw.choice(SIMPLE))
+        if choice <= 10:
+            kind = draw.choice(
+                [ex.ObjectMinCardinality, ex.ObjectMaxCardinality, ex.ObjectExactCardinality]
+            )
+            filler = THING if draw.random() < 0.4 else self.expression(less)
+            return kind(draw.choice([0, 1, 1, 2, 2, 3]), self.simple(), filler)
+        data = draw.choice(DATAS)
+        if choice == 11:
+            return ex.DataHasValue(data, self.literal())
+        if choice <= 13:
+            return ex.DataSomeValuesFrom(data, self.data_range())
+        if choice == 14:
+            return ex.DataAllValuesFrom(data, self.data_range())
+        counted = draw.choice(
+            [ex.DataMinCardinality, ex.DataMaxCardinality, ex.DataExactCardinality]
+        )
+        return counted(draw.choice([0, 1, 2, 3]), data, self.data_range())
+
+    def _leaf(self) -> ClassExpression:
+        chance = self.random.random()
+        if chance < 0.04:
+            return THING
+        return NOTHING if chance < 0.06 else self.named()
+
+    # --- axioms ---
+
+    def class_axiom(self) -> Axiom:
+        draw = self.random
+        choice = draw.randrange(12)
+        if choice <= 4:
+            return ax.SubClassOf(self.named(), self.expression())
+        if choice <= 6:
+            return ax.SubClassOf(self.expression(), self.expression())
+        if choice <= 8:
+            return ax.EquivalentClasses((self.named(), self.expression()))
+        if choice <= 10:
+            return ax.DisjointClasses(tuple(draw.sample(CLASSES, 2)))
+        whole, *parts = draw.sample(CLASSES, 3)
+        return ax.DisjointUnion(whole, tuple(parts))
+
+    def property_axiom(self) -> Axiom:
+        draw = self.random
+        choice = draw.randrange(20)
+        prop = self.prop()
+        if choice <= 1:
+            return ax.SubObjectPropertyOf(self.simple(), draw.choice(OBJECTS))
+        if choice == 2:
+            return ax.InverseObjectProperties(*draw.sample(SIMPLE, 2))
+        if choice == 3:
+            return ax.SymmetricObjectProperty(draw.choice(OBJECTS))
+        if choice == 4:
+            return ax.TransitiveObjectProperty(draw.choice(LONG))
+        if choice == 5:
+            first, second = draw.choice(SIMPLE), draw.choice(SIMPLE)
+            target = draw.choice(LONG)
+            chain = draw.choice([(first, second), (target, second), (first, target)])
+            return ax.SubPropertyChainOf(chain, target)
+        if choice == 6:
+            return ax.FunctionalObjectProperty(self.simple())
+        if choice == 7:
+            return ax.InverseFunctionalObjectProperty(draw.choice(SIMPLE))
+        if choice == 8:
+            return ax.ReflexiveObjectProperty(draw.choice(OBJECTS))
+        if choice == 9:
+            kinds = [ax.AsymmetricObjectProperty, ax.IrreflexiveObjectProperty]
+            return draw.choice(kinds)(draw.choice(SIMPLE))
+        if choice == 10:
+            return ax.DisjointObjectProperties(tuple(draw.sample(SIMPLE, 2)))
+        if choice <= 12:
+            return ax.ObjectPropertyDomain(prop, self.expression(2))
+        if choice <= 14:
+            return ax.ObjectPropertyRange(prop, self.expression(2))
+        if choice == 15:
+            return ax.FunctionalDataProperty(draw.choice(DATAS))
+        if choice == 16:
+            return ax.DataPropertyRange(draw.choice(DATAS), self.data_range())
+        if choice == 17:
+            pair = tuple(draw.sample(DATAS, 2))
+            if draw.random() < 0.4:
+                return ax.DisjointDataProperties(pair)
+            return ax.SubDataPropertyOf(*pair)
+        if choice == 18:
+            return ax.DataPropertyDomain(draw.choice(DATAS), self.expression(2))
+        if draw.random() < 0.6:
+            return ax.HasKey(self.named(), (), (draw.choice(DATAS),))
+        return ax.HasKey(self.named(), (self.simple(),), ())
+
+    def assertion(self) -> Axiom:
+        draw = self.random
+        chance = draw.random()
+        one, two = draw.choice(INDIVIDUALS), draw.choice(INDIVIDUALS)
+        if chance < 0.2:
+            return ax.ClassAssertion(self.named(), one)
+        if chance < 0.32:
+            return ax.ClassAssertion(self.expression(), one)
+        if chance < 0.6:
+            return ax.ObjectPropertyAssertion(draw.choice(OBJECTS), one, two)
+        if chance < 0.75:
+            return ax.DataPropertyAssertion(draw.choice(DATAS), one, self.literal())
+        if chance < 0.85:
+            members = draw.sample(INDIVIDUALS, draw.choice([2, 2, 3, 4]))
+            return ax.DifferentIndividuals(frozenset(members))
+        if chance < 0.9:
+            return ax.SameIndividual(frozenset(draw.sample(INDIVIDUALS, 2)))
+        if chance < 0.95:
+            return ax.NegativeObjectPropertyAssertion(draw.choice(OBJECTS), one, two)
+        return ax.NegativeDataPropertyAssertion(draw.choice(DATAS), one, self.literal())
+
+    def ontology(self, schema: int, assertions: int) -> list[Axiom]:
+        """Declarations, axioms about classes and properties, and assertions."""
+        declared: list[Axiom] = [ax.Declaration('class', name) for name in CLASSES]
+        declared += [ax.Declaration('object_property', name) for name in OBJECTS]
+        declared += [ax.Declaration('data_property', name) for name in DATAS]
+        declared += [ax.Declaration('individual', name) for name in INDIVIDUALS]
+        drawn = [
+            self.class_axiom() if self.random.random() < 0.6 else self.property_axiom()
+            for _ in range(schema)
+        ]
+        drawn += [self.assertion() for _ in range(assertions)]
+        return list(dict.fromkeys(declared + drawn))
