@@ -8,9 +8,10 @@ the chains of R (Horrocks and Sattler, "Decidability of SHIQ with complex role i
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from itertools import count
+from typing import Any, TypeAlias
 
 from surveillance_ontology.owl.axiom_text import axiom_text
 from surveillance_ontology.reasoner.clauses import (
@@ -26,24 +27,124 @@ from surveillance_ontology.reasoner.clauses import (
 )
 from surveillance_ontology.reasoner.contexts import Role, closure, turned
 
-_Steps = list[tuple[int, 'Role | None', int]]
+AnyRole: TypeAlias = tuple[Any, bool]
+Step: TypeAlias = tuple[int, 'AnyRole | None', int]
 _X, _Y = 0, 1
 
 
 def spell_out_chains(program: Program) -> None:
-    """Add the steps of every chain to a program's clauses."""
-    _Chains(program).run()
+    """Adds the steps of every chain to a program's clauses."""
+    _Spelling(program).run()
 
 
-class _IrregularError(Exception):
+class IrregularError(Exception):
     """Property chains depend on each other in a circle."""
 
 
-class _Chains:
+class Chains:
+    """The chains that imply each role; a role is a property's key and whether it is turned."""
+
+    def __init__(self) -> None:
+        self._chains: dict[AnyRole, list[tuple[AnyRole, ...]]] = {}
+        self._below: dict[AnyRole, set[AnyRole]] = {}
+
+    def __bool__(self) -> bool:
+        return bool(self._chains)
+
+    def __iter__(self) -> Iterator[AnyRole]:
+        return iter(tuple(self._chains))
+
+    def imply(self, chain: tuple[AnyRole, ...], role: AnyRole) -> None:
+        """Notes that a chain, or with one part a property, implies a role."""
+        back = tuple(turned(one) for one in reversed(chain))
+        if len(chain) == 1:
+            self._below.setdefault(role, set()).add(chain[0])
+            self._below.setdefault(turned(role), set()).add(back[0])
+        else:
+            self._chains.setdefault(role, []).append(tuple(chain))
+            self._chains.setdefault(turned(role), []).append(back)
+
+    def roles_below(self, role: AnyRole) -> list[AnyRole]:
+        """The role and every role that implies it by itself."""
+        return list(closure(role, lambda one: self._below.get(one, ())))
+
+    def is_complex(self, role: AnyRole) -> bool:
+        """Whether a chain implies the role."""
+        return any(one in self._chains for one in self.roles_below(role))
+
+    def steps(self, role: AnyRole) -> list[Step]:
+        """The automaton of a role: its steps from state 0 to state 1.
+
+        Raises:
+            IrregularError: The role's chains use a role that depends on it.
+        """
+        found: list[Step] = []
+        self._accept(role, 0, 1, found, (), count(2))
+        return found
+
+    def _accept(
+        self,
+        role: AnyRole,
+        first: int,
+        last: int,
+        steps: list[Step],
+        above: tuple[AnyRole, ...],
+        fresh: count[int],
+    ) -> None:
+        """Adds the steps between two states of a role's own that its chains make.
+
+        Raises:
+            IrregularError: The role's chains use a role that depends on it.
+        """
+        below = self.roles_below(role)
+        if any(one in above for one in below):
+            raise IrregularError
+        equal = [one for one in below if role in self.roles_below(one)]
+        stack = (*above, *equal)
+        steps.append((first, role, last))
+        for one in below:
+            if one not in equal and one in self._chains:
+                self._detour(one, first, last, steps, stack, fresh)
+        for chain in [chain for one in equal for chain in self._chains.get(one, ())]:
+            inner, start, end = list(chain), first, last
+            if len(inner) == 2 and inner[0] in equal and inner[1] in equal:
+                steps.append((last, None, first))
+                continue
+            if inner[0] in equal:
+                start, inner = last, inner[1:]
+            elif inner[-1] in equal:
+                end, inner = first, inner[:-1]
+            here = start
+            for place, part in enumerate(inner):
+                there = end if place == len(inner) - 1 else next(fresh)
+                self._detour(part, here, there, steps, stack, fresh)
+                here = there
+
+    def _detour(
+        self,
+        role: AnyRole,
+        here: int,
+        there: int,
+        steps: list[Step],
+        above: tuple[AnyRole, ...],
+        fresh: count[int],
+    ) -> None:
+        """Leads from one state to another along a role, through states of its own."""
+        if not self.is_complex(role):
+            if role in above:
+                raise IrregularError
+            steps.append((here, role, there))
+            return
+        first, last = next(fresh), next(fresh)
+        steps.append((here, None, first))
+        steps.append((last, None, there))
+        self._accept(role, first, last, steps, above, fresh)
+
+
+class _Spelling:
     def __init__(self, program: Program) -> None:
         self._program = program
-        self._chains: dict[Role, list[tuple[Role, ...]]] = {}
-        self._below: dict[Role, set[Role]] = {}
+        self._chains = Chains()
         self._numbers = count(1)
         for clause in program.clauses:
             if not clause.named_only:
@@ -70,20 +171,7 @@ class _Chains:
             here = step.terms[0] if backwards else step.terms[1]
         if here != end or start == end:
             return
-        role = (head.predicate, False)
-        back = tuple(turned(one) for one in reversed(chain))
-        if len(chain) == 1:
-            self._below.setdefault(role, set()).add(chain[0])
-            self._below.setdefault(turned(role), set()).add(back[0])
-        else:
-            self._chains.setdefault(role, []).append(tuple(chain))
-            self._chains.setdefault(turned(role), []).append(back)
-
-    def _roles_below(self, role: Role) -> list[Role]:
-        return list(closure(role, lambda one: self._below.get(one, ())))
-
-    def _is_complex(self, role: Role) -> bool:
-        return any(one in self._chains for one in self._roles_below(role))
+        self._chains.imply(tuple(chain), (head.predicate, False))
 
     # --- clauses ---
 
@@ -108,7 +196,7 @@ class _Chains:
         if one == other or (isinstance(one, Constant) and isinstance(other, Constant)):
             return
         role = (link.predicate, False)
-        if not self._is_complex(role):
+        if not self._chains.is_complex(role):
             return
         rest = [atom for atom in clause.body if atom is not link]
         used = {t for atom in (*rest, clause.head) for t in atom.terms}
@@ -135,10 +223,9 @@ class _Chains:
         head: HeadAtom,
         clause: Clause,
     ) -> None:
-        steps: _Steps = []
         try:
-            self._accept(role, 0, 1, steps, (), count(2))
-        except _IrregularError:
+            steps = self._chains.steps(role)
+        except IrregularError:
             text = 'the ontology' if clause.origin is None else axiom_text(clause.origin)
             sentence = f'{text}: its property chains depend on each other in a circle'
             if sentence not in self._program.unsupported:
@@ -174,64 +261,6 @@ class _Chains:
         last = (PredicateAtom(state(1), (_X,)), *(_moved(atom, end, _X) for atom in target))
         add(Clause(last, _moved(head, end, _X), clause.origin))  # type: ignore[arg-type]
 
-    def _accept(
-        self,
-        role: Role,
-        first: int,
-        last: int,
-        steps: _Steps,
-        above: tuple[Role, ...],
-        fresh: count[int],
-    ) -> None:
-        """Add the steps between two states of a role's own that its chains make.
-
-        Raises:
-            _IrregularError: The role's chains use a role that depends on it.
-        """
-        below = self._roles_below(role)
-        if any(one in above for one in below):
-            raise _IrregularError
-        equal = [one for one in below if role in self._roles_below(one)]
-        stack = (*above, *equal)
-        steps.append((first, role, last))
-        for one in below:
-            if one not in equal and one in self._chains:
-                self._detour(one, first, last, steps, stack, fresh)
-        for chain in [chain for one in equal for chain in self._chains.get(one, ())]:
-            inner, start, end = list(chain), first, last
-            if len(inner) == 2 and inner[0] in equal and inner[1] in equal:
-                steps.append((last, None, first))
-                continue
-            if inner[0] in equal:
-                start, inner = last, inner[1:]
-            elif inner[-1] in equal:
-                end, inner = first, inner[:-1]
-            here = start
-            for place, part in enumerate(inner):
-                there = end if place == len(inner) - 1 else next(fresh)
-                self._detour(part, here, there, steps, stack, fresh)
-                here = there
-
-    def _detour(
-        self,
-        role: Role,
-        here: int,
-        there: int,
-        steps: _Steps,
-        above: tuple[Role, ...],
-        fresh: count[int],
-    ) -> None:
-        """Lead from one state to another along a role, through states of its own."""
-        if not self._is_complex(role):
-            if role in above:
-                raise _IrregularError
-            steps.append((here, role, there))
-            return
-        first, last = next(fresh), next(fresh)
-        steps.append((here, None, first))
-        steps.append((last, None, there))
-        self._accept(role, first, last, steps, above, fresh)
-
     def _individuals(self) -> None:
         """Chains that end at an individual the classes name."""
         names = {
@@ -244,7 +273,7 @@ class _Chains:
             if isinstance(term, Constant) and not term.is_value
         }
         for name in names:
-            for role in tuple(self._chains):
+            for role in self._chains:
                 constant = Constant(name)
                 terms = (constant, _X) if role[1] else (_X, constant)
                 head = PredicateAtom(role[0], terms)

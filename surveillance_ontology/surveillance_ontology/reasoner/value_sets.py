@@ -258,6 +258,15 @@ class ValueSet:
         """Tell whether every value is in another set."""
         return (self & ~other).is_empty
 
+    def members(self) -> Iterator[Value]:
+        """The values of a finite set."""
+        for part in self.parts.values():
+            for one in part:
+                yield from one.listed or ()
+        for layer, intervals in self.intervals.items():
+            for low, high in intervals:
+                yield from _between(layer, low, high)
+
     @property
     def size(self) -> float:
         """The number of values."""
@@ -289,6 +298,35 @@ def _count(layer: str, low: _End, high: _End) -> float:
     if low.key != high.key:
         return math.inf
     return int(_layer_of(low.key) == layer)
+
+
+def _between(layer: str, low: _End, high: _End) -> Iterator[Value]:
+    """The values of a layer between two ends, where they are finitely many."""
+    number = int(_count(layer, low, high))
+    if layer == 'whole':
+        first = math.ceil(low.key) + (low.side > 0 and math.ceil(low.key) == low.key)
+        yield from range(first, first + number)
+    elif layer in ('float', 'double'):
+        key = float(low.key)
+        if low.side > 0:
+            key = _next_float(layer, key)
+        for _ in range(number):
+            yield layer, key
+            key = _next_float(layer, key)
+    elif number:
+        yield low.key
+
+
+def _next_float(layer: str, key: float) -> float:
+    if layer == 'double':
+        return math.nextafter(key, math.inf)
+    bits: int = struct.unpack('<i', struct.pack('<f', key))[0]
+    if key == 0.0:
+        bits = 1
+    else:
+        bits += 1 if bits >= 0 else -1
+    following: float = struct.unpack('<f', struct.pack('<i', bits))[0]
+    return 0.0 if following == 0.0 else following
 
 
 def _count_floats(layer: str, low: _End, high: _End) -> float:

@@ -1,0 +1,756 @@
+"""Axioms as rules with alternatives, for reasoning by cases.
+
+A rule says: whoever has all these concepts (and is related to somebody, or has a value, with those)
+has one of these concepts, or one of them belongs to the other. Complex classes get concepts of
+their own (Motik, Shearer and Horrocks, "Hypertableau reasoning for description logics", JAIR 2009,
+section 4.1): `positive` ones imply the class, `recognised` ones are implied by it. Concepts and
+roles are numbers; a negative role is the inverse. Chains become automata (`property_chains`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+
+from surveillance_ontology.owl import axioms as ax
+from surveillance_ontology.owl import expressions as ex
+from surveillance_ontology.owl.axiom_text import axiom_text
+from surveillance_ontology.owl.axioms import Axiom
+from surveillance_ontology.owl.expressions import ClassExpression, PropertyExpression
+from surveillance_ontology.owl.vocabulary import NOTHING, OWL, THING, TOP_LITERAL, local_name
+from surveillance_ontology.reasoner.datatypes import value_of
+from surveillance_ontology.reasoner.property_chains import AnyRole, Chains, IrregularError
+from surveillance_ontology.reasoner.translation import directed, negated, normal
+from surveillance_ontology.reasoner.value_sets import EVERY, ValueSet, point, value_set
+
+_X, _Y = 0, 1
+Heads = tuple[tuple[int, int], ...]
+"""Alternatives: pairs of place (0: the individual, 1: the related one) and concept."""
+_FRESH = 'urn:case:'
+_MOST = 200
+_NONE: frozenset[int] = frozenset()
+
+
+class NotCoveredError(Exception):
+    """Part of an axiom that reasoning by cases does not take; the text says which."""
+
+
+@dataclass(frozen=True, slots=True)
+class NodeRule:
+    """Whoever has the concepts has one of the heads."""
+
+    body: frozenset[int]
+    heads: Heads
+
+
+@dataclass(frozen=True, slots=True)
+class EdgeRule:
+    """For x related to y by the role, with concepts of both: one of the heads."""
+
+    xs: frozenset[int]
+    role: int
+    ys: frozenset[int]
+    heads: Heads
+
+
+@dataclass(frozen=True, slots=True)
+class ValueRule:
+    """For x with a value in `values`: one of the heads; `rest` is what is not in `values`."""
+
+    xs: frozenset[int]
+    values: ValueSet
+    rest: ValueSet
+    heads: Heads
+
+
+@dataclass(frozen=True, slots=True)
+class Count:
+    """At least, or at most, `n` by the role with the concept (0: any)."""
+
+    n: int
+    role: int
+    concept: int
+
+
+@dataclass(frozen=True, slots=True)
+class ValueCount:
+    """At least, or at most, `n` values in a set by a data property."""
+
+    n: int
+    prop: str
+    values: ValueSet
+
+
+@dataclass(frozen=True, slots=True)
+class KeyRule:
+    """Named individuals with the concept that share a value of every property are the same."""
+
+    concept: int
+    roles: tuple[int, ...]
+    props: tuple[str, ...]
+
+
+class CaseRules:
+    """The rules of an ontology's axioms; assertions are passed over.
+
+    Attributes:
+        names: The classes and individuals of concepts: IRI by number, '' for the others.
+        always: Heads for everybody.
+        of_node: Node rules by each concept of the body.
+        by_role, by_source, by_target: Edge rules by role, and by each concept of x and of y.
+        by_prop: Value rules by data property; `of_values` by each concept of x.
+        at_least, at_most, values_at_least, values_at_most: What a concept counts.
+        functional, functional_values: Counts that hold for everybody.
+        loops: Concepts that relate their members to themselves, and the role.
+        marks: Concepts of whoever is related to itself by a role.
+        nominals: Concepts of one individual; `nominal_of` the other way.
+        above: Every role that a role implies, itself included; `props_above` the same for data.
+        disjoint, disjoint_props: Roles (data properties) that exclude each other.
+        keys: The keys.
+        gaps: One sentence for each axiom that is not fully covered.
+        has_inverse: Whether any role is used backwards.
+    """
+
+    def __init__(self, axioms: Iterable[Axiom]) -> None:
+        tbox = [axiom for axiom in axioms if not isinstance(axiom, (ax.Assertion, ax.Annotation))]
+        self.names: list[str] = ['']
+        self._numbers: dict[str, int] = {}
+        self._roles: dict[str, int] = {}
+        self.role_names: list[str] = ['']
+        self.always: list[Heads] = []
+        self.of_node: dict[int, list[NodeRule]] = {}
+        self.by_role: dict[int, list[EdgeRule]] = {}
+        self.by_source: dict[int, list[EdgeRule]] = {}
+        self.by_target: dict[int, list[EdgeRule]] = {}
+        self.by_prop: dict[str, list[ValueRule]] = {}
+        self.of_values: set[int] = set()
+        self.at_least: dict[int, Count] = {}
+        self.at_most: dict[int, Count] = {}
+        self.values_at_least: dict[int, ValueCount] = {}
+        self.values_at_most: dict[int, ValueCount] = {}
+        self.functional: list[Count] = []
+        self.functional_values: list[ValueCount] = []
+        self.loops: dict[int, int] = {}
+        self.marks: dict[int, list[int]] = {}
+        self.nominals: dict[int, str] = {}
+        self.nominal_of: dict[str, int] = {}
+        self.above: dict[int, tuple[int, ...]] = {}
+        self.props_above: dict[str, tuple[str, ...]] = {}
+        self.disjoint: dict[int, set[int]] = {}
+        self.disjoint_props: dict[str, set[str]] = {}
+        self.keys: list[KeyRule] = []
+        self.gaps: dict[str, None] = {}
+        self.has_inverse = False
+        self._positive: dict[ClassExpression, int] = {}
+        self._recognised: dict[ClassExpression, int] = {}
+        self._counts: dict[object, int] = {}
+        self._chains = Chains()
+        self._inclusions: dict[AnyRole, set[AnyRole]] = {}
+        self._data_inclusions: dict[str, set[str]] = {}
+        self._datatypes = {a.datatype: a.range for a in tbox if isinstance(a, ax.DatatypeDefinition)}
+        for axiom in tbox:
+            self._attempt(axiom, self._property_inclusion)
+        for axiom in tbox:
+            self._attempt(axiom, self._axiom)
+
+    def _attempt(self, axiom: Axiom, take: Callable[[Axiom], None]) -> None:
+        try:
+            take(axiom)
+        except NotCoveredError as reason:
+            self.gaps[f'{axiom_text(axiom)}: {reason}'] = None
+
+    # --- numbers ---
+
+    def concept(self, iri: str) -> int:
+        """The number of a named class."""
+        number = self._numbers.get(iri)
+        if number is None:
+            number = self._numbers[iri] = len(self.names)
+            self.names.append('' if iri.startswith(_FRESH) else iri)
+            if iri == NOTHING:
+                self.node_rule(frozenset((number,)), ())
+        return number
+
+    def fresh(self) -> str:
+        """A name for a concept of its own."""
+        return f'{_FRESH}{len(self.names)}'
+
+    def nominal(self, individual: str) -> int:
+        """The concept of one individual."""
+        number = self.nominal_of.get(individual)
+        if number is None:
+            number = self.concept(self.fresh())
+            self.nominal_of[individual] = number
+            self.nominals[number] = individual
+        return number
+
+    def role(self, prop: PropertyExpression | AnyRole) -> int:
+        """The number of a role."""
+        iri, inverted = prop if isinstance(prop, tuple) else directed(prop)
+        if iri in (f'{OWL}topObjectProperty', f'{OWL}bottomObjectProperty'):
+            raise NotCoveredError(f'owl:{local_name(iri)} is not reasoned about by cases')
+        number = self._roles.get(iri)
+        if number is None:
+            number = self._roles[iri] = len(self.role_names)
+            self.role_names.append(iri)
+        if inverted:
+            self.has_inverse = True
+        return -number if inverted else number
+
+    def roles_above(self, role: int) -> tuple[int, ...]:
+        """The role and every role that it implies by itself."""
+        found = self.above.get(role)
+        if found is None:
+            key = (self.role_names[abs(role)], role < 0)
+            seen = {key: None}
+            pending = [key]
+            while pending:
+                for other in self._inclusions.get(pending.pop(), ()):
+                    if other not in seen:
+                        seen[other] = None
+                        pending.append(other)
+            found = self.above[role] = tuple(self.role(one) for one in seen)
+        return found
+
+    def data_above(self, prop: str) -> tuple[str, ...]:
+        """The data property and every one that it implies."""
+        found = self.props_above.get(prop)
+        if found is None:
+            seen = {prop: None}
+            pending = [prop]
+            while pending:
+                for other in self._data_inclusions.get(pending.pop(), ()):
+                    if other not in seen:
+                        seen[other] = None
+                        pending.append(other)
+            found = self.props_above[prop] = tuple(seen)
+        return found
+
+    def is_complex(self, prop: str) -> bool:
+        """Whether a chain implies the property."""
+        return self._chains.is_complex((prop, False))
+
+    def steps(self, prop: str) -> list[tuple[int, int | None, int]]:
+        """The automaton of a property, from state 0 to state 1."""
+        found = self._chains.steps((prop, False))
+        return [(a, None if step is None else self.role(step), b) for a, step, b in found]
+
+    # --- concepts of expressions ---
+
+    def positive(self, expression: ClassExpression) -> int:
+        """A concept whose members are in the class; 0 for owl:Thing."""
+        expression = normal(expression)
+        if expression == THING:
+            return 0
+        if isinstance(expression, str):
+            return self.concept(expression)
+        if isinstance(expression, ex.ObjectOneOf) and len(expression.individuals) == 1:
+            return self.nominal(expression.individuals[0])
+        known = self._positive.get(expression)
+        if known is None:
+            name = self.fresh()
+            known = self._positive[expression] = self.concept(name)
+            self.include(name, expression)
+        return known
+
+    def recognised(self, expression: ClassExpression) -> int:
+        """A concept that all members of the class have; 0 for owl:Thing."""
+        expression = normal(expression)
+        if expression == THING:
+            return 0
+        if isinstance(expression, str):
+            return self.concept(expression)
+        if isinstance(expression, ex.ObjectOneOf) and len(expression.individuals) == 1:
+            return self.nominal(expression.individuals[0])
+        known = self._recognised.get(expression)
+        if known is None:
+            name = self.fresh()
+            known = self._recognised[expression] = self.concept(name)
+            self.include(expression, name)
+        return known
+
+    def _counted(self, table: dict[int, Count], n: int, role: int, concept: int) -> int:
+        key = (id(table), n, role, concept)
+        known = self._counts.get(key)
+        if known is None:
+            if n > _MOST:
+                raise NotCoveredError(f'numbers above {_MOST} are not counted by cases')
+            known = self._counts[key] = self.concept(self.fresh())
+            table[known] = Count(n, role, concept)
+        return known
+
+    def _counted_values(
+        self, table: dict[int, ValueCount], n: int, prop: str, values: ValueSet
+    ) -> int:
+        key = (id(table), n, prop, values)
+        known = self._counts.get(key)
+        if known is None:
+            if n > _MOST:
+                raise NotCoveredError(f'numbers above {_MOST} are not counted by cases')
+            known = self._counts[key] = self.concept(self.fresh())
+            table[known] = ValueCount(n, prop, values)
+        return known
+
+    def values(self, data_range: ex.DataRange) -> ValueSet:
+        """The values of a data range."""
+        found = value_set(self._defined(data_range, ()))
+        if found is None:
+            raise NotCoveredError('a data range is not supported')
+        return found
+
+    def _defined(self, data_range: ex.DataRange, seen: tuple[str, ...]) -> ex.DataRange:
+        if isinstance(data_range, str):
+            if data_range in seen:
+                raise NotCoveredError('a datatype is defined by itself')
+            definition = self._datatypes.get(data_range)
+            if definition is None:
+                return data_range
+            return self._defined(definition, (*seen, data_range))
+        if isinstance(data_range, (ex.DataIntersectionOf, ex.DataUnionOf)):
+            kind = type(data_range)
+            return kind(tuple(self._defined(operand, seen) for operand in data_range.operands))
+        if isinstance(data_range, ex.DataComplementOf):
+            return ex.DataComplementOf(self._defined(data_range.operand, seen))
+        return data_range
+
+    # --- inclusions ---
+
+    def include(self, sub: ClassExpression, sup: ClassExpression) -> None:
+        """Adds the rules by which members of one class are members of another."""
+        _Clause(self).add([negated(normal(sub)), sup])
+
+    def node_rule(self, body: frozenset[int], heads: Heads) -> None:
+        """Adds a rule about one individual."""
+        if any(concept in body for _, concept in heads):
+            return
+        if not body:
+            self.always.append(heads)
+        rule = NodeRule(body, heads)
+        for concept in body:
+            self.of_node.setdefault(concept, []).append(rule)
+
+    def edge_rule(self, rule: EdgeRule) -> None:
+        """Adds a rule about related individuals."""
+        self.by_role.setdefault(rule.role, []).append(rule)
+        for concept in rule.xs:
+            self.by_source.setdefault(concept, []).append(rule)
+        for concept in rule.ys:
+            self.by_target.setdefault(concept, []).append(rule)
+
+    def value_rule(self, prop: str, xs: frozenset[int], values: ValueSet, heads: Heads) -> None:
+        """Adds a rule about values."""
+        if not values.is_empty:
+            self.by_prop.setdefault(prop, []).append(ValueRule(xs, values, ~values, heads))
+            self.of_values |= xs
+
+    def universal(self, concept: int, prop: PropertyExpression, target: int) -> None:
+        """Adds the rules by which whoever a member is related to has another concept."""
+        role = directed(prop)
+        if not self._chains.is_complex(role):
+            rule = EdgeRule(frozenset((concept,)), self.role(role), _NONE, ((_Y, target),))
+            self.edge_rule(rule)
+            return
+        try:
+            steps = self._chains.steps(role)
+        except IrregularError:
+            text = 'its property chains depend on each other in a circle'
+            raise NotCoveredError(text) from None
+        states = {0: concept, 1: self.concept(self.fresh())}
+        self.node_rule(frozenset((states[1],)), ((_X, target),))
+        for before, _, after in steps:
+            for number in (before, after):
+                if number not in states:
+                    states[number] = self.concept(self.fresh())
+        # State 0 may be entered again, so it is not the concept itself.
+        states[0] = self.concept(self.fresh())
+        self.node_rule(frozenset((concept,)), ((_X, states[0]),))
+        for before, step, after in steps:
+            here, there = frozenset((states[before],)), states[after]
+            if step is None:
+                self.node_rule(here, ((_X, there),))
+            else:
+                self.edge_rule(EdgeRule(here, self.role(step), _NONE, ((_Y, there),)))
+
+    def complex_role(self, prop: PropertyExpression) -> bool:
+        """Whether a chain implies the role."""
+        return self._chains.is_complex(directed(prop))
+
+    def mark(self, prop: PropertyExpression) -> int:
+        """A concept of whoever is related to itself by the role."""
+        if self.complex_role(prop):
+            raise NotCoveredError('a property with chains is asked for itself')
+        found = self.marks.setdefault(abs(self.role(prop)), [])
+        if not found:
+            found.append(self.concept(self.fresh()))
+        return found[0]
+
+    def loop(self, prop: PropertyExpression) -> int:
+        """A concept whose members are related to themselves by the role."""
+        key = ('loop', directed(prop)[0])
+        known = self._counts.get(key)
+        if known is None:
+            known = self._counts[key] = self.concept(self.fresh())
+            self.loops[known] = abs(self.role(prop))
+        return known
+
+    # --- axioms ---
+
+    def _property_inclusion(self, axiom: Axiom) -> None:
+        if isinstance(axiom, ax.SubObjectPropertyOf):
+            self._below(directed(axiom.sub), directed(axiom.sup))
+        elif isinstance(axiom, ax.EquivalentObjectProperties):
+            for sub in axiom.props:
+                for sup in axiom.props:
+                    self._below(directed(sub), directed(sup))
+        elif isinstance(axiom, ax.InverseObjectProperties):
+            first, (iri, inverted) = directed(axiom.first), directed(axiom.second)
+            self._below(first, (iri, not inverted))
+            self._below((iri, not inverted), first)
+            self.has_inverse = True
+        elif isinstance(axiom, ax.SymmetricObjectProperty):
+            iri, inverted = directed(axiom.prop)
+            self._below((iri, inverted), (iri, not inverted))
+            self.has_inverse = True
+        elif isinstance(axiom, ax.TransitiveObjectProperty):
+            role = directed(axiom.prop)
+            self._chains.imply((role, role), role)
+        elif isinstance(axiom, ax.SubPropertyChainOf):
+            self._chains.imply(tuple(map(directed, axiom.chain)), directed(axiom.sup))
+        elif isinstance(axiom, ax.SubDataPropertyOf):
+            self._data_inclusions.setdefault(axiom.sub, set()).add(axiom.sup)
+        elif isinstance(axiom, ax.EquivalentDataProperties):
+            for data_prop in axiom.props:
+                self._data_inclusions.setdefault(data_prop, set()).update(axiom.props)
+
+    def _below(self, sub: AnyRole, sup: AnyRole) -> None:
+        for role in (sub, sup):
+            self.role(role)
+        self._inclusions.setdefault(sub, set()).add(sup)
+        turned = (sub[0], not sub[1])
+        self._inclusions.setdefault(turned, set()).add((sup[0], not sup[1]))
+        self._chains.imply((sub,), sup)
+
+    def _axiom(self, axiom: Axiom) -> None:
+        if isinstance(axiom, ax.SubClassOf):
+            self.include(axiom.sub, axiom.sup)
+        elif isinstance(axiom, ax.EquivalentClasses):
+            for sub in axiom.classes:
+                for sup in axiom.classes:
+                    if sub is not sup:
+                        self.include(sub, sup)
+        elif isinstance(axiom, ax.DisjointClasses):
+            self._all_disjoint(axiom.classes)
+        elif isinstance(axiom, ax.DisjointUnion):
+            self._all_disjoint(axiom.classes)
+            for part in axiom.classes:
+                self.include(part, axiom.cls)
+            self.include(axiom.cls, ex.ObjectUnionOf(axiom.classes))
+        elif isinstance(axiom, ax.HasKey):
+            roles = tuple(self.role(prop) for prop in axiom.object_props)
+            if any(map(self.complex_role, axiom.object_props)):
+                raise NotCoveredError('a key uses a property with chains')
+            self.keys.append(KeyRule(self.recognised(axiom.cls), roles, axiom.data_props))
+        elif isinstance(axiom, ax.Rule):
+            raise NotCoveredError('rules are not used in reasoning by cases')
+        else:
+            self._property_axiom(axiom)
+
+    def _all_disjoint(self, classes: tuple[ClassExpression, ...]) -> None:
+        concepts = [self.recognised(expression) for expression in classes]
+        for place, first in enumerate(concepts):
+            for second in concepts[place + 1 :]:
+                self.node_rule(frozenset((first, second)) - {0}, ())
+
+    def _property_axiom(self, axiom: Axiom) -> None:
+        if isinstance(axiom, ax.ReflexiveObjectProperty):
+            self.always.append(((_X, self.loop(axiom.prop)),))
+        elif isinstance(axiom, ax.IrreflexiveObjectProperty):
+            self.node_rule(frozenset((self.mark(axiom.prop),)), ())
+        elif isinstance(axiom, ax.AsymmetricObjectProperty):
+            role = self.role(axiom.prop)
+            self._exclude(role, -role)
+        elif isinstance(axiom, ax.DisjointObjectProperties):
+            if any(map(self.complex_role, axiom.props)):
+                raise NotCoveredError('a property with chains is disjoint from another')
+            for place, first in enumerate(axiom.props):
+                for second in axiom.props[place + 1 :]:
+                    self._exclude(self.role(first), self.role(second))
+        elif isinstance(axiom, (ax.FunctionalObjectProperty, ax.InverseFunctionalObjectProperty)):
+            if self.complex_role(axiom.prop):
+                raise NotCoveredError('a property with chains is functional')
+            role = self.role(axiom.prop)
+            if isinstance(axiom, ax.InverseFunctionalObjectProperty):
+                role, self.has_inverse = -role, True
+            self.functional.append(Count(1, role, 0))
+        elif isinstance(axiom, ax.ObjectPropertyDomain):
+            self.include(ex.ObjectSomeValuesFrom(axiom.prop, THING), axiom.domain)
+        elif isinstance(axiom, ax.ObjectPropertyRange):
+            self.include(THING, ex.ObjectAllValuesFrom(axiom.prop, axiom.range))
+        elif isinstance(axiom, ax.DataPropertyDomain):
+            self.include(ex.DataSomeValuesFrom(axiom.prop, TOP_LITERAL), axiom.domain)
+        elif isinstance(axiom, ax.DataPropertyRange):
+            self.include(THING, ex.DataAllValuesFrom(axiom.prop, axiom.range))
+        elif isinstance(axiom, ax.FunctionalDataProperty):
+            self.functional_values.append(ValueCount(1, axiom.prop, EVERY))
+        elif isinstance(axiom, ax.DisjointDataProperties):
+            for place, name in enumerate(axiom.props):
+                for other in axiom.props[place + 1 :]:
+                    self.disjoint_props.setdefault(name, set()).add(other)
+                    self.disjoint_props.setdefault(other, set()).add(name)
+
+    def _exclude(self, first: int, second: int) -> None:
+        for one, other in ((first, second), (-first, -second)):
+            self.disjoint.setdefault(one, set()).add(other)
+            self.disjoint.setdefault(other, set()).add(one)
+
+
+class _Clause:
+    """A disjunction of class expressions, which everybody is in, on its way to becoming rules."""
+
+    def __init__(self, rules: CaseRules) -> None:
+        self._rules = rules
+        self._body: set[int] = set()
+        self._heads: list[int] = []
+        self._every: list[tuple[PropertyExpression, ClassExpression]] = []
+        self._never: list[tuple[str, ValueSet]] = []
+        self._both: list[ex.ObjectIntersectionOf] = []
+
+    def add(self, disjuncts: Iterable[ClassExpression]) -> None:
+        """Adds the rules of a disjunction."""
+        if not all(map(self._take, _flat(disjuncts))):
+            return
+        if len(self._both) == 1 and not (self._heads or self._every):
+            (both,) = self._both
+            for operand in both.operands:
+                self._apart(operand)
+            return
+        for both in self._both:
+            self._heads.append(self._rules.positive(both))
+        self._related()
+
+    def _apart(self, operand: ClassExpression) -> None:
+        """The disjunction with one operand instead of an intersection."""
+        other = _Clause(self._rules)
+        other._body |= self._body
+        other._never += self._never
+        other.add([operand])
+
+    def _take(self, one: ClassExpression) -> bool:
+        """Sorts a disjunct in; False where it holds of everybody."""
+        rules = self._rules
+        if isinstance(one, str):
+            if one == NOTHING:
+                return True
+            if one == THING:
+                return False
+            self._heads.append(rules.concept(one))
+        elif isinstance(one, ex.ObjectComplementOf):
+            return self._take_complement(one.operand)
+        elif isinstance(one, ex.ObjectIntersectionOf):
+            self._both.append(one)
+        elif isinstance(one, ex.ObjectOneOf):
+            self._heads += map(rules.nominal, one.individuals)
+        elif isinstance(one, ex.ObjectHasValue):
+            self._some(1, one.prop, rules.nominal(one.individual))
+        elif isinstance(one, ex.ObjectHasSelf):
+            self._heads.append(rules.loop(one.prop))
+        elif isinstance(one, ex.ObjectSomeValuesFrom):
+            if normal(one.filler) != NOTHING:
+                self._some(1, one.prop, rules.positive(one.filler))
+        elif isinstance(one, ex.ObjectMinCardinality):
+            if one.n == 0:
+                return False
+            if normal(one.filler) != NOTHING:
+                self._some(one.n, one.prop, rules.positive(one.filler))
+        elif isinstance(one, ex.ObjectAllValuesFrom):
+            if normal(one.filler) == THING:
+                return False
+            self._every.append((one.prop, one.filler))
+        elif isinstance(one, ex.ObjectMaxCardinality):
+            if normal(one.filler) == NOTHING:
+                return False
+            if one.n == 0:
+                self._every.append((one.prop, negated(normal(one.filler))))
+            else:
+                if rules.complex_role(one.prop):
+                    raise NotCoveredError('a property with chains is counted')
+                concept = rules.recognised(one.filler)
+                role = rules.role(one.prop)
+                self._heads.append(rules._counted(rules.at_most, one.n, role, concept))
+        elif isinstance(one, (ex.ObjectExactCardinality, ex.DataExactCardinality)):
+            self._both.append(_exactly(one))
+        else:
+            return self._take_values(one)
+        return True
+
+    def _some(self, n: int, prop: PropertyExpression, concept: int) -> None:
+        rules = self._rules
+        if n > 1 and rules.complex_role(prop):
+            raise NotCoveredError('a property with chains is counted')
+        self._heads.append(rules._counted(rules.at_least, n, rules.role(prop), concept))
+
+    def _take_values(self, one: ClassExpression) -> bool:
+        rules = self._rules
+        if isinstance(one, ex.DataHasValue):
+            values = point(value_of(one.literal))
+            table = rules.values_at_least
+            self._heads.append(rules._counted_values(table, 1, one.prop, values))
+        elif isinstance(one, ex.DataSomeValuesFrom):
+            values = rules.values(one.range)
+            table = rules.values_at_least
+            self._heads.append(rules._counted_values(table, 1, one.prop, values))
+        elif isinstance(one, ex.DataMinCardinality):
+            if one.n == 0:
+                return False
+            values = rules.values(one.range)
+            table = rules.values_at_least
+            self._heads.append(rules._counted_values(table, one.n, one.prop, values))
+        elif isinstance(one, ex.DataAllValuesFrom):
+            self._never.append((one.prop, ~rules.values(one.range)))
+        elif isinstance(one, ex.DataMaxCardinality):
+            values = rules.values(one.range)
+            if one.n == 0:
+                self._never.append((one.prop, values))
+            else:
+                table = rules.values_at_most
+                self._heads.append(rules._counted_values(table, one.n, one.prop, values))
+        else:
+            raise NotCoveredError('a class expression is not known')
+        return True
+
+    def _take_complement(self, one: ClassExpression) -> bool:
+        rules = self._rules
+        if isinstance(one, str):
+            self._body.add(rules.concept(one))
+        elif isinstance(one, ex.ObjectOneOf):
+            if len(one.individuals) == 1:
+                self._body.add(rules.nominal(one.individuals[0]))
+            else:
+                each = tuple(ex.ObjectComplementOf(ex.ObjectOneOf((a,))) for a in one.individuals)
+                self._both.append(ex.ObjectIntersectionOf(each))
+        elif isinstance(one, ex.ObjectHasValue):
+            other = ex.ObjectComplementOf(ex.ObjectOneOf((one.individual,)))
+            self._every.append((one.prop, other))
+        elif isinstance(one, ex.ObjectHasSelf):
+            self._body.add(rules.mark(one.prop))
+        elif isinstance(one, ex.DataHasValue):
+            self._never.append((one.prop, point(value_of(one.literal))))
+        else:
+            raise NotCoveredError('a class expression is not known')
+        return True
+
+    # --- relations: at most one is spelt out, the others become concepts ---
+
+    def _related(self) -> None:
+        rules = self._rules
+        inline: tuple[PropertyExpression, ClassExpression] | None = None
+        never = list(self._never)
+        for prop, filler in sorted(self._every, key=lambda one: _is_negative(one[1])):
+            simple = not rules.complex_role(prop)
+            if inline is None and simple and not (never and _is_negative(filler)):
+                inline = (prop, filler)
+            elif _is_negative(filler):
+                name = rules.fresh()
+                self._body.add(rules.concept(name))
+                self._recognise(prop, negated(normal(filler)), name)
+            else:
+                concept = rules.concept(rules.fresh())
+                self._heads.append(concept)
+                rules.universal(concept, prop, rules.positive(filler))
+        if inline is None and len(never) == 1:
+            self._finish_values(*never[0])
+            return
+        for data_prop, values in never:
+            concept = rules.concept(rules.fresh())
+            self._body.add(concept)
+            rules.value_rule(data_prop, _NONE, values, ((_X, concept),))
+        body = frozenset(self._body)
+        heads = tuple((_X, concept) for concept in dict.fromkeys(self._heads))
+        if inline is None:
+            rules.node_rule(body, heads)
+        else:
+            self._finish_edge(body, heads, *inline)
+
+    def _recognise(self, prop: PropertyExpression, filler: ClassExpression, name: str) -> None:
+        """Everybody related to a member of the filler gets the named concept."""
+        rules = self._rules
+        source = rules.recognised(filler)
+        target = rules.concept(name)
+        if not rules.complex_role(prop):
+            ys = frozenset((source,)) - {0}
+            rules.edge_rule(EdgeRule(_NONE, rules.role(prop), ys, ((_X, target),)))
+            return
+        if not source:
+            source = rules.concept(rules.fresh())
+            rules.always.append(((_X, source),))
+        iri, inverted = directed(prop)
+        rules.has_inverse = True
+        rules.universal(source, iri if inverted else ex.ObjectInverseOf(iri), target)
+
+    def _finish_values(self, prop: str, values: ValueSet) -> None:
+        heads = tuple((_X, concept) for concept in dict.fromkeys(self._heads))
+        self._rules.value_rule(prop, frozenset(self._body), values, heads)
+
+    def _finish_edge(
+        self,
+        body: frozenset[int],
+        heads: Heads,
+        prop: PropertyExpression,
+        filler: ClassExpression,
+    ) -> None:
+        rules = self._rules
+        role = rules.role(prop)
+        filler = normal(filler)
+        parts = filler.operands if isinstance(filler, ex.ObjectIntersectionOf) else (filler,)
+        for part in parts:
+            ys: set[int] = set()
+            ends: list[tuple[int, int]] = []
+            for one in _flat([part]):
+                opposite = one.operand if isinstance(one, ex.ObjectComplementOf) else None
+                if one == NOTHING:
+                    continue
+                if isinstance(opposite, str):
+                    ys.add(rules.concept(opposite))
+                elif isinstance(opposite, ex.ObjectOneOf) and len(opposite.individuals) == 1:
+                    ys.add(rules.nominal(opposite.individuals[0]))
+                elif isinstance(one, ex.ObjectOneOf):
+                    ends += [(_Y, rules.nominal(name)) for name in one.individuals]
+                elif _is_negative(one):
+                    ys.add(rules.recognised(negated(one)))
+                else:
+                    ends.append((_Y, rules.positive(one)))
+            if (_Y, 0) not in ends:
+                rules.edge_rule(EdgeRule(body, role, frozenset(ys) - {0}, (*heads, *ends)))
+
+
+def _flat(disjuncts: Iterable[ClassExpression]) -> Iterator[ClassExpression]:
+    for disjunct in disjuncts:
+        one = normal(disjunct)
+        if isinstance(one, ex.ObjectUnionOf):
+            yield from _flat(one.operands)
+        else:
+            yield one
+
+
+def _exactly(
+    one: ex.ObjectExactCardinality | ex.DataExactCardinality,
+) -> ex.ObjectIntersectionOf:
+    if isinstance(one, ex.ObjectExactCardinality):
+        parts = (one.n, one.prop, one.filler)
+        return ex.ObjectIntersectionOf(
+            (ex.ObjectMinCardinality(*parts), ex.ObjectMaxCardinality(*parts))
+        )
+    counted = (one.n, one.prop, one.range)
+    return ex.ObjectIntersectionOf((ex.DataMinCardinality(*counted), ex.DataMaxCardinality(*counted)))
+
+
+def _is_negative(expression: ClassExpression) -> bool:
+    """Whether a class only excludes: its complement can be recognised from what is there."""
+    one = normal(expression)
+    if isinstance(one, (ex.ObjectUnionOf, ex.ObjectIntersectionOf)):
+        return all(map(_is_negative, one.operands))
+    if isinstance(one, ex.ObjectAllValuesFrom):
+        return _is_negative(one.filler)
+    if isinstance(one, (ex.ObjectMaxCardinality, ex.DataMaxCardinality)):
+        return one.n == 0
+    return one == NOTHING or isinstance(one, (ex.ObjectComplementOf, ex.DataAllValuesFrom))
