@@ -643,6 +643,10 @@ class _Clause:
 
     def _related(self) -> None:
         rules = self._rules
+        if self._is_chained():
+            ((prop, filler),), (concept,) = self._every, self._body
+            rules.universal(concept, prop, rules.positive(filler))
+            return
         inline: tuple[PropertyExpression, ClassExpression] | None = None
         never = list(self._never)
         for prop, filler in sorted(self._every, key=lambda one: _is_negative(one[1])):
@@ -670,6 +674,11 @@ class _Clause:
             rules.node_rule(body, heads)
         else:
             self._finish_edge(body, heads, *inline)
+
+    def _is_chained(self) -> bool:
+        """Whether one concept alone says what a property with chains leads to."""
+        alone = len(self._every) == len(self._body) == 1 and not (self._heads or self._never)
+        return alone and self._rules.complex_role(self._every[0][0])
 
     def _recognise(self, prop: PropertyExpression, filler: ClassExpression, name: str) -> None:
         """Everybody related to a member of the filler gets the named concept."""

@@ -95,6 +95,7 @@ class CaseSearch:
         self._functional: dict[int, list[Count]] = {}
         for limit in rules.functional:
             self._functional.setdefault(limit.role, []).append(limit)
+        self._failures: dict[int, int] = {}
         self._index_size = -1
         self._fillers: dict[int, list[int]] = {}
         self._pairwise = True
@@ -144,12 +145,12 @@ class CaseSearch:
             self._put(self._individuals, iri, known)
             self._put(self.names, known, (iri,))
             self.concept(known, self.rules.nominal(iri), 0)
-        return self._find(known)[0] or known
+        return self.find(known)[0] or known
 
     def choices_of(self, iri: str) -> Choices:
         """What it depends on that `individual` stands for the name."""
         known = self._individuals[iri]
-        return self._find(known)[1]
+        return self.find(known)[1]
 
     def somebody(self) -> int:
         """An individual of which nothing is known."""
@@ -179,7 +180,8 @@ class CaseSearch:
             self._one_of(heads, x, x, 0)
         return x
 
-    def _find(self, x: int) -> tuple[int | None, Choices]:
+    def find(self, x: int) -> tuple[int | None, Choices]:
+        """Who stands for an individual now (None: nobody), and the choices that depends on."""
         choices = 0
         current: int | None = x
         while current is not None and current in self._gone:
@@ -246,8 +248,8 @@ class CaseSearch:
 
     def same(self, x: int, y: int, choices: Choices = 0) -> None:
         """Two individuals are the same."""
-        found, more = self._find(x)
-        other, others = self._find(y)
+        found, more = self.find(x)
+        other, others = self.find(y)
         if found is None or other is None or found == other:
             return
         self._merge(found, other, choices | more | others)
@@ -338,11 +340,16 @@ class CaseSearch:
             if len(alternatives) == 1:
                 self._apply(alternatives[0], stated)
                 return True
-            choice = _Choice(len(self._trail), alternatives, stated)
+            # What failed often is tried late, as HermiT does.
+            ordered = tuple(sorted(alternatives, key=self._failures_of))
+            choice = _Choice(len(self._trail), ordered, stated)
             self._stack.append(choice)
-            self._apply(alternatives[0], stated | 1 << len(self._stack) - 1)
+            self._apply(ordered[0], stated | 1 << len(self._stack) - 1)
             return True
         return False
+
+    def _failures_of(self, alternative: Alternative) -> int:
+        return self._failures.get(alternative[2], 0) if alternative[0] == 'concept' else 0
 
     def _go_back(self, choices: Choices) -> bool:
         """Takes the next alternative of the last choice that took part; False: there is none."""
@@ -355,6 +362,9 @@ class CaseSearch:
                 self._stack.pop()
                 continue
             choice.choices |= choices & ~bit
+            failed = choice.alternatives[choice.place]
+            if failed[0] == 'concept':
+                self._failures[failed[2]] = self._failures.get(failed[2], 0) + 1
             choice.place += 1
             alternative = choice.alternatives[choice.place]
             stated = choice.stated | bit
@@ -377,14 +387,14 @@ class CaseSearch:
         for alternative in key:
             kind = alternative[0]
             if kind == 'concept':
-                x, more = self._find(alternative[1])
+                x, more = self.find(alternative[1])
                 if x is None or alternative[2] in self.labels[x]:
                     return None
                 choices |= more
                 left.append(('concept', x, alternative[2]))
             elif kind == 'same':
-                x, more = self._find(alternative[1])
-                y, others = self._find(alternative[2])
+                x, more = self.find(alternative[1])
+                y, others = self.find(alternative[2])
                 if x is None or y is None or x == y:
                     return None
                 apart = self._different(x, y)
@@ -394,7 +404,7 @@ class CaseSearch:
                 else:
                     choices |= apart
             elif kind == 'root':
-                y, more = self._find(alternative[1])
+                y, more = self.find(alternative[1])
                 if y is None or self._parent[y] is None:
                     return None
                 choices |= more
@@ -459,7 +469,8 @@ class CaseSearch:
             if named != x:
                 more = self.choices_of(rules.nominals[concept])
                 self._merge(named, x, labels[concept] | more)
-                return
+                if x in self._gone:
+                    return
         for rule in rules.of_node.get(concept, ()):
             choices = _sum(rule.body, labels)
             if choices is not None:
@@ -579,7 +590,7 @@ class CaseSearch:
 
     def _make_root(self, y: int, key: Any, choices: Choices) -> None:
         known = self._introduced.get(key)
-        found = None if known is None else self._find(known)[0]
+        found = None if known is None else self.find(known)[0]
         if found is not None:
             self.same(found, y, choices)
             return

@@ -75,6 +75,8 @@ class CaseReasoner:
         search = self._search
         for name in self._individuals:
             search.individual(name)
+        if not self._individuals and not self._assertions:
+            search.somebody()
         concepts = dict(self._stated)
         for axiom in self._assertions:
             if axiom in concepts:
@@ -297,8 +299,11 @@ class CaseReasoner:
             if not asked([rules.concept(cls)]):
                 yield cls, NOTHING
             elif not self.stopped:
-                labels = search.labels[self._somebody]
-                certain = {rules.names[one] for one, choices in labels.items() if not choices}
+                found, merged = search.find(self._somebody)
+                labels = {} if found is None else search.labels[found]
+                certain = {
+                    rules.names[one] for one, choices in labels.items() if not choices | merged
+                }
                 possible[cls] = {rules.names[one] for one in labels} - certain - {'', cls}
                 for sup in certain - {'', cls}:
                     if not known(cls, sup):
