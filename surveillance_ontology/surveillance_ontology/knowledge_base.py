@@ -29,15 +29,18 @@ from surveillance_ontology.owl.axioms import (
     DifferentIndividuals,
     EquivalentClasses,
     ObjectPropertyAssertion,
+    Rule,
     SameIndividual,
     SubClassOf,
 )
 from surveillance_ontology.owl.entities import entities_of, renamed
 from surveillance_ontology.owl.expressions import ClassExpression, Literal
-from surveillance_ontology.owl.vocabulary import THING
+from surveillance_ontology.owl.vocabulary import NOTHING, THING
+from surveillance_ontology.reasoner.cases import entails
 from surveillance_ontology.reasoner.classification import Classification
 from surveillance_ontology.reasoner.clauses import Fact as StoredFact
 from surveillance_ontology.reasoner.clauses import Predicate
+from surveillance_ontology.reasoner.completion import Completion
 from surveillance_ontology.reasoner.engine import Engine, FactView, is_public
 from surveillance_ontology.reasoner.explanation import Explanation, Reasons
 from surveillance_ontology.reasoner.program_change import ProgramChange, program_change
@@ -181,6 +184,11 @@ def justify(
 
 def follows(axioms: Iterable[Axiom], goal: Axiom | None) -> bool:
     """Tell whether a fact, or with None a contradiction, follows from axioms."""
+    axioms = list(axioms)
+    if not any(isinstance(axiom, Rule) for axiom in axioms):
+        found = entails(axioms, goal)
+        if found is not None:
+            return found
     kb = KnowledgeBase('', axioms)
     consistent = kb.reason()
     return not consistent if goal is None else consistent and kb.holds(goal)
@@ -240,6 +248,7 @@ class KnowledgeBase:
         self._told = Assertions()
         self._classification: Classification | None = None
         self._engine: Engine | None = None
+        self._completion: Completion | None = None
         self._consistent = True
         self._snapshots: dict[str, frozenset[str]] = {}
         self._watched: set[Predicate] = set()
@@ -304,6 +313,8 @@ class KnowledgeBase:
         """
         if self._classification is None or self._engine is None:
             return ()
+        if self._completion is not None and self._completion.unsupported is not None:
+            return self._completion.unsupported
         found = dict.fromkeys(self._classification.program.unsupported)
         if self._consistent:
             found.update(dict.fromkeys(self._engine.open_cases()))
@@ -521,11 +532,32 @@ class KnowledgeBase:
             return False
         if isinstance(fact, SubClassOf):
             if isinstance(fact.sub, str) and isinstance(fact.sup, str):
-                return fact.sup in (fact.sub, THING, *self.superclasses(fact.sub))
+                return self._is_below(fact.sub, fact.sup)
             return False
         if isinstance(fact, ClassAssertion) and fact.cls == THING:
             return self.is_known('individual', fact.individual)
-        return engine.understands(fact) and engine.holds(fact)
+        if engine.understands(fact) and engine.holds(fact):
+            return True
+        if isinstance(fact, DifferentIndividuals) and self._completion is not None:
+            return self._completion.entails(self._told.axioms, fact)
+        return False
+
+    def _is_below(self, sub: str, sup: str) -> bool:
+        if sup == NOTHING:
+            known = self._classification
+            return known is not None and sub in known.unsatisfiable()
+        return sup in (sub, THING, *self.superclasses(sub))
+
+    def entails(self, axiom: Axiom) -> bool:
+        """Whether an axiom of any kind follows from what is asserted now.
+
+        Unlike `holds` it searches a model without the axiom, which takes longer.
+
+        Raises:
+            NotAskableError: The axiom is a key, a rule, a datatype definition or about anonymous
+                individuals, or compares data properties.
+        """
+        return self.holds(axiom) or bool(entails(self._told.axioms, axiom))
 
     def explain(self, fact: Axiom) -> Explanation | None:
         """Return why a fact holds; None when it is neither asserted nor derived.
@@ -670,6 +702,7 @@ class KnowledgeBase:
             self._classify()
             change = self._change_of(engine)
             if engine is not None and change is not None:
+                self._completion = self._completion_of(engine)
                 self._update(engine, partial(self._adopt, engine, change))
             else:
                 self._rebuild(engine)
@@ -695,11 +728,22 @@ class KnowledgeBase:
         return program_change(engine.program, self._classification.program)
 
     def _update(self, engine: Engine, update: Callable[[], None]) -> None:
-        if self._feed:
-            self._feed.updating(engine, update)
-        else:
+        assert self._completion is not None
+        completion = self._completion
+
+        def complete() -> None:
             update()
+            completion.run(self._told.axioms)
+
+        if self._feed:
+            self._feed.updating(engine, complete)
+        else:
+            complete()
         self._consistent = engine.consistent
+
+    def _completion_of(self, engine: Engine) -> Completion:
+        assert self._classification is not None
+        return Completion(self._classification, engine, tuple(self._told.schema))
 
     def _adopt(self, engine: Engine, change: ProgramChange) -> None:
         added, removed = self._told.settle()
@@ -716,8 +760,10 @@ class KnowledgeBase:
             engine.take_spelling(old)
         self._told.settle()
         assertions = [axiom for axiom in self._told.axioms if is_assertion(axiom)]
+        self._completion = self._completion_of(engine)
         with uncollected():
             engine.update(assertions, ())
+            self._completion.run(self._told.axioms)
         self._consistent = engine.consistent
         self._snapshots.clear()
         self._watched.clear()

@@ -8,18 +8,18 @@ found on the way rules out further candidates.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
+from itertools import combinations, permutations
 
 from surveillance_ontology.owl import axioms as ax
 from surveillance_ontology.owl import expressions as ex
 from surveillance_ontology.owl.axioms import Axiom
-from surveillance_ontology.owl.expressions import ClassExpression
-from surveillance_ontology.owl.vocabulary import NOTHING, THING
+from surveillance_ontology.owl.expressions import ClassExpression, PropertyExpression
+from surveillance_ontology.owl.vocabulary import NOTHING, THING, TOP_LITERAL
 from surveillance_ontology.reasoner.case_rules import CaseRules, NotCoveredError
 from surveillance_ontology.reasoner.case_search import CaseSearch, StoppedError
-from surveillance_ontology.reasoner.datatypes import Value, literal_of, value_of
-from surveillance_ontology.reasoner.value_sets import point
+from surveillance_ontology.reasoner.datatypes import literal_of, value_of
 
-MOST_STEPS = 400_000
+MOST_STEPS = 200_000
 """Facts that may be added in all searches for one answer; some seconds."""
 
 
@@ -33,6 +33,7 @@ class CaseReasoner:
     Attributes:
         gaps: One sentence for each axiom that is not fully used, or for what was not decided.
         stopped: Whether a search was given up.
+        names_individuals: Whether the axioms about classes name individuals.
     """
 
     def __init__(self, axioms: Iterable[Axiom], most_steps: int = MOST_STEPS) -> None:
@@ -45,7 +46,7 @@ class CaseReasoner:
             a.iri for a in axioms if isinstance(a, ax.Declaration) and a.kind == 'individual'
         ]
         self._left = most_steps
-        self._names_individuals = bool(self._rules.nominals)
+        self.names_individuals = bool(self._rules.nominals)
         self._stated: list[tuple[Axiom, int]] = []
         for axiom in self._assertions:
             self._translate(axiom)
@@ -119,34 +120,15 @@ class CaseReasoner:
         self.gaps.update(search.gaps)
         return found
 
-    def entails(self, axiom: Axiom) -> bool:
-        """Whether a fact follows from consistent axioms."""
-        search = self._search
-        if not self.consistent():
-            return False
-        state = self._denial(axiom)
-        if state is None:
-            return False
-        search.undo(self._base)
-        found = not self._is_possible(state)
-        search.undo(self._base)
-        return found
-
     def _denial(self, axiom: Axiom) -> Callable[[], None] | None:
-        """What to state for a fact to be false; None for a fact that cannot be asked for."""
+        """What to state for a fact of the model to be false; None where that has no concept."""
         search = self._search
-        if isinstance(axiom, ax.SubClassOf):
-            both = ex.ObjectIntersectionOf((axiom.sub, ex.ObjectComplementOf(axiom.sup)))
-            concept = self._concept(both)
-            return (lambda: search.concept(search.somebody(), concept, 0)) if concept else None
         if isinstance(axiom, ax.ClassAssertion):
             name, concept = axiom.individual, self._concept(ex.ObjectComplementOf(axiom.cls))
         elif isinstance(axiom, ax.ObjectPropertyAssertion | ax.DataPropertyAssertion):
             name, concept = axiom.subject, self._concept(_without(axiom))
-        elif isinstance(axiom, ax.SameIndividual) and len(axiom.individuals) == 2:
+        elif isinstance(axiom, ax.SameIndividual):
             return lambda: search.differ(map(search.individual, axiom.individuals))
-        elif isinstance(axiom, ax.DifferentIndividuals) and len(axiom.individuals) == 2:
-            return lambda: search.same(*map(search.individual, axiom.individuals))
         else:
             return None
         return (lambda: search.concept(search.individual(name), concept, 0)) if concept else None
@@ -183,7 +165,7 @@ class CaseReasoner:
             search.undo(self._base)
 
     def _held(self) -> Iterator[tuple[Axiom, int]]:
-        """The facts of the model, with the choices they depend on."""
+        """The facts of the last model, with the choices they depend on."""
         search, rules = self._search, self._rules
         named = [x for x in search.alive() if search.names[x]]
         for x in named:
@@ -267,7 +249,7 @@ class CaseReasoner:
         if not self.consistent():
             return
         rules = self._rules
-        search = self._search if self._names_individuals else CaseSearch(rules, self._left)
+        search = self._search if self.names_individuals else CaseSearch(rules, self._left)
         base = self._base if search is self._search else search.mark()
         possible: dict[str, set[str]] = {}
         known_models: dict[str, set[str]] = {}
@@ -326,3 +308,140 @@ def _without(axiom: Axiom) -> ClassExpression:
         return ex.ObjectAllValuesFrom(axiom.prop, other)
     assert isinstance(axiom, ax.DataPropertyAssertion | ax.NegativeDataPropertyAssertion)
     return ex.ObjectComplementOf(ex.DataHasValue(axiom.prop, axiom.literal))
+
+
+# --- any axiom ---
+
+
+class NotAskableError(ValueError):
+    """Whether an axiom of this kind follows cannot be asked for."""
+
+
+def entails(axioms: Iterable[Axiom], goal: Axiom | None) -> bool | None:
+    """Whether an axiom (None: a contradiction) follows from others: its denial contradicts them.
+
+    Returns:
+        None where some axioms are not covered, or the search was given up, and no contradiction was
+        found.
+
+    Raises:
+        NotAskableError: The goal is a key, a rule, a datatype definition or about anonymous
+            individuals, or compares data properties.
+    """
+    axioms = list(axioms)
+    denials: list[Denial] = [()] if goal is None else list(_denials(goal))
+    certain = True
+    for denial in denials:
+        reasoner = CaseReasoner([*axioms, *denial])
+        if reasoner.consistent():
+            if not reasoner.gaps and not reasoner.stopped:
+                return False
+            certain = False
+    return True if certain else None
+
+
+_A, _B = 'urn:case:someone', 'urn:case:another'
+Denial = tuple[Axiom, ...]
+
+
+def _denials(goal: Axiom) -> Iterator[Denial]:
+    """Assertions one of which must hold where an axiom does not."""
+    if '_:' in repr(goal):
+        raise NotAskableError('an axiom about anonymous individuals')
+    if isinstance(goal, ax.SubClassOf):
+        yield (_member(goal.sub, ex.ObjectComplementOf(goal.sup)),)
+    elif isinstance(goal, ax.EquivalentClasses):
+        for sub, sup in permutations(goal.classes, 2):
+            yield (_member(sub, ex.ObjectComplementOf(sup)),)
+    elif isinstance(goal, ax.DisjointClasses):
+        yield from ((_member(*pair),) for pair in combinations(goal.classes, 2))
+    elif isinstance(goal, ax.DisjointUnion):
+        whole, parts = goal.cls, ex.ObjectUnionOf(goal.classes)
+        yield from _denials(ax.EquivalentClasses((whole, parts)))
+        yield from _denials(ax.DisjointClasses(goal.classes))
+    elif isinstance(goal, ax.ClassAssertion):
+        yield (ax.ClassAssertion(ex.ObjectComplementOf(goal.cls), goal.individual),)
+    elif isinstance(goal, ax.SameIndividual):
+        for pair in combinations(sorted(goal.individuals), 2):
+            yield (ax.DifferentIndividuals(frozenset(pair)),)
+    elif isinstance(goal, ax.DifferentIndividuals):
+        for pair in combinations(sorted(goal.individuals), 2):
+            yield (ax.SameIndividual(frozenset(pair)),)
+    elif isinstance(goal, ax.ObjectPropertyAssertion):
+        yield (ax.NegativeObjectPropertyAssertion(goal.prop, goal.subject, goal.object),)
+    elif isinstance(goal, ax.NegativeObjectPropertyAssertion):
+        yield (ax.ObjectPropertyAssertion(goal.prop, goal.subject, goal.object),)
+    elif isinstance(goal, ax.DataPropertyAssertion):
+        yield (ax.NegativeDataPropertyAssertion(goal.prop, goal.subject, goal.literal),)
+    elif isinstance(goal, ax.NegativeDataPropertyAssertion):
+        yield (ax.DataPropertyAssertion(goal.prop, goal.subject, goal.literal),)
+    else:
+        yield from _property_denials(goal)
+
+
+def _property_denials(goal: Axiom) -> Iterator[Denial]:
+    if isinstance(goal, ax.SubObjectPropertyOf):
+        yield _holds(goal.sub), _fails(goal.sup)
+    elif isinstance(goal, ax.EquivalentObjectProperties):
+        for sub, sup in permutations(goal.props, 2):
+            yield _holds(sub), _fails(sup)
+    elif isinstance(goal, ax.InverseObjectProperties):
+        yield _holds(goal.first), _fails(goal.second, _B, _A)
+        yield _holds(goal.second), _fails(goal.first, _B, _A)
+    elif isinstance(goal, ax.SymmetricObjectProperty):
+        yield _holds(goal.prop), _fails(goal.prop, _B, _A)
+    elif isinstance(goal, ax.AsymmetricObjectProperty):
+        yield _holds(goal.prop), _holds(goal.prop, _B, _A)
+    elif isinstance(goal, ax.TransitiveObjectProperty):
+        yield from _property_denials(ax.SubPropertyChainOf((goal.prop, goal.prop), goal.prop))
+    elif isinstance(goal, ax.SubPropertyChainOf):
+        places = [f'{_A}{place}' for place in range(len(goal.chain) + 1)]
+        steps = zip(goal.chain, places, places[1:], strict=False)
+        links = (_holds(prop, one, other) for prop, one, other in steps)
+        yield (*links, _fails(goal.sup, places[0], places[-1]))
+    elif isinstance(goal, ax.DisjointObjectProperties):
+        for one, other in combinations(goal.props, 2):
+            yield _holds(one), _holds(other)
+    elif isinstance(goal, ax.FunctionalObjectProperty):
+        yield (_member(ex.ObjectMinCardinality(2, goal.prop)),)
+    elif isinstance(goal, ax.InverseFunctionalObjectProperty):
+        prop = goal.prop
+        back = ex.ObjectInverseOf(prop) if isinstance(prop, str) else prop.prop
+        yield (_member(ex.ObjectMinCardinality(2, back)),)
+    elif isinstance(goal, ax.ReflexiveObjectProperty):
+        yield (_member(ex.ObjectComplementOf(ex.ObjectHasSelf(goal.prop))),)
+    elif isinstance(goal, ax.IrreflexiveObjectProperty):
+        yield (_member(ex.ObjectHasSelf(goal.prop)),)
+    elif isinstance(goal, ax.ObjectPropertyDomain):
+        some = ex.ObjectSomeValuesFrom(goal.prop, THING)
+        yield (_member(some, ex.ObjectComplementOf(goal.domain)),)
+    elif isinstance(goal, ax.ObjectPropertyRange):
+        yield (_member(ex.ObjectSomeValuesFrom(goal.prop, ex.ObjectComplementOf(goal.range))),)
+    elif isinstance(goal, ax.FunctionalDataProperty):
+        yield (_member(ex.DataMinCardinality(2, goal.prop)),)
+    elif isinstance(goal, ax.DataPropertyDomain):
+        value = ex.DataSomeValuesFrom(goal.prop, TOP_LITERAL)
+        yield (_member(value, ex.ObjectComplementOf(goal.domain)),)
+    elif isinstance(goal, ax.DataPropertyRange):
+        outside = ex.DataComplementOf(goal.range)
+        yield (_member(ex.DataSomeValuesFrom(goal.prop, outside)),)
+    else:
+        raise NotAskableError(f'an axiom of the kind {type(goal).__name__}')
+
+
+def _member(*classes: ClassExpression) -> ax.ClassAssertion:
+    """Somebody is in all classes."""
+    cls = classes[0] if len(classes) == 1 else ex.ObjectIntersectionOf(classes)
+    return ax.ClassAssertion(cls, _A)
+
+
+def _holds(prop: PropertyExpression, one: str = _A, other: str = _B) -> Axiom:
+    if isinstance(prop, str):
+        return ax.ObjectPropertyAssertion(prop, one, other)
+    return ax.ObjectPropertyAssertion(prop.prop, other, one)
+
+
+def _fails(prop: PropertyExpression, one: str = _A, other: str = _B) -> Axiom:
+    if isinstance(prop, str):
+        return ax.NegativeObjectPropertyAssertion(prop, one, other)
+    return ax.NegativeObjectPropertyAssertion(prop.prop, other, one)

@@ -73,6 +73,7 @@ class Classification:
         self._impossible: set[str] = set()
         self.within: dict[str, frozenset[str]] = {}
         self._hierarchy()
+        self._own = dict(self._above), frozenset(self._impossible)
         self._named_neighbours(translation)
         self._exclusions()
         self._requirements()
@@ -123,6 +124,25 @@ class Classification:
         """Named classes strictly below, those that can have no members included."""
         found = {name for name, above in self._above.items() if cls in above}
         return (found | self._impossible) - {cls}
+
+    def complete(self, pairs: Iterable[tuple[str, str]]) -> None:
+        """Adds what reasoning by cases found, and nothing of what it found before.
+
+        Args:
+            pairs: A class and one above it, or owl:Nothing.
+        """
+        self._above, self._impossible = dict(self._own[0]), set(self._own[1])
+        for sub, sup in pairs:
+            if sup == NOTHING:
+                self._impossible.add(sub)
+                self._above[sub] = frozenset()
+            else:
+                self._above[sub] = self._above.get(sub, frozenset()) | {sup}
+
+    def below_by_itself(self, sub: str, sup: str) -> bool:
+        """Whether a class is below another, or owl:Nothing, without reasoning by cases."""
+        above, impossible = self._own
+        return sub in impossible or sup == THING or sup in above.get(sub, ())
 
     def classes(self) -> set[str]:
         """Return every named class."""

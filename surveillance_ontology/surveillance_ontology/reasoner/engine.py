@@ -39,6 +39,8 @@ from surveillance_ontology.reasoner.proofs import ProofSearch
 Conflict = tuple[str, str]
 Classes = Mapping[str, Iterable[str]]
 _MOST_VALUES = 20_000
+BY_CASES = 'every case leads to it'
+"""The origin of facts that reasoning by cases found."""
 
 
 class Engine:
@@ -82,6 +84,8 @@ class Engine:
         self._removed: dict[Fact, None] = {}
         self._split_happened = False
         self.proofs = ProofSearch(self.asserted)
+        self._by_cases: set[Fact] = set()
+        self._cases = Predicate('class', 'found by cases')
         self.changed: dict[Fact, bool] | None = None
         self.renamed = False
         self._network = Network(
@@ -455,6 +459,9 @@ class Engine:
         splitting: set[str] = set()
         self.proofs.reset()
         added, removed = list(added), list(removed)
+        if self._by_cases:
+            self._overdeleted += map(self.current, self._by_cases)
+            self._by_cases.clear()
         self._restate_differences(added, removed, splitting)
         for axiom in removed:
             if equality.members:
@@ -505,6 +512,43 @@ class Engine:
         for clause in change.added:
             network.instances(clause, holding=False)
         self._propagate()
+
+    def take_from_cases(self, facts: Iterable[Axiom] | None) -> None:
+        """Adds facts that reasoning by cases found; they hold until the next `update`.
+
+        Args:
+            facts: Class and property assertions and who is the same; None for a contradiction.
+        """
+        if not self._cases.supports:
+            for predicate in dict.fromkeys((self._cases, *self.program.predicates())):
+                predicate.supports.append((self._case_supports(predicate), BY_CASES))
+        found: list[Fact] = []
+        if facts is None:
+            found.append((self._nothing, NOTHING))
+            facts = ()
+        axioms = list(facts)
+        sames = [axiom for axiom in axioms if isinstance(axiom, SameIndividual)]
+        if sames:
+            mark = self._cases, NOTHING
+            self._by_cases.add(mark)
+            self._queue.append(mark)
+            self._propagate()
+        for same in sames:
+            first, *others = sorted(same.individuals)
+            for other in others:
+                self._requests[Merge(first, other, None, (mark,))] = None
+        self._propagate()
+        found += filter(None, map(self.fact_of, axioms))
+        self._by_cases.update(found)
+        self._queue += found
+        self._propagate()
+
+    def _case_supports(self, predicate: Predicate) -> Callable[..., Iterator[Premises]]:
+        def supports(*arguments: object) -> Iterator[Premises]:
+            if (predicate, *arguments) in self._by_cases:
+                yield ()
+
+        return supports
 
     def _classes_of(self, axiom: Axiom) -> set[str]:
         found = {self.equality.find(name) for name in individuals_of(axiom)}

@@ -1,0 +1,110 @@
+"""Adds to an engine what its Horn clauses cannot derive, by reasoning by cases (`cases`).
+
+It leaves alone what the engine does by itself, such as the patrol's map with its rules.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from surveillance_ontology.owl.assertions import is_assertion
+from surveillance_ontology.owl.axioms import Axiom, ClassAssertion, Rule
+from surveillance_ontology.reasoner.cases import CaseReasoner, entails
+from surveillance_ontology.reasoner.classification import Classification
+from surveillance_ontology.reasoner.clauses import Constant, Program
+from surveillance_ontology.reasoner.engine import Engine, FactView
+
+_MOST_ASSERTIONS = 20_000
+
+
+class Completion:
+    """What reasoning by cases adds to one classification and its engine.
+
+    Args:
+        classification: Gets the subclasses that are missing.
+        engine: Gets the facts that are missing.
+        axioms: Everything that is asserted.
+
+    Attributes:
+        unsupported: One sentence for each axiom that is not fully used; None where reasoning by
+            cases was not needed.
+    """
+
+    def __init__(
+        self, classification: Classification, engine: Engine, axioms: Iterable[Axiom]
+    ) -> None:
+        self._classification, self._engine = classification, engine
+        schema = [axiom for axiom in axioms if not is_assertion(axiom)]
+        self._has_rules = any(isinstance(axiom, Rule) for axiom in schema)
+        self._wanted = self._may_lack(classification.program)
+        self._schema = schema
+        self._native = tuple(classification.program.unsupported)
+        self._compared = False
+        self.unsupported: tuple[str, ...] | None = None
+
+    def run(self, axioms: Iterable[Axiom]) -> None:
+        """Adds what follows from everything that is asserted now."""
+        engine = self._engine
+        self.unsupported = None
+        if not engine.consistent or not self._is_wanted():
+            return
+        assertions = [axiom for axiom in axioms if is_assertion(axiom)]
+        if len(assertions) > _MOST_ASSERTIONS:
+            self.unsupported = (*self._native, 'the assertions: too many for reasoning by cases')
+            return
+        if self._has_rules:
+            assertions += FactView(engine).derived()
+        reasoner = CaseReasoner([*self._schema, *assertions])
+        if not reasoner.consistent():
+            engine.take_from_cases(None)
+            return
+        engine.take_from_cases(list(reasoner.facts(self._is_known)))
+        if engine.consistent and (reasoner.names_individuals or not self._compared):
+            known = self._classification
+            found = reasoner.hierarchy(known.classes(), known.below_by_itself)
+            known.complete(list(found))
+            self._compared = True
+        self._report(reasoner)
+
+    def entails(self, axioms: Iterable[Axiom], fact: Axiom) -> bool:
+        """Whether a fact that was not derived follows all the same."""
+        axioms = list(axioms)
+        few = len(axioms) - len(self._schema) <= _MOST_ASSERTIONS
+        return few and bool(entails(axioms, fact))
+
+    def _may_lack(self, program: Program) -> bool:
+        """Whether the clauses may leave something out without saying so.
+
+        They do not where nothing unnamed must exist, nor where each class that requires somebody
+        says all by itself and rules, which take no part in cases, do the rest.
+        """
+        if program.unsupported or program.contexts is not None:
+            return True
+        if not program.existentials:
+            return False
+        names_somebody = any(
+            isinstance(term, Constant) and not term.is_value
+            for clause in program.clauses
+            if not clause.named_only
+            for atom in (*clause.body, clause.head)
+            for term in atom.terms
+        )
+        return names_somebody or not self._has_rules
+
+    def _is_wanted(self) -> bool:
+        if self._wanted or self._has_rules:
+            return self._wanted
+        return next(self._engine.open_cases(), None) is not None
+
+    def _is_known(self, fact: Axiom) -> bool:
+        if isinstance(fact, ClassAssertion) and not isinstance(fact.cls, str):
+            return True
+        return self._engine.holds(fact)
+
+    def _report(self, reasoner: CaseReasoner) -> None:
+        gaps = list(reasoner.gaps)
+        if reasoner.stopped:
+            gaps = [*self._native, *gaps, 'the ontology: reasoning by cases took too many steps']
+        elif gaps:
+            gaps = [*self._native, *gaps]
+        self.unsupported = tuple(dict.fromkeys(gaps))
