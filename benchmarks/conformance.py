@@ -28,7 +28,7 @@ from typing import Any
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
-from benchmarks.java_reasoner import KINDS, JavaReasonerError, JavaReasoner, absent  # noqa: E402
+from benchmarks.java_reasoner import KINDS, JavaReasoner, JavaReasonerError, absent  # noqa: E402
 from surveillance_ontology import (  # noqa: E402
     KnowledgeBase,
     OntologyFileError,

@@ -41,7 +41,7 @@ from surveillance_ontology.reasoner.classification import Classification
 from surveillance_ontology.reasoner.clauses import Fact as StoredFact
 from surveillance_ontology.reasoner.clauses import Predicate
 from surveillance_ontology.reasoner.completion import Completion
-from surveillance_ontology.reasoner.engine import Engine, FactView, is_public
+from surveillance_ontology.reasoner.engine import BY_CASES, Engine, FactView, is_public
 from surveillance_ontology.reasoner.explanation import Explanation, Reasons
 from surveillance_ontology.reasoner.program_change import ProgramChange, program_change
 
@@ -589,14 +589,19 @@ class KnowledgeBase:
         return self._complete(found, None)
 
     def _complete(self, found: Explanation, goal: Axiom | None) -> Explanation:
-        """Return the explanation with the axioms that its steps use without saying so."""
-        sources = found.sources()
-        schema = self._told.schema
-        declared = (axiom for axiom in schema if isinstance(axiom, Declaration))
-        if follows((*declared, *sources), goal):
+        """Return the explanation resting on no more axioms than it needs, and on all of them."""
+        needed = justify(self._told.axioms, goal, found.sources(), self._told.schema)
+        if not needed or set(needed) == set(found.sources()):
             return found
-        needed = justify((), goal, sources, schema)
-        return replace(found, background=tuple(a for a in needed if a not in sources))
+        alone = KnowledgeBase(self.iri, needed)
+        alone.reason()
+        if alone._engine is not None:
+            reasons = Reasons(alone._engine, alone._schema_axioms)
+            again = reasons.of_inconsistency() if goal is None else reasons.of_fact(goal)
+            if again is not None and again.because != BY_CASES:
+                sources = again.sources()
+                return replace(again, background=tuple(a for a in needed if a not in sources))
+        return self._listed(found.fact_text, needed)
 
     def justification(self, fact: Axiom | None) -> tuple[Axiom, ...]:
         """Return the fewest asserted axioms to which a fact is owed: without any of them it would

@@ -27,7 +27,8 @@ _X, _Y = 0, 1
 Heads = tuple[tuple[int, int], ...]
 """Alternatives: pairs of place (0: the individual, 1: the related one) and concept."""
 _FRESH = 'urn:case:'
-_MOST = 200
+_MOST = 300
+_CIRCLE = 'its property chains depend on each other in a circle'
 _NONE: frozenset[int] = frozenset()
 
 
@@ -147,10 +148,13 @@ class CaseRules:
         self._chains = Chains()
         self._inclusions: dict[AnyRole, set[AnyRole]] = {}
         self._data_inclusions: dict[str, set[str]] = {}
-        self._datatypes = {a.datatype: a.range for a in tbox if isinstance(a, ax.DatatypeDefinition)}
+        self._datatypes = {
+            a.datatype: a.range for a in tbox if isinstance(a, ax.DatatypeDefinition)
+        }
         for axiom in tbox:
             self._attempt(axiom, self._property_inclusion)
         for axiom in tbox:
+            self._attempt(axiom, self._check_chains)
             self._attempt(axiom, self._axiom)
 
     def _attempt(self, axiom: Axiom, take: Callable[[Axiom], None]) -> None:
@@ -232,7 +236,10 @@ class CaseRules:
 
     def steps(self, prop: str) -> list[tuple[int, int | None, int]]:
         """The automaton of a property, from state 0 to state 1."""
-        found = self._chains.steps((prop, False))
+        try:
+            found = self._chains.steps((prop, False))
+        except IrregularError:
+            return [(0, self.role(prop), 1)]
         return [(a, None if step is None else self.role(step), b) for a, step, b in found]
 
     # --- concepts of expressions ---
@@ -353,8 +360,7 @@ class CaseRules:
         try:
             steps = self._chains.steps(role)
         except IrregularError:
-            text = 'its property chains depend on each other in a circle'
-            raise NotCoveredError(text) from None
+            raise NotCoveredError(_CIRCLE) from None
         states = {0: concept, 1: self.concept(self.fresh())}
         self.node_rule(frozenset((states[1],)), ((_X, target),))
         for before, _, after in steps:
@@ -429,6 +435,13 @@ class CaseRules:
         turned = (sub[0], not sub[1])
         self._inclusions.setdefault(turned, set()).add((sup[0], not sup[1]))
         self._chains.imply((sub,), sup)
+
+    def _check_chains(self, axiom: Axiom) -> None:
+        if isinstance(axiom, ax.SubPropertyChainOf):
+            try:
+                self._chains.steps(directed(axiom.sup))
+            except IrregularError:
+                raise NotCoveredError(_CIRCLE) from None
 
     def _axiom(self, axiom: Axiom) -> None:
         if isinstance(axiom, ax.SubClassOf):
@@ -750,7 +763,9 @@ def _exactly(
             (ex.ObjectMinCardinality(*parts), ex.ObjectMaxCardinality(*parts))
         )
     counted = (one.n, one.prop, one.range)
-    return ex.ObjectIntersectionOf((ex.DataMinCardinality(*counted), ex.DataMaxCardinality(*counted)))
+    return ex.ObjectIntersectionOf(
+        (ex.DataMinCardinality(*counted), ex.DataMaxCardinality(*counted))
+    )
 
 
 def _is_negative(expression: ClassExpression) -> bool:

@@ -42,9 +42,7 @@ class _Choice:
 
     __slots__ = ('alternatives', 'choices', 'mark', 'place', 'stated')
 
-    def __init__(
-        self, mark: int, alternatives: tuple[Alternative, ...], choices: Choices
-    ) -> None:
+    def __init__(self, mark: int, alternatives: tuple[Alternative, ...], choices: Choices) -> None:
         self.mark, self.alternatives, self.place = mark, alternatives, 0
         self.stated = self.choices = choices
 
@@ -317,7 +315,7 @@ class CaseSearch:
                 if len(event) == 2:
                     self._on_concept(*event)
                 elif event[2] not in self._gone:
-                    self._on_relation(*event)  # type: ignore[misc]
+                    self._on_relation(*event)
             if self._recount:
                 x, _ = self._recount.popitem()
                 if x not in self._gone:
@@ -672,9 +670,9 @@ class CaseSearch:
                 return True
             for next_place in range(place, len(found) - (n - len(chosen)) + 1):
                 y = found[next_place]
-                if all(self._different(one, y) is not None for one in chosen):
-                    if extend([*chosen, y], next_place + 1):
-                        return True
+                fits = all(self._different(one, y) is not None for one in chosen)
+                if fits and extend([*chosen, y], next_place + 1):
+                    return True
             return False
 
         return extend([], 0)
@@ -800,9 +798,9 @@ class CaseSearch:
         choices = self.labels[x][concept]
         if needed.n == 1:
             for v in self.values[x]:
-                if needed.prop in self.value_props[v]:
-                    if self.value_sets[v][0].within(needed.values):
-                        return
+                known = needed.prop in self.value_props[v]
+                if known and self.value_sets[v][0].within(needed.values):
+                    return
         elif (x, concept) in self._made:
             return
         self._put(self._made, (x, concept), True)

@@ -19,6 +19,7 @@ from surveillance_ontology.reasoner.case_rules import CaseRules, NotCoveredError
 from surveillance_ontology.reasoner.case_search import CaseSearch, StoppedError
 from surveillance_ontology.reasoner.datatypes import literal_of, value_of
 
+_NEGATIVE = (ax.NegativeObjectPropertyAssertion, ax.NegativeDataPropertyAssertion)
 MOST_STEPS = 200_000
 """Facts that may be added in all searches for one answer; some seconds."""
 
@@ -59,7 +60,7 @@ class CaseReasoner:
         """Makes the concept of an assertion that needs one."""
         if isinstance(axiom, ax.ClassAssertion):
             expression: ClassExpression = axiom.cls
-        elif isinstance(axiom, ax.NegativeObjectPropertyAssertion | ax.NegativeDataPropertyAssertion):
+        elif isinstance(axiom, _NEGATIVE):
             expression = _without(axiom)
         else:
             return

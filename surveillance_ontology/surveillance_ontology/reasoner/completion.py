@@ -36,9 +36,10 @@ class Completion:
         self._classification, self._engine = classification, engine
         schema = [axiom for axiom in axioms if not is_assertion(axiom)]
         self._has_rules = any(isinstance(axiom, Rule) for axiom in schema)
-        self._wanted = self._may_lack(classification.program)
+        self._program = classification.program
+        self._wanted = self._may_lack(self._program)
         self._schema = schema
-        self._native = tuple(classification.program.unsupported)
+        self._native = tuple(self._program.unsupported)
         self._compared = False
         self.unsupported: tuple[str, ...] | None = None
 
@@ -102,9 +103,13 @@ class Completion:
         return self._engine.holds(fact)
 
     def _report(self, reasoner: CaseReasoner) -> None:
-        gaps = list(reasoner.gaps)
+        """Names what is still left out, in the words of the classification where it has some."""
+        found = list(self._native) if reasoner.stopped else []
+        for gap in reasoner.gaps:
+            subject = gap.rpartition(': ')[0] + ':'
+            said = [sentence for sentence in self._native if sentence.startswith(subject)]
+            found += said or [gap]
         if reasoner.stopped:
-            gaps = [*self._native, *gaps, 'the ontology: reasoning by cases took too many steps']
-        elif gaps:
-            gaps = [*self._native, *gaps]
-        self.unsupported = tuple(dict.fromkeys(gaps))
+            found.append('the ontology: reasoning by cases took too many steps')
+        found += self._program.unsupported[len(self._native) :]
+        self.unsupported = tuple(dict.fromkeys(found))

@@ -105,9 +105,7 @@ def nested(depth: int, inner: ClassExpression) -> ClassExpression:
 )
 def test_no_nested_class_ends_reasoning(required: ClassExpression) -> None:
     kb = reasoned(SubClassOf(A, required), ObjectPropertyDomain(R, required), ClassAssertion(A, i))
-    in_cases = 'Union' in repr(required) or 'OneOf' in repr(required)
-    assert bool(kb.unsupported) == in_cases
-    assert all('x:A' in text or 'domain' in text for text in kb.unsupported)
+    assert not kb.unsupported
 
 
 @pytest.mark.parametrize(
@@ -263,17 +261,16 @@ def test_long_rules(length: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ('axioms', 'words'),
+    'axioms',
     [
-        ([SubClassOf(ObjectMaxCardinality(1, P), A)], 'max 1'),
-        ([SubClassOf(ObjectAllValuesFrom(P, B), A)], 'only'),
-        ([SubClassOf(ObjectComplementOf(B), A)], 'not x:B'),
-        ([SubClassOf(A, ObjectMaxCardinality(2, P)), *(ClassAssertion(A, one) for one in (i, o)), *(ObjectPropertyAssertion(P, i, one) for one in (j, k, m))], 'max 2'),
-        ([SubClassOf(ObjectMinCardinality(2, P), A), *(ObjectPropertyAssertion(P, i, one) for one in (j, k))], 'min 2'),
-        ([SubClassOf(A, some(P, ObjectHasValue(Q, i))), SubClassOf(some(P, some(Q, B)), C), ClassAssertion(A, j)], 'facts about the individual'),
+        [SubClassOf(ObjectMaxCardinality(1, P), A)],
+        [SubClassOf(ObjectAllValuesFrom(P, B), A)],
+        [SubClassOf(ObjectComplementOf(B), A)],
+        [SubClassOf(A, ObjectMaxCardinality(2, P)), *(ClassAssertion(A, one) for one in (i, o)), *(ObjectPropertyAssertion(P, i, one) for one in (j, k, m))],
+        [SubClassOf(ObjectMinCardinality(2, P), A), *(ObjectPropertyAssertion(P, i, one) for one in (j, k))],
+        [SubClassOf(A, some(P, ObjectHasValue(Q, i))), SubClassOf(some(P, some(Q, B)), C), ClassAssertion(A, j)],
     ],
 )  # fmt: skip
-def test_what_is_lost_is_named_with_its_axiom(axioms: list[Axiom], words: str) -> None:
+def test_what_takes_cases_is_not_lost(axioms: list[Axiom]) -> None:
     kb = reasoned(*axioms, AsymmetricObjectProperty(R))
-    (sentence,) = kb.unsupported
-    assert words in sentence
+    assert kb.unsupported == ()

