@@ -591,17 +591,17 @@ class KnowledgeBase:
     def _complete(self, found: Explanation, goal: Axiom | None) -> Explanation:
         """Return the explanation resting on no more axioms than it needs, and on all of them."""
         needed = justify(self._told.axioms, goal, found.sources(), self._told.schema)
-        if not needed or set(needed) == set(found.sources()):
-            return found
-        alone = KnowledgeBase(self.iri, needed)
-        alone.reason()
-        if alone._engine is not None:
+        again: Explanation | None = found
+        if not set(found.sources()) <= set(needed):
+            alone = KnowledgeBase(self.iri, needed)
+            alone.reason()
+            assert alone._engine is not None
             reasons = Reasons(alone._engine, alone._schema_axioms)
             again = reasons.of_inconsistency() if goal is None else reasons.of_fact(goal)
-            if again is not None and again.because != BY_CASES:
-                sources = again.sources()
-                return replace(again, background=tuple(a for a in needed if a not in sources))
-        return self._listed(found.fact_text, needed)
+        if again is None or again.because == BY_CASES:
+            return self._listed(found.fact_text, needed)
+        sources = again.sources()
+        return replace(again, background=tuple(a for a in needed if a not in sources))
 
     def justification(self, fact: Axiom | None) -> tuple[Axiom, ...]:
         """Return the fewest asserted axioms to which a fact is owed: without any of them it would
