@@ -545,7 +545,7 @@ class KnowledgeBase:
     def _is_below(self, sub: str, sup: str) -> bool:
         if sup == NOTHING:
             known = self._classification
-            return known is not None and sub in known.unsatisfiable()
+            return known is not None and known.is_impossible(sub)
         return sup in (sub, THING, *self.superclasses(sub))
 
     def entails(self, axiom: Axiom) -> bool:

@@ -166,7 +166,7 @@ class CaseRules:
     # --- numbers ---
 
     def concept(self, iri: str) -> int:
-        """The number of a named class."""
+        """Return the number of a named class."""
         number = self._numbers.get(iri)
         if number is None:
             number = self._numbers[iri] = len(self.names)
@@ -176,7 +176,7 @@ class CaseRules:
         return number
 
     def fresh(self) -> str:
-        """A name for a concept of its own."""
+        """Return a name for a concept of its own."""
         return f'{_FRESH}{len(self.names)}'
 
     def nominal(self, individual: str) -> int:
@@ -189,7 +189,7 @@ class CaseRules:
         return number
 
     def role(self, prop: PropertyExpression | AnyRole) -> int:
-        """The number of a role."""
+        """Return the number of a role."""
         iri, inverted = prop if isinstance(prop, tuple) else directed(prop)
         if iri in (f'{OWL}topObjectProperty', f'{OWL}bottomObjectProperty'):
             raise NotCoveredError(f'owl:{local_name(iri)} is not reasoned about by cases')
@@ -202,7 +202,7 @@ class CaseRules:
         return -number if inverted else number
 
     def roles_above(self, role: int) -> tuple[int, ...]:
-        """The role and every role that it implies by itself."""
+        """Return the role and every role that it implies by itself."""
         found = self.above.get(role)
         if found is None:
             key = (self.role_names[abs(role)], role < 0)
@@ -217,7 +217,7 @@ class CaseRules:
         return found
 
     def data_above(self, prop: str) -> tuple[str, ...]:
-        """The data property and every one that it implies."""
+        """Return the data property and every one that it implies."""
         found = self.props_above.get(prop)
         if found is None:
             seen = {prop: None}
@@ -231,11 +231,11 @@ class CaseRules:
         return found
 
     def is_complex(self, prop: str) -> bool:
-        """Whether a chain implies the property."""
+        """Tell whether a chain implies the property."""
         return self._chains.is_complex((prop, False))
 
     def steps(self, prop: str) -> list[tuple[int, int | None, int]]:
-        """The automaton of a property, from state 0 to state 1."""
+        """Return the automaton of a property, from state 0 to state 1."""
         try:
             found = self._chains.steps((prop, False))
         except IrregularError:
@@ -245,7 +245,7 @@ class CaseRules:
     # --- concepts of expressions ---
 
     def positive(self, expression: ClassExpression) -> int:
-        """A concept whose members are in the class; 0 for owl:Thing."""
+        """Return a concept whose members are in the class; 0 for owl:Thing."""
         expression = normal(expression)
         if expression == THING:
             return 0
@@ -261,7 +261,7 @@ class CaseRules:
         return known
 
     def recognised(self, expression: ClassExpression) -> int:
-        """A concept that all members of the class have; 0 for owl:Thing."""
+        """Return a concept that all members of the class have; 0 for owl:Thing."""
         expression = normal(expression)
         if expression == THING:
             return 0
@@ -299,7 +299,7 @@ class CaseRules:
         return known
 
     def values(self, data_range: ex.DataRange) -> ValueSet:
-        """The values of a data range."""
+        """Return the values of a data range."""
         found = value_set(self._defined(data_range, ()))
         if found is None:
             raise NotCoveredError('a data range is not supported')
@@ -323,11 +323,11 @@ class CaseRules:
     # --- inclusions ---
 
     def include(self, sub: ClassExpression, sup: ClassExpression) -> None:
-        """Adds the rules by which members of one class are members of another."""
+        """Add the rules by which members of one class are members of another."""
         _Clause(self).add([negated(normal(sub)), sup])
 
     def node_rule(self, body: frozenset[int], heads: Heads) -> None:
-        """Adds a rule about one individual."""
+        """Add a rule about one individual."""
         if any(concept in body for _, concept in heads):
             return
         if not body:
@@ -337,7 +337,7 @@ class CaseRules:
             self.of_node.setdefault(concept, []).append(rule)
 
     def edge_rule(self, rule: EdgeRule) -> None:
-        """Adds a rule about related individuals."""
+        """Add a rule about related individuals."""
         self.by_role.setdefault(rule.role, []).append(rule)
         for concept in rule.xs:
             self.by_source.setdefault(concept, []).append(rule)
@@ -345,13 +345,13 @@ class CaseRules:
             self.by_target.setdefault(concept, []).append(rule)
 
     def value_rule(self, prop: str, xs: frozenset[int], values: ValueSet, heads: Heads) -> None:
-        """Adds a rule about values."""
+        """Add a rule about values."""
         if not values.is_empty:
             self.by_prop.setdefault(prop, []).append(ValueRule(xs, values, ~values, heads))
             self.of_values |= xs
 
     def universal(self, concept: int, prop: PropertyExpression, target: int) -> None:
-        """Adds the rules by which whoever a member is related to has another concept."""
+        """Add the rules by which whoever a member is related to has another concept."""
         role = directed(prop)
         if not self._chains.is_complex(role):
             rule = EdgeRule(frozenset((concept,)), self.role(role), _NONE, ((_Y, target),))
@@ -378,11 +378,11 @@ class CaseRules:
                 self.edge_rule(EdgeRule(here, self.role(step), _NONE, ((_Y, there),)))
 
     def complex_role(self, prop: PropertyExpression) -> bool:
-        """Whether a chain implies the role."""
+        """Tell whether a chain implies the role."""
         return self._chains.is_complex(directed(prop))
 
     def mark(self, prop: PropertyExpression) -> int:
-        """A concept of whoever is related to itself by the role."""
+        """Return a concept of whoever is related to itself by the role."""
         if self.complex_role(prop):
             raise NotCoveredError('a property with chains is asked for itself')
         found = self.marks.setdefault(abs(self.role(prop)), [])
@@ -391,7 +391,7 @@ class CaseRules:
         return found[0]
 
     def loop(self, prop: PropertyExpression) -> int:
-        """A concept whose members are related to themselves by the role."""
+        """Return a concept whose members are related to themselves by the role."""
         key = ('loop', directed(prop)[0])
         known = self._counts.get(key)
         if known is None:
@@ -529,7 +529,7 @@ class _Clause:
         self._both: list[ex.ObjectIntersectionOf] = []
 
     def add(self, disjuncts: Iterable[ClassExpression]) -> None:
-        """Adds the rules of a disjunction."""
+        """Add the rules of a disjunction."""
         if not all(map(self._take, _flat(disjuncts))):
             return
         if len(self._both) == 1 and not (self._heads or self._every):
@@ -549,7 +549,7 @@ class _Clause:
         other.add([operand])
 
     def _take(self, one: ClassExpression) -> bool:
-        """Sorts a disjunct in; False where it holds of everybody."""
+        """Sort a disjunct in; False where it holds of everybody."""
         rules = self._rules
         if isinstance(one, str):
             if one == NOTHING:
@@ -689,7 +689,7 @@ class _Clause:
             self._finish_edge(body, heads, *inline)
 
     def _is_chained(self) -> bool:
-        """Whether one concept alone says what a property with chains leads to."""
+        """Tell whether one concept alone says what a property with chains leads to."""
         alone = len(self._every) == len(self._body) == 1 and not (self._heads or self._never)
         return alone and self._rules.complex_role(self._every[0][0])
 
@@ -769,7 +769,7 @@ def _exactly(
 
 
 def _is_negative(expression: ClassExpression) -> bool:
-    """Whether a class only excludes: its complement can be recognised from what is there."""
+    """Tell whether a class only excludes: its complement can be recognised from what is there."""
     one = normal(expression)
     if isinstance(one, (ex.ObjectUnionOf, ex.ObjectIntersectionOf)):
         return all(map(_is_negative, one.operands))

@@ -110,11 +110,11 @@ class CaseSearch:
             self._trail.append((table, key, table.pop(key)))
 
     def mark(self) -> int:
-        """A state to come back to."""
+        """Return a state to come back to."""
         return len(self._trail)
 
     def undo(self, mark: int) -> None:
-        """Goes back to a state without choices."""
+        """Go back to a state without choices."""
         self._undo(mark)
         self._stack.clear()
         self._forget()
@@ -136,7 +136,7 @@ class CaseSearch:
     # --- individuals ---
 
     def individual(self, iri: str) -> int:
-        """The individual of a name."""
+        """Return the individual of a name."""
         known = self._individuals.get(iri)
         if known is None:
             known = self._new(None)
@@ -146,12 +146,12 @@ class CaseSearch:
         return self.find(known)[0] or known
 
     def choices_of(self, iri: str) -> Choices:
-        """What it depends on that `individual` stands for the name."""
+        """Return what it depends on that `individual` stands for the name."""
         known = self._individuals[iri]
         return self.find(known)[1]
 
     def somebody(self) -> int:
-        """An individual of which nothing is known."""
+        """Return an individual of which nothing is known."""
         return self._new(None)
 
     def _new(self, parent: int | None) -> int:
@@ -179,7 +179,7 @@ class CaseSearch:
         return x
 
     def find(self, x: int) -> tuple[int | None, Choices]:
-        """Who stands for an individual now (None: nobody), and the choices that depends on."""
+        """Return who stands for an individual now (None: nobody), and by which choices."""
         choices = 0
         current: int | None = x
         while current is not None and current in self._gone:
@@ -188,7 +188,7 @@ class CaseSearch:
         return current, choices
 
     def alive(self) -> Iterator[int]:
-        """Every individual that is there, in the order they came."""
+        """Return every individual that is there, in the order they came."""
         return (x for x in self.labels if x not in self._gone)
 
     # --- facts ---
@@ -253,7 +253,7 @@ class CaseSearch:
         self._merge(found, other, choices | more | others)
 
     def _different(self, x: int, y: int) -> Choices | None:
-        """The choices by which two individuals differ; None where they are not known to."""
+        """Return the choices by which two individuals differ; None where they are not known to."""
         mine, theirs = self._groups[x], self._groups[y]
         found: Choices | None = None
         for group, choices in mine.items():
@@ -267,7 +267,7 @@ class CaseSearch:
     # --- the search ---
 
     def solve(self) -> bool:
-        """Whether there is a model; the tables then hold it."""
+        """Tell whether there is a model; the tables then hold it."""
         self._prepare()
         while True:
             try:
@@ -280,7 +280,7 @@ class CaseSearch:
                     return False
 
     def attempt(self, state: Callable[[], None]) -> bool:
-        """States something; False where that is a contradiction at once."""
+        """State something; False where that is a contradiction at once."""
         try:
             state()
         except _ClashError:
@@ -288,7 +288,7 @@ class CaseSearch:
         return True
 
     def settle(self) -> bool:
-        """Derives what needs no cases; False on a contradiction."""
+        """Derive what needs no cases; False on a contradiction."""
         self._prepare()
         try:
             self._saturate()
@@ -326,7 +326,7 @@ class CaseSearch:
                     self._check_values(x)
 
     def _branch(self) -> bool:
-        """Tries the first open disjunction; whether something was added."""
+        """Try the first open disjunction; whether something was added."""
         for key, choices in tuple(self._pending.items()):
             found = self._open(key, choices)
             self._drop(self._pending, key)
@@ -350,7 +350,7 @@ class CaseSearch:
         return self._failures.get(alternative[2], 0) if alternative[0] == 'concept' else 0
 
     def _go_back(self, choices: Choices) -> bool:
-        """Takes the next alternative of the last choice that took part; False: there is none."""
+        """Take the next alternative of the last choice that took part; False: there is none."""
         while self._stack:
             self._forget()
             choice = self._stack[-1]
@@ -380,7 +380,7 @@ class CaseSearch:
     def _open(
         self, key: tuple[Alternative, ...], choices: Choices
     ) -> tuple[tuple[Alternative, ...], Choices] | None:
-        """The alternatives that are left; None where one holds, or none is about anybody."""
+        """Return the alternatives that are left; None where one holds, or none is about anybody."""
         left: list[Alternative] = []
         for alternative in key:
             kind = alternative[0]
@@ -576,7 +576,7 @@ class CaseSearch:
         self._revalue[kept] = None
 
     def _prune(self, x: int, parent: int, choices: Choices) -> None:
-        """Takes away an unnamed individual and those that hang on it."""
+        """Take away an unnamed individual and those that hang on it."""
         if self._parent[x] != parent or x in self._gone:
             return
         self._put(self._gone, x, (None, choices))
@@ -680,7 +680,7 @@ class CaseSearch:
     # --- individuals that must exist ---
 
     def _expand(self) -> bool:
-        """Adds the individuals that are still needed; whether there were any."""
+        """Add the individuals that are still needed; whether there were any."""
         self.blocked = self._blocked()
         progress = False
         for x in tuple(self.alive()):
@@ -837,7 +837,7 @@ class CaseSearch:
                     self._alternatives([narrow, *heads], choices | more)
 
     def _join_known(self, x: int) -> None:
-        """Makes one of the values that are the same."""
+        """Make one of the values that are the same."""
         known: dict[Value, int] = {}
         for v in tuple(self.values[x]):
             values, choices = self.value_sets[v]
@@ -886,7 +886,7 @@ class CaseSearch:
         self._alternatives(pairs, choices)
 
     def _assign(self, x: int) -> None:
-        """Whether values that differ can be chosen from small sets."""
+        """Tell whether values that differ can be chosen from small sets."""
         others: dict[int, list[int]] = {}
         for v, w in combinations(self.values[x], 2):
             if self._values_apart(v, w) is not None:
@@ -923,7 +923,7 @@ class CaseSearch:
     # --- keys ---
 
     def _keys(self) -> bool:
-        """Makes one of named individuals that share a key; whether something was added."""
+        """Make one of named individuals that share a key; whether something was added."""
         for key in self.rules.keys:
             members = [
                 x
@@ -974,7 +974,7 @@ class CaseSearch:
 
 
 def _sum(concepts: frozenset[int], labels: dict[int, Choices]) -> Choices | None:
-    """The choices that concepts depend on; None where one is missing."""
+    """Return the choices that concepts depend on; None where one is missing."""
     total = 0
     for concept in concepts:
         found = labels.get(concept)

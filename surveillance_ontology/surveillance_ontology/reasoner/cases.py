@@ -57,7 +57,7 @@ class CaseReasoner:
         self._consistent: bool | None = None
 
     def _translate(self, axiom: Axiom) -> None:
-        """Makes the concept of an assertion that needs one."""
+        """Make the concept of an assertion that needs one."""
         if isinstance(axiom, ax.ClassAssertion):
             expression: ClassExpression = axiom.cls
         elif isinstance(axiom, _NEGATIVE):
@@ -100,7 +100,7 @@ class CaseReasoner:
     # --- questions ---
 
     def consistent(self) -> bool:
-        """Whether there is a model; True where that was not found out."""
+        """Tell whether there is a model; True where that was not found out."""
         if self._consistent is None:
             found = self._possible and self._search.settle()
             self._base = self._search.mark()
@@ -109,7 +109,7 @@ class CaseReasoner:
         return self._consistent
 
     def _is_possible(self, state: Callable[[], None]) -> bool:
-        """Whether there is a model in which what `state` says holds; it is left in the tables."""
+        """Tell whether what `state` says holds in some model, left in the tables."""
         search = self._search
         try:
             if not search.attempt(state):
@@ -122,7 +122,7 @@ class CaseReasoner:
         return found
 
     def _denial(self, axiom: Axiom) -> Callable[[], None] | None:
-        """What to state for a fact of the model to be false; None where that has no concept."""
+        """Return what to state to deny a fact of the model; None where it has no concept."""
         search = self._search
         if isinstance(axiom, ax.ClassAssertion):
             name, concept = axiom.individual, self._concept(ex.ObjectComplementOf(axiom.cls))
@@ -137,7 +137,7 @@ class CaseReasoner:
     # --- everything that follows about individuals ---
 
     def facts(self, known: Callable[[Axiom], bool]) -> Iterator[Axiom]:
-        """Every fact about named individuals that follows and is not known."""
+        """Return every fact about named individuals that follows and is not known."""
         search = self._search
         if not self.consistent():
             return
@@ -166,7 +166,7 @@ class CaseReasoner:
             search.undo(self._base)
 
     def _held(self) -> Iterator[tuple[Axiom, int]]:
-        """The facts of the last model, with the choices they depend on."""
+        """Return the facts of the last model, with the choices they depend on."""
         search, rules = self._search, self._rules
         named = [x for x in search.alive() if search.names[x]]
         for x in named:
@@ -198,7 +198,7 @@ class CaseReasoner:
                     yield fact, choices | more
 
     def _relations(self, x: int) -> Iterator[tuple[str, int, int]]:
-        """Named individuals that one is related to: (property, individual, choices)."""
+        """Return named individuals that one is related to: (property, individual, choices)."""
         search, rules = self._search, self._rules
         for y, roles in search.out[x].items():
             if search.names[y]:
@@ -210,7 +210,7 @@ class CaseReasoner:
                 yield from self._along(x, prop)
 
     def _along(self, x: int, prop: str) -> Iterator[tuple[str, int, int]]:
-        """Follows a property that chains imply through the model."""
+        """Follow a property that chains imply through the model."""
         search = self._search
         steps: dict[int, list[tuple[int | None, int]]] = {}
         for before, step, after in self._rules.steps(prop):
@@ -243,7 +243,7 @@ class CaseReasoner:
     def hierarchy(
         self, classes: Iterable[str], known: Callable[[str, str], bool]
     ) -> Iterator[tuple[str, str]]:
-        """Every pair of named classes, the first below the second, that follows and is not known.
+        """Return the pairs of named classes, one below the other, that follow and are not known.
 
         A class that can have no members is below owl:Nothing.
         """
@@ -303,7 +303,7 @@ class CaseReasoner:
 
 
 def _without(axiom: Axiom) -> ClassExpression:
-    """The class of what an individual would be without a property assertion."""
+    """Return the class of what an individual would be without a property assertion."""
     if isinstance(axiom, ax.ObjectPropertyAssertion | ax.NegativeObjectPropertyAssertion):
         other = ex.ObjectComplementOf(ex.ObjectOneOf((axiom.object,)))
         return ex.ObjectAllValuesFrom(axiom.prop, other)
@@ -319,7 +319,7 @@ class NotAskableError(ValueError):
 
 
 def entails(axioms: Iterable[Axiom], goal: Axiom | None) -> bool | None:
-    """Whether an axiom (None: a contradiction) follows from others: its denial contradicts them.
+    """Tell whether an axiom (None: a contradiction) follows: its denial contradicts the others.
 
     Returns:
         None where some axioms are not covered, or the search was given up, and no contradiction was
@@ -346,7 +346,7 @@ Denial = tuple[Axiom, ...]
 
 
 def _denials(goal: Axiom) -> Iterator[Denial]:
-    """Assertions one of which must hold where an axiom does not."""
+    """Return assertions one of which must hold where an axiom does not."""
     if '_:' in repr(goal):
         raise NotAskableError('an axiom about anonymous individuals')
     if isinstance(goal, ax.SubClassOf):

@@ -125,8 +125,12 @@ class Classification:
         found = {name for name, above in self._above.items() if cls in above}
         return (found | self._impossible) - {cls}
 
+    def is_impossible(self, cls: str) -> bool:
+        """Tell whether a named class can have no members."""
+        return cls in self._impossible
+
     def complete(self, pairs: Iterable[tuple[str, str]]) -> None:
-        """Adds what reasoning by cases found, and nothing of what it found before.
+        """Add what reasoning by cases found, and nothing of what it found before.
 
         Args:
             pairs: A class and one above it, or owl:Nothing.
@@ -140,7 +144,7 @@ class Classification:
                 self._above[sub] = self._above.get(sub, frozenset()) | {sup}
 
     def below_by_itself(self, sub: str, sup: str) -> bool:
-        """Whether a class is below another, or owl:Nothing, without reasoning by cases."""
+        """Tell whether a class is below another, or owl:Nothing, without reasoning by cases."""
         above, impossible = self._own
         return sub in impossible or sup == THING or sup in above.get(sub, ())
 

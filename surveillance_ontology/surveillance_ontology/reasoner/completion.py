@@ -44,7 +44,7 @@ class Completion:
         self.unsupported: tuple[str, ...] | None = None
 
     def run(self, axioms: Iterable[Axiom]) -> None:
-        """Adds what follows from everything that is asserted now."""
+        """Add what follows from everything that is asserted now."""
         engine = self._engine
         self.unsupported = None
         if not engine.consistent or not self._is_wanted():
@@ -68,13 +68,13 @@ class Completion:
         self._report(reasoner)
 
     def entails(self, axioms: Iterable[Axiom], fact: Axiom) -> bool:
-        """Whether a fact that was not derived follows all the same."""
+        """Tell whether a fact that was not derived follows all the same."""
         axioms = list(axioms)
         few = len(axioms) - len(self._schema) <= _MOST_ASSERTIONS
         return few and bool(entails(axioms, fact))
 
     def _may_lack(self, program: Program) -> bool:
-        """Whether the clauses may leave something out without saying so.
+        """Tell whether the clauses may leave something out without saying so.
 
         They do not where nothing unnamed must exist, nor where each class that requires somebody
         says all by itself and rules, which take no part in cases, do the rest.
@@ -103,7 +103,7 @@ class Completion:
         return self._engine.holds(fact)
 
     def _report(self, reasoner: CaseReasoner) -> None:
-        """Names what is still left out, in the words of the classification where it has some."""
+        """Name what is still left out, in the words of the classification where it has some."""
         found = list(self._native) if reasoner.stopped else []
         for gap in reasoner.gaps:
             subject = gap.rpartition(': ')[0] + ':'
