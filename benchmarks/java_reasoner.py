@@ -59,11 +59,11 @@ class JavaReasoner:
         )
 
     def ask(self, *words: str) -> str:
-        """Sends a command; its answer."""
+        """Send a command and return its answer."""
         return self._exchange('\t'.join(words) + '\n')
 
     def ask_all(self, questions: list[tuple[str, ...]]) -> str:
-        """Sends questions; a letter for each: t(rue), f(alse) or e(rror)."""
+        """Send questions and return a letter for each: t(rue), f(alse) or e(rror)."""
         lines = ''.join('\t'.join(words) + '\n' for words in questions)
         return self._exchange(f'all\t{len(questions)}\n{lines}')
 

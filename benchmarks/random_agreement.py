@@ -75,7 +75,7 @@ def questions(axioms: list[Axiom]) -> Iterator[tuple[Axiom, tuple[str, ...]]]:
 
 
 def spelt_out(axioms: list[Axiom]) -> Iterator[Axiom]:
-    """The axioms with disjoint unions in two parts: the Java copies do not read them."""
+    """Return the axioms with disjoint unions in two parts: the Java copies do not read them."""
     for axiom in axioms:
         if isinstance(axiom, DisjointUnion):
             yield EquivalentClasses((axiom.cls, ObjectUnionOf(axiom.classes)))
@@ -99,7 +99,7 @@ class Comparison:
         self.time = 0.0
 
     def compare(self, seed: int, axioms: list[Axiom], path: Path) -> Iterator[str]:
-        """Counts one ontology; yields a line for every fault."""
+        """Count one ontology and yield a line for every fault."""
         counts = self.counts
         counts['ontologies'] += 1
         write_ontology(spelt_out(axioms), IRI, path)
@@ -168,7 +168,7 @@ class Comparison:
         return True, self._java.ask_all(asked)
 
     def _judged(self, path: Path, words: tuple[str, ...] | None) -> bool | None:
-        """What the other Java reasoner says: of a fact, or with None of consistency."""
+        """Ask the other Java reasoner about a fact, or with None about consistency."""
         (other,) = (kind for kind in KINDS if kind != self._kind)
         try:
             with JavaReasoner(other, timeout=self._seconds) as judge:
@@ -178,14 +178,14 @@ class Comparison:
             return None
 
     def close(self) -> None:
-        """Ends the JVM; the next comparison starts another one."""
+        """End the JVM; the next comparison starts another one."""
         if self._java is not None:
             self._java.close()
             self._java = None
 
 
 def main() -> None:
-    """Reads the arguments and prints the table."""
+    """Read the arguments and print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument('--number', type=int, default=1000, help='how many ontologies')
     parser.add_argument('--first', type=int, default=0, help='the first seed')

@@ -180,7 +180,7 @@ class CaseRules:
         return f'{_FRESH}{len(self.names)}'
 
     def nominal(self, individual: str) -> int:
-        """The concept of one individual."""
+        """Return the concept of one individual."""
         number = self.nominal_of.get(individual)
         if number is None:
             number = self.concept(self.fresh())
@@ -542,7 +542,7 @@ class _Clause:
         self._related()
 
     def _apart(self, operand: ClassExpression) -> None:
-        """The disjunction with one operand instead of an intersection."""
+        """Add the disjunction with one operand instead of an intersection."""
         other = _Clause(self._rules)
         other._body |= self._body
         other._never += self._never

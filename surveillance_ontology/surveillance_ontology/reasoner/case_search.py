@@ -194,7 +194,7 @@ class CaseSearch:
     # --- facts ---
 
     def concept(self, x: int, concept: int, choices: Choices) -> None:
-        """An individual has a concept."""
+        """State that an individual has a concept."""
         labels = self.labels[x]
         if concept and concept not in labels:
             self.steps += 1
@@ -204,7 +204,7 @@ class CaseSearch:
             self._queue.append((x, concept))
 
     def relate(self, x: int, role: int, y: int, choices: Choices) -> None:
-        """An individual is related to another one."""
+        """State that an individual is related to another one."""
         there = self.out[x].get(y)
         if there is None:
             there = {}
@@ -222,7 +222,7 @@ class CaseSearch:
                 self._queue.append((x, one, y))
 
     def value(self, x: int, prop: str, values: ValueSet, choices: Choices) -> int:
-        """An individual has some value of a set by a data property."""
+        """State that an individual has some value of a set by a data property."""
         v = next(self._numbers)
         self._put(self.values[x], v, None)
         self._put(self.value_props, v, dict.fromkeys(self.rules.data_above(prop), choices))
@@ -233,11 +233,11 @@ class CaseSearch:
         return v
 
     def state_value(self, x: int, prop: str, value: Value) -> None:
-        """An individual has a value."""
+        """State that an individual has a value."""
         self.value(x, prop, point(value), 0)
 
     def differ(self, individuals: Iterable[int], choices: Choices = 0) -> None:
-        """No two of the individuals are the same."""
+        """State that no two of the individuals are the same."""
         group = next(self._numbers)
         for x in individuals:
             if group in self._groups[x]:
@@ -245,7 +245,7 @@ class CaseSearch:
             self._put(self._groups[x], group, choices)
 
     def same(self, x: int, y: int, choices: Choices = 0) -> None:
-        """Two individuals are the same."""
+        """State that two individuals are the same."""
         found, more = self.find(x)
         other, others = self.find(y)
         if found is None or other is None or found == other:
@@ -439,7 +439,7 @@ class CaseSearch:
             self._merge_values(alternative[1], alternative[2], choices)
 
     def _one_of(self, heads: Heads, x: int, y: int, choices: Choices) -> None:
-        """One of the heads must hold of x (place 0) or y."""
+        """State that one of the heads holds of x (place 0) or y."""
         alternatives: list[Alternative] = []
         for place, concept in heads:
             one = y if place else x
@@ -639,7 +639,7 @@ class CaseSearch:
         self._alternatives(pairs, choices)
 
     def _introduce(self, x: int, limit: Count, y: int, choices: Choices) -> None:
-        """An unnamed individual that a named one counts is one of so many."""
+        """Make an unnamed individual that a named one counts one of so many."""
         choices |= self.out[x][y][limit.role]
         if limit.concept:
             choices |= self.labels[y][limit.concept]

@@ -514,7 +514,7 @@ class Engine:
         self._propagate()
 
     def take_from_cases(self, facts: Iterable[Axiom] | None) -> None:
-        """Adds facts that reasoning by cases found; they hold until the next `update`.
+        """Add facts that reasoning by cases found; they hold until the next `update`.
 
         Args:
             facts: Class and property assertions and who is the same; None for a contradiction.

@@ -33,7 +33,7 @@ _X, _Y = 0, 1
 
 
 def spell_out_chains(program: Program) -> None:
-    """Adds the steps of every chain to a program's clauses."""
+    """Add the steps of every chain to a program's clauses."""
     _Spelling(program).run()
 
 
@@ -55,7 +55,7 @@ class Chains:
         return iter(tuple(self._chains))
 
     def imply(self, chain: tuple[AnyRole, ...], role: AnyRole) -> None:
-        """Notes that a chain, or with one part a property, implies a role."""
+        """Note that a chain, or with one part a property, implies a role."""
         back = tuple(turned(one) for one in reversed(chain))
         if len(chain) == 1:
             self._below.setdefault(role, set()).add(chain[0])
@@ -65,7 +65,7 @@ class Chains:
             self._chains.setdefault(turned(role), []).append(back)
 
     def roles_below(self, role: AnyRole) -> list[AnyRole]:
-        """The role and every role that implies it by itself."""
+        """Return the role and every role that implies it by itself."""
         return list(closure(role, lambda one: self._below.get(one, ())))
 
     def is_complex(self, role: AnyRole) -> bool:
@@ -73,7 +73,7 @@ class Chains:
         return any(one in self._chains for one in self.roles_below(role))
 
     def steps(self, role: AnyRole) -> list[Step]:
-        """The automaton of a role: its steps from state 0 to state 1.
+        """Return the automaton of a role: its steps from state 0 to state 1.
 
         Raises:
             IrregularError: The role's chains use a role that depends on it.
@@ -91,7 +91,7 @@ class Chains:
         above: tuple[AnyRole, ...],
         fresh: count[int],
     ) -> None:
-        """Adds the steps between two states of a role's own that its chains make.
+        """Add the steps between two states of a role's own that its chains make.
 
         Raises:
             IrregularError: The role's chains use a role that depends on it.

@@ -259,7 +259,7 @@ class ValueSet:
         return (self & ~other).is_empty
 
     def members(self) -> Iterator[Value]:
-        """The values of a finite set."""
+        """Return the values of a finite set."""
         for part in self.parts.values():
             for one in part:
                 yield from one.listed or ()
@@ -301,7 +301,7 @@ def _count(layer: str, low: _End, high: _End) -> float:
 
 
 def _between(layer: str, low: _End, high: _End) -> Iterator[Value]:
-    """The values of a layer between two ends, where they are finitely many."""
+    """Return the finitely many values of a layer between two ends."""
     number = int(_count(layer, low, high))
     if layer == 'whole':
         first = math.ceil(low.key) + (low.side > 0 and math.ceil(low.key) == low.key)

@@ -113,7 +113,7 @@ class WideOntology:
         return ex.ObjectInverseOf(name) if self.random.random() < 0.25 else name
 
     def expression(self, depth: int = 4) -> ClassExpression:
-        """A class expression, nested to the given depth."""
+        """Return a class expression, nested to the given depth."""
         draw = self.random
         if not depth or draw.random() < 0.3:
             return self._leaf()
@@ -246,7 +246,7 @@ class WideOntology:
         return ax.NegativeDataPropertyAssertion(draw.choice(DATAS), one, self.literal())
 
     def ontology(self, schema: int, assertions: int) -> list[Axiom]:
-        """Declarations, axioms about classes and properties, and assertions."""
+        """Return declarations, axioms about classes and properties, and assertions."""
         declared: list[Axiom] = [ax.Declaration('class', name) for name in CLASSES]
         declared += [ax.Declaration('object_property', name) for name in OBJECTS]
         declared += [ax.Declaration('data_property', name) for name in DATAS]
