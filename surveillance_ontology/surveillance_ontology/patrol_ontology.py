@@ -84,6 +84,19 @@ class Snapshot:
     connections: Mapping[str, tuple[str, ...]]
 
 
+@dataclass(frozen=True)
+class _Answers:
+    """What one batch of questions brought, all of one moment."""
+
+    is_in: DirectiveResponse
+    seen_at: DirectiveResponse
+    can_reach: DirectiveResponse
+    locations: DirectiveResponse
+    members: Mapping[str, frozenset[str]]
+    connections: Mapping[str, tuple[str, ...]]
+    visited: Mapping[str, int]
+
+
 class PatrolOntology:
     """One robot's view of one ontology.
 
@@ -339,55 +352,72 @@ class PatrolOntology:
                     raise
 
     def _ask(self, now: float, classes: Sequence[str], visits: Mapping[str, float]) -> Snapshot:
-        request, robot = self._request, self._robot
         asked = self._places
         # A visit of this moment is the latest there can be, and nobody takes away the place that
         # the robot stands in: it can be told unasked. For any other the ontology is asked first.
         owed = [place for place, at in visits.items() if place in asked and int(at) >= int(now)]
         while True:
-            told = [self._set_value('visitedAt', place, int(visits[place])) for place in owed]
-            told += [self._set_value('now', robot, int(now)), request('REASON')]
-            questions = [
-                request('QUERY OBJECTPROP IND', 'isIn', robot),
-                request('QUERY DATAPROP IND', 'seenAt', robot),
-                request('QUERY OBJECTPROP IND', 'canReach', robot),
-                *(request('QUERY IND CLASS', name) for name in ('LOCATION', *classes)),
-                *(request('QUERY OBJECTPROP IND', 'connectedTo', place) for place in asked),
-                *(request('QUERY DATAPROP IND', 'visitedAt', place) for place in asked),
-            ]
-            answers = self._carry_out([*told, *questions], whole=True)[len(told) :]
-            is_in, seen_at, can_reach, locations, *rest = answers
-            members, rest = rest[: len(classes)], rest[len(classes) :]
-            self._places = _names(locations)
-            visited = {
-                place: _time(f'visitedAt of {place}', answer)
-                for place, answer in zip(asked, rest[len(asked) :], strict=True)
-            }
+            found = self._exchange(now, {place: visits[place] for place in owed}, classes, asked)
+            self._places = _names(found.locations)
             owed = [
                 place
                 for place in asked
-                if place in self._places and int(visits.get(place, NEVER)) > visited[place]
+                if place in self._places and int(visits.get(place, NEVER)) > found.visited[place]
             ]
             if asked == self._places and not owed:
-                break
+                return self._snapshot_of(found, classes)
             asked = self._places
-        if not is_in.is_consistent:
+
+    def _exchange(
+        self, now: float, visits: Mapping[str, float], classes: Sequence[str], asked: Sequence[str]
+    ) -> _Answers:
+        """Tell visits and the time, and ask about the robot and some places, in one batch."""
+        request, robot = self._request, self._robot
+        told = [self._set_value('visitedAt', place, int(at)) for place, at in visits.items()]
+        told += [self._set_value('now', robot, int(now)), request('REASON')]
+        questions = [
+            request('QUERY OBJECTPROP IND', 'isIn', robot),
+            request('QUERY DATAPROP IND', 'seenAt', robot),
+            request('QUERY OBJECTPROP IND', 'canReach', robot),
+            request('QUERY IND CLASS', 'LOCATION'),
+            *(request('QUERY IND CLASS', name) for name in classes),
+            *(request('QUERY OBJECTPROP IND', 'connectedTo', place) for place in asked),
+            *(request('QUERY DATAPROP IND', 'visitedAt', place) for place in asked),
+        ]
+        answers = iter(self._carry_out([*told, *questions], whole=True)[len(told) :])
+        return _Answers(
+            is_in=next(answers),
+            seen_at=next(answers),
+            can_reach=next(answers),
+            locations=next(answers),
+            members={name: frozenset(_names(next(answers))) for name in classes},
+            connections={place: _names(next(answers)) for place in asked},
+            visited={place: _time(f'visitedAt of {place}', next(answers)) for place in asked},
+        )
+
+    def _snapshot_of(self, found: _Answers, classes: Sequence[str]) -> Snapshot:
+        """Make a snapshot of answers about all places.
+
+        Raises:
+            OntologyNotReadyError: The ontology contradicts itself, or has the robot in no place, or
+                in several.
+        """
+        if not found.is_in.is_consistent:
             raise OntologyNotReadyError(f'ontology {self.reference} is inconsistent')
-        where = _names(is_in)
+        where = _names(found.is_in)
         if len(where) != 1:
             what = f'in {" and ".join(where)}' if where else 'in no place'
-            raise OntologyNotReadyError(f'ontology {self.reference} has {robot} {what}')
-        among = {name: set(_names(answer)) for name, answer in zip(classes, members, strict=True)}
+            raise OntologyNotReadyError(f'ontology {self.reference} has {self._robot} {what}')
         return Snapshot(
             place=where[0],
-            seen_at=_time(f'seenAt of {robot}', seen_at),
-            reachable=_names(can_reach),
+            seen_at=_time(f'seenAt of {self._robot}', found.seen_at),
+            reachable=_names(found.can_reach),
             classes={
-                place: frozenset(name for name in classes if place in among[name])
-                for place in asked
+                place: frozenset(name for name in classes if place in found.members[name])
+                for place in found.connections
             },
-            visited_at={place: float(at) for place, at in visited.items() if at != NEVER},
-            connections={place: _names(answer) for place, answer in zip(asked, rest, strict=False)},
+            visited_at={place: float(at) for place, at in found.visited.items() if at != NEVER},
+            connections=found.connections,
         )
 
     # --- directives ---
