@@ -15,6 +15,7 @@ from surveillance_interfaces.msg import (
     OntologyPlace,
     QueryItem,
 )
+from surveillance_ontology.armor import protocol
 from surveillance_ontology.armor.facts import ShortFact, short_facts
 from surveillance_ontology.armor.protocol import DirectiveRequest, DirectiveResponse
 from surveillance_ontology.map_building import RoomNote
@@ -55,7 +56,9 @@ def response_from_ros(msg: ArmorDirectiveRes) -> DirectiveResponse:
         error_description=msg.error_description,
         is_consistent=msg.is_consistent,
         queried_objects=list(msg.queried_objects),
-        sparql_queried_objects=[(item.key, item.value) for item in msg.sparql_queried_objects],
+        sparql_queried_objects=[
+            protocol.QueryItem(item.key, item.value) for item in msg.sparql_queried_objects
+        ],
     )
 
 

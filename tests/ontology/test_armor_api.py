@@ -20,6 +20,9 @@ from armor_api.armor_exceptions import (
 from armor_api.armor_manipulation_client import ArmorManipulationClient
 from armor_api.armor_query_client import ArmorQueryClient
 from armor_api.armor_utils_client import ArmorUtilsClient
+from surveillance_ontology.armor import client
+from surveillance_ontology.armor.client import InProcessTransport
+from surveillance_ontology.armor.protocol import DirectiveRequest, DirectiveResponse
 from surveillance_ontology.armor_server_node import ArmorServer
 
 from .seven_rooms import FIXTURES, ONTOLOGY
@@ -138,3 +141,128 @@ def test_the_names_of_armor_py_api_are_there() -> None:
         for name, arguments in methods.items():
             steps = getattr(kind, name)._steps
             assert list(inspect.signature(steps).parameters)[1:] == arguments, name
+
+
+SENT: dict[str, tuple[tuple[object, ...], str, tuple[str, ...]]] = {
+    'manipulation.add_ind_to_class': (('i', 'C'), 'ADD IND CLASS', ('i', 'C')),
+    'manipulation.disj_inds_of_class': (('C',), 'DISJOINT IND CLASS', ('C',)),
+    'manipulation.add_objectprop_to_ind': (('p', 'i', 'j'), 'ADD OBJECTPROP IND', ('p', 'i', 'j')),
+    'manipulation.add_dataprop_to_ind': (
+        ('d', 'i', 'LONG', '1'),
+        'ADD DATAPROP IND',
+        ('d', 'i', 'LONG', '1'),
+    ),
+    'manipulation.replace_objectprop_b2_ind': (
+        ('p', 'i', 'new', 'old'),
+        'REPLACE OBJECTPROP IND',
+        ('p', 'i', 'new', 'old'),
+    ),
+    'manipulation.replace_dataprop_b2_ind': (
+        ('d', 'i', 'LONG', '2', '1'),
+        'REPLACE DATAPROP IND',
+        ('d', 'i', 'LONG', '2', '1'),
+    ),
+    'manipulation.remove_dataprop_from_ind': (
+        ('d', 'i', 'LONG', '1'),
+        'REMOVE DATAPROP IND',
+        ('d', 'i', 'LONG', '1'),
+    ),
+    'manipulation.remove_objectprop_from_ind': (
+        ('p', 'i', 'j'),
+        'REMOVE OBJECTPROP IND',
+        ('p', 'i', 'j'),
+    ),
+    'manipulation.remove_ind_from_class': (('i', 'C'), 'REMOVE IND CLASS', ('i', 'C')),
+    'query.ind_b2_class': (('C',), 'QUERY IND CLASS', ('C',)),
+    'query.objectprop_b2_ind': (('p', 'i'), 'QUERY OBJECTPROP IND', ('p', 'i')),
+    'query.dataprop_b2_ind': (('d', 'i'), 'QUERY DATAPROP IND', ('d', 'i')),
+    'query.check_ind_exists': (('i',), 'QUERY IND', ('i',)),
+    'utils.apply_buffered_changes': ((), 'APPLY', ()),
+    'utils.sync_buffered_reasoner': ((), 'REASON', ()),
+    'utils.save_ref_with_inferences': (('f.owl',), 'SAVE INFERENCE', ('f.owl',)),
+    'utils.save': (('f.owl',), 'SAVE', ('f.owl',)),
+    'utils.load_ref_from_file': (
+        ('f.owl', 'http://i', True, 'PELLET', False),
+        'LOAD FILE',
+        ('f.owl', 'http://i', 'True', 'PELLET', 'False'),
+    ),
+    'utils.mount_on_ref': ((), 'MOUNT', ()),
+    'utils.unmount_from_ref': ((), 'UNMOUNT', ()),
+    'utils.set_log_to_terminal': ((True,), 'LOG SCREEN ON', ()),
+    'utils.set_log_to_file': ((True, 'f.log'), 'LOG FILE ON', ('f.log',)),
+}
+"""What each method of armor_py_api 0a6610a sends: arguments, directive, arguments of that."""
+EACH = pytest.mark.parametrize('method', SENT)
+
+
+class Answers(InProcessTransport):
+    """A transport that notes what is sent and gives one answer to everything."""
+
+    def __init__(self, answer: DirectiveResponse | Exception) -> None:
+        self.sent: list[DirectiveRequest] = []
+        self._answer = answer
+
+    def call(self, request: DirectiveRequest) -> DirectiveResponse:
+        self.sent.append(request)
+        if isinstance(self._answer, Exception):
+            raise self._answer
+        return self._answer
+
+
+def called(method: str, answer: DirectiveResponse | Exception) -> tuple[Any, Answers]:
+    """Call a method with what `SENT` says; its result, and what was sent."""
+    transport = Answers(answer)
+    part, name = method.split('.')
+    made = client.ArmorClient('me', 'map', transport)
+    return getattr(getattr(made, part), name)(*SENT[method][0]), transport
+
+
+@EACH
+def test_each_method_sends_what_armor_py_api_sends(method: str) -> None:
+    answer = DirectiveResponse(is_consistent=True, queried_objects=['<http://i#a>'])
+    result, transport = called(method, answer)
+    (sent,) = transport.sent
+    assert (sent.client_name, sent.reference_name) == ('me', 'map')
+    assert (sent.words, tuple(sent.args)) == SENT[method][1:]
+    if method.startswith('manipulation.') or method.split('.')[1].split('_')[0] in (
+        'apply',
+        'sync',
+    ):
+        assert result is True, 'whether the ontology is consistent'
+    elif method.startswith('utils.'):
+        assert result is None
+    elif method == 'query.check_ind_exists':
+        assert result is True
+    else:
+        assert result == (['<http://i#a>'] if 'dataprop' in method else ['a'])
+
+
+@EACH
+def test_each_method_raises_what_the_server_refuses(method: str) -> None:
+    refusal = DirectiveResponse(False, exit_code=205, error_description='why')
+    with pytest.raises(ArmorServiceInternalError) as error:
+        called(method, refusal)
+    assert (error.value.code, error.value.msg) == (205, 'why')
+
+
+@EACH
+def test_each_method_raises_that_nobody_answers(method: str) -> None:
+    with pytest.raises(ArmorServiceCallError) as error:
+        called(method, ArmorServiceCallError('nobody'))
+    assert error.value.msg == 'nobody'
+
+
+def test_exceptions_are_made_as_in_armor_py_api() -> None:
+    assert ArmorPyException('a').msg == ArmorServiceCallError('a').msg == 'a'
+    unknown = ArmorServiceInternalError('a', '299')
+    assert (unknown.msg, unknown.code) == ('a', 299)
+    assert isinstance(unknown, ArmorPyException)
+
+
+def test_rows_of_a_sparql_answer_have_key_and_value(server: ArmorServer) -> None:
+    made = ArmorClient('one', 'reference', timeout=20)
+    made.utils.load_ref_from_file(ONTOLOGY, BASE)
+    made.manipulation.add_ind_to_class('a', 'B')
+    response = made.call('QUERY', 'SPARQL', 'FORMATTED', [f'SELECT ?x {{ ?x a <{BASE}#B> }}'])
+    (item,) = response.sparql_queried_objects
+    assert (item.key, item.value) == ('x', f'{BASE}#a')

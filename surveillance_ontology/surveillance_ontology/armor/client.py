@@ -21,6 +21,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable, Generator, Iterable, Sequence
+from contextlib import suppress
 from functools import update_wrapper
 from typing import Any, Concatenate, Generic, ParamSpec, Protocol, TypeVar, overload
 
@@ -63,15 +64,17 @@ class ArmorServiceInternalError(ArmorError):
     """The server refused a directive.
 
     Attributes:
-        code: ARMOR's exit code.
+        code: ARMOR's exit code; one that `ExitCode` does not know stays a number.
     """
 
     def __init__(self, message: str, exit_code: int | str) -> None:
         super().__init__(message)
-        self.code = ExitCode(int(exit_code))
+        self.code = int(exit_code)
+        with suppress(ValueError):
+            self.code = ExitCode(self.code)
 
     @property
-    def exit_code(self) -> ExitCode:
+    def exit_code(self) -> int:
         """The same as `code`, by the name of the response's field."""
         return self.code
 

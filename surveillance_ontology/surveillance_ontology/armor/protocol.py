@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
+from typing import NamedTuple
 
 
 class ExitCode(IntEnum):
@@ -55,6 +56,13 @@ class DirectiveRequest:
         return ' '.join(word for word in (self.command, self.primary, self.secondary) if word)
 
 
+class QueryItem(NamedTuple):
+    """A variable of a row of a SPARQL answer, and its value."""
+
+    key: str
+    value: str
+
+
 @dataclass(slots=True)
 class DirectiveResponse:
     """The answer to one directive.
@@ -76,7 +84,7 @@ class DirectiveResponse:
     error_description: str = ''
     is_consistent: bool = False
     queried_objects: list[str] = field(default_factory=list)
-    sparql_queried_objects: list[tuple[str, str]] = field(default_factory=list)
+    sparql_queried_objects: list[QueryItem] = field(default_factory=list)
 
 
 @dataclass(slots=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 
 from surveillance_ontology.armor.directives.table import query, text
-from surveillance_ontology.armor.protocol import DirectiveError, DirectiveResponse
+from surveillance_ontology.armor.protocol import DirectiveError, DirectiveResponse, QueryItem
 from surveillance_ontology.armor.reference import Reference
 from surveillance_ontology.armor.rendering import shown
 from surveillance_ontology.armor.session import Session
@@ -53,7 +53,7 @@ def _sparql(session: Session, ref: Reference, *parts: str) -> DirectiveResponse:
 )
 def _sparql_formatted(session: Session, ref: Reference, *parts: str) -> DirectiveResponse:
     rows = _select(session, ref, parts)
-    pairs = [(bound.variable, _value(bound)) for row in rows for bound in row]
+    pairs = [QueryItem(bound.variable, _value(bound)) for row in rows for bound in row]
     return DirectiveResponse(sparql_queried_objects=pairs)
 
 
