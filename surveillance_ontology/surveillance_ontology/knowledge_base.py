@@ -227,6 +227,9 @@ def _before(engine: Engine, view: FactView, log: dict[StoredFact, bool]) -> set[
     return {axiom for fact in now if is_public(fact[0]) for axiom in view.public(fact, {})}
 
 
+MOST_SEARCHED = 500
+"""Axioms about classes and properties among which a name like a mistyped one is looked for."""
+
 Fact: TypeAlias = ClassAssertion | ObjectPropertyAssertion | DataPropertyAssertion | SameIndividual
 
 
@@ -291,6 +294,15 @@ class KnowledgeBase:
     def is_known(self, kind: str, iri: str) -> bool:
         """Tell whether an asserted axiom declares or uses the entity as this kind."""
         return any((kind, iri) in entities_of(axiom) for axiom in self._told.about.get(iri, ()))
+
+    def schema_names(self, kind: str) -> list[str]:
+        """Return the classes or properties of an ontology that has few; none of a large one."""
+        schema = self._told.schema
+        if len(schema) > MOST_SEARCHED:
+            return []
+        return list(
+            dict.fromkeys(iri for axiom in schema for k, iri in entities_of(axiom) if k == kind)
+        )
 
     # --- the last reasoning ---
 
@@ -394,16 +406,32 @@ class KnowledgeBase:
         return found
 
     def subclasses(self, cls: str) -> set[str]:
-        """Named classes strictly below, direct and indirect, as of the last `reason`."""
+        """Named classes strictly below, direct and indirect: as of the last `reason`, and what is
+        asserted now to be below those.
+        """
         known = self._classification
         if known is None:
             return set()
-        if cls == THING:
-            return known.classes()
-        found = known.subclasses(cls)
-        if known.within:
+        found = known.classes() if cls == THING else known.subclasses(cls)
+        if known.within and cls != THING:
             found.update(name for name in known.within if cls in self.superclasses(name))
+        if self._told.schema_changed or cls == THING:
+            found |= self._asserted_below(found | {cls})
         return found - {cls}
+
+    def _asserted_below(self, classes: set[str]) -> set[str]:
+        below: dict[ClassExpression, list[str]] = {}
+        for axiom in self._told.schema:
+            if isinstance(axiom, SubClassOf) and isinstance(axiom.sub, str):
+                below.setdefault(axiom.sup, []).append(axiom.sub)
+        found = dict.fromkeys(classes)
+        pending = list(classes)
+        while pending:
+            for sub in below.get(pending.pop(), ()):
+                if sub not in found:
+                    found[sub] = None
+                    pending.append(sub)
+        return set(found)
 
     def superclasses(self, cls: str) -> set[str]:
         """Named classes strictly above, direct and indirect, as of the last `reason`."""

@@ -93,6 +93,29 @@ def test_wrong_arguments_are_named_with_what_was_expected(ask: Ask) -> None:
         assert expected in answer.error_description
 
 
+def test_unknown_names_and_commands_are_answered_with_the_nearest(ask: Ask) -> None:
+    for words, args, there in (
+        ('QUERY IND CLASS', ('ROM',), 'ROOM'),
+        ('QUERY OBJECTPROP IND', ('hasdoor', 'R1'), 'hasDoor'),
+        ('QUERY DATAPROP IND', ('visitdAt', 'R1'), 'visitedAt'),
+        ('QUERY CLASS CLASS', ('LOCATIONS',), 'LOCATION'),
+    ):
+        answer = ask(words, *args)
+        assert answer.success
+        assert f'(there is <{IRI}#{there}>)' in answer.error_description
+    assert ask('QUERRY IND CLASS', 'ROOM').error_description.endswith("expected 'QUERY'.")
+    wrong = ask('QUERY CLASS RESTRICTION', 'ROOM').error_description
+    assert wrong.endswith("expected 'QUERY CLASS RESTRICTIONS'.")
+
+
+def test_a_subclass_shows_before_the_next_reasoning(service: ArmorService) -> None:
+    ask = loaded(service, 'false', 'true')
+    ask('ADD CLASS CLASS', 'GARAGE', 'ROOM')
+    ask('ADD CLASS', 'CELLAR')
+    assert 'GARAGE' in names(ask('QUERY CLASS CLASS', 'LOCATION'))
+    assert {'GARAGE', 'CELLAR'} <= {*names(ask('QUERY CLASS CLASS', 'owl:Thing'))}
+
+
 def test_unsupported_types_are_101(ask: Ask) -> None:
     added = ask('ADD DATAPROP IND', 'p', 'i', 'DATE', 'x')
     assert (added.success, added.exit_code) == (True, 101)

@@ -6,6 +6,7 @@ ontology is named in the description of an otherwise empty answer.
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from typing import Any
@@ -32,7 +33,6 @@ from surveillance_ontology.owl.axioms import (
     DataPropertyAssertion,
     ObjectPropertyAssertion,
     SameIndividual,
-    SubClassOf,
 )
 from surveillance_ontology.owl.expressions import (
     ClassExpression,
@@ -64,16 +64,20 @@ def _entities(iris: Iterable[str]) -> list[str]:
 
 def _answer(objects: list[str], ref: Reference, *asked: tuple[str, str]) -> DirectiveResponse:
     """Answer with objects; when there are none, say which entity asked about is unknown."""
-    note = ''
-    if not objects:
-        unknown = [
-            f'{kind.replace("_", " ")} {render_entity(iri)}'
-            for kind, iri in asked
-            if not ref.kb.is_known(kind, iri)
-        ]
-        if unknown:
-            note = f'{ref.name} has no {" and no ".join(unknown)}'
+    note = _unknown(ref, *asked) if not objects else ''
     return DirectiveResponse(queried_objects=objects, error_description=note)
+
+
+def _unknown(ref: Reference, *asked: tuple[str, str]) -> str:
+    """Return which entities are unknown, with the nearest known class or property; or nothing."""
+    unknown: list[str] = []
+    for kind, iri in asked:
+        if not ref.kb.is_known(kind, iri):
+            known = {local_name(name): name for name in ref.kb.schema_names(kind)}
+            alike = difflib.get_close_matches(local_name(iri), known, n=1)
+            instead = f' (there is {render_entity(known[alike[0]])})' if alike else ''
+            unknown.append(f'{kind.replace("_", " ")} {render_entity(iri)}{instead}')
+    return f'{ref.name} has no {" and no ".join(unknown)}' if unknown else ''
 
 
 @query(
@@ -131,15 +135,8 @@ def _classes(ref: Reference, ind: str, bottom: bool) -> DirectiveResponse:
 )
 def _subclasses(ref: Reference, cls: str) -> DirectiveResponse:
     classes = ref.kb.subclasses(cls) | {NOTHING}
-    if cls == THING:
-        # A class of which nothing else is known is none of the reasoner's.
-        told = (axiom for axiom in ref.kb.axioms_about(THING) if isinstance(axiom, SubClassOf))
-        classes |= {axiom.sub for axiom in told if isinstance(axiom.sub, str)} - {THING}
     below = _entities(classes)
-    response = DirectiveResponse(queried_objects=below)
-    if not ref.kb.is_known('class', cls):
-        response.error_description = f'{ref.name} has no class {render_entity(cls)}'
-    return response
+    return DirectiveResponse(queried_objects=below, error_description=_unknown(ref, ('class', cls)))
 
 
 @query(

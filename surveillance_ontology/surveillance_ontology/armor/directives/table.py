@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, Protocol, TypeVar
 
 from surveillance_ontology.armor.protocol import DirectiveError, DirectiveRequest, ExitCode
@@ -21,6 +21,7 @@ from surveillance_ontology.armor.rendering import (
     shown,
     unsupported_type,
 )
+from surveillance_runtime.suggestions import nearest
 
 MAX_CARDINALITY = 2**31 - 1
 Run = TypeVar('Run', bound=Callable[..., Any])
@@ -248,15 +249,28 @@ def look_up(request: DirectiveRequest) -> Directive:
             raise DirectiveError('Invalid request. No command specified.', ExitCode.NO_COMMAND)
         raise DirectiveError(
             'Malformed command. No Command/Specs combination match found. '
-            f'Please check your service requests and retry. Got {_echo(request)}.'
+            f'Please check your service requests and retry. Got {_echo(request)}, '
+            f'expected {_expected(*(word[:40].upper() for word in _words(request)))}.'
         )
     return directive
 
 
+@lru_cache(maxsize=256)
+def _expected(command: str, primary: str, secondary: str) -> str:
+    """Return the nearest directive of the same command, or the nearest command."""
+    commands = dict.fromkeys(known for known, _, _ in TABLE)
+    if command not in commands:
+        return nearest(command, commands)
+    alike = [directive.words for key, directive in TABLE.items() if key[0] == command]
+    return nearest(' '.join((command, primary, secondary)), alike)
+
+
+def _words(request: DirectiveRequest) -> tuple[str, str, str]:
+    return request.command, request.primary, request.secondary
+
+
 def _echo(request: DirectiveRequest) -> str:
-    return ' '.join(
-        shown(word, 40) for word in (request.command, request.primary, request.secondary)
-    )
+    return ' '.join(shown(word, 40) for word in _words(request))
 
 
 def _enter(kind: Kind, words: str, arguments: Sequence[Argument], **properties: Any) -> Enter:
