@@ -4,7 +4,8 @@
 
 Starts a whole mission in processes of its own, looks at its page in a real Chromium (where Debian's
 chromium and chromium-driver are installed) and with further readers of the same events, and prints
-each figure beside its limit. `--minutes` sets how long memory is watched.
+each figure beside its limit. Without `--quick` memory is watched beside a second mission, whose
+time runs as fast as it can, for `--minutes` of real time.
 """
 
 from __future__ import annotations
@@ -15,7 +16,6 @@ import json
 import os
 import random
 import re
-import shutil
 import signal
 import socket
 import subprocess
@@ -23,12 +23,26 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+
+from geometry_msgs.msg import PoseWithCovarianceStamped
+from rclpy.serialization import serialize_message
+from sensor_msgs.msg import CompressedImage, LaserScan
 
 ROOT = Path(__file__).resolve().parents[1]
-DOMAIN = 93
+sys.path.insert(0, str(ROOT))
+
+from surveillance_operator.recording.bag import BagWriter, TopicType  # noqa: E402
+from surveillance_operator.recording.schemas import definition  # noqa: E402
+from surveillance_operator.recording.sights import RecordedSights  # noqa: E402
+from surveillance_operator.recording.timeline import Timeline  # noqa: E402
+from surveillance_runtime.testing import claim_domain  # noqa: E402
+from tests.operator.browser import CHROMIUM, DRIVER, Viewer  # noqa: E402
+
+START = 1e9
+"""Of the recordings that are made up here, seconds since 1970."""
+FULL_SPEED = ('-p', 'use_sim_time:=true', '-p', 'simulator:speed:=0.0')
 TICKS = os.sysconf('SC_CLK_TCK')
 PAGE_FILES = ROOT / 'surveillance_operator/surveillance_operator/page/static'
 
@@ -36,12 +50,12 @@ Row = tuple[str, str, str]
 
 
 @contextlib.contextmanager
-def mission(folder: Path) -> Iterator[tuple[str, dict[str, int]]]:
+def mission(folder: Path, domain: int, *options: str) -> Iterator[tuple[str, dict[str, int]]]:
     """Run a mission; yield its page's address and the processes by name."""
     with socket.socket() as free:
         free.bind(('127.0.0.1', 0))
         port = free.getsockname()[1]
-    words = [sys.executable, str(ROOT / 'launch.py'), '--domain', str(DOMAIN), '--web']
+    words = [sys.executable, str(ROOT / 'launch.py'), '--domain', str(domain), '--web', *options]
     words += ['--web-address', f'127.0.0.1:{port}', '--record', str(folder)]
     process = subprocess.Popen(
         words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, cwd=folder
@@ -112,23 +126,6 @@ def _read_all(connection: socket.socket) -> None:
             pass
 
 
-def browser(address: str) -> Any:
-    """Open the page in a Chromium; None where there is none."""
-    binary, driver = shutil.which('chromium'), shutil.which('chromedriver')
-    if not binary or not driver:
-        return None
-    from selenium import webdriver
-    from selenium.webdriver.chrome.service import Service
-
-    options = webdriver.ChromeOptions()
-    options.binary_location = binary
-    for argument in ('headless=new', 'no-sandbox', 'disable-gpu', 'disable-dev-shm-usage'):
-        options.add_argument(f'--{argument}')
-    opened = webdriver.Chrome(options=options, service=Service(driver))
-    opened.get(address)
-    return opened
-
-
 WATCH = """
 window.seen = {};
 new MutationObserver(() => {
@@ -138,9 +135,9 @@ new MutationObserver(() => {
 """
 
 
-def latencies(opened: Any, events: int) -> list[float]:
+def latencies(viewer: Viewer, domain: int, events: int) -> list[float]:
     """Publish events in ROS; return after how long each was in the DOM, milliseconds."""
-    os.environ['ROS_DOMAIN_ID'] = str(DOMAIN)
+    os.environ['ROS_DOMAIN_ID'] = str(domain)
     os.environ.setdefault('FASTDDS_BUILTIN_TRANSPORTS', 'UDPv4')
     import rclpy
 
@@ -151,7 +148,7 @@ def latencies(opened: Any, events: int) -> list[float]:
     node = rclpy.create_node('mission_benchmark')
     publisher = node.create_publisher(MissionStatus, 'mission_status', STATE_QOS)
     time.sleep(1.5)
-    opened.execute_script(WATCH)
+    viewer.js(WATCH)
     sent = {}
     for number in range(events):
         message = MissionStatus(machine='surveillance', state='X', text=f'event-{number}')
@@ -159,22 +156,20 @@ def latencies(opened: Any, events: int) -> list[float]:
         publisher.publish(message)
         time.sleep(0.08 + random.random() * 0.04)
     time.sleep(0.5)
-    seen = opened.execute_script('return seen')
+    seen = viewer.js('return seen')
     node.destroy_node()
     rclpy.try_shutdown()
     return sorted(seen[number] - at for number, at in sent.items() if number in seen)
 
 
-def heap(opened: Any) -> float:
+def heap(viewer: Viewer) -> float:
     """Return the tab's live memory after a collection, megabytes."""
-    opened.execute_cdp_cmd('HeapProfiler.collectGarbage', {})
-    return float(opened.execute_script('return performance.memory.usedJSHeapSize')) / 1e6
+    viewer.driver.execute_cdp_cmd('HeapProfiler.collectGarbage', {})
+    return float(viewer.js('return performance.memory.usedJSHeapSize')) / 1e6
 
 
 def replay_rows(folder: Path) -> list[Row]:
     """Measure a time line of 24 hours."""
-    from surveillance_operator.recording.timeline import Timeline
-
     path = folder / 'timeline.jsonl'
     parts = {
         'pose': [1.0, 2.0, 0.5],
@@ -184,62 +179,136 @@ def replay_rows(folder: Path) -> list[Row]:
     }
     with open(path, 'w', encoding='utf-8') as file:
         for tick in range(24 * 3600 * 5 // 2):
-            at, whole = 1e9 + tick * 0.4, tick % 150 == 0
+            at, whole = START + tick * 0.4, tick % 150 == 0
             content = parts if whole else {'pose': [tick % 20, 2.0, 0.5]}
             body = json.dumps({'now': at, 'p': content}, separators=(',', ':'))
             file.write(f'{{"t":{at:.3f},"k":{int(whole)},"e":"",{body[1:]}\n')
     began = time.perf_counter()
     line = Timeline(path)
     ready = time.perf_counter() - began
-    jumps = []
-    for _ in range(50):
-        moment = random.uniform(line.times[0], line.times[-1])
-        began = time.perf_counter()
-        line.at(moment)
-        jumps.append(time.perf_counter() - began)
+    jumps = slowest(50, lambda: line.at(random.uniform(line.times[0], line.times[-1])))
     size = path.stat().st_size / 1e6
     return [
-        (f'replay of 24 h ({size:.0f} MB) ready', f'{ready:.2f} s', '2 s'),
-        ('a jump in it, slowest of 50', f'{1000 * max(jumps):.0f} ms', '300 ms'),
+        (f'replay of 24 h, time line of {size:.0f} MB: ready', f'{ready:.2f} s', '2 s'),
+        ('a jump in it, slowest of 50', f'{1000 * jumps:.0f} ms', '300 ms'),
     ]
 
 
-def mission_rows(folder: Path, quick: bool, minutes: float) -> list[Row]:
+def sight_rows(folder: Path, hours: float) -> list[Row]:
+    """Measure what lidar and camera saw in a long recording, in segments of an hour."""
+    recording = folder / 'recording'
+    bag = BagWriter(recording, segment_seconds=1e9)
+    image = serialize_message(CompressedImage(format='jpeg', data=b'\xff\xd8' + bytes(40_000)))
+    for topic, kind in (
+        ('/amcl_pose', 'geometry_msgs/msg/PoseWithCovarianceStamped'),
+        ('/scan', 'sensor_msgs/msg/LaserScan'),
+        ('/camera/rgb/image_raw/compressed', 'sensor_msgs/msg/CompressedImage'),
+    ):
+        bag.add_topic(TopicType(topic, kind, definition(kind)))
+    pose, scan = PoseWithCovarianceStamped(), LaserScan(range_max=9.0, ranges=[2.0] * 360)
+    pose.pose.pose.orientation.w = 1.0
+    for second in range(int(hours * 3600)):
+        if second and second % 3600 == 0:
+            bag.close()
+            bag = BagWriter(recording, segment_seconds=1e9)
+        for tenth in range(0, 10, 2):
+            for message, topic in ((pose, '/amcl_pose'), (scan, '/scan')):
+                message.header.stamp.sec = second
+                message.header.stamp.nanosec = tenth * 100_000_000
+                at = int((START + second + tenth / 10) * 1e9)
+                bag.write(topic, serialize_message(message), at, at)
+        at = int((START + second) * 1e9)
+        bag.write('/camera/rgb/image_raw/compressed', image, at, at)
+        bag.seal()
+    bag.close()
+    size = sum(path.stat().st_size for path in recording.iterdir()) / 1e6
+    began = time.perf_counter()
+    sights = RecordedSights(recording)
+    ready = time.perf_counter() - began
+
+    def jump() -> None:
+        at = START + random.uniform(5.0, hours * 3600 - 1)
+        assert sights.scan(at)
+        assert sights.jpeg(at)
+
+    return [
+        (f'lidar and camera of {hours:g} h, {size:.0f} MB: ready', f'{ready:.2f} s', '2 s'),
+        (
+            'lidar and camera after a jump, slowest of 50',
+            f'{1000 * slowest(50, jump):.0f} ms',
+            '300 ms',
+        ),
+    ]
+
+
+def slowest(times: int, do: Callable[[], object]) -> float:
+    """Return how long the slowest of some calls took, seconds."""
+    took = []
+    for _ in range(times):
+        began = time.perf_counter()
+        do()
+        took.append(time.perf_counter() - began)
+    return max(took)
+
+
+def mission_rows(folder: Path, quick: bool) -> list[Row]:
     """Measure beside a running mission."""
     seconds = 6.0 if quick else 20.0
     rows: list[Row] = []
-    with mission(folder) as (address, processes):
+    domain = claim_domain()
+    with mission(folder, domain) as (address, processes):
         page, recorder = processes['mission_page'], processes['mission_recorder']
         time.sleep(3.0)
         nobody, recording = share([page, recorder], seconds)
         rows.append(('server, nobody looks', f'{nobody:.1f} % of a core', ''))
         rows.append(('recording, markers and diagnostics', f'{recording:.1f} % of a core', '4 %'))
-        with readers(address, 1):
-            time.sleep(0.5)
-            rows.append(('server, 1 viewer', f'{share([page], seconds)[0]:.1f} % of a core', '3 %'))
-        with readers(address, 10):
-            time.sleep(0.5)
-            rows.append(
-                ('server, 10 viewers', f'{share([page], seconds)[0]:.1f} % of a core', '8 %')
-            )
-        opened = browser(address)
-        if opened is None:
+        for count, limit in ((1, '3 %'), (10, '8 %')):
+            with readers(address, count):
+                time.sleep(0.5)
+                (used,) = share([page], seconds)
+            viewers = f'{count} viewer{"" if count == 1 else "s"}'
+            rows.append((f'server, {viewers}', f'{used:.1f} % of a core', limit))
+        if not (CHROMIUM and DRIVER):
             rows.append(('event in ROS to DOM', 'no Chromium here', '50 ms'))
             return rows
+        viewer = Viewer(address)
         try:
             time.sleep(2.0)
-            found = latencies(opened, 100 if quick else 500)
+            found = latencies(viewer, domain, 100 if quick else 500)
             for name, at in (('p50', 0.5), ('p99', 0.99)):
                 value = found[min(len(found) - 1, int(at * len(found)))]
                 limit = '50 ms' if at > 0.9 else ''
                 rows.append((f'event in ROS to DOM, {name}', f'{value:.0f} ms', limit))
-            before = megabytes(page), heap(opened)
-            time.sleep(5.0 if quick else 60.0 * minutes)
-            after = megabytes(page), heap(opened)
-            for name, a, b in zip(('server', 'tab'), before, after, strict=True):
-                rows.append((f'memory of the {name}', f'{a:.1f} -> {b:.1f} MB', 'flat'))
         finally:
-            opened.quit()
+            viewer.close()
+    return rows
+
+
+def memory_rows(folder: Path, minutes: float) -> list[Row]:
+    """Watch memory beside a mission whose time runs as fast as it can.
+
+    The first third of the time fills what is kept: an hour's history, the trail, the caches.
+    """
+    with mission(folder, claim_domain(), *FULL_SPEED) as (address, processes):
+        page = processes['mission_page']
+        viewer = Viewer(address) if CHROMIUM and DRIVER else None
+        try:
+            seen = []
+            for wait in (20 * minutes, 20 * minutes, 20 * minutes):
+                time.sleep(wait)
+                tab = heap(viewer) if viewer is not None else 0.0
+                now = float(viewer.js('return mission.now()')) if viewer is not None else 0.0
+                seen.append((megabytes(page), tab, now))
+        finally:
+            if viewer is not None:
+                viewer.close()
+    hours = (seen[-1][2] - seen[0][2]) / 3600
+    rows = []
+    for name, column in (('server', 0), ('tab', 1)):
+        shown = ' -> '.join(f'{each[column]:.1f}' for each in seen)
+        rows.append(
+            (f'memory of the {name} over {hours:.1f} h at full speed', f'{shown} MB', 'flat')
+        )
     return rows
 
 
@@ -253,7 +322,10 @@ def main() -> None:
     rows: list[Row] = [('page, all files', f'{size / 1000:.0f} kB', '150 kB')]
     with tempfile.TemporaryDirectory() as folder:
         rows += replay_rows(Path(folder))
-        rows += mission_rows(Path(folder), options.quick, options.minutes)
+        rows += sight_rows(Path(folder), 1.0 if options.quick else 24.0)
+        rows += mission_rows(Path(folder), options.quick)
+        if not options.quick:
+            rows += memory_rows(Path(folder), options.minutes)
     width = max(len(name) for name, _, _ in rows)
     print(f'{"figure":<{width}}  {"measured":>20}  {"limit":>8}')
     for name, measured, limit in rows:

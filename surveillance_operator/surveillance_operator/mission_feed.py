@@ -94,6 +94,7 @@ class MissionFeed:
         self._facts = _Facts(node, self.update)
         self._others = _OtherRobots(node) if streams else None
         self._next_look = 0.0
+        self._next_reading: dict[str, float] = {}
         node.spawn(self._run, 'mission feed')
 
     @property
@@ -148,6 +149,8 @@ class MissionFeed:
         for topic, subscription in self._topics:
             if topic.beside and not any(each.name == topic.beside for each, _ in came):
                 continue
+            if topic.period and not self._is_due(topic):
+                continue
             for _ in range(subscription.qos.depth):
                 if (taken := subscription.take()) is None:
                     break
@@ -163,6 +166,13 @@ class MissionFeed:
             return replace(snapshot, others={**snapshot.others, **others}) if others else snapshot
 
         return changed
+
+    def _is_due(self, topic: Topic) -> bool:
+        now = time.monotonic()
+        if now < self._next_reading.get(topic.name, 0.0):
+            return False
+        self._next_reading[topic.name] = now + topic.period
+        return True
 
     def _look(self) -> None:
         node, old = self._node, self._snapshot

@@ -77,6 +77,7 @@ class Topic:
             be used.
         stream: Whether a view may do without it.
         beside: Taken only together with a message of this topic, and read before it.
+        period: Least time between two looks at it, seconds.
     """
 
     name: str
@@ -85,6 +86,7 @@ class Topic:
     read: Callable[[Any, Snapshot], Fields]
     stream: bool = False
     beside: str = ''
+    period: float = 0.0
 
 
 def read_message(snapshot: Snapshot, topic: Topic, message: Any) -> Snapshot:
@@ -304,6 +306,7 @@ TOPICS: tuple[Topic, ...] = (
         DiagnosticArray,
         _MANY,
         lambda m, old: {'health': {**old.health, **conversions.health_from(m)}},
+        period=1.0,
     ),
     Topic('/parameter_events', ParameterEvent, _MANY, _on_parameters),
 )

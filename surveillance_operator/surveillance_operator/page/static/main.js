@@ -18,7 +18,7 @@ const why = new Why(state);
 const hands = new Hands(state, may && !replaying);
 const map = new MapView($('map'), (place) => { why.choose(place); hands.choose(place); }, (point) => hands.point(point));
 const replay = replaying ? new Replay() : null;
-window.mission = {state, received: 0};
+window.mission = {state, now, received: 0};
 
 export function now() {
   const passed = (performance.now() - clock.at) / 1000;
