@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import sys
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from itertools import pairwise
 from pathlib import Path
@@ -26,15 +26,23 @@ EXIT_BAD_INPUT = 2
 NAME, PICTURE = 'report.html', 'report.png'
 MOST_LINES = 2000
 _STYLE = """
-:root{color-scheme:light dark}body{font:15px/1.5 system-ui,sans-serif;max-width:70rem;margin:auto;
-padding:1rem}table{border-collapse:collapse}td,th{padding:.2rem .7rem;text-align:left;
-border-bottom:1px solid #8886}td.n{text-align:right;font-variant-numeric:tabular-nums}
-svg.map{height:auto;max-height:32rem}.wall{stroke:currentColor;stroke-width:.12}
-.door{stroke:Canvas;stroke-width:.16}.way{fill:none;stroke:#5b9bd5;stroke-width:.1;stroke-opacity:.7}
-.map text{font-size:.7px;text-anchor:middle;fill:currentColor;paint-order:stroke;stroke:Canvas;
-stroke-width:.15px}.late{font-weight:700}svg{width:100%;height:2rem;display:block}
-.strip{fill:#5b9bd5}.limit{stroke:#b3132b;stroke-dasharray:4 3}th.w{width:50%}
-@media(max-width:40rem){th.w,td.w{display:none}}"""
+:root{color-scheme:light dark}
+body{font:15px/1.5 system-ui,sans-serif;max-width:70rem;margin:auto;padding:1rem}
+h2,summary{font-size:1.15rem;font-weight:600;margin:1.2rem 0 .4rem}summary{cursor:pointer}
+table{border-collapse:collapse;width:100%}
+td,th{padding:.2rem .7rem .2rem 0;text-align:left;vertical-align:top;border-bottom:1px solid #8886}
+.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}
+.late{font-weight:700}th.w{width:55%}
+svg{width:100%;height:2rem;display:block}svg.map{height:auto;max-height:32rem}
+.wall{stroke:currentColor;stroke-width:.12}.door{stroke:Canvas;stroke-width:.16}
+.way{fill:none;stroke:#5b9bd5;stroke-width:.1;stroke-opacity:.7}
+.map text{font-size:.7px;font-weight:600;text-anchor:middle;fill:currentColor;paint-order:stroke;
+stroke:Canvas;stroke-width:.15px}
+.strip{fill:#5b9bd5}.limit{stroke:#b3132b;stroke-dasharray:4 3}
+@media(max-width:40rem){.w{display:none}
+.long tr{display:grid;grid-template-columns:4rem 1fr 1fr;border-bottom:1px solid #8886}
+.long td,.long th{border:0}.long td:nth-child(4){grid-column:1/-1}
+.long th:nth-child(4){display:none}}"""
 
 
 def write_report(folder: Path) -> Path:
@@ -100,8 +108,8 @@ def _map(plan: FloorPlan, run: Run) -> str:
         'M' + 'L'.join(f'{x:.2f} {-y:.2f}' for x, y, *_ in way) for way in run.driven if way
     )
     names = ''.join(
-        f'<text x="{point[0]:.2f}" y="{-point[1]:.2f}">{escape(name)}</text>'
-        for name, point in plan.place.positions.items()
+        f'<text x="{x:.2f}" y="{-y:.2f}">{escape(name)}</text>'
+        for name, (x, y) in _labels(plan.place.positions).items()
     )
     ends = [end for wall in plan.walls.values() for end in (wall.start, wall.end)]
     xs, ys = [end[0] for end in ends], [-end[1] for end in ends]
@@ -111,6 +119,16 @@ def _map(plan: FloorPlan, run: Run) -> str:
         f'viewBox="{" ".join(f"{each:.2f}" for each in box)}"><path class="wall" d="{walls}"/>'
         f'<path class="door" d="{doors}"/><path class="way" d="{ways}"/>{names}</svg>'
     )
+
+
+def _labels(points: Mapping[str, Sequence[float]]) -> dict[str, tuple[float, float]]:
+    """Return where names stand: above their place, or below where another one is close above."""
+    found = {}
+    for name, (x, y, *_) in points.items():
+        others = (each for other, each in points.items() if other != name)
+        crowded = any(abs(each[0] - x) < 2.0 and 0.0 <= each[1] - y < 2.0 for each in others)
+        found[name] = (x, y - 0.9) if crowded else (x, y + 0.4)
+    return found
 
 
 def _fastest(events: Sequence[Event]) -> float:
@@ -141,34 +159,31 @@ def _page(folder: Path, events: Sequence[Event], drawn: str, bound: float | None
     summary = mission_log.summarize(events)
     threshold = _threshold(folder)
     start, end = events[0].time, max(event.time for event in events)
-    limits = [
-        f'threshold {threshold:g} s' if threshold else 'threshold not recorded',
-        f'no patrol at this pace keeps every place below {bound:.0f} s' if bound else '',
-    ]
-    body = [
-        f'<h1>Mission {escape(folder.name)}</h1>',
-        f'<pre>{escape(str(summary))}</pre>',
-        f'<p>{escape("; ".join(each for each in limits if each))}.</p>',
-    ]
+    body = [f'<h1>Mission {escape(folder.name)}</h1>']
+    body += [f'<p>{escape(line)}</p>' for line in _overview(summary, threshold, bound)]
     body.append(drawn)
     body.append('<h2>Idleness</h2>')
     body.append(_idleness(events, summary, threshold, start, end))
-    for title, name, columns in (
-        ('Recharges', 'recharge', ('place', 'seconds')),
-        ('Failures', 'failure', ('what', 'reason')),
-        ('Decisions', 'decision', ('place', 'rule', 'reason')),
-        ('Visits', 'visit', ('place', 'distance')),
+    for title, name, columns, is_open in (
+        ('Recharges', 'recharge', ('place', 'seconds'), True),
+        ('Failures', 'failure', ('what', 'reason'), True),
+        ('Decisions', 'decision', ('place', 'rule', 'reason'), False),
+        ('Visits', 'visit', ('place', 'distance'), False),
     ):
         found = [event for event in events if event.name == name]
-        body.append(f'<h2>{title} ({len(found)})</h2>')
-        if found:
-            rows = [
-                [_clock(event.time - start), *(_cell(event.fields[key]) for key in columns)]
-                for event in found[:MOST_LINES]
-            ]
-            body.append(_table(['at', *columns], rows))
+        if not found:
+            body.append(f'<h2>{title} (0)</h2>')
+            continue
+        rows = [
+            [_clock(event.time - start), *(_cell(event.fields[key]) for key in columns)]
+            for event in found[:MOST_LINES]
+        ]
+        table = _table(['at', *columns], rows)
         if len(found) > MOST_LINES:
-            body.append(f'<p>and {len(found) - MOST_LINES} more: see {RECORD}.</p>')
+            table += f'<p>and {len(found) - MOST_LINES} more: see {RECORD}.</p>'
+        opened = ' open' if is_open else ''
+        head = f'<summary>{title} ({len(found)})</summary>'
+        body.append(f'<details{opened}>{head}{table}</details>')
     made = time.strftime('%Y-%m-%d %H:%M')
     return (
         '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
@@ -176,6 +191,28 @@ def _page(folder: Path, events: Sequence[Event], drawn: str, bound: float | None
         f'<title>Mission {escape(folder.name)}</title><style>{_STYLE}</style></head>'
         f'<body><main>{"".join(body)}<p>Made {made}.</p></main></body></html>\n'
     )
+
+
+def _overview(
+    summary: mission_log.Summary, threshold: float | None, bound: float | None
+) -> list[str]:
+    """Return the mission in a few sentences."""
+    visited = sum(1 for times in summary.visits.values() if times)
+    minutes, seconds = divmod(round(summary.seconds), 60)
+    did = [
+        f'{minutes} min {seconds:02d} s',
+        f'{visited} of {len(summary.visits)} places visited',
+        f'{sum(summary.visits.values())} visits',
+        f'{summary.distance:.0f} m driven',
+        f'{summary.recharges} recharges ({summary.charging_seconds:.0f} s)',
+        f'{sum(summary.failures.values())} failures',
+    ]
+    if summary.restarts:
+        did.append(f'the behaviour started {summary.restarts} times again')
+    limits = [f'Threshold {threshold:g} s.' if threshold else 'The threshold was not recorded.']
+    if bound:
+        limits.append(f'No patrol at this pace keeps every place below {bound:.0f} s.')
+    return [' · '.join(did), ' '.join(limits)]
 
 
 def _idleness(
@@ -197,7 +234,8 @@ def _idleness(
             f'<td class="w">{_strip(times, threshold, start, end)}</td></tr>'
         )
     return (
-        '<table><thead><tr><th>place</th><th>visits</th><th>longest unvisited</th>'
+        '<table><thead><tr><th>place</th><th class="n">visits</th>'
+        '<th class="n">longest unvisited</th>'
         f'<th class="w">over the mission</th></tr></thead><tbody>{"".join(rows)}</tbody></table>'
     )
 
@@ -226,7 +264,7 @@ def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     lines = ''.join(
         '<tr>' + ''.join(f'<td>{escape(cell)}</td>' for cell in row) + '</tr>' for row in rows
     )
-    return f'<table><thead><tr>{cells}</tr></thead><tbody>{lines}</tbody></table>'
+    return f'<table class="long"><thead><tr>{cells}</tr></thead><tbody>{lines}</tbody></table>'
 
 
 def _cell(value: object) -> str:

@@ -17,6 +17,7 @@ from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_operator import replay, report
 from surveillance_operator.page.hub import Hub
 from surveillance_operator.page.server import Page
+from surveillance_operator.recording.runs import find_run
 from surveillance_operator.recording.timeline import Timeline
 from surveillance_operator.replay import Player
 from surveillance_operator.report import RecordingError, draw_picture, write_report
@@ -129,6 +130,15 @@ def test_the_commands_find_runs_and_say_what_is_wrong(
         assert error.startswith(f'{name}: nowhere: expected the folder of a run')
         assert '20260101-000000' in error
         assert error.count('\n') == 1
+
+
+def test_a_run_is_found_by_what_it_holds_and_not_by_a_wrong_name(
+    run: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert find_run(str(run / 'mission.jsonl'), run.parent) == run
+    monkeypatch.chdir(run)  # the folder of a run itself
+    with pytest.raises(RecordingError, match='nowhere'):
+        find_run('nowhere', run.parent)
 
 
 def test_a_run_without_a_visit_has_no_report(run: Path) -> None:

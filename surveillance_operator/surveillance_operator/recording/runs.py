@@ -28,7 +28,10 @@ def find_run(name: str, runs: Path) -> Path:
         if not known:
             raise RecordingError(f'no run in {runs} yet')
         return runs / known[-1]
-    for folder in (Path(name), runs / name, Path(name).parent):
+    given = Path(name)
+    # A file or folder of a run stands for the run.
+    holder = [given.parent] if given.exists() else []
+    for folder in (given, runs / name, *holder):
         if is_run(folder):
             return folder
     newest = f', e.g. {known[-1]}, or {LAST}' if known else ''
