@@ -60,7 +60,7 @@ class MissionState(fsm.State):
             return FAILED
 
     def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
-        """Return the state's own work; the outcome."""
+        """Do the state's own work and return the outcome."""
         raise NotImplementedError
 
     def interrupted(self, ud: Any) -> str:
