@@ -26,13 +26,14 @@ from surveillance_behaviour.peers.ports import InterruptedWaitError, PeerError
 from surveillance_behaviour.peers.ros_ports import RosPlaces, ros_ontology
 from surveillance_behaviour.world_model import Experience
 from surveillance_fsm import Interrupt
+from surveillance_fsm.ros import ClockWait
 from surveillance_interfaces.msg import MissionStatus
 from surveillance_interfaces.srv import Reason
 from surveillance_runtime.conversions import seconds_of
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
-from surveillance_runtime.waiting import AwaitedWork, ClockWait
+from surveillance_runtime.waiting import AwaitedWork
 
 
 class Reasoner(PatrolNode):

@@ -30,10 +30,11 @@ from surveillance_controllers.controller_parameters import (
 from surveillance_controllers.manual.commands import BATTERY, BATTERY_SET, ParsedCommand
 from surveillance_controllers.manual.requests import CommandConsole
 from surveillance_controllers.state_file import StateFile
+from surveillance_fsm.ros import ClockWait
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
-from surveillance_runtime.waiting import AwaitedEvent, ClockWait
+from surveillance_runtime.waiting import AwaitedEvent
 
 RECHARGE_STEPS = 50
 """Steps in which `recharge` fills an empty battery in MANUAL and RANDOM."""

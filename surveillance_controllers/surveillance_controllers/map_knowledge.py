@@ -12,6 +12,7 @@ from contextlib import contextmanager
 
 from surveillance_controllers import conversions
 from surveillance_controllers.geometry import Points
+from surveillance_fsm import Interrupt
 from surveillance_fsm.ros import CallError, ServiceCaller
 from surveillance_interfaces.msg import RobotPlace
 from surveillance_interfaces.srv import ReferenceName, RoomPosition
@@ -24,7 +25,6 @@ from surveillance_ontology.armor_client import (
 from surveillance_ontology.patrol_ontology import DOORS, PatrolOntology
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import STATE_QOS
-from surveillance_runtime.waiting import Interrupt
 
 RETRY_PERIOD = 0.1
 """Pause before the ontology is asked again where the robot is, seconds."""

@@ -8,8 +8,8 @@ import os
 from collections.abc import Mapping
 from pathlib import Path
 
+from surveillance_fsm import Interrupt
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.waiting import Interrupt
 
 WRITE_PERIOD = 0.2
 """Least time between two writes, seconds of steady time."""

@@ -19,6 +19,7 @@ from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
+from surveillance_fsm import Interrupt
 from surveillance_fsm.ros import CallError, CallTimeoutError, ServiceCaller
 from surveillance_interfaces.msg import FactChanges
 from surveillance_interfaces.srv import ArmorDirective, ArmorDirectiveList
@@ -37,7 +38,6 @@ from surveillance_ontology.conversions import (
     request_to_ros,
     response_from_ros,
 )
-from surveillance_runtime.waiting import Interrupt
 
 __all__ = [
     'ArmorClient',

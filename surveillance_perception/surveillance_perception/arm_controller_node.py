@@ -12,7 +12,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
 from trajectory_msgs.msg import JointTrajectory
 
-from surveillance_fsm.ros import GoalAbortedError, GoalRun, GoalServer
+from surveillance_fsm.ros import GoalAbortedError, GoalRun, GoalServer, work_aside
 from surveillance_interfaces.action import ScanSurroundings
 from surveillance_interfaces.srv import MarkerRoutine, PointCamera
 from surveillance_perception.arm.driver import ArmDriver
@@ -33,7 +33,6 @@ from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 from surveillance_runtime.robot_arm import ARM
 from surveillance_runtime.settled_frames import SettledFrames
-from surveillance_runtime.waiting import work_aside
 
 _POSES = {
     MarkerRoutine.Request.LEFT: 'left',

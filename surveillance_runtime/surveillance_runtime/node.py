@@ -34,12 +34,12 @@ from rclpy.qos import qos_policy_name_from_kind
 from rclpy.service import Service
 from rclpy.subscription import Subscription
 
+from surveillance_fsm import Interrupt
+from surveillance_fsm.ros.waiting import CLIENT_QOS, SERVICE_QOS
 from surveillance_runtime.configuration import RosArguments, Setting, read_schema
 from surveillance_runtime.diagnostics import Health
 from surveillance_runtime.logging import CleanLogger, clean
 from surveillance_runtime.parameters import Check, ParameterError, ParameterSpec, element_type
-from surveillance_runtime.qos import CLIENT_QOS, SERVICE_QOS
-from surveillance_runtime.waiting import Interrupt
 
 _EMPTY = {
     bool: Parameter.Type.BOOL_ARRAY,

@@ -1,9 +1,6 @@
-"""The quality-of-service profiles that the nodes use for topics and services."""
+"""The quality-of-service profiles of topics; those of services are in `surveillance_fsm.ros`."""
 
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-
-from surveillance_fsm.ros.waiting import CLIENT_QOS as CLIENT_QOS
-from surveillance_fsm.ros.waiting import SERVICE_QOS as SERVICE_QOS
 
 STATE_QOS = QoSProfile(
     depth=1,

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 from rclpy.time import Time
 
+from surveillance_fsm import Interrupt
+from surveillance_fsm.ros import ClockWait
 from surveillance_interfaces.msg import MarkerDetectionArray
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.waiting import ClockWait, Interrupt
 
 
 class SettledFrames:

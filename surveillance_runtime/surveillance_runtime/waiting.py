@@ -1,7 +1,6 @@
-"""What callbacks await while the executor goes on: work in order, and events.
+"""What callbacks of a `PatrolNode` await while the executor goes on: work in order, and events.
 
-What needs no `PatrolNode` is in `surveillance_fsm.ros` and offered here as well: `ClockWait`,
-which sleeps on ROS time, `Interrupt`, which ends a sleep, and `work_aside`.
+What any node can wait for is in `surveillance_fsm.ros`.
 """
 
 from __future__ import annotations
@@ -13,10 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from rclpy.task import Future
 
-from surveillance_fsm import Interrupt as Interrupt
-from surveillance_fsm.ros.waiting import ClockWait as ClockWait
 from surveillance_fsm.ros.waiting import reported, wake_executor
-from surveillance_fsm.ros.waiting import work_aside as work_aside
 
 if TYPE_CHECKING:
     from surveillance_runtime.node import PatrolNode

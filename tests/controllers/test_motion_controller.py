@@ -10,11 +10,11 @@ from geometry_msgs.msg import Point
 from std_msgs.msg import String
 
 from surveillance_controllers.motion_controller_node import MotionController
+from surveillance_fsm import Interrupt
 from surveillance_fsm.ros import CallInterruptedError, GoalCaller, ServiceCaller
 from surveillance_interfaces.action import Control, FollowPath
 from surveillance_interfaces.srv import ConsoleCommand
 from surveillance_runtime.qos import STATE_QOS
-from surveillance_runtime.waiting import Interrupt
 
 PATH = [Point(x=0.0, y=0.0), Point(x=4.0, y=0.0), Point(x=4.0, y=3.0)]
 

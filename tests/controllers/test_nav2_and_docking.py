@@ -17,10 +17,10 @@ from geometry_msgs.msg import PoseWithCovarianceStamped
 from surveillance_controllers.motion import docking
 from surveillance_controllers.motion import nav2 as nav2_motion
 from surveillance_controllers.motion.arrival import MotionFailedError
+from surveillance_fsm import Interrupt
 from surveillance_fsm.ros import CallInterruptedError, GoalEnd, UnavailableError
 from surveillance_runtime.node import StartError
 from surveillance_runtime.qos import STATE_QOS
-from surveillance_runtime.waiting import Interrupt
 
 PATH = np.array([[0.0, 0, 0], [3, 0, 0], [3, 4, 0]])
 

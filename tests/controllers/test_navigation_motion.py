@@ -15,6 +15,7 @@ from std_msgs.msg import UInt32
 
 from surveillance_controllers.motion_controller_node import MotionController
 from surveillance_controllers.planner_controller_node import PlannerController
+from surveillance_fsm import Interrupt
 from surveillance_fsm.ros import CallInterruptedError, GoalCaller, ServiceCaller
 from surveillance_interfaces.action import ComputePath, Control, FollowPath, Plan
 from surveillance_interfaces.msg import OntologyMap, OntologyPlace, RoomConnection
@@ -23,7 +24,6 @@ from surveillance_ontology.armor_client import ArmorClient
 from surveillance_ontology.armor_server_node import ArmorServer
 from surveillance_ontology.ontology_map_builder_node import OntologyMapBuilder
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
-from surveillance_runtime.waiting import Interrupt
 from surveillance_simulation.simulator_node import Simulator
 
 

@@ -10,11 +10,11 @@ from geometry_msgs.msg import Point
 from std_msgs.msg import String
 
 from surveillance_controllers.planner_controller_node import PlannerController
+from surveillance_fsm import Interrupt
 from surveillance_fsm.ros import CallInterruptedError, GoalCaller, ServiceCaller
 from surveillance_interfaces.action import ComputePath
 from surveillance_interfaces.srv import ConsoleCommand
 from surveillance_runtime.qos import STATE_QOS
-from surveillance_runtime.waiting import Interrupt
 
 START, GOAL = Point(x=5.0, y=10.0), Point(x=10.0, y=5.0)
 

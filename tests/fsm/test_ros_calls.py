@@ -10,9 +10,11 @@ from geometry_msgs.msg import Point
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
+from surveillance_fsm import Interrupt
 from surveillance_fsm.ros import (
     CallInterruptedError,
     CallTimeoutError,
+    ClockWait,
     GoalAbortedError,
     GoalCaller,
     GoalServer,
@@ -23,7 +25,6 @@ from surveillance_fsm.ros import (
 from surveillance_fsm.ros.calls import RoundTrips
 from surveillance_interfaces.action import FollowPath
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.waiting import ClockWait, Interrupt
 
 
 def in_thread(work):

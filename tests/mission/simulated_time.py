@@ -18,7 +18,7 @@ from typing import Any
 import pytest
 from rosgraph_msgs.msg import Clock
 
-from surveillance_runtime.waiting import ClockWait
+from surveillance_fsm.ros import ClockWait
 
 CARRIES_ON = ('surveillance', 'patrol', 'machine', ' goal', '_recharge')
 """Ends of the names of threads whose sleep means that nothing else is under way."""

@@ -16,6 +16,7 @@ from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState
 from std_msgs.msg import Bool, Header, Int32
 from trajectory_msgs.msg import JointTrajectory
 
+from surveillance_fsm import Interrupt
 from surveillance_fsm.ros import CallInterruptedError, GoalCaller, ServiceCaller
 from surveillance_interfaces.action import ScanSurroundings
 from surveillance_interfaces.msg import MarkerDetectionArray
@@ -37,7 +38,6 @@ from surveillance_runtime.node import StartError
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 from surveillance_runtime.robot_arm import ARM
-from surveillance_runtime.waiting import Interrupt
 
 CAMERA = CameraModel.from_field_of_view(320, 240, math.radians(60))
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import threading
 
-from surveillance_runtime.waiting import AwaitedEvent, AwaitedWork, work_aside
+from surveillance_fsm.ros import work_aside
+from surveillance_runtime.waiting import AwaitedEvent, AwaitedWork
 
 
 def awaited(graph, coroutine):

@@ -10,13 +10,13 @@ from std_msgs.msg import Int32
 
 from surveillance_behaviour.conversions import place_note_from
 from surveillance_behaviour.map_from_markers.assembly import Survey, SurveyReport
-from surveillance_fsm.ros import CallError, GoalCaller, ServiceCaller
+from surveillance_fsm import Interrupt
+from surveillance_fsm.ros import CallError, ClockWait, GoalCaller, ServiceCaller
 from surveillance_interfaces.action import ScanSurroundings
 from surveillance_interfaces.msg import MarkerDetectionArray
 from surveillance_interfaces.srv import MarkerRoutine, RoomInformation
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.settled_frames import SettledFrames
-from surveillance_runtime.waiting import ClockWait, Interrupt
 
 _ARM_SECONDS = 30.0
 _ANSWER_SECONDS = 5.0

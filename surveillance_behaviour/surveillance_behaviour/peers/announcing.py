@@ -12,11 +12,11 @@ import surveillance_fsm as fsm
 from surveillance_behaviour import conversions
 from surveillance_behaviour.mission.mission import Mission
 from surveillance_behaviour.policy.world import Decision
+from surveillance_fsm.ros import ClockWait
 from surveillance_interfaces.msg import Decision as DecisionMessage
 from surveillance_interfaces.msg import MissionStatus
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import STATE_QOS
-from surveillance_runtime.waiting import ClockWait
 
 MARGIN = 1e-6
 """By how much a wait is announced longer than it is, seconds: more than stamps are rounded by."""

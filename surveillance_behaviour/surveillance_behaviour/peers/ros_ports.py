@@ -41,7 +41,6 @@ from surveillance_interfaces.msg import Decision as DecisionMessage
 from surveillance_interfaces.msg import RobotPlace
 from surveillance_interfaces.srv import Reason, ReferenceName, RoomPosition
 from surveillance_ontology.armor_client import RosTransport
-from surveillance_runtime import waiting
 from surveillance_runtime.conversions import nanoseconds_of
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import STATE_QOS
@@ -77,7 +76,7 @@ def ros_ontology(node: PatrolNode, deadlines: Deadlines) -> ArmorKnowledge:
     """Return the ontology over ``armor_interface_serialized_srv``, its reference name over
     ``ontology_map/reference_name``, and the robot's place by the topic ``robot_place``."""
     names = ServiceCaller(node, ReferenceName, 'ontology_map/reference_name')
-    wake = waiting.Interrupt()
+    wake = Interrupt()
 
     def reference(interrupt: Interrupt) -> str:
         request = ReferenceName.Request()

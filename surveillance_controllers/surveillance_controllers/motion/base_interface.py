@@ -25,11 +25,11 @@ from surveillance_controllers.motion.localisation import Scan
 from surveillance_controllers.motion.navigator import Navigator
 from surveillance_controllers.motion.path_following import Velocity
 from surveillance_controllers.planning.grid_planning import NoPathError
+from surveillance_fsm import Interrupt
 from surveillance_interfaces.msg import DoorStates
 from surveillance_runtime.conversions import cloud_from_points, seconds_of
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
-from surveillance_runtime.waiting import Interrupt
 
 LONGEST_SILENCE = 0.25
 """A robot whose lidar or odometry has been silent for longer is told to stand, seconds of ROS time;

@@ -17,10 +17,10 @@ from surveillance_controllers.motion.navigator import Navigator
 from surveillance_controllers.motion.place_recording import RETRY_PERIOD, PlaceRecorder
 from surveillance_controllers.motion.robot_parameters import RobotSettings
 from surveillance_controllers.planning.grid_planning import NoPathError
+from surveillance_fsm import Interrupt
 from surveillance_fsm.ros import CallError, GoalCaller, GoalRun
 from surveillance_interfaces.action import ComputePath
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.waiting import Interrupt
 
 
 class NavigationMotion:

@@ -11,12 +11,12 @@ from collections.abc import Mapping
 
 from surveillance_controllers.map_knowledge import KnowledgeError, MapKnowledge
 from surveillance_controllers.motion.place_regions import Segment
+from surveillance_fsm import Interrupt
 from surveillance_fsm.ros import CallError, ServiceCaller
 from surveillance_interfaces.msg import DoorStates
 from surveillance_interfaces.srv import SetDoor
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import STATE_QOS
-from surveillance_runtime.waiting import Interrupt
 
 RETRY_PERIOD = 1.0
 """Pause before a peer that did not answer is asked again, seconds."""

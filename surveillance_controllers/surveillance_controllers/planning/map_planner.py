@@ -23,11 +23,11 @@ from surveillance_controllers.planning.grid_planning import (
     PlanningParameters,
 )
 from surveillance_controllers.planning.route_planning import route
+from surveillance_fsm import Interrupt
 from surveillance_fsm.ros import GoalAbortedError, GoalRun
 from surveillance_runtime.conversions import points_from_cloud
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import STATE_QOS
-from surveillance_runtime.waiting import Interrupt
 
 
 class MapPlanner:

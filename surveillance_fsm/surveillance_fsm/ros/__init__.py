@@ -34,7 +34,7 @@ from surveillance_fsm.ros.states import (
     ServiceState,
     SimpleActionState,
 )
-from surveillance_fsm.ros.waiting import ClockWait, set_preempt_handler
+from surveillance_fsm.ros.waiting import ClockWait, set_preempt_handler, work_aside
 
 if TYPE_CHECKING:
     from surveillance_fsm.ros.introspection import IntrospectionClient, IntrospectionServer
@@ -60,6 +60,7 @@ __all__ = [
     'SimpleActionState',
     'UnavailableError',
     'set_preempt_handler',
+    'work_aside',
 ]
 
 
