@@ -1,4 +1,4 @@
-"""The `detect` command: prints the markers in image files and writes annotated copies."""
+"""The `detect` command: prints the markers in image files; with `--out` it draws them too."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     parser = _Parser(
         prog='launch.py detect',
-        description='Find ArUco markers in images and write annotated copies.',
+        description='Find ArUco markers in images; nothing is written without --out.',
     )
     parser.add_argument('images', nargs='+', type=Path, metavar='IMAGE')
     parser.add_argument(
@@ -38,7 +38,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     )
     parser.add_argument('--known', type=int, nargs='+', metavar='ID', help='ids that are expected')
     parser.add_argument(
-        '--out', type=Path, metavar='FOLDER', help='for the annotated copies; default: beside each'
+        '--out', type=Path, metavar='FOLDER', help='write annotated copies into it'
     )
     options = parser.parse_args(argv)
     known = None if options.known is None else frozenset(options.known)
@@ -61,13 +61,14 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _detect(detector: MarkerDetector, path: Path, folder: Path | None, written: set[Path]) -> None:
     image = read_image(path)
     detections = detector.detect(image)
+    said = f'{path}: {len(detections)} marker{"" if len(detections) == 1 else "s"}'
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
-    target = _target(path, folder or path.parent, written)
-    encoded = cv2.imencode('.png', annotated(image, detections))[1]
-    target.write_bytes(encoded.tobytes())
-    count = f'{len(detections)} marker{"" if len(detections) == 1 else "s"}'
-    print(f'{path}: {count}, drawn in {target}')
+        target = _target(path, folder, written)
+        encoded = cv2.imencode('.png', annotated(image, detections))[1]
+        target.write_bytes(encoded.tobytes())
+        said += f', drawn in {target}'
+    print(said)
     for detection in sorted(detections, key=lambda each: each.marker_id):
         x, y = detection.corners.mean(axis=0)
         note = '' if detection.known else '  not on the known list'

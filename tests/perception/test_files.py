@@ -37,10 +37,10 @@ def image():
     return image_of(panels, camera, dictionary, scene, Degradation(), generator)
 
 
-def test_detect_prints_ids_and_writes_the_annotated_image(tmp_path, capsys, image):
+def test_detect_prints_ids_and_draws_them_where_asked(tmp_path, capsys, image):
     path = tmp_path / 'room.png'
     cv2.imwrite(str(path), image)
-    assert main([str(path), '--known', '12']) == 0
+    assert main([str(path), '--known', '12', '--out', str(tmp_path)]) == 0
     said = capsys.readouterr().out
     assert '2 markers' in said
     assert 'id   12' in said
@@ -48,6 +48,14 @@ def test_detect_prints_ids_and_writes_the_annotated_image(tmp_path, capsys, imag
     drawn = cv2.imread(str(tmp_path / 'room_markers.png'))
     assert drawn.shape == (240, 320, 3)
     assert (drawn != cv2.cvtColor(image, cv2.COLOR_GRAY2BGR)).any()
+
+
+def test_detect_writes_nothing_without_out(tmp_path, capsys, image):
+    path = tmp_path / 'room.png'
+    cv2.imwrite(str(path), image)
+    assert main([str(path)]) == 0
+    assert capsys.readouterr().out.splitlines()[0] == f'{path}: 2 markers'
+    assert list(tmp_path.iterdir()) == [path]
 
 
 def test_detect_names_each_file_that_is_no_image_and_goes_on(tmp_path, capsys, image):
@@ -95,7 +103,7 @@ def test_detect_never_writes_over_an_image_it_was_given(tmp_path, capsys, image)
     for path in (room, other):
         cv2.imwrite(str(path), image)
     given = other.read_bytes()
-    assert main([str(room), str(other)]) == 0
+    assert main([str(room), str(other), '--out', str(tmp_path)]) == 0
     assert other.read_bytes() == given
 
 
