@@ -55,6 +55,7 @@ class ArucoDetector(PatrolNode):
         self._undescribed = True
         self._rest_since: Time | None = Time(clock_type=self.get_clock().clock_type)
         self._stale = False
+        self._said_left_out = False
         self.skipped = 0
         self._watch = MarkerStream(self._options.settings())
         self._images: Latest[Image | CompressedImage] = Latest()
@@ -141,6 +142,12 @@ class ArucoDetector(PatrolNode):
         image = image_from_any(message, self._options.max_pixels)
         height, width = image.shape[:2]
         sightings, new = self._watch.look(image, self._camera_of(width, height))
+        if self._watch.left_out and not self._said_left_out:
+            self._said_left_out = True
+            self.get_logger().warn(
+                f'{self._watch.left_out} candidates of an image were left unread to bound the work '
+                '(max_candidates); diagnostics counts them from now on'
+            )
         for marker_id in new:
             self._ids.publish(Int32(data=marker_id))
         self._detections.publish(detections_to_ros(message.header, sightings))

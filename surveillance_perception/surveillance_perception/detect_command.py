@@ -37,9 +37,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         help="one of OpenCV's, or a file in its form; default: %(default)s",
     )
     parser.add_argument('--known', type=int, nargs='+', metavar='ID', help='ids that are expected')
-    parser.add_argument(
-        '--out', type=Path, metavar='FOLDER', help='write annotated copies into it'
-    )
+    parser.add_argument('--out', type=Path, metavar='FOLDER', help='write annotated copies into it')
     options = parser.parse_args(argv)
     known = None if options.known is None else frozenset(options.known)
     try:

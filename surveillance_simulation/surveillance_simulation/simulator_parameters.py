@@ -9,6 +9,7 @@ from typing import Any
 
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import Described, declare_fields
+from surveillance_simulation.camera.lighting import LIGHTINGS
 from surveillance_simulation.camera.model import Camera, Conditions
 from surveillance_simulation.clock_rate import ClockRateModel
 from surveillance_simulation.robot.base import BaseModel
@@ -69,6 +70,7 @@ _CONDITIONS = {
     'blur': Described("Standard deviation of the lens's blur, pixels.", 0.0, 100.0),
     'motion': Described('Length of the streak that motion draws in a picture, pixels.', 0.0, 100.0),
     'motion_angle': Described('Direction of that streak, rad.', -math.pi, math.pi),
+    'lighting': Described('How evenly the light falls on what the camera sees.', choices=LIGHTINGS),
 }
 _PLACE_TABLES = ('map', 'room_positions', 'walls', 'doors', 'markers')
 
@@ -203,7 +205,7 @@ def conditions(node: PatrolNode, on_change: Callable[[Conditions], None]) -> Con
     """Declare light, noise and blur, which may be changed while the node runs."""
     present = Conditions()
 
-    def changed(field: str, value: float) -> None:
+    def changed(field: str, value: Any) -> None:
         nonlocal present
         present = replace(present, **{field: value})
         on_change(present)

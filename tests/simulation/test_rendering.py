@@ -10,6 +10,7 @@ import pytest
 
 from surveillance_runtime.place import PlaceError
 from surveillance_runtime.place.floor_plan import Marker
+from surveillance_simulation.camera.lighting import LIGHTINGS, lit
 from surveillance_simulation.camera.model import Camera, Conditions, camera_pose, expose
 from surveillance_simulation.camera.rendering import Renderer, render
 from surveillance_simulation.world import textures
@@ -168,3 +169,24 @@ def test_a_marker_that_does_not_exist_is_refused(
 def test_a_camera_that_cannot_be_is_refused(arguments: tuple, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         Camera.from_field_of_view(*arguments)
+
+
+def test_lighting_changes_the_brightness_as_its_name_says() -> None:
+    scene = np.full((240, 320, 3), 150.0, np.float32)
+    rng = np.random.default_rng(0)
+    assert (lit(scene, 'even', rng) == scene).all()
+    for name in ('hard shadow', 'soft shadow', 'vignette'):
+        darker = lit(scene, name, rng)
+        assert darker.max() <= 150.0
+        assert darker.min() < 75.0
+    assert lit(scene, 'glare', rng).max() > 350.0
+    hard, soft = (lit(scene, name, rng) for name in ('hard shadow', 'soft shadow'))
+    assert np.abs(np.diff(hard, axis=1)).max() > 2 * np.abs(np.diff(soft, axis=1)).max()
+
+
+@pytest.mark.parametrize('lighting', LIGHTINGS)
+def test_pictures_under_every_lighting_go_through_the_exposure(lighting: str) -> None:
+    world, pose = facing_west()
+    taken = look(world, *pose, conditions=Conditions(lighting=lighting))
+    assert taken.shape == (480, 640, 3)
+    assert taken.std() > 5.0

@@ -145,6 +145,11 @@ class MarkerStream:
         """All ids confirmed so far."""
         return self._confirmation.confirmed
 
+    @property
+    def left_out(self) -> int:
+        """Candidates of the last image that were left unread, to bound the work."""
+        return self._detector.left_out
+
     def adopt(self, settings: StreamSettings) -> None:
         """Go on with other settings; confirmed ids stay so, unless the dictionary changes.
 
@@ -186,7 +191,7 @@ class MarkerStream:
             pose = None if camera is None else pose_of(detection.corners, size, camera)
             sightings.append(Sighting(detection, pose, size, detection.marker_id in confirmed))
         self.statistics.images += 1
-        self.statistics.left_out += self._detector.left_out
+        self.statistics.left_out += self.left_out
         self.statistics.seconds += time.perf_counter() - start
         return sightings, new
 

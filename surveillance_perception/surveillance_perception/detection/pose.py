@@ -14,6 +14,7 @@ from surveillance_perception.detection.image_sampling import homographies_of
 _OUTLINE = np.array([[-1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [-1.0, -1.0, 0.0]])
 _CORNER_DEVIATION = 0.15
 _SAME_POSE = 0.02
+_FARTHEST = 1e6
 _STRAIGHT = np.zeros(0)
 
 
@@ -65,7 +66,8 @@ def pose_of(corners: Array, size: float, camera: CameraModel) -> MarkerPose | No
     # the corners as a camera without distortion would see them
     seen = rays @ camera.matrix[:2, :2].T + camera.matrix[:2, 2]
     rotation, position = _from_homography(homographies_of(rays[None])[0], size)
-    if not np.isfinite(rotation).all() or not np.isfinite(position).all():
+    # not a number, or so far away that its square is none
+    if not np.isfinite(rotation).all() or not np.abs(position).max() < _FARTHEST:
         return None
     found = [
         pose

@@ -12,6 +12,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from surveillance_simulation.camera.lighting import lit
+
 Array = npt.NDArray[np.float64]
 Picture = npt.NDArray[np.uint8]
 
@@ -93,6 +95,7 @@ class Conditions:
         blur: Standard deviation of the lens's blur, pixels.
         motion: Length of the streak that motion draws, pixels.
         motion_angle: Direction of the streak in the picture, rad, from x towards y.
+        lighting: One of `LIGHTINGS`: how evenly the light falls.
     """
 
     light: float = 1.0
@@ -100,13 +103,14 @@ class Conditions:
     blur: float = 0.4
     motion: float = 0.0
     motion_angle: float = 0.0
+    lighting: str = 'even'
 
 
 def expose(
     scene: npt.NDArray[np.float32], conditions: Conditions, rng: np.random.Generator
 ) -> Picture:
     """Return the picture (rows, columns, channels) that the camera takes of ideal brightnesses."""
-    taken = scene
+    taken = lit(scene, conditions.lighting, rng)
     if conditions.blur > 0:
         taken = cv2.GaussianBlur(taken, (0, 0), conditions.blur)
     if conditions.motion > 1:
