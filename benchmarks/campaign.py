@@ -8,14 +8,17 @@
 `python3 launch.py` runs the mission as it does for a user, in a ROS domain of its own. One or two
 nodes at a time get SIGKILL, SIGSTOP or SIGTERM; now and then the launcher is killed with all it
 started, and started again with `--resume`. A node that was hit is back when another process answers
-for it. At the end three things must agree:
+for it. Now and then it is the whole machine: everything is stopped for a while and goes on, the
+disk of the run is full, the clock is set forward or back (`machine_faults`); after that the next
+visit has to come within a minute. At the end three things must agree:
 
 - the simulator's `ground_truth`: where the robot really was, and when;
 - the mission's record: a visit that the truth does not know is *invented*; a visit that a reader
   saw once in the record and that is gone later is *lost*;
 - the ontology's `visitedAt`: later than the record's last visit is *invented*, earlier is *lost*.
 
-The exit code is 1 when something was lost or invented, or a node stayed away.
+The exit code is 1 when something was lost or invented, or a node stayed away, or processes are left
+behind.
 """
 
 from __future__ import annotations
@@ -33,7 +36,7 @@ import sys
 import threading
 import time
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -51,8 +54,10 @@ from rclpy.qos import qos_profile_sensor_data  # noqa: E402
 from std_msgs.msg import UInt32  # noqa: E402
 
 from benchmarks.link_campaign import LinkCampaign  # noqa: E402
+from benchmarks.machine_faults import SmallDisk, SteppedClock  # noqa: E402
 from surveillance_interfaces.srv import ArmorDirective  # noqa: E402
-from surveillance_runtime.place import read_place  # noqa: E402
+from surveillance_runtime.place import read_place_file  # noqa: E402
+from surveillance_runtime.place.regions import Regions  # noqa: E402
 from surveillance_runtime.qos import STATE_QOS  # noqa: E402
 from surveillance_runtime.testing import claim_domain  # noqa: E402
 
@@ -62,6 +67,10 @@ NEAR = 1.6
 """How far from a place's point the robot may be and count as having visited it, metres."""
 CLOSE_IN_TIME = 4.0
 """By how much a record's time may differ from when the robot was there, seconds."""
+SETTLED = 60.0
+"""Seconds after its start from which a process's growth is watched."""
+DISK = 300
+"""Megabytes of the disk that is filled up."""
 PATIENCE = 60.0
 """After how long a node that was hit counts as staying away, seconds."""
 
@@ -73,8 +82,10 @@ class Launcher:
         processes: The process id of each node that was started last.
     """
 
-    def __init__(self, words: Sequence[str], domain: int, log: Path) -> None:
-        environ = {**os.environ, 'ROS_DOMAIN_ID': str(domain)}
+    def __init__(
+        self, words: Sequence[str], domain: int, log: Path, more: Mapping[str, str]
+    ) -> None:
+        environ = {**os.environ, **more, 'ROS_DOMAIN_ID': str(domain)}
         self.processes: dict[str, int] = {}
         self.folder: Path | None = None
         self._log = log.open('a')
@@ -191,6 +202,17 @@ class Watcher:
 
 
 @dataclass
+class Usage:
+    """What a process held when it was looked at first, a minute after its start, and last."""
+
+    name: str
+    first_at: float
+    first: tuple[float, int]
+    last_at: float = 0.0
+    last: tuple[float, int] = (0.0, 0)
+
+
+@dataclass
 class Results:
     """What the campaign saw."""
 
@@ -200,7 +222,10 @@ class Results:
     lost: list[str] = field(default_factory=list)
     invented: list[str] = field(default_factory=list)
     resumes: list[float] = field(default_factory=list)
-    growth: dict[str, tuple[float, float]] = field(default_factory=dict)
+    machine: list[tuple[str, float]] = field(default_factory=list)
+    restarted: int = 0
+    left_behind: list[str] = field(default_factory=list)
+    usage: dict[int, Usage] = field(default_factory=dict)
 
 
 def records(folder: Path) -> list[Path]:
@@ -236,17 +261,28 @@ class Campaign:
         self._chance = random.Random(chosen.seed)
         self._domain = claim_domain()
         self._log = scratch / 'launch.log'
+        self._disk = self._clock = None
+        if SmallDisk.may_be_made():
+            self._disk = SmallDisk(scratch / 'disk', DISK)
+        if SteppedClock.may_be_made():
+            self._clock = SteppedClock(scratch)
+        self._began: dict[int, float] = {}
         self.watcher = Watcher(self._domain)
         self.results = Results()
         self._seen: dict[tuple[float, str], None] = {}
-        place = read_place(ROOT / 'config' / PLACES[chosen.behaviour])
-        self._positions = {name: (at[0], at[1]) for name, at in place.positions.items()}
+        described = read_place_file(ROOT / 'config' / PLACES[chosen.behaviour])
+        positions = described.place.positions
+        self._positions = {name: (at[0], at[1]) for name, at in positions.items()}
+        self._regions = Regions(described.plan) if described.plan is not None else None
         self.launcher = self._launch(())
         self._folder = self._wait_for_folder()
 
     def _launch(self, more: Sequence[str]) -> Launcher:
         words = ['--behaviour', self._chosen.behaviour, *more]
-        return Launcher(words, self._domain, self._log)
+        if self._disk is not None:
+            words += ['--record', str(self._disk.folder)]
+        environ = {} if self._clock is None else self._clock.environ
+        return Launcher(words, self._domain, self._log, environ)
 
     def _wait_for_folder(self) -> Path:
         deadline = time.monotonic() + 30.0
@@ -257,24 +293,34 @@ class Campaign:
         return self.launcher.folder
 
     def run(self, seconds: float) -> None:
-        """Hit nodes until the time is over, then compare."""
+        """Hit nodes and the machine until the time is over, then compare."""
         end = time.monotonic() + seconds
         self._await_all(PATIENCE)
-        for name, process in self.launcher.processes.items():
-            self.results.growth[name] = (_memory(process), 0.0)
         while time.monotonic() < end:
             time.sleep(self._chance.uniform(1.0, self._chosen.pause))
             self._read_record()
-            if self._chance.random() < self._chosen.restarts:
+            self._note_usage()
+            drawn = self._chance.random()
+            if drawn < self._chosen.restarts:
                 self._kill_everything()
+            elif drawn < self._chosen.restarts + self._chosen.machine:
+                self._hit_machine()
             else:
                 self._hit_nodes()
         self._await_all(PATIENCE)
         time.sleep(5.0)
-        for name, process in self.launcher.processes.items():
-            before = self.results.growth.get(name, (0.0, 0.0))[0]
-            self.results.growth[name] = (before, _memory(process))
+        self._note_usage()
         self._compare()
+
+    def _note_usage(self) -> None:
+        now = time.monotonic()
+        launcher = {'launcher': self.launcher.process.pid}
+        for name, process in {**launcher, **self.launcher.processes}.items():
+            began = self._began.setdefault(process, now)
+            if now - began < SETTLED or (held := _held(process)) is None:
+                continue
+            usage = self.results.usage.setdefault(process, Usage(name, now, held))
+            usage.last_at, usage.last = now, held
 
     def _await_all(self, patience: float) -> None:
         deadline = time.monotonic() + patience
@@ -304,6 +350,47 @@ class Campaign:
                 time.sleep(0.05)
             else:
                 self.results.away.append(f'{name} after {signal.Signals(kind).name}')
+
+    def _hit_machine(self) -> None:
+        faults: dict[str, Callable[[], None]] = {'freeze': self._freeze}
+        if self._disk is not None:
+            faults['full disk'] = self._fill_disk
+        if self._clock is not None:
+            faults['clock step'] = self._step_clock
+        kind = self._chance.choice(sorted(faults))
+        self.results.hits[kind] += 1
+        before = dict(self.launcher.processes)
+        faults[kind]()
+        # The record may be behind: what was seen already does not count.
+        visited, began = len(visits(self._folder)), time.monotonic()
+        while len(visits(self._folder)) <= visited:
+            if time.monotonic() - began > PATIENCE:
+                self.results.away.append(f'the mission after {kind}')
+                return
+            time.sleep(0.1)
+        self.results.machine.append((kind, time.monotonic() - began))
+        self.results.restarted += sum(
+            before[name] != process for name, process in self.launcher.processes.items()
+        )
+        self._await_all(PATIENCE)
+
+    def _freeze(self) -> None:
+        processes = [self.launcher.process.pid, *self.launcher.processes.values()]
+        for kind, seconds in ((signal.SIGSTOP, self._chosen.freeze), (signal.SIGCONT, 0.0)):
+            for process in processes:
+                with contextlib.suppress(ProcessLookupError):
+                    os.kill(process, kind)
+            time.sleep(seconds)
+
+    def _fill_disk(self) -> None:
+        assert self._disk is not None
+        self._disk.fill()
+        time.sleep(self._chosen.freeze)
+        self._disk.free()
+
+    def _step_clock(self) -> None:
+        assert self._clock is not None
+        self._clock.step(self._chance.choice((3600, 60, 5, -5, -60)))
 
     def _kill_everything(self) -> None:
         self.results.hits['everything'] += 1
@@ -340,9 +427,8 @@ class Campaign:
         for at, place in written:
             if not self._was_there(place, at):
                 self.results.invented.append(f'{place} at {at:.0f} s stands in the record')
-        last: dict[str, float] = {}
-        for at, place in written:
-            last[place] = max(at, last.get(place, 0.0))
+        # As written: after the clock was set back, a later visit has an earlier time.
+        last = {place: at for at, place in written}
         for place, seconds in self.watcher.visited_at(
             'surveillance', list(self._positions)
         ).items():
@@ -361,8 +447,10 @@ class Campaign:
 
     def _was_there(self, place: str, at: float) -> bool:
         x, y = self._positions[place]
+        regions = self._regions
         near = [
             math.hypot(px - x, py - y) < NEAR
+            or (regions is not None and regions.room_at(px, py) == place)
             for seconds, px, py in self.watcher.truth
             if abs(seconds - at) < CLOSE_IN_TIME
         ]
@@ -370,18 +458,47 @@ class Campaign:
         return any(near) or not near
 
     def close(self) -> None:
-        """Stop the mission and leave."""
+        """Stop the mission, look for what is left of it, and leave."""
         self.launcher.end()
         self.watcher.close()
+        self.results.left_behind = list(_processes_of(self._folder))
 
 
-def _memory(process: int) -> float:
+def _processes_of(folder: Path) -> Iterator[str]:
+    """Yield the processes whose command line names a folder."""
+    for entry in Path('/proc').glob('[0-9]*'):
+        with contextlib.suppress(OSError):
+            words = (entry / 'cmdline').read_bytes().decode('utf-8', 'replace').split('\0')
+            if (
+                any(word.startswith(str(folder)) for word in words)
+                and int(entry.name) != os.getpid()
+            ):
+                yield f'process {entry.name}: {" ".join(words)[:120]}'
+
+
+def _held(process: int) -> tuple[float, int] | None:
+    """Return megabytes of resident memory and open descriptors; None for a process that is gone."""
     try:
         status = Path(f'/proc/{process}/status').read_text()
+        descriptors = len(os.listdir(f'/proc/{process}/fd'))
     except OSError:
-        return 0.0
+        return None
     resident = [line for line in status.splitlines() if line.startswith('VmRSS')]
-    return int(resident[0].split()[1]) / 1024 if resident else 0.0
+    return (int(resident[0].split()[1]) / 1024, descriptors) if resident else None
+
+
+def _growth(usage: Iterable[Usage]) -> str:
+    """Return in words which processes grew most, among those that were watched for long."""
+    watched = [each for each in usage if each.last_at - each.first_at >= SETTLED]
+    if not watched:
+        return 'none lived long enough'
+    most = max(watched, key=lambda each: each.last[0] - each.first[0])
+    files = max(watched, key=lambda each: each.last[1] - each.first[1])
+    return (
+        f'{len(watched)} watched; most: {most.name} {most.last[0] - most.first[0]:+.1f} MB in '
+        f'{most.last_at - most.first_at:.0f} s, '
+        f'{files.name} {files.last[1] - files.first[1]:+d} descriptors'
+    )
 
 
 def _quantile(values: Sequence[float], share: float) -> float:
@@ -405,11 +522,13 @@ def main(words: Sequence[str] | None = None) -> int:
         help='two hosts whose link fails; root only',
     )
     parser.add_argument('--cuts', type=int, default=2, help='with --network: cuts of 120 s')
+    parser.add_argument('--machine', type=float, default=0.15, help='share of hits on the machine')
+    parser.add_argument('--freeze', type=float, default=30.0, help='how long those last, s')
     parser.add_argument('--quick', action='store_true', help='25 s of hits')
     parser.add_argument('--keep', type=Path, default=ROOT / 'runs', help='folder for the log')
     chosen = parser.parse_args(words)
     if chosen.quick:
-        chosen.hours, chosen.pause = 25.0 / 3600.0, 3.0
+        chosen.hours, chosen.pause, chosen.freeze = 25.0 / 3600.0, 3.0, 4.0
     chosen.keep.mkdir(parents=True, exist_ok=True)
     scratch = chosen.keep / time.strftime('campaign-%Y%m%d-%H%M%S')
     scratch.mkdir()
@@ -433,12 +552,15 @@ def main(words: Sequence[str] | None = None) -> int:
         ('lost', _named(results.lost)),
         ('invented', _named(results.invented)),
         ('collisions', str(campaign.watcher.collisions)),
-        ('memory of all nodes, begin and end', '{:.0f} MB, {:.0f} MB'.format(
-            *(sum(pair[side] for pair in results.growth.values()) for side in (0, 1)))),
+        ('next visit after the machine was hit', _times(results.machine)),
+        ('restarts by that', str(results.restarted)),
+        ('growth of processes', _growth(results.usage.values())),
+        ('processes left behind', _named(results.left_behind)),
         ('log', str(scratch)),
     ]  # fmt: skip
     show(rows)
-    return 1 if results.away or results.lost or results.invented else 0
+    wrong = results.away or results.lost or results.invented or results.left_behind
+    return 1 if wrong else 0
 
 
 def run_on_two_hosts(chosen: argparse.Namespace, scratch: Path) -> int:
@@ -462,6 +584,10 @@ def show(rows: Sequence[tuple[str, str]]) -> None:
     width = max(len(title) for title, _ in rows)
     for title, figure in rows:
         print(f'{title:{width}}  {figure}')
+
+
+def _times(what: Sequence[tuple[str, float]]) -> str:
+    return ', '.join(f'{kind} {seconds:.1f} s' for kind, seconds in what) or 'not tried'
 
 
 def _named(what: Sequence[str]) -> str:

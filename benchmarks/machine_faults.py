@@ -1,0 +1,126 @@
+"""What goes wrong with a whole machine, for one group of processes only.
+
+A small disk that fills up is a tmpfs in this process's own mount namespace; it ends with the
+process. A clock that steps is the real-time clock of the processes that are started with
+`SteppedClock.environ`: a library in front of libc's adds an offset, the machine's own clock stays.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import mmap
+import os
+import shutil
+import struct
+import subprocess
+import sys
+from pathlib import Path
+
+CLONE_NEWNS = 0x00020000  # linux/sched.h
+_STEPPED = r"""
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <fcntl.h>
+#include <stdlib.h>
+#include <sys/mman.h>
+#include <sys/time.h>
+#include <time.h>
+
+static long offset(void) {
+  static volatile long *seconds;
+  if (!seconds) {
+    int file = open(getenv("STEPPED_CLOCK"), O_RDONLY);
+    seconds = mmap(0, sizeof(long), PROT_READ, MAP_SHARED, file, 0);
+  }
+  return *seconds;
+}
+
+int clock_gettime(clockid_t clock, struct timespec *at) {
+  static int (*real)(clockid_t, struct timespec *);
+  if (!real) real = dlsym(RTLD_NEXT, "clock_gettime");
+  int failed = real(clock, at);
+  if (!failed && clock == CLOCK_REALTIME) at->tv_sec += offset();
+  return failed;
+}
+
+int gettimeofday(struct timeval *restrict at, void *restrict zone) {
+  struct timespec now;
+  clock_gettime(CLOCK_REALTIME, &now);
+  at->tv_sec = now.tv_sec;
+  at->tv_usec = now.tv_nsec / 1000;
+  return 0;
+}
+
+time_t time(time_t *at) {
+  struct timespec now;
+  clock_gettime(CLOCK_REALTIME, &now);
+  if (at) *at = now.tv_sec;
+  return now.tv_sec;
+}
+"""
+
+
+class SmallDisk:
+    """A disk of a few megabytes that can be filled up.
+
+    Args:
+        folder: Where it is mounted; made if it is not there.
+        megabytes: Its size.
+    """
+
+    def __init__(self, folder: Path, megabytes: int) -> None:
+        self.folder = folder
+        self._filler = folder / 'filler'
+        folder.mkdir(exist_ok=True)
+        # Of this thread and what it starts from now on.
+        if ctypes.CDLL(None, use_errno=True).unshare(CLONE_NEWNS):
+            raise OSError(ctypes.get_errno(), 'unshare')
+        subprocess.run(['mount', '--make-rprivate', '/'], check=True)
+        size = f'size={megabytes}m'
+        subprocess.run(['mount', '-t', 'tmpfs', '-o', size, 'tmpfs', str(folder)], check=True)
+
+    @staticmethod
+    def may_be_made() -> bool:
+        """Tell whether this user may mount."""
+        return sys.platform == 'linux' and os.geteuid() == 0
+
+    def fill(self) -> None:
+        """Leave no byte free."""
+        with contextlib.suppress(OSError), self._filler.open('ab', buffering=0) as file:
+            while True:
+                file.write(bytes(4096))
+
+    def free(self) -> None:
+        """Give the space back."""
+        self._filler.unlink(missing_ok=True)
+
+
+class SteppedClock:
+    """A real-time clock that is some seconds off, for the processes with its environment.
+
+    Args:
+        folder: Where its library is built.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        source, library = folder / 'stepped.c', folder / 'stepped.so'
+        source.write_text(_STEPPED)
+        words = ['cc', '-shared', '-fPIC', '-O1', '-o', str(library), str(source), '-ldl']
+        subprocess.run(words, check=True)
+        shared = folder / 'offset'
+        shared.write_bytes(struct.pack('l', 0))
+        with shared.open('r+b') as file:
+            self._offset = mmap.mmap(file.fileno(), 0)
+        self.environ = {'LD_PRELOAD': str(library), 'STEPPED_CLOCK': str(shared)}
+        self.seconds = 0
+
+    @staticmethod
+    def may_be_made() -> bool:
+        """Tell whether there is a compiler."""
+        return sys.platform == 'linux' and shutil.which('cc') is not None
+
+    def step(self, seconds: int) -> None:
+        """Set the clock forward, or back."""
+        self.seconds += seconds
+        self._offset[:] = struct.pack('l', self.seconds)
