@@ -8,6 +8,7 @@ import re
 import shutil
 import sys
 import textwrap
+import time
 from collections.abc import Callable, Sequence
 from datetime import datetime
 from pathlib import Path
@@ -21,6 +22,10 @@ _ESCAPES = re.compile(r'\x1b\[[0-9;?]*[ -/]*[@-~]')
 _SEVERITY_COLOURS = {'WARN': '33', 'ERROR': '31', 'FATAL': '1;31', 'DEBUG': '2'}
 _NODE_COLOURS = ('36', '32', '35', '34', '96', '92', '95', '94')
 LAUNCHER = 'launch'
+LOG_BYTES = 10_000_000
+"""Size of a log file from which on another one is begun; two are kept."""
+RETRY_SECONDS = 10.0
+"""After how long a log file that could not be written is tried again."""
 LONGEST_LINE = 4000
 """Characters of a line that are kept."""
 _LEAST_TEXT = 40
@@ -56,7 +61,7 @@ class MergedLog:
             colour = self._terminal and not os.environ.get('NO_COLOR')
         self._colour = colour
         self._heard: Callable[[str, str], None] = lambda _name, _text: None
-        self._file = path.open('a', encoding='utf-8') if path is not None else None
+        self._file = LogFile(path, self.warn) if path is not None else None
 
     def listen(self, heard: Callable[[str, str], None]) -> None:
         """Have each line of a process told as well: its node and its text."""
@@ -128,14 +133,7 @@ class MergedLog:
 
     def _emit(self, shown: str, plain: str) -> None:
         if self._file is not None:
-            try:
-                self._file.write(plain + '\n')
-                self._file.flush()
-            except OSError as error:
-                full, self._file = self._file, None
-                with contextlib.suppress(OSError):
-                    full.close()
-                self.warn(f'{full.name}: {error.strerror}: the log goes on here only')
+            self._file.write(plain)
         if self.broken:
             return
         stream = self._stream or sys.stdout
@@ -145,6 +143,55 @@ class MergedLog:
         except (OSError, ValueError):
             self.broken = True
             _discard(stream)
+
+
+class LogFile:
+    """A log of bounded size: the older half is in a second file, whose name ends with `.1`.
+
+    A disk that is full costs the lines until there is space again.
+
+    Args:
+        path: The file; continued when it exists.
+        warn: Told once when a line could not be written.
+        most: Bytes of each of the two files.
+
+    Raises:
+        OSError: It cannot be opened.
+    """
+
+    def __init__(self, path: Path, warn: Callable[[str], None], most: int = LOG_BYTES) -> None:
+        self._path = path
+        self._warn = warn
+        self._most = most
+        self._retry_at = 0.0
+        self._file: TextIO | None = path.open('a', encoding='utf-8')
+
+    def write(self, line: str) -> None:
+        """Append a line, if that is possible now."""
+        if self._file is None and time.monotonic() < self._retry_at:
+            return
+        try:
+            if self._file is None:
+                self._file = self._path.open('a', encoding='utf-8')
+                self._retry_at = 0.0
+            self._file.write(line + '\n')
+            self._file.flush()
+            if self._file.tell() >= self._most:
+                self._file.close()
+                os.replace(self._path, f'{self._path}.1')
+                self._file = self._path.open('a', encoding='utf-8')
+        except OSError as error:
+            first, self._retry_at = not self._retry_at, time.monotonic() + RETRY_SECONDS
+            self.close()
+            if first:
+                self._warn(f'{self._path}: {error.strerror}: the log goes on here only')
+
+    def close(self) -> None:
+        """Write no more."""
+        full, self._file = self._file, None
+        if full is not None:
+            with contextlib.suppress(OSError):
+                full.close()
 
 
 def bounded(text: str) -> str:

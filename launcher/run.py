@@ -347,6 +347,14 @@ def ros_arguments(files: Sequence[Path], run: Run) -> list[str]:
     return arguments
 
 
+def _merged_arguments(files: Sequence[Path], run: Run) -> list[str]:
+    """Return the arguments of a node that prints into the launcher's log.
+
+    A log file of its own, as ROS writes it, would grow without bound.
+    """
+    return [*ros_arguments(files, run), '--disable-external-lib-logs']
+
+
 def ros_domain(run: Run) -> str:
     """Return the ROS domain of a run: as asked for, else as the environment says.
 
@@ -494,7 +502,7 @@ def run_mission(run: Run, config: Path, runs: Path, resume: Path | None = None) 
     manual = run.mode == 'MANUAL'
     if run.composed:
         own = [files[node.name] for node in nodes]
-        words = command(nodes, ros_arguments(own, run), os.getpid())
+        words = command(nodes, _merged_arguments(own, run), os.getpid())
         # Everything together may hold what the nodes may hold by themselves, and shares much.
         memory = run.memory * 2**20 * COMPOSED_SHARE
         programs = [
@@ -504,7 +512,7 @@ def run_mission(run: Run, config: Path, runs: Path, resume: Path | None = None) 
         programs = [
             Program(
                 node.name,
-                command([node], ros_arguments([files[node.name]], run), os.getpid()),
+                command([node], _merged_arguments([files[node.name]], run), os.getpid()),
                 environ,
                 takes_input=node.name == node_table.CONSOLE,
                 leads=node.name == BEHAVIOUR_NODE,
@@ -520,7 +528,7 @@ def run_mission(run: Run, config: Path, runs: Path, resume: Path | None = None) 
     for together in ((RECORDER, MARKERS), (PAGE,)):
         if members := [node for node in observers if node.name in together]:
             own = [files[node.name] for node in members]
-            words = command(members, ros_arguments(own, run), os.getpid())
+            words = command(members, _merged_arguments(own, run), os.getpid())
             observer = Program(members[0].name, words, environ, says_up=True, watched=True)
             programs.append(replace(observer, memory=run.memory * 2**20))
     names = [

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from launcher.log_merge import LONGEST_LINE, MergedLog, bounded
+from launcher import log_merge
+from launcher.log_merge import LONGEST_LINE, RETRY_SECONDS, LogFile, MergedLog, bounded
 
 
 @pytest.fixture
@@ -71,6 +72,33 @@ def test_a_log_file_that_cannot_be_written_any_more_costs_one_warning(stream):
     log.close()
     warning = 'launch | WARN: /dev/full: No space left on device: the log goes on here only'
     assert body(stream.getvalue()) == [warning, 'one    | first', 'one    | second']
+
+
+def test_a_log_file_goes_on_when_the_disk_has_space_again(tmp_path, monkeypatch):
+    warnings, now, path = [], [100.0], tmp_path / 'log'
+    monkeypatch.setattr(log_merge.time, 'monotonic', lambda: now[0])
+    path.symlink_to('/dev/full')
+    log = LogFile(path, warnings.append)
+    log.write('lost')
+    path.unlink()
+    log.write('also lost')
+    now[0] += RETRY_SECONDS
+    log.write('kept')
+    log.close()
+    assert len(warnings) == 1
+    assert (tmp_path / 'log').read_text() == 'kept\n'
+
+
+def test_a_log_file_has_a_bounded_size(tmp_path):
+    log = LogFile(tmp_path / 'log', pytest.fail, most=1000)
+    for number in range(1000):
+        log.write(f'line {number}')
+    log.close()
+    sizes = [path.stat().st_size for path in tmp_path.iterdir()]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ['log', 'log.1']
+    assert max(sizes) < 1100
+    kept = (tmp_path / 'log.1').read_text() + (tmp_path / 'log').read_text()
+    assert kept.endswith('line 998\nline 999\n')
 
 
 def test_a_redrawn_line_shows_what_it_ended_with(stream):

@@ -1,0 +1,163 @@
+#!/usr/bin/env python3
+"""Let a robot patrol for thirty days without driving, and look at what that leaves.
+
+    .venv/bin/python benchmarks/month.py
+    .venv/bin/python benchmarks/month.py --quick
+
+The mission's record and the ontology's store get what a patrol of seven rooms writes at the pace of
+a real one (`benchmarks/campaign.py --network` counts 4.5 visits a minute): each visit with its
+decision, the notes of exploring, the leg's path, now and then a failure and a recharge. The table
+has the disk they take, the processor time to read both at the next start, and how much memory the
+process gained after its first day. Logs are bounded by themselves (`launcher.log_merge.LOG_BYTES`),
+recordings by `--keep`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import gc
+import random
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[1]
+if str(ROOT) not in sys.path:
+    sys.path.insert(0, str(ROOT))
+
+from surveillance_behaviour.mission import mission_log  # noqa: E402
+from surveillance_ontology.armor.access import DATA, Settings  # noqa: E402
+from surveillance_ontology.armor.client import ArmorClient, InProcessTransport  # noqa: E402
+from surveillance_ontology.armor.service import ArmorService  # noqa: E402
+from surveillance_ontology.armor.store import Store  # noqa: E402
+from surveillance_ontology.patrol_ontology import PatrolOntology  # noqa: E402
+from surveillance_runtime.place import read_place_file  # noqa: E402
+
+DAY = 86400.0
+LEG = 13.3
+"""Seconds from one visit to the next."""
+REFERENCE = 'surveillance'
+START = 1_700_000_000.0
+REASON = (
+    'of 2 CORRIDOR places within reach, by tour: it leads to R3, which went unvisited for 230.4 s; '
+    'this round leaves no place longer than 260 s'
+)
+CLASSES = ('URGENT', 'CORRIDOR', 'ROOM')
+
+
+class Month:
+    """The record and the ontology of one mission.
+
+    Args:
+        folder: Where they are kept.
+        seed: Of the places visited.
+    """
+
+    def __init__(self, folder: Path, seed: int) -> None:
+        self._folder = folder
+        self._chance = random.Random(seed)
+        self._place = read_place_file(ROOT / 'config' / 'seven_rooms.yaml').place
+        self._service = ArmorService(Settings(), store=Store(folder / 'armor_store'))
+        self._ontology = PatrolOntology(
+            ArmorClient('month', REFERENCE, InProcessTransport(self._service))
+        )
+        self.record = mission_log.MissionRecord(folder / 'mission.jsonl')
+
+    def begin(self) -> None:
+        """Build the map and begin the record."""
+        uri = 'http://bnc/exp-rob-lab/2022-23'
+        self._ontology.build(self._place, str(DATA / 'surveillance.owl'), uri, int(START))
+        names = sorted(self._place.positions)
+        self.record.start(START, 'surveillance', names[0], names)
+
+    def legs(self, seconds: float) -> Iterator[float]:
+        """Patrol for so many seconds; yield the time after each leg."""
+        names, now = sorted(self._place.positions), START
+        while now < START + seconds:
+            now += LEG
+            place = self._chance.choice(names)
+            self.record.decision(now - 11.0, place, 'CORRIDOR', f'{place} {REASON}')
+            path = [[round(self._chance.uniform(0, 20), 2) for _ in range(2)] for _ in range(20)]
+            self.record.write('visit', now, place=place, distance=5.5, path=path)
+            for noted in (1.0, 2.0):
+                self.record.write('exploring', now + noted, place=place, seconds=noted)
+            if self._chance.random() < 0.01:
+                self.record.failure(now + 2.0, 'moving', 'compute_path: no answer in time')
+            if self._chance.random() < 0.005:
+                self.record.recharge(now + 2.0, place, 120.0)
+            self._ontology.record_place(place, int(now * 1e9))
+            self._ontology.snapshot(now, CLASSES, visits={place: now})
+            yield now
+
+    def close(self) -> None:
+        """End as a killed process does: nothing is written any more."""
+        self.record.close()
+        self._service.close()
+
+
+def reads(folder: Path) -> tuple[float, float, Any]:
+    """Return processor seconds to read record and store at a start, and what was in the record."""
+    began = time.process_time()
+    with mission_log.MissionRecord(folder / 'mission.jsonl'):
+        events = mission_log.read(folder / 'mission.jsonl')
+    cut_off = mission_log.cut_off(events)
+    middle = time.process_time()
+    service = ArmorService(Settings(), store=Store(folder / 'armor_store'))
+    end = time.process_time()
+    service.close()
+    return middle - began, end - middle, cut_off
+
+
+def _resident() -> float:
+    gc.collect()
+    for line in Path('/proc/self/status').read_text().splitlines():
+        if line.startswith('VmRSS'):
+            return int(line.split()[1]) / 1024
+    return 0.0
+
+
+def _size(path: Path) -> float:
+    return sum(each.stat().st_size for each in path.rglob('*') if each.is_file()) / 1e6
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    """Run it, print the table, return the exit code."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+    )
+    parser.add_argument('--days', type=float, default=30.0)
+    parser.add_argument('--seed', type=int, default=1)
+    parser.add_argument('--quick', action='store_true', help='half a day')
+    chosen = parser.parse_args(words)
+    days = 0.5 if chosen.quick else chosen.days
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch)
+        month = Month(folder, chosen.seed)
+        month.begin()
+        settled, legs, began = 0.0, 0, time.monotonic()
+        for now in month.legs(days * DAY):
+            legs += 1
+            if not settled and now > START + min(1.0, days / 2) * DAY:
+                settled = _resident()
+        grown = _resident() - settled
+        month.close()
+        seconds = time.monotonic() - began
+        record_seconds, store_seconds, cut_off = reads(folder)
+        store = _size(folder / 'armor_store')
+        rows = [
+            ('legs', f'{legs} in {days:g} days; {seconds:.0f} s of this machine'),
+            ('disk: record, store', f'{_size(folder) - store:.1f} MB, {store:.1f} MB'),
+            ('start: record, store (CPU)', f'{record_seconds:.2f} s, {store_seconds:.2f} s'),
+            ('memory after the first day', f'{grown:+.1f} MB'),
+            ('place that the record ends in', str(getattr(cut_off, 'place', None))),
+        ]
+    for title, figure in rows:
+        print(f'{title:32} {figure}')
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())
