@@ -126,12 +126,12 @@ class PatrolGraph:
         """Return the part of the map that can be reached from ``place``; itself when that is
         all.
         """
-        within = np.isfinite(self.distances[self.index[place]])
-        if within.all():
-            return self
-        return self.restricted(
-            name for name, inside in zip(self.places, within, strict=True) if inside
-        )
+        within, pending = {place}, [place]
+        while pending:
+            found = [other for other in self.legs[pending.pop()] if other not in within]
+            within.update(found)
+            pending += found
+        return self if len(within) == len(self.legs) else self.restricted(within)
 
     def restricted(self, kept: Iterable[str]) -> PatrolGraph:
         """Return the map without all places but ``kept``."""

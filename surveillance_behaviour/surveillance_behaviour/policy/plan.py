@@ -38,7 +38,7 @@ from surveillance_behaviour.policy.world import World
 
 FIRST_WORK, MORE_WORK, ALL_WORK = 360_000.0, 1_500.0, 20e6
 """Work before the first choice of a plan, at each later one, in all: about microseconds."""
-FULL_UP_TO = 300.0
+FULL_UP_TO = 150.0
 """Larger maps, in places, have less work before the first choice: knowing them takes its time."""
 FIRST_SECONDS, MORE_SECONDS = 0.4, 0.004
 """Time of the processor for the first two at most."""

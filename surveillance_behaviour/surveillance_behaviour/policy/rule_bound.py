@@ -1,13 +1,15 @@
-"""The least longest wait that any robot can have that obeys the rules: exhaustive, for small maps.
+"""The least longest wait that any robot can have that obeys the rules.
 
-The shortest closed tour is a bound for every robot, but the rules may forbid it: they hold the
-robot to URGENT places while there are any within reach, and to corridors else. `rule_bound` asks
-whether a robot that obeys can go on for ever with no wait from visit to visit above a limit. A
-depth-first search answers that: a state (place, and how long ago each place was visited) from which
-a wait must exceed the limit is dead, and one that comes back to itself goes on for ever. Bisection
-over the limit gives the bound.
+The rules hold the robot to URGENT places while there are any within reach, and to corridors else.
+`simple_bound` holds on every map: nobody is faster than the shortest closed tour, and a place that
+may be entered only when it is URGENT waits for the threshold and the leg to it. It need not be
+reachable.
 
-The search grows exponentially with the map; it is for maps of up to about ten places.
+`rule_bound` is exhaustive, for small maps. It asks whether a robot that obeys can go on for ever
+with no wait from visit to visit above a limit. A depth-first search answers that: a state (place,
+and how long ago each place was visited) from which a wait must exceed the limit is dead, and one
+that comes back to itself goes on for ever. Bisection over the limit gives the bound. The search
+grows exponentially with the map; it ends after a number of states, with nothing proven.
 """
 
 from __future__ import annotations
@@ -16,11 +18,23 @@ import math
 from collections.abc import Sequence
 
 from surveillance_behaviour.policy.graph import PatrolGraph
+from surveillance_behaviour.policy.rollout import RuleMap
 
 STATES = 60_000
-"""How many states the search may visit for one limit."""
+"""How many states the search may visit in all; about 0.1 ms each."""
 FIRST_WAITS = 2.0
 """How long a place may wait for its first visit, in limits or thresholds."""
+
+
+def simple_bound(graph: PatrolGraph, threshold: float, ranks: Sequence[int] | None = None) -> float:
+    """Return a wait from visit to visit that no robot can go below, seconds; see `rule_bound`."""
+    rules = RuleMap(graph, threshold, ranks or default_ranks(graph), 0)
+    return max(graph.tour.bound, rules.least_period)
+
+
+def default_ranks(graph: PatrolGraph) -> list[int]:
+    """Return the ranks of the default rules: places with several ways before those with one."""
+    return [1 if len(graph.legs[place]) > 1 else 2 for place in graph.places]
 
 
 def rule_bound(
@@ -28,32 +42,37 @@ def rule_bound(
     threshold: float,
     ranks: Sequence[int] | None = None,
     precision: float = 0.01,
+    states: int = STATES,
 ) -> float | None:
-    """Return the least longest wait from visit to visit, seconds; None: the map is too large.
+    """Return the least longest wait from visit to visit, seconds; None: nothing was proven.
 
     Args:
         graph: The map.
         threshold: Seconds after which a place is URGENT, which comes before everything.
-        ranks: Priority of each place while it is not URGENT, less comes first; default: places
-            with several ways (corridors) before those with one.
+        ranks: Priority of each place while it is not URGENT, less comes first; default: see
+            `default_ranks`.
         precision: Of the result, as a part of it.
+        states: How many states may be visited in all.
     """
-    kinds = list(ranks or [1 if len(graph.legs[place]) > 1 else 2 for place in graph.places])
-    low, high = graph.tour.bound, 4.0 * max(graph.tour.length, threshold)
+    kinds = list(ranks or default_ranks(graph))
+    low, high = simple_bound(graph, threshold, kinds), 4.0 * max(graph.tour.length, threshold)
+    left = [states]
+    limit = low * (1.0 + precision / 2.0)
     while high - low > precision * low / 2.0:
-        limit = (low + high) / 2.0
-        feasible = _goes_on(graph, threshold, kinds, limit)
+        feasible = _goes_on(graph, threshold, kinds, limit, left)
         if feasible is None:
             return None
         low, high = (low, limit) if feasible else (limit, high)
+        limit = (low + high) / 2.0
     return high
 
 
 def _goes_on(
-    graph: PatrolGraph, threshold: float, ranks: Sequence[int], limit: float
+    graph: PatrolGraph, threshold: float, ranks: Sequence[int], limit: float, left: list[int]
 ) -> bool | None:
-    """Tell whether the robot can go on for ever with no wait above the limit; None: not found out.
+    """Whether the robot can go on for ever with no wait above the limit; None: not found out.
 
+    ``left`` holds the number of states that may still be visited.
     It begins in any place, with all places visited just now; the wait before the first visit of a
     place after that may be several times as long, so that the start does not count.
     """
@@ -64,7 +83,6 @@ def _goes_on(
     ]
     distances = graph.distances.tolist()
     count = len(neighbours)
-    left = [STATES]
     dead: set[tuple[int, ...]] = set()
 
     patience = FIRST_WAITS * max(limit, threshold)

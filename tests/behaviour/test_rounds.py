@@ -1,0 +1,104 @@
+"""Rounds within the rules, and following them ahead: what is promised is what comes."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from surveillance_behaviour.decision import Rules
+from surveillance_behaviour.policy.graph import PatrolGraph
+from surveillance_behaviour.policy.plan import Plan
+from surveillance_behaviour.policy.rollout import (
+    Guide,
+    Lookahead,
+    Oldest,
+    Outcome,
+    RuleMap,
+    State,
+    roll_out,
+)
+from surveillance_behaviour.policy.rounds import RoundSearch
+from surveillance_behaviour.policy.rule_bound import default_ranks, simple_bound
+from surveillance_behaviour.policy.simulation import Patrol
+
+from .test_plan import chain, grid
+from .worlds import graphs, seven_rooms
+
+
+def rules_of(graph: PatrolGraph, threshold: float) -> RuleMap:
+    return RuleMap(graph, threshold, default_ranks(graph), 0)
+
+
+def outcome_of(moves: Generator[int, None, Outcome]) -> Outcome:
+    found = []
+
+    def run() -> Generator[int]:
+        found.append((yield from moves))
+
+    for _ in run():
+        pass
+    return found[0]
+
+
+def at_start(graph: PatrolGraph) -> State:
+    count = len(graph.places)
+    return State(0, 0.0, [0.0] * count, [False] * count)
+
+
+def test_the_shortest_lawful_round_of_a_grid_is_found() -> None:
+    graph = grid(3, 3)
+    search = RoundSearch(rules_of(graph, 0.1 * graph.tour.length), graph.tour.order)
+    search.improve(200_000.0)
+    assert not search.best.breaches
+    assert search.best.length == pytest.approx(1.2 * graph.tour.length)
+
+
+@settings(max_examples=30, deadline=None, derandomize=True)
+@given(graphs(), st.floats(0.1, 2.0))
+def test_a_round_visits_every_place_in_its_length(graph: PatrolGraph, factor: float) -> None:
+    rules = rules_of(graph, factor * graph.tour.length)
+    search = RoundSearch(rules, graph.tour.order)
+    search.improve(5_000.0)
+    assert set(search.best.targets) == set(range(len(graph.places)))
+    walked = rules.length(search.best.targets)
+    assert search.best.length == pytest.approx(max(walked, rules.least_period))
+    assert walked >= graph.tour.length - 1e-9
+
+
+@pytest.mark.parametrize('kind', ['oldest', 'lookahead'])
+@pytest.mark.parametrize('factor', [0.1, 0.75, 1.25])
+def test_a_policy_followed_ahead_does_what_it_does_in_a_patrol(kind: str, factor: float) -> None:
+    graph = seven_rooms()
+    threshold = factor * graph.tour.length
+    patrol = Patrol(graph, Rules(), kind, threshold, graph.places[0])
+    for _ in patrol.until(60.0 * graph.tour.length):
+        pass
+    rules = rules_of(graph, threshold)
+    guide: Guide = Oldest(rules) if kind == 'oldest' else Lookahead(rules)
+    found = outcome_of(roll_out(rules, guide, at_start(graph), 60.0 * graph.tour.length))
+    assert found.settled == pytest.approx(patrol.run.settled)
+    assert found.first == pytest.approx(patrol.run.longest)
+
+
+@pytest.mark.parametrize('factor', [0.1, 1.25])
+def test_a_plan_keeps_what_it_promises(factor: float) -> None:
+    graph = chain(6)
+    threshold = factor * graph.tour.length
+    patrol = Patrol(graph, Rules(), 'tour', threshold, graph.places[0])
+    promised = Plan(patrol.world()).longest
+    for _ in patrol.until(12.0 * max(graph.tour.length, threshold)):
+        pass
+    assert patrol.run.settled <= promised + 1e-6
+
+
+@settings(max_examples=25, deadline=None, derandomize=True)
+@given(graphs(), st.floats(0.05, 3.0))
+def test_nobody_goes_below_the_simple_bound(graph: PatrolGraph, factor: float) -> None:
+    threshold = factor * graph.tour.length
+    patrol = Patrol(graph, Rules(), 'oldest', threshold, graph.places[0])
+    for _ in patrol.until(20.0 * max(graph.tour.length, threshold)):
+        pass
+    assert patrol.run.settled >= simple_bound(graph, threshold) - 0.01
