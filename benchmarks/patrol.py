@@ -256,7 +256,7 @@ def random_graph(count: int, seed: int, uneven: bool = False) -> Map:
 def within_rules(
     places: Sequence[Map], factors: Sequence[float], periods: float, states: int
 ) -> None:
-    """The ruled policies over a bound that knows the rules, once settled, by threshold / tour.
+    """Compare the ruled policies with a bound that knows the rules, by threshold / tour.
 
     The bound is exhaustive (and marked ``*``) on maps of up to nine places where that search ends.
     Else it is `simple_bound`, which no robot need be able to reach: a ratio above 1 is not proven
