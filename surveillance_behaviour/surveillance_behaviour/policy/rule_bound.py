@@ -20,7 +20,7 @@ from collections.abc import Sequence
 from surveillance_behaviour.policy.graph import PatrolGraph
 from surveillance_behaviour.policy.rollout import RuleMap
 
-STATES = 60_000
+STATES = 300_000
 """How many states the search may visit in all; about 0.1 ms each."""
 FIRST_WAITS = 2.0
 """How long a place may wait for its first visit, in limits or thresholds."""
