@@ -28,7 +28,7 @@ NEIGHBOURS = 12
 """How many nearest places each place is tried beside when a tour is improved."""
 ASCENT_STEPS = 150
 """Steps of the subgradient ascent that raises the lower bound."""
-KICKS = 600_000
+KICKS = 300_000
 """How often a good tour is disturbed and improved again, times its places; at most `MOST_KICKS`."""
 MOST_KICKS = 2000
 
