@@ -249,6 +249,30 @@ def test_goal_aborts_with_its_result(graph, server):
     assert (end.status, end.result.position.x) == ('aborted', 0.5)
 
 
+def test_a_goal_that_is_taken_back_is_no_error_and_the_next_one_may_be(graph, server, capfd):
+    begun = threading.Event()
+
+    def execute(goal, run):
+        if goal.path:
+            begun.set()
+            run.sleep(1e6)
+        raise GoalAbortedError('withdrawn')
+
+    GoalServer(server, FollowPath, 'follow_path', execute)
+    caller = GoalCaller(graph.node, FollowPath, 'follow_path')
+    interrupt = Interrupt()
+    end = in_thread(lambda: caller.run(follow(1), accept_timeout=5.0, interrupt=interrupt))
+    assert begun.wait(10)
+    interrupt.set()
+    with pytest.raises(CallInterruptedError):
+        end()
+    assert caller.run(follow(), accept_timeout=5.0).status == 'aborted'
+    said = capfd.readouterr().err
+    assert '[INFO]' in said
+    assert said.count('[ERROR]') == 1
+    assert 'Traceback' not in said
+
+
 def test_exception_in_execute_aborts_the_goal_and_the_server_goes_on(graph, server):
     def execute(goal, run):
         return FollowPath.Result(position=goal.path[0])

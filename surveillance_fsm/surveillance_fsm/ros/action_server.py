@@ -165,9 +165,11 @@ class GoalServer:
             if self._current is run:
                 self._current = None
         if error is not None:
-            log = self._node.get_logger()
-            # Whoever takes a goal back wants it to end.
-            (log.info if run.interrupt.is_set() else log.error)(f'{self.name}: {error}')
+            # In two lines: rclpy's loggers take one severity for each line of code.
+            if run.interrupt.is_set():  # whoever takes a goal back wants it to end
+                self._node.get_logger().info(f'{self.name}: {error}')
+            else:
+                self._node.get_logger().error(f'{self.name}: {error}')
         if handle.is_cancel_requested:
             handle.canceled()
         elif error is not None or run.interrupt.is_set():
