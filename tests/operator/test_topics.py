@@ -1,0 +1,123 @@
+"""What messages tell of a mission, where more than one message is needed to know it."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import PoseWithCovarianceStamped
+from sensor_msgs.msg import JointState
+
+from surveillance_interfaces.msg import MarkerDetection, MarkerDetectionArray
+from surveillance_ontology.armor.facts import parse_fact
+from surveillance_operator import mission_feed
+from surveillance_operator.mission_feed import MissionFeed
+from surveillance_operator.snapshot import Snapshot
+from surveillance_operator.topics import DETECTIONS_TOPIC, TOPICS, read_message, with_fact
+from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.qos import STATE_QOS
+from surveillance_runtime.robot_arm import ARM
+
+TOPIC = {topic.name: topic for topic in TOPICS}
+
+
+def pose(x: float, y: float, yaw: float = 0.0, second: int = 5) -> PoseWithCovarianceStamped:
+    message = PoseWithCovarianceStamped()
+    message.header.stamp = Time(sec=second)
+    at = message.pose.pose
+    at.position.x, at.position.y = x, y
+    at.orientation.z, at.orientation.w = math.sin(yaw / 2), math.cos(yaw / 2)
+    return message
+
+
+def joints(speed: float = 0.0) -> JointState:
+    message = JointState(name=list(ARM.names), position=[0.0] * 5, velocity=[speed] * 5)
+    message.header.stamp = Time(sec=5)
+    return message
+
+
+def seen(second: int = 5, *, confirmed: bool = True) -> MarkerDetectionArray:
+    """Return a marker three metres ahead of the camera."""
+    message = MarkerDetectionArray(detections=[MarkerDetection(id=12, confirmed=confirmed)])
+    message.detections[0].pose.position.z = 3.0
+    message.header.stamp = Time(sec=second)
+    return message
+
+
+def told(*messages: tuple[str, Any]) -> Snapshot:
+    snapshot = Snapshot()
+    for name, message in messages:
+        snapshot = read_message(snapshot, TOPIC[name], message)
+    assert not snapshot.silent
+    return snapshot
+
+
+def test_a_confirmed_marker_is_put_on_the_map() -> None:
+    standing = [('amcl_pose', pose(1.0, 2.0, math.pi / 2))] * 2
+    known = told(*standing, ('joint_states', joints()), (DETECTIONS_TOPIC, seen()))
+    camera = ARM.camera_frame([0.0] * 5)
+    ahead, left = (camera[:3, :3] @ np.array([0.0, 0.0, 3.0]) + camera[:3, 3])[:2]
+    assert known.markers[12] == pytest.approx((1.0 - left, 2.0 + ahead), abs=0.01)
+
+
+@pytest.mark.parametrize(
+    'messages',
+    [
+        [pose(1.0, 2.0), pose(1.5, 2.0), joints(), seen()],  # the robot drives
+        [pose(1.0, 2.0), pose(1.0, 2.0), joints(0.5), seen()],  # the arm moves
+        [pose(1.0, 2.0), pose(1.0, 2.0), joints(), seen(second=4)],  # an image from before
+        [pose(1.0, 2.0), pose(1.0, 2.0), joints(), seen(confirmed=False)],
+        [pose(1.0, 2.0), pose(1.0, 2.0), seen()],  # nobody knows where the camera is
+    ],
+)
+def test_where_a_marker_is_cannot_be_told_from_a_moving_camera(messages: list[Any]) -> None:
+    names = {
+        PoseWithCovarianceStamped: 'amcl_pose',
+        JointState: 'joint_states',
+        MarkerDetectionArray: DETECTIONS_TOPIC,
+    }
+    known = told(*((names[type(message)], message) for message in messages))
+    assert known.markers == {}
+    assert len(known.detections) == 1
+
+
+def test_facts_come_and_go() -> None:
+    snapshot = Snapshot()
+    for text in ('URGENT(R1)', 'connectedTo(R1, C1)', 'visitedAt(R1, "7"^^xsd:long)', 'ROBOT(x)'):
+        snapshot = with_fact(snapshot, parse_fact(text), came=True)
+    assert snapshot.urgent == {'R1'}
+    assert snapshot.links == {('R1', 'C1')}
+    assert snapshot.visited_at == {'R1': 7.0}
+    snapshot = with_fact(snapshot, parse_fact('visitedAt(R1, "9"^^xsd:long)'), came=True)
+    snapshot = with_fact(snapshot, parse_fact('visitedAt(R1, "7"^^xsd:long)'), came=False)
+    assert snapshot.visited_at == {'R1': 9.0}
+    assert with_fact(snapshot, parse_fact('URGENT(R1)'), came=False).urgent == set()
+
+
+class Watcher(PatrolNode):
+    """Watches as the page does."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__('mission_watcher', **options)
+        self.feed = MissionFeed(self, 0.05, streams=True)
+
+
+def test_robots_of_other_namespaces_appear_and_go(
+    graph: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(mission_feed, 'LOOK_PERIOD', 0.05)
+    watcher = graph.add(Watcher)
+    publishers = {
+        name: graph.node.create_publisher(PoseWithCovarianceStamped, topic, STATE_QOS)
+        for name, topic in (('', 'amcl_pose'), ('two', '/two/amcl_pose'), ('a/b', '/a/b/amcl_pose'))
+    }
+    for number, publisher in enumerate(publishers.values()):
+        publisher.publish(pose(float(number), 0.0))
+    graph.until(lambda: watcher.feed.snapshot.others.keys() == {'two', 'a/b'})
+    assert watcher.feed.snapshot.others['two'] == (1.0, 0.0, 0.0)
+    graph.until(lambda: watcher.feed.snapshot.pose == (0.0, 0.0, 0.0))
+    graph.node.destroy_publisher(publishers['two'])
+    graph.until(lambda: watcher.feed.snapshot.others.keys() == {'a/b'})
