@@ -1,8 +1,9 @@
 """Navigation measured: planning beside its peers, one step of control, and the whole stack's speed.
 
-    python benchmarks/navigation.py [--quick] [planning] [control] [people] [silence] [stack] [pace]
+    python benchmarks/navigation.py [--quick] [SECTION ...]
 
-Without a section's name all are run. Every figure stands beside its peer's from the same run.
+The sections are planning, control, people, kidnaps, silence, stack and pace; all by default. Every
+figure of planning stands beside its peers' from the same run.
 """
 
 from __future__ import annotations
@@ -369,6 +370,104 @@ def people(*, quick: bool) -> None:
     )
 
 
+def kidnaps(*, quick: bool) -> None:
+    """Robots that are carried off while they drive: when they know where they are."""
+    places = {
+        'seven_rooms': (read_world(ROOT / 'config' / 'seven_rooms.yaml'), 16),
+        'patrol_world': (read_world(ROOT / 'config' / 'patrol_world.yaml'), 10),
+        'office, rooms alike': (read_world(ROOT / 'config' / 'office.yaml'), 10),
+        'grid, all rooms alike': (World.from_parameters(place_generation.grid(3, 3)), 10),
+    }
+    rows = []
+    for name, (world, count) in places.items():
+        count = 3 if quick else count
+        ends = [kidnapped(world, seed) for seed in range(count)]
+        found = [after for after, _ in ends if after is not None]
+        wrong = [longest for _, longest in ends]
+        rows.append(
+            (
+                name,
+                f'{count}',
+                f'{len(found)}',
+                f'{median(found):.1f}' if found else '-',
+                f'{max(wrong):.1f}',
+                f'{sum(longest > 60.0 for longest in wrong)}',
+            )
+        )
+    table(
+        'A driving robot is carried to another pose and watched for 90 s; wrong is an estimate '
+        'more than 0.5 m off\nof a robot that does not say it is lost.',
+        ('place', 'kidnaps', 'found', 'after s, median', 'longest wrong s', 'wrong for 60 s'),
+        rows,
+    )
+
+
+def kidnapped(world: World, seed: int) -> tuple[float | None, float]:
+    """Carry a driving robot off; return when it knew its pose again, and how long it was wrong."""
+    rng = np.random.default_rng(seed)
+    robot = Robot(world, rng=np.random.default_rng(seed))
+    drawn = occupancy_grid.draw(world.plan)
+    grid = GridMap(drawn.cells, drawn.resolution, drawn.origin)
+    planner, navigator = GridPlanner(grid), Navigator()
+    navigator.set_map(grid)
+    free = grid.centres_of(np.argwhere(planner.cost > 0))
+    rooms = list(world.plan.place.rooms)
+    goal: Any = None
+
+    def anywhere() -> geometry.Pose:
+        x, y = free[int(rng.integers(len(free)))]
+        return float(x), float(y), float(rng.uniform(-math.pi, math.pi))
+
+    def steer() -> None:
+        nonlocal goal
+        assert navigator.pose is not None
+        drive = navigator.task
+        assert drive is None or isinstance(drive, Drive)
+        anew = drive is None or drive.state.ended
+        if not anew and drive is not None and drive.state is not State.ASKING:
+            return
+        if anew:
+            goal = world.plan.place.positions[rooms[int(rng.integers(len(rooms)))]][:2]
+        try:
+            path = planner.plan(navigator.pose[:2], goal)
+        except NoPathError as error:
+            if drive is not None:
+                drive.no_path(str(error))
+            return
+        if anew or drive is None:
+            navigator.task = Drive(path)
+        else:
+            drive.new_path(path)
+
+    def look() -> None:
+        navigator.move(robot.base.odometry)
+        scan = Scan(robot.lidar.angles, robot.scan().astype(float), robot.lidar.range_max)
+        velocity = navigator.see(scan, robot.time) or Velocity()
+        robot.base.command(velocity.speed, velocity.turn)
+        robot.advance(0.1)
+        steer()
+
+    robot.base.pose = robot.base.odometry = anywhere()
+    navigator.believe(robot.base.pose)
+    for _ in range(30):
+        look()
+    robot.base.pose = anywhere()
+    robot.base.push(0.0, 0.0, 0.0)
+    begun, found, wrong_since, longest = robot.time, None, None, 0.0
+    while robot.time - begun < 90.0 and (found is None or robot.time - begun < found + 5.0):
+        look()
+        assert navigator.pose is not None
+        right = math.dist(navigator.pose[:2], robot.base.pose[:2]) <= 0.5
+        if right and not navigator.lost and found is None:
+            found = robot.time - begun
+        if right or navigator.lost:
+            wrong_since = None
+        else:
+            wrong_since = robot.time if wrong_since is None else wrong_since
+            longest = max(longest, robot.time - wrong_since)
+    return found, longest
+
+
 def silence(*, quick: bool) -> None:
     """Time and way from the last message of a sensor until the robot stands, in real time."""
     rows = []
@@ -599,6 +698,7 @@ SECTIONS: dict[str, Callable[..., None]] = {
     'planning': planning,
     'control': control,
     'people': people,
+    'kidnaps': kidnaps,
     'silence': silence,
     'stack': stack,
     'pace': pace,

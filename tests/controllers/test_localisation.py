@@ -10,8 +10,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from surveillance_controllers.geometry import composed, relative
+from surveillance_controllers.geometry import Pose, composed, relative
 from surveillance_controllers.motion.localisation import Localiser, Scan
+from surveillance_controllers.planning.grid_map import GridMap
 
 POSES = st.tuples(st.floats(-5, 5), st.floats(-5, 5), st.floats(-3, 3))
 
@@ -71,6 +72,32 @@ def test_a_robot_carried_into_another_room_finds_itself_after_some_scans(flat: A
         localiser.see(flat.scan(true), now=float(step))
     assert error(localiser, true)[0] < 0.06
     assert localiser.jumps == 1
+
+
+def test_of_rooms_that_look_alike_the_one_wins_that_the_way_out_shows() -> None:
+    # Four rooms of 2 m, all the same, with their doors to a corridor.
+    cells = np.full((68, 164), 100, np.int8)
+    for column in (2, 42, 82, 122):
+        cells[2:42, column : column + 38] = 0
+        cells[42:44, column + 14 : column + 26] = 0
+    cells[44:64, 2:160] = 0
+    grid = GridMap(cells, 0.05, (0.0, 0.0))
+    localiser = Localiser(grid, (1.0, 1.0, 0.0))
+    angles = np.linspace(-math.pi, math.pi, 180, endpoint=False)
+
+    def scan(pose: Pose) -> Scan:
+        return Scan(angles, localiser.cast(pose, angles, 8.0), 8.0)
+
+    start = (5.1, 1.0, math.pi / 2)
+    localiser.move(start)
+    for step in range(10):
+        localiser.see(scan(start), now=float(step))
+    assert not localiser.lost, 'it can be driven with'
+    for step in range(1, 18):
+        true = composed(start, (0.1 * step, 0.0, 0.0))
+        localiser.move(true)
+        localiser.see(scan(true), now=10.0 + step)
+    assert error(localiser, true)[0] < 0.1
 
 
 def test_a_slip_of_the_odometry_is_not_believed(flat: Any) -> None:

@@ -11,6 +11,10 @@ go as far as they should. When that part drops, the robot doubts (it may have be
 or slipped; or there only are obstacles that the map does not have) and looks for a better pose:
 near where it was, then everywhere, over a lattice of poses, the best of which are refined by the
 same correction and compared by their rays. A pose that is not clearly better is not taken.
+
+Rooms look alike. Poses that explained about as much as the one that was taken stay as rivals: they
+move with the odometry and are corrected by the same scans, until they explain less, or one of them
+wins.
 """
 
 from __future__ import annotations
@@ -76,6 +80,10 @@ class LocalisationParameters:
         far_better: A pose far away must explain this much more, and win in several searches: that
             somebody carried the robot there is unlikely, and rooms look alike.
         far_wins: In so many, one after the other.
+        alike: A pose that explains less than the one taken, by at most this, is a rival.
+        most_rivals: At most so many are kept.
+        rival_wins: A rival that explained so much more, summed over scans, is taken instead;
+        rival_loses: one that explained so much less is forgotten.
         rounds: After so many searches without a winner the present pose is kept.
         doubt_time: How long scans are doubtful before it looks, seconds; one scan is enough when it
             would be lost.
@@ -101,6 +109,10 @@ class LocalisationParameters:
     better: float = 0.1
     far_better: float = 0.2
     far_wins: int = 3
+    alike: float = 0.1
+    most_rivals: int = 40
+    rival_wins: float = 0.3
+    rival_loses: float = 0.5
     rounds: int = 5
     doubt_time: float = 0.2
     lost_pause: float = 1.0
@@ -110,6 +122,14 @@ class LocalisationParameters:
     lattice: float = 0.25
     headings: int = 24
     body: float = 0.15
+
+
+@dataclass
+class _Rival:
+    """Another pose at which the robot may be, and by how much it has explained more so far."""
+
+    pose: Pose
+    lead: float = 0.0
 
 
 class Localiser:
@@ -140,6 +160,7 @@ class Localiser:
         self._tolerated = 1.0
         self._rival: tuple[Pose, int] | None = None
         self._rounds = 0
+        self._rivals: list[_Rival] = []
         self._moved = (0.0, 0.0)
         self._used_at: float | None = None
         self.set_map(grid)
@@ -174,6 +195,7 @@ class Localiser:
         self._look_at = None
         self._tolerated = 1.0
         self._used_at = None
+        self._rivals.clear()
 
     def move(self, odometry: Pose) -> None:
         """Take a new reading of the odometry, in the odometry's own frame."""
@@ -183,6 +205,8 @@ class Localiser:
             p = self.parameters
             if step <= p.top_step and abs(turn) <= p.top_turn:
                 self.pose = composed(self.pose, (dx, dy, turn))
+                for rival in self._rivals:
+                    rival.pose = composed(rival.pose, (dx, dy, turn))
                 self._moved = (self._moved[0] + step, self._moved[1] + abs(turn))
         self._odometry = odometry
 
@@ -204,8 +228,41 @@ class Localiser:
         moved, self._moved = self._moved, (0.0, 0.0)
         corrected = self._matched(self.pose, thin.points, moved)
         agreement = self.explained(corrected, thin.thinned(p.cast_rays))
+        winner = self._weighed(corrected, agreement, thin, moved)
+        if winner is not None:
+            self.jumps += 1
+            corrected, agreement = winner
         self._judge(corrected, agreement, thin, now)
         return True
+
+    def _weighed(
+        self, present: Pose, agreement: float, thin: Scan, moved: tuple[float, float]
+    ) -> tuple[Pose, float] | None:
+        """Correct the rivals by a scan; return the one that wins over the present pose, if any."""
+        p = self.parameters
+        best: tuple[_Rival, float] | None = None
+        for rival in self._rivals:
+            rival.pose = self._matched(rival.pose, thin.points, moved)
+            explained = self.explained(rival.pose, thin.thinned(p.cast_rays))
+            rival.lead += explained - agreement
+            if not self._can_stand(rival.pose) or self._same(rival.pose, present):
+                rival.lead = -math.inf
+            elif rival.lead >= p.rival_wins and (best is None or rival.lead > best[0].lead):
+                best = rival, explained
+        self._rivals = [each for each in self._rivals if each.lead > -p.rival_loses]
+        if best is None:
+            return None
+        winner, explained = best
+        for rival in self._rivals:
+            rival.lead -= winner.lead
+        self._rivals.remove(winner)
+        self._rivals.append(_Rival(present, -winner.lead))
+        return winner.pose, explained
+
+    @staticmethod
+    def _same(first: Pose, second: Pose) -> bool:
+        turned = math.remainder(first[2] - second[2], math.tau)
+        return math.dist(first[:2], second[:2]) < 0.5 and abs(turned) < 0.5
 
     def _is_due(self, now: float) -> bool:
         p = self.parameters
@@ -233,10 +290,12 @@ class Localiser:
             self._look_at = min(self._look_at, now)
         if now < self._look_at - 1e-9:
             return
-        found = self.search(thin)
+        candidates = self.search(thin)
+        found = candidates[0] if candidates else None
         if found is not None and self._is_convincing(found, agreement):
             self.jumps += 1
             self._settle(*found)
+            self._rivals = self._alike(candidates)
         elif self._rival is not None and self._rounds < p.rounds:
             # Somewhere far away fits better: the next scans decide.
             self._rounds += 1
@@ -272,18 +331,33 @@ class Localiser:
         self._rounds = 0
         self._rival = None
 
-    def search(self, scan: Scan) -> tuple[Pose, float] | None:
-        """Look for the pose that explains a scan: near the last one first, then everywhere.
+    def search(self, scan: Scan) -> list[tuple[Pose, float]]:
+        """Look everywhere for poses that explain a scan.
 
         Returns:
-            The pose and the part of the rays it explains; None when the scan shows too little.
+            Poses and the part of the rays each explains, the likeliest first; empty when the scan
+            shows too little. Of poses that explain as much, one near the last pose comes first.
         """
-        near = self._searched(scan, self.parameters.near)
-        if near is not None and near[1] >= self.parameters.sure_from:
-            return near
-        far = self._searched(scan, math.inf)
-        found = [f for f in (near, far) if f is not None]
-        return max(found, key=lambda f: self._worth(*f), default=None)
+        p = self.parameters
+        found = self._searched(scan, p.near, 24)
+        near = max(found, key=lambda each: self._worth(*each), default=None)
+        found += self._searched(scan, math.inf, p.most_rivals)
+        found.sort(key=lambda each: -self._worth(*each))
+        if near is not None and near[1] >= p.sure_from:
+            # That somebody carried the robot far away is unlikely.
+            found.remove(near)
+            found.insert(0, near)
+        return found
+
+    def _alike(self, candidates: list[tuple[Pose, float]]) -> list[_Rival]:
+        """Return the candidates that explain about as much as the first."""
+        p = self.parameters
+        taken: list[Pose] = [candidates[0][0]]
+        for pose, explained in candidates[1:]:
+            good = explained >= max(candidates[0][1] - p.alike, p.lost_below)
+            if good and not any(self._same(pose, other) for other in taken):
+                taken.append(pose)
+        return [_Rival(pose) for pose in taken[1 : p.most_rivals + 1]]
 
     def _worth(self, pose: Pose, explained: float) -> float:
         # Among poses that explain a scan as well, the nearest one is the likeliest.
@@ -364,16 +438,16 @@ class Localiser:
         slope_y = (north - south) / self.grid.resolution
         return south + (north - south) * v, slope_x, slope_y
 
-    def _searched(self, scan: Scan, reach: float) -> tuple[Pose, float] | None:
+    def _searched(self, scan: Scan, reach: float, count: int) -> list[tuple[Pose, float]]:
+        """Search within reach of the last pose; refine the best `count` poses of the lattice."""
         poses = self._lattice(reach)
         points = scan.thinned(40).points
         if not len(poses) or len(points) < 8:
-            return None
+            return []
         scores = self._scores(poses, points)
-        candidates = _apart(poses, scores, 24, 2 * self.parameters.lattice)
+        candidates = _apart(poses, scores, count, 2 * self.parameters.lattice)
         refined = [self._matched(pose, scan.points, (1.0, 1.0)) for pose in candidates]
-        found = [(pose, self.explained(pose, scan)) for pose in refined if self._can_stand(pose)]
-        return max(found, key=lambda f: self._worth(*f), default=None)
+        return [(pose, self.explained(pose, scan)) for pose in refined if self._can_stand(pose)]
 
     def _can_stand(self, pose: Pose) -> bool:
         cell = self.grid.cells_of(pose[:2])
