@@ -396,7 +396,8 @@ def kidnaps(*, quick: bool) -> None:
         )
     table(
         'A driving robot is carried to another pose and watched for 90 s; wrong is an estimate '
-        'more than 0.5 m off\nof a robot that does not say it is lost.',
+        'more than 0.5 m off\nof a robot that does not say it is lost or unsure (covariance of '
+        'amcl_pose).',
         ('place', 'kidnaps', 'found', 'after s, median', 'longest wrong s', 'wrong for 60 s'),
         rows,
     )
@@ -460,7 +461,7 @@ def kidnapped(world: World, seed: int) -> tuple[float | None, float]:
         right = math.dist(navigator.pose[:2], robot.base.pose[:2]) <= 0.5
         if right and not navigator.lost and found is None:
             found = robot.time - begun
-        if right or navigator.lost:
+        if right or navigator.lost or navigator.ambiguous:
             wrong_since = None
         else:
             wrong_since = robot.time if wrong_since is None else wrong_since

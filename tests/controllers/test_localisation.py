@@ -93,11 +93,13 @@ def test_of_rooms_that_look_alike_the_one_wins_that_the_way_out_shows() -> None:
     for step in range(10):
         localiser.see(scan(start), now=float(step))
     assert not localiser.lost, 'it can be driven with'
+    assert localiser.ambiguous
     for step in range(1, 18):
         true = composed(start, (0.1 * step, 0.0, 0.0))
         localiser.move(true)
         localiser.see(scan(true), now=10.0 + step)
     assert error(localiser, true)[0] < 0.1
+    assert not localiser.ambiguous
 
 
 def test_a_slip_of_the_odometry_is_not_believed(flat: Any) -> None:

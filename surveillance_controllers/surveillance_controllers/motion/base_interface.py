@@ -304,7 +304,8 @@ class RobotBase:
         navigator = self._navigator
         if navigator.pose is None or 0 <= measured - self._pose_sent < POSE_PERIOD:
             return
-        deviation = (5.0, 3.0) if navigator.lost else (0.03, 0.02)
+        unsure = navigator.lost or navigator.ambiguous
+        deviation = (5.0, 3.0) if unsure else (0.03, 0.02)
         estimate = conversions.pose_estimate(navigator.pose, *deviation)
         estimate.header.stamp = stamp
         self._pose_sent = measured

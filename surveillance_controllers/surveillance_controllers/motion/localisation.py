@@ -188,6 +188,11 @@ class Localiser:
         """Whether the last scan fitted, so that the estimate is to be trusted."""
         return not self.lost and self._look_at is None
 
+    @property
+    def ambiguous(self) -> bool:
+        """Whether the robot may as well be elsewhere: a rival explains about as much."""
+        return any(rival.lead > -self.parameters.rival_loses / 2 for rival in self._rivals)
+
     def believe(self, pose: Pose) -> None:
         """Take a pose that somebody gave as the estimate."""
         self.pose = pose

@@ -99,6 +99,11 @@ class Navigator:
         return self._localiser is not None and self._localiser.lost
 
     @property
+    def ambiguous(self) -> bool:
+        """Whether the robot may as well be in another place that looks alike."""
+        return self._localiser is not None and self._localiser.ambiguous
+
+    @property
     def obstacles(self) -> Points:
         """Obstacles that the map does not have, shape (n, 2), metres, map frame."""
         return np.zeros((0, 2)) if self._memory is None else self._memory.points
