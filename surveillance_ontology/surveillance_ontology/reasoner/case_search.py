@@ -81,7 +81,9 @@ class CaseSearch:
         self._value_gone: dict[int, tuple[int, Choices]] = {}
         self._value_owner: dict[int, int] = {}
         self._made: dict[tuple[int, int], bool] = {}
-        self._pending: dict[tuple[Alternative, ...], Choices] = {}
+        self._pending: dict[int, tuple[tuple[Alternative, ...], Choices]] = {}
+        self._pending_ends = {'first': 0, 'end': 0}
+        self._stated: dict[tuple[Alternative, ...], bool] = {}
         self._individuals: dict[str, int] = {}
         self._numbers = count(1)
         self._trail: list[tuple[dict[Any, Any], Any, Any]] = []
@@ -155,9 +157,7 @@ class CaseSearch:
         return self._new(None)
 
     def _new(self, parent: int | None) -> int:
-        self.steps += 1
-        if self.steps > self._most_steps:
-            raise StoppedError
+        self._step()
         x = next(self._numbers)
         tables: tuple[dict[int, Any], ...] = (
             self.labels,
@@ -178,6 +178,11 @@ class CaseSearch:
             self._one_of(heads, x, x, 0)
         return x
 
+    def _step(self) -> None:
+        self.steps += 1
+        if self.steps > self._most_steps:
+            raise StoppedError
+
     def find(self, x: int) -> tuple[int | None, Choices]:
         """Return who stands for an individual now (None: nobody), and by which choices."""
         choices = 0
@@ -197,9 +202,7 @@ class CaseSearch:
         """State that an individual has a concept."""
         labels = self.labels[x]
         if concept and concept not in labels:
-            self.steps += 1
-            if self.steps > self._most_steps:
-                raise StoppedError
+            self._step()
             self._put(labels, concept, choices)
             self._queue.append((x, concept))
 
@@ -327,9 +330,11 @@ class CaseSearch:
 
     def _branch(self) -> bool:
         """Try the first open disjunction; whether something was added."""
-        for key, choices in tuple(self._pending.items()):
+        ends = self._pending_ends
+        while ends['first'] < ends['end']:
+            key, choices = self._pending[ends['first']]
             found = self._open(key, choices)
-            self._drop(self._pending, key)
+            self._put(ends, 'first', ends['first'] + 1)
             if found is None:
                 continue
             alternatives, stated = found
@@ -455,8 +460,11 @@ class CaseSearch:
             self._apply(alternatives[0], choices)
         else:
             key = tuple(dict.fromkeys(alternatives))
-            if key not in self._pending:
-                self._put(self._pending, key, choices)
+            if key not in self._stated:
+                self._put(self._stated, key, True)
+                end = self._pending_ends['end']
+                self._put(self._pending, end, (key, choices))
+                self._put(self._pending_ends, 'end', end + 1)
 
     # --- rules ---
 
@@ -621,6 +629,9 @@ class CaseSearch:
                 parent = self._parent[y]
                 if parent is not None and parent != x:
                     self._introduce(x, limit, y, choices)
+            if x in self._gone or not self._gone.keys().isdisjoint(counted):
+                self._recount[x] = None
+                return
         if len(counted) <= limit.n:
             return
         counted.sort(key=lambda y: (-len(self._groups[y]), y))
@@ -813,6 +824,7 @@ class CaseSearch:
                 self._put(self._value_groups[v], group, choices)
 
     def _apply_value_rules(self, x: int, v: int) -> None:
+        self._step()
         labels, props = self.labels[x], self.value_props[v]
         for prop, choices in tuple(props.items()):
             for other in self.rules.disjoint_props.get(prop, ()):

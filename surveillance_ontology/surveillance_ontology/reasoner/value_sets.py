@@ -171,11 +171,12 @@ def _impossible(tests: frozenset[tuple[DataRange, bool]]) -> bool:
 class ValueSet:
     """A set of values; where it has tests, `is_empty`, `within` and `size` err towards more."""
 
-    __slots__ = ('intervals', 'parts')
+    __slots__ = ('_complement', 'intervals', 'parts')
 
     def __init__(self, intervals: dict[str, _Intervals], parts: dict[str, _Part]) -> None:
         self.intervals = {name: found for name, found in intervals.items() if found}
         self.parts = {name: found for name, found in parts.items() if found}
+        self._complement: ValueSet | None = None
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, ValueSet):
@@ -214,6 +215,11 @@ class ValueSet:
         )
 
     def __invert__(self) -> ValueSet:
+        if self._complement is None:
+            self._complement = self._all_others()
+        return self._complement
+
+    def _all_others(self) -> ValueSet:
         parts = {name: _not(self.parts.get(name, ())) for name in _PLAIN}
         parts['boolean'] = _both(parts['boolean'], _listed(_BOOLEANS))
         intervals = {name: _outside(self.intervals.get(name, ())) for name in _ORDERED}
