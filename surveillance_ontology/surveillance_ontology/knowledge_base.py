@@ -244,10 +244,16 @@ class KnowledgeBase:
     Args:
         iri: The ontology's IRI.
         axioms: The first assertions.
+
+    Attributes:
+        iri: The ontology's IRI.
+        classified: How often the classes were put in order; tells whether `subclasses` may have
+            changed.
     """
 
     def __init__(self, iri: str, axioms: Iterable[Axiom] = ()) -> None:
         self.iri = iri
+        self.classified = 0
         self._told = Assertions()
         self._classification: Classification | None = None
         self._engine: Engine | None = None
@@ -750,6 +756,7 @@ class KnowledgeBase:
         return all(engine.understands(axiom) for axiom in self._told.added)
 
     def _classify(self) -> None:
+        self.classified += 1
         needs = Engine.needs_of(self._told.complex)
         self._classification = Classification(self._told.schema, *needs)
 

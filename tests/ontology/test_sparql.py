@@ -16,6 +16,7 @@ from surveillance_ontology.armor.client import (
     ArmorClient,
     ArmorServiceInternalError,
     InProcessTransport,
+    checked,
 )
 from surveillance_ontology.armor.service import ArmorService
 from surveillance_ontology.armor.sparql_engine import SparqlEngine, SparqlTimeoutError
@@ -230,7 +231,7 @@ def test_a_graph_that_is_kept_up_to_date_is_the_one_that_a_new_process_gets(
     monkeypatch.setattr(GraphChanges, 'update', counted)
     change, seed = client.manipulation, random.Random(5)
     rooms = ['R1', 'R2', 'R3', 'C1', 'NEW']
-    for step in range(60):
+    for step in range(80):
         here, there, value = seed.choice(rooms), seed.choice(rooms), str(seed.randrange(3))
         seed.choice(
             [
@@ -245,6 +246,11 @@ def test_a_graph_that_is_kept_up_to_date_is_the_one_that_a_new_process_gets(
                 lambda h=here, s=step: change.remove_ind(h) if s % 10 == 9 else None,
                 lambda v=value: change.add_class(f'CLASS_{v}'),
                 lambda v=value: change.remove_class(f'CLASS_{v}'),
+                lambda v=value: change.add_class(f'CLASS_{v}', 'ODD'),
+                lambda v=value: change.add_class('ODD', f'CLASS_{v}'),
+                lambda v=value: checked(
+                    client.call('REMOVE', 'CLASS', 'CLASS', [f'CLASS_{v}', 'ODD'])
+                ),
                 lambda: client.utils.sync_buffered_reasoner(),
             ]
         )()

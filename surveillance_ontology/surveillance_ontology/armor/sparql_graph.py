@@ -18,7 +18,6 @@ from surveillance_ontology.owl.axioms import (
     ClassAssertion,
     DataPropertyAssertion,
     Declaration,
-    EquivalentClasses,
     ObjectPropertyAssertion,
     SubClassOf,
 )
@@ -41,11 +40,13 @@ class Version:
         epoch: Tells a loaded ontology from any other.
         derived: Whether derived facts are in it.
         sequence: Counts the changes within an epoch.
+        classified: Counts the times that the classes were put in order.
     """
 
     epoch: int
     derived: bool
     sequence: int
+    classified: int = 0
 
 
 @dataclass(frozen=True)
@@ -101,6 +102,9 @@ class _Log:
     oldest: int = 0
     """A graph of this sequence or a later one can be brought up to date by differences."""
     touched: deque[tuple[int, Fact]] = field(default_factory=deque)
+    hierarchy: frozenset[SubClassOf] = frozenset()
+    """Which class is below which in the graphs of `hierarchy_since` and later."""
+    hierarchy_since: tuple[int, int] = (0, 0)
 
 
 class GraphChanges:
@@ -119,10 +123,8 @@ class GraphChanges:
             del self._logs[name]
             return
         log.sequence += 1
-        axioms = [axiom for axiom, _ in (*changes.added, *changes.removed)]
-        taken_away = any(isinstance(axiom, SubClassOf) for axiom, _ in changes.removed)
-        for axiom in axioms:
-            if taken_away or not _is_plain(axiom) or len(log.touched) >= KEPT:
+        for axiom, _ in (*changes.added, *changes.removed):
+            if not _is_plain(axiom) or len(log.touched) >= KEPT:
                 log.oldest = log.sequence
                 log.touched.clear()
                 return
@@ -133,23 +135,54 @@ class GraphChanges:
         log = self._log(ref)
         # What a Java reasoner derives is not told fact by fact.
         sequence = ref.revision if ref.origin.reasoner else log.sequence
-        return Version(log.epoch, derived, sequence)
+        return Version(log.epoch, derived, sequence, ref.kb.classified)
 
     def update(self, ref: Reference, derived: bool, known: Version | None) -> GraphUpdate:
         """Return what brings a process that has a graph, or none, up to date."""
         log, now = self._log(ref), self.version(ref, derived)
-        same = known is not None and (known.epoch, known.derived) == (now.epoch, derived)
-        if known is None or not same or ref.origin.reasoner or known.sequence < log.oldest:
-            return GraphUpdate(now, True, ref.kb.iri, _whole(ref, derived))
+        found = None
+        if known is not None and (known.epoch, known.derived) == (now.epoch, derived):
+            found = self._difference(ref, log, known, now)
+        if found is not None:
+            return GraphUpdate(now, False, ref.kb.iri, *found)
+        axioms: list[Axiom] = list(ref.kb.axioms())
+        if derived:
+            axioms += ref.kb.derived_facts()
+            axioms += self._hierarchy(ref, log, now)
+        return GraphUpdate(now, True, ref.kb.iri, axioms)
+
+    def _difference(
+        self, ref: Reference, log: _Log, known: Version, now: Version
+    ) -> tuple[list[Axiom], list[Axiom]] | None:
+        """Return what came and what went since a version; None where only all of it will do."""
+        if ref.origin.reasoner or known.sequence < log.oldest:
+            return None
+        touched = dict.fromkeys(fact for at, fact in log.touched if at > known.sequence)
+        before = hierarchy = log.hierarchy
+        ordered = now.classified != known.classified
+        if now.derived and (ordered or any(isinstance(fact, SubClassOf) for fact in touched)):
+            since = log.hierarchy_since
+            if known.sequence < since[0] or known.classified < since[1]:
+                return None
+            hierarchy = self._hierarchy(ref, log, now)
+            touched.update(dict.fromkeys(before ^ hierarchy))
         added: list[Axiom] = []
         removed: list[Axiom] = []
-        for fact in dict.fromkeys(f for at, f in log.touched if at > known.sequence):
-            (added if _holds(ref.kb, fact, derived) else removed).append(fact)
+        for fact in touched:
+            there = fact in hierarchy or _holds(ref.kb, fact, now.derived)
+            (added if there else removed).append(fact)
         gone = (iri for fact in removed for kind, iri in entities_of(fact) if kind != 'individual')
         if any(next(ref.kb.axioms_about(iri), None) is None for iri in gone):
-            # The declaration of a class or property goes with its last axiom.
-            return GraphUpdate(now, True, ref.kb.iri, _whole(ref, derived))
-        return GraphUpdate(now, False, ref.kb.iri, added, removed)
+            return None  # The declaration of a class or property goes with its last axiom.
+        return added, removed
+
+    def _hierarchy(self, ref: Reference, log: _Log, now: Version) -> frozenset[SubClassOf]:
+        """Return which class is below which now, and remember it."""
+        classes = ref.kb.subclasses(THING) | {THING}
+        below = frozenset(SubClassOf(sub, cls) for cls in classes for sub in ref.kb.subclasses(cls))
+        if below != log.hierarchy:
+            log.hierarchy, log.hierarchy_since = below, (now.sequence, now.classified)
+        return below
 
     def _log(self, ref: Reference) -> _Log:
         log = self._logs.get(ref.name)
@@ -166,7 +199,7 @@ def _is_plain(axiom: Axiom) -> bool:
         names = (axiom.prop, axiom.subject, axiom.object)
         return all(isinstance(name, str) and not name.startswith('_:') for name in names)
     if isinstance(axiom, SubClassOf):
-        return axiom.sup == THING and isinstance(axiom.sub, str)
+        return isinstance(axiom.sup, str) and isinstance(axiom.sub, str)
     return isinstance(axiom, DataPropertyAssertion) and not axiom.subject.startswith('_:')
 
 
@@ -180,25 +213,3 @@ def _holds(kb: KnowledgeBase, fact: Fact, derived: bool) -> bool:
     if isinstance(fact, ObjectPropertyAssertion):
         return fact.object in kb.object_values(str(fact.prop), fact.subject)
     return fact.literal in kb.data_values(fact.prop, fact.subject)
-
-
-def _whole(ref: Reference, derived: bool) -> list[Axiom]:
-    axioms: list[Axiom] = list(ref.kb.axioms())
-    if derived:
-        hierarchy = _hierarchy(axioms, ref)
-        axioms += ref.kb.derived_facts()
-        axioms += hierarchy
-    return axioms
-
-
-def _hierarchy(axioms: list[Axiom], ref: Reference) -> list[Axiom]:
-    classes = {
-        iri
-        for axiom in axioms
-        if isinstance(axiom, SubClassOf | EquivalentClasses | Declaration)
-        for kind, iri in entities_of(axiom)
-        if kind == 'class'
-    }
-    # Always: a class that is told to be below it is then no more than one triple.
-    classes.add(THING)
-    return [SubClassOf(sub, cls) for cls in sorted(classes) for sub in ref.kb.subclasses(cls)]
