@@ -146,3 +146,18 @@ def test_make_equivalent_turns_what_is_above_into_a_definition(ask: Ask) -> None
     assert names(ask('QUERY IND CLASS', 'HALL')) == ['X']
     (definition,) = ask('QUERY CLASS RESTRICTIONS', 'HALL').queried_objects
     assert 'C-DEFINITION_MIN_OBJECT : HALL -> hasDoor 3(DOOR)' in definition
+
+
+def test_what_is_not_there_to_be_taken_away_is_named(ask: Ask) -> None:
+    ask('ADD DATAPROP IND', 'size', 'X', 'INT', '1')
+    for words, args, remark in (
+        ('REMOVE DATAPROP IND', ('size', 'X', 'INT', '2'), 'was not asserted'),
+        ('REPLACE DATAPROP IND', ('size', 'X', 'INT', '3', '2'), 'was not asserted'),
+        ('REMOVE OBJECTPROP IND', ('near', 'X', 'Y'), 'was not asserted'),
+        ('REMOVE IND', ('NOBODY',), f'map has no individual {iri("NOBODY")}'),
+        ('RENAME CLASS', ('ROOMS', 'HALL'), f'map has no class {iri("ROOMS")}'),
+    ):
+        answer = ask(words, *args)
+        assert (answer.success, answer.exit_code) == (True, 0), 'as ARMOR does'
+        assert remark in answer.error_description
+    assert ask('REMOVE DATAPROP IND', 'size', 'X', 'INT', '1').error_description == ''

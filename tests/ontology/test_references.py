@@ -217,16 +217,10 @@ UNSUPPORTED = """<?xml version="1.0"?>
 <rdf:RDF xmlns="http://example.org/u#" xml:base="http://example.org/u"
      xmlns:owl="http://www.w3.org/2002/07/owl#" xmlns:rdfs="http://www.w3.org/2000/01/rdf-schema#"
      xmlns:rdf="http://www.w3.org/1999/02/22-rdf-syntax-ns#">
-  <owl:Class rdf:about="#A">
-    <rdfs:subClassOf>
-      <owl:Class>
-        <owl:unionOf rdf:parseType="Collection">
-          <owl:Class rdf:about="#B"/>
-          <owl:Class rdf:about="#C"/>
-        </owl:unionOf>
-      </owl:Class>
-    </rdfs:subClassOf>
-  </owl:Class>
+  <owl:ObjectProperty rdf:about="http://www.w3.org/2002/07/owl#topObjectProperty">
+    <rdfs:subPropertyOf rdf:resource="#p"/>
+  </owl:ObjectProperty>
+  <owl:ObjectProperty rdf:about="#p"/>
 </rdf:RDF>
 """
 

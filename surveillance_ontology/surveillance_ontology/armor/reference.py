@@ -14,8 +14,9 @@ from pathlib import Path
 
 from surveillance_ontology.armor.history import History
 from surveillance_ontology.armor.protocol import DirectiveError
-from surveillance_ontology.armor.rendering import shown
+from surveillance_ontology.armor.rendering import render_entity, shown
 from surveillance_ontology.knowledge_base import KnowledgeBase
+from surveillance_ontology.owl.axiom_text import axiom_text
 from surveillance_ontology.owl.axioms import Axiom
 from surveillance_ontology.reasoner.java_reasoning import JavaKnowledgeBase
 
@@ -157,6 +158,25 @@ class Reference:
             self.queue += changes
         else:
             self._apply(changes)
+
+    def missing(self, changes: Iterable[Change]) -> str:
+        """Return what changes are to take away or rename and is not there; not while others wait.
+
+        ARMOR says nothing. A value that was to be replaced, and is another, leaves two of them.
+        """
+        if self.queue:
+            return ''
+        found: list[str] = []
+        for change in changes:
+            if isinstance(change, RemoveAxiom):
+                if change.axiom not in self.kb:
+                    found.append(f'{axiom_text(change.axiom)} was not asserted')
+            elif isinstance(change, RenameEntity | RemoveEntity):
+                iri = change.old if isinstance(change, RenameEntity) else change.iri
+                if not self.kb.is_known(change.kind, iri):
+                    kind = change.kind.replace('_', ' ')
+                    found.append(f'{self.name} has no {kind} {render_entity(iri)}')
+        return '; '.join(found)
 
     def flush(self) -> None:
         """Apply the queued changes."""

@@ -208,25 +208,28 @@ class ArmorService:
                 return self._execute(request)
             if directive.kind is Kind.QUERY:
                 return _response(directive.run(ref, *self._values(directive, request, ref)))
-            self._change(directive, request, ref)
+            remark = self._change(directive, request, ref)
         if self._store:
             self._store.compact_if_large(
                 lambda: self.references.held(self.references.names()), self.session.warn
             )
-        return DirectiveResponse()
+        return DirectiveResponse(error_description=remark)
 
-    def _change(self, directive: Directive, request: DirectiveRequest, ref: Reference) -> None:
+    def _change(self, directive: Directive, request: DirectiveRequest, ref: Reference) -> str:
+        """Carry out a manipulation; return what a client should know of it."""
         self.session.check_free(ref, request.client_name)
         if directive.kind is Kind.CONTROL:
             if self._store and ref.queue:
                 self._store.flushed(ref.name, self.session.clock())
             directive.run(ref)
-            return
+            return ''
         changes: list[Change] = directive.run(ref, *self._values(directive, request, ref))
         if self._store and changes:
             self._store.changed(ref.name, changes, self.session.clock())
         ref.heavy |= directive.schema
+        remark = ref.missing(changes)
         ref.submit(changes)
+        return remark
 
     def _values(self, directive: Directive, request: DirectiveRequest, ref: Reference) -> list[Any]:
         return directive.read(request.args, ref.kb.iri, narrow_doubles=self.settings.narrow_doubles)
