@@ -104,16 +104,22 @@ class MissionFeed:
 
     def see(self) -> Snapshot:
         """Return all that is known, at the mission's present time, or the time of its end."""
-        return self._snapshot if self._over else replace(self._snapshot, now=self._now())
+        with self._lock:
+            return self._snapshot if self._over else replace(self._snapshot, now=self._now())
 
-    def update(self, change: Callable[[Snapshot], Snapshot]) -> None:
-        """Take a change into the snapshot; from any thread."""
+    def update(self, change: Callable[[Snapshot], Snapshot], *, begins: bool = True) -> None:
+        """Take a change into the snapshot; from any thread.
+
+        Args:
+            change: From the old snapshot to the new one.
+            begins: Whether it tells of a mission, so that after the end of one it is the next.
+        """
         with self._lock:
             old = self._snapshot
             new = change(old)
             if new is old:
                 return
-            if self._over:
+            if self._over and begins:
                 self._over = False
                 self._facts.forget()
                 # What follows the ontology tells what goes, too.
@@ -124,22 +130,21 @@ class MissionFeed:
                 old = replace(self._empty, **kept)
                 new = change(old)
             new, told = follow(old, replace(new, now=self._now()), time.strftime('%H:%M:%S'))
+            self._over = self._over or bool(old.nodes and not new.nodes)
             self._snapshot = new
         self._on_change(new, told)
 
     def _run(self) -> None:
         stopping = self._node.stopping
         while not stopping.is_set():
-            change = self._take()
-            if change is not None:
-                self.update(change)
+            self._take()
             if time.monotonic() >= self._next_look:
                 self._next_look = time.monotonic() + LOOK_PERIOD
                 self._look()
             stopping.wait(self._period())
 
-    def _take(self) -> Callable[[Snapshot], Snapshot] | None:
-        """Return what all messages that came change together."""
+    def _take(self) -> None:
+        """Take all messages that came into one new snapshot."""
         clock = None
         while (taken := self._clock.take()) is not None:
             clock = taken[0].clock
@@ -158,14 +163,15 @@ class MissionFeed:
                 came.insert(0 if topic.beside else len(came), (topic, taken[0]))
         others = self._others.take() if self._others is not None else {}
         if not came and not others:
-            return None
+            return
 
         def changed(snapshot: Snapshot) -> Snapshot:
             for topic, message in came:
                 snapshot = read_message(snapshot, topic, message)
             return replace(snapshot, others={**snapshot.others, **others}) if others else snapshot
 
-        return changed
+        # Observers go on reporting after a mission's end.
+        self.update(changed, begins=any(topic.name[0] != '/' for topic, _ in came))
 
     def _is_due(self, topic: Topic) -> bool:
         now = time.monotonic()
@@ -194,15 +200,17 @@ class MissionFeed:
         nodes = {name: frozenset(processes.get(name, ())) for name in names}
         if nodes != old.nodes or silent != old.silent:
             ended = old.ended.union(old.nodes).difference(nodes)
-            self.update(lambda old: replace(old, nodes=nodes, ended=ended, silent=silent))
-            self._over = not nodes and bool(old.nodes)
+            self.update(
+                lambda old: replace(old, nodes=nodes, ended=ended, silent=silent),
+                begins=bool(nodes),
+            )
         if not node.count_publishers('/clock'):
             self._clock_time = None
         self._note_silent()
         self._facts.ask()
         if self._others is not None:
             for robot in self._others.find():
-                self.update(partial(_without_robot, robot=robot))
+                self.update(partial(_without_robot, robot=robot), begins=False)
 
     def _note_silent(self) -> None:
         """Mark the nodes whose own reports have ceased."""
@@ -213,7 +221,7 @@ class MissionFeed:
             if each.level != 3 and now - each.heard > STALE_AFTER
         }
         if silent:
-            self.update(lambda old: replace(old, health={**old.health, **silent}))
+            self.update(lambda old: replace(old, health={**old.health, **silent}), begins=False)
 
     def _now(self) -> float:
         if self._clock_time is not None:

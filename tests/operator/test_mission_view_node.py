@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
 from rclpy.qos import QoSProfile
@@ -141,6 +142,14 @@ def test_the_next_mission_begins_with_an_empty_picture(graph: Any) -> None:
     assert frozen.status is not None
     assert frozen.status.state == 'FIRST'
     assert view.see().now == frozen.now
+    reports = say(graph, '/diagnostics', DiagnosticArray(status=[DiagnosticStatus(name='x')]), 10)
+
+    def reported() -> bool:  # an observer of the mission, which goes on
+        reports.publish(DiagnosticArray(status=[DiagnosticStatus(name='x')]))
+        return 'x' in view.snapshot.health
+
+    graph.until(reported)
+    assert view.see().status == frozen.status
 
     say(graph, 'mission_status', MissionStatus(state='SECOND'))
     graph.until(lambda: view.snapshot.status and view.snapshot.status.state == 'SECOND')
