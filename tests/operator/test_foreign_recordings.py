@@ -166,6 +166,20 @@ def test_messages_before_a_moment_come_newest_first(bag: Path) -> None:
     last.close()
 
 
+def test_a_file_alone_and_a_folder_without_metadata_show_the_same(
+    bag: Path, tmp_path: Path
+) -> None:
+    (file,) = bag.glob('*.mcap')
+    bare = tmp_path / 'bare'
+    bare.mkdir()
+    (bare / 'part_0.mcap').write_bytes(file.read_bytes())
+    (bare / 'metadata.yaml').write_text('[no metadata')
+    for recording in (file, bare):
+        sights = RecordedSights(recording)
+        assert sights.scan(START + 8.5) == [[6.0, 0.0]]
+        sights.close()
+
+
 def test_a_recording_of_something_else_is_refused(tmp_path: Path) -> None:
     store = get_typestore(Stores.ROS2_JAZZY)
     folder = tmp_path / 'other'

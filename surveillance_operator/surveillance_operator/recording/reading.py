@@ -8,7 +8,7 @@ import threading
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 import yaml
 from mcap.exceptions import McapError
@@ -35,14 +35,21 @@ def files_of(recording: Path) -> list[Path]:
     return files
 
 
+def _metadata(folder: Path) -> dict[str, Any]:
+    """Return what rosbag2's metadata says of a folder, nothing where there is none."""
+    try:
+        text = (folder / METADATA).read_text(encoding='utf-8')
+        loader = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
+        content = yaml.load(text, loader)['rosbag2_bagfile_information']
+    except (OSError, ValueError, TypeError, KeyError, yaml.YAMLError):
+        return {}
+    return content if isinstance(content, dict) else {}
+
+
 def _listed(folder: Path) -> list[Path]:
     """Return the files that the folder's metadata names, those of them that there are."""
-    try:
-        content = yaml.safe_load((folder / METADATA).read_text(encoding='utf-8'))
-        names = content['rosbag2_bagfile_information']['relative_file_paths']
-        paths = [folder / str(name) for name in names]
-    except (OSError, ValueError, TypeError, KeyError, yaml.YAMLError):
-        return []
+    names = _metadata(folder).get('relative_file_paths') or []
+    paths = [folder / str(name) for name in names]
     # The file that is being written is not listed yet.
     listed = [path for path in paths if path.suffix == SUFFIX and path.is_file()]
     newer = set(folder.glob(f'*{SUFFIX}')) - set(listed)
@@ -128,14 +135,30 @@ class LastMessages:
     Args:
         recording: Its folder, or its only file.
 
+    Attributes:
+        topics: Types by the names of the recording's topics.
+
     Raises:
-        RecordingError: There is no file.
+        RecordingError: There is no file, or it cannot be read.
     """
 
     def __init__(self, recording: Path) -> None:
         self._files = files_of(recording)
         self._lock = threading.Lock()
         self._open: dict[Path, tuple[IO[bytes], SeekingReader]] = {}
+        # A file's own summary takes long to read: the metadata says when which file begins.
+        known = _metadata(recording) if recording.is_dir() else {}
+        try:
+            self.topics = {
+                str(each['topic_metadata']['name']): str(each['topic_metadata']['type'])
+                for each in known['topics_with_message_count']
+            }
+            self._starts = {
+                recording / str(each['path']): int(each['starting_time']['nanoseconds_since_epoch'])
+                for each in known['files']
+            }
+        except (KeyError, TypeError, ValueError):
+            self.topics, self._starts = Contents.of(recording).topics, {}
 
     def before(
         self, topics: Sequence[str], at: float, within: float, most: int = 10
@@ -152,6 +175,8 @@ class LastMessages:
         found: list[tuple[str, bytes]] = []
         with self._lock:
             for path in reversed(self._files):
+                if self._starts.get(path, 0) >= end:
+                    continue
                 # A file that is torn or being written shows nothing.
                 with contextlib.suppress(OSError, McapError):
                     reader = self._reader(path)

@@ -10,7 +10,7 @@ from sensor_msgs.msg import CompressedImage, Image
 
 from surveillance_operator.conversions import jpeg_from
 from surveillance_operator.recording.conversion import namespace_of, read_stored
-from surveillance_operator.recording.reading import Contents, LastMessages
+from surveillance_operator.recording.reading import LastMessages
 from surveillance_operator.snapshot import Snapshot
 from surveillance_operator.topics import POSE_TOPIC, TOPICS
 
@@ -32,7 +32,7 @@ class RecordedSights:
 
     def __init__(self, recording: Path) -> None:
         self._messages = LastMessages(recording)
-        topics = Contents.of(recording).topics
+        topics = self._messages.topics
         namespace = namespace_of(topics)
         self._prefix = f'/{namespace}/' if namespace else '/'
         names = [f'{self._prefix}{name}{end}' for name in IMAGES for end in ('', '/compressed')]
