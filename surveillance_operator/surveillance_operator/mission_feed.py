@@ -39,6 +39,7 @@ from surveillance_operator.topics import (
     with_fact,
     without,
 )
+from surveillance_runtime.conversions import clean_texts
 from surveillance_runtime.diagnostics import STALE_AFTER
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
@@ -159,6 +160,7 @@ class MissionFeed:
             for _ in range(subscription.qos.depth):
                 if (taken := subscription.take()) is None:
                     break
+                clean_texts(taken[0])
                 # In front: what it stands beside is read with it.
                 came.insert(0 if topic.beside else len(came), (topic, taken[0]))
         others = self._others.take() if self._others is not None else {}

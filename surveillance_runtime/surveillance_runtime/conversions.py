@@ -1,11 +1,41 @@
-"""Conversions of messages that several packages use: time stamps, points in the plane."""
+"""Conversions of messages that several packages use: time stamps, points in the plane, texts."""
 
 from __future__ import annotations
+
+from functools import cache
+from typing import Any
 
 import numpy as np
 from builtin_interfaces.msg import Duration, Time
 from numpy.typing import NDArray
 from sensor_msgs.msg import PointCloud2, PointField
+
+from surveillance_runtime.logging import without_controls
+
+
+def clean_texts(message: Any) -> None:
+    """Write the control characters in all texts of a message as escapes, but for line breaks.
+
+    Whoever shows the message on a terminal then passes no command of a peer on to it.
+    """
+    for name in _fields_to_clean(message.__class__):
+        value = getattr(message, name)
+        if isinstance(value, str):
+            setattr(message, name, without_controls(value))
+        elif not isinstance(value, list):
+            clean_texts(value)
+        elif value and isinstance(value[0], str):
+            setattr(message, name, [without_controls(each) for each in value])
+        else:
+            for each in value:
+                clean_texts(each)
+
+
+@cache
+def _fields_to_clean(kind: Any) -> tuple[str, ...]:
+    """Return the fields of a message's class that are texts, or messages that may hold some."""
+    fields = kind.get_fields_and_field_types()
+    return tuple(name for name, written in fields.items() if 'string' in written or '/' in written)
 
 
 def seconds_of(stamp: Time | Duration) -> float:

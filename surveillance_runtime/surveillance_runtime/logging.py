@@ -40,6 +40,15 @@ def clean(text: str) -> str:
     return ''.join(each if each.isprintable() else _escaped(each) for each in text)
 
 
+def without_controls(text: str) -> str:
+    """Return a text of several lines, with its other control characters written as escapes."""
+    if text.isprintable():
+        return text
+    return ''.join(
+        each if each.isprintable() or each in '\n\t' else _escaped(each) for each in text
+    )
+
+
 def _escaped(character: str) -> str:
     return character.encode('unicode_escape').decode('ascii')
 

@@ -53,6 +53,15 @@ def say(graph: Any, topic: str, message: Any, qos: Any = STATE_QOS) -> Any:
     return publisher
 
 
+def test_what_a_peer_says_commands_no_terminal(graph: Any, capfd: Any) -> None:
+    said = MissionStatus(state='MOVE', place='\x1b[2J', heading_to='E\nlaunch | forged')
+    publisher = say(graph, 'mission_status', said)
+    view = graph.add(MissionViewNode)
+    graph.until(lambda: view.snapshot.status)
+    graph.until(lambda: r'in \x1b[2J, heading for E\nlaunch | forged' in capfd.readouterr().out)
+    assert publisher is not None
+
+
 def test_it_gathers_what_topics_ontology_and_parameters_tell(graph: Any) -> None:
     graph.add(ArmorServer)
     graph.add(OntologyMapBuilder, parameters=PLACE)
