@@ -8,12 +8,14 @@ from typing import Any
 import numpy as np
 from nav_msgs.msg import Odometry
 from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.time import Time
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Bool
+from std_msgs.msg import Bool, Header
 from trajectory_msgs.msg import JointTrajectory
 
 from surveillance_fsm.ros import GoalAbortedError, GoalRun, GoalServer, work_aside
 from surveillance_interfaces.action import ScanSurroundings
+from surveillance_interfaces.msg import MarkerDetectionArray
 from surveillance_interfaces.srv import MarkerRoutine, PointCamera
 from surveillance_perception.arm.driver import ArmDriver
 from surveillance_perception.arm.kinematics import UnreachableError, in_base, look_at
@@ -23,11 +25,14 @@ from surveillance_perception.arm.trajectory import ArmMotionError
 from surveillance_perception.arm.view_coverage import View
 from surveillance_perception.conversions import (
     base_pose_from_ros,
+    fuse_views,
+    fused_to_ros,
     scan_feedback_to_ros,
     scan_plan_from_ros,
     scan_result_to_ros,
     trajectory_to_ros,
 )
+from surveillance_perception.detection.fusion import FusedPositions
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
@@ -51,13 +56,14 @@ class ArmController(PatrolNode):
         self._settings = arm_settings(self, ARM)
         group = ReentrantCallbackGroup()
         self._base: tuple[str, np.ndarray] | None = None
+        self._rest_since: Time | None = None
         self._trajectories = self.create_publisher(JointTrajectory, 'arm/joint_trajectory', 10)
         self._at_rest = self.create_publisher(Bool, 'arm/at_rest', STATE_QOS)
         self._driver = ArmDriver(
             ARM,
             lambda motion: self._trajectories.publish(trajectory_to_ros(motion, ARM.names)),
             lambda: self.get_clock().now().nanoseconds / 1e9,
-            lambda resting: self._at_rest.publish(Bool(data=resting)),
+            self._tell_rest,
         )
         self.stopping.subscribe(self._driver.wake)
         self.create_subscription(
@@ -67,6 +73,11 @@ class ArmController(PatrolNode):
             SENSOR_QOS,
         )
         self._read = SettledFrames(self)
+        self._fused = FusedPositions()
+        self._markers = self.create_publisher(MarkerDetectionArray, 'arm/markers', 10)
+        self.create_subscription(
+            MarkerDetectionArray, 'aruco_detector/detections', self._on_detections, 10
+        )
         self.create_subscription(Odometry, 'odom', self._on_odometry, SENSOR_QOS)
         self.create_service(MarkerRoutine, 'move_arm', self._on_move, callback_group=group)
         self.create_service(PointCamera, 'point_camera', self._on_point, callback_group=group)
@@ -77,6 +88,26 @@ class ArmController(PatrolNode):
             self._base = (message.header.frame_id, base_pose_from_ros(message))
         except ValueError as error:
             self.get_logger().warn(str(error), throttle_duration_sec=60.0)
+
+    def _tell_rest(self, resting: bool) -> None:
+        self._rest_since = self.get_clock().now() if resting else None
+        self._at_rest.publish(Bool(data=resting))
+
+    def _on_detections(self, message: MarkerDetectionArray) -> None:
+        """Fuse what is seen at rest with what was seen from elsewhere, in the odometry's frame."""
+        since = self._rest_since
+        if self._base is None or since is None or not message.detections:
+            return
+        if Time.from_msg(message.header.stamp, since.clock_type) < since:
+            return
+        frame, base = self._base
+        camera = base @ ARM.camera_frame(self._driver.posture)
+        taken = fuse_views(self._fused, message, camera)
+        fused = [(each, self._fused.position_of(each)) for each in taken]
+        seen = MarkerDetectionArray(header=Header(stamp=message.header.stamp, frame_id=frame))
+        seen.detections = [fused_to_ros(each, at) for each, at in fused if at is not None]
+        if seen.detections:
+            self._markers.publish(seen)
 
     async def _on_move(self, request: Any, response: Any) -> Any:
         def work() -> str:

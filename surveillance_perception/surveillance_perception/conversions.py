@@ -22,8 +22,9 @@ from surveillance_interfaces.srv import RoomInformation
 from surveillance_perception.arm.scan import ScanOutcome, ScanPlan
 from surveillance_perception.arm.trajectory import ArmTrajectory
 from surveillance_perception.arm.view_coverage import View
-from surveillance_perception.detection.camera_model import DISTORTION_MODELS, CameraModel
+from surveillance_perception.detection.camera_model import DISTORTION_MODELS, Array, CameraModel
 from surveillance_perception.detection.detector import Detection
+from surveillance_perception.detection.fusion import FusedPosition, FusedPositions
 from surveillance_perception.detection.marker_stream import Sighting, Statistics
 from surveillance_perception.detection.pose import MarkerPose
 from surveillance_perception.marker_registry import MarkedPlace
@@ -145,6 +146,53 @@ def detections_to_ros(header: Header, sightings: Iterable[Sighting]) -> MarkerDe
             for each in sightings
         ],
     )
+
+
+def fuse_views(fused: FusedPositions, message: MarkerDetectionArray, camera: Array) -> list[int]:
+    """Take the confirmed markers of an image into their fused positions.
+
+    Args:
+        fused: Takes the views.
+        message: What `aruco_detector` saw.
+        camera: Transform (4, 4) from the camera's optical frame to the fixed frame.
+
+    Returns:
+        The ids whose view counts.
+    """
+    taken = []
+    for each in message.detections:
+        place = each.pose.position
+        covariance = np.array(each.pose_covariance).reshape(6, 6)[:3, :3]
+        position = np.array([place.x, place.y, place.z])
+        # a covariance of zeros means: unknown
+        if not each.confirmed or not covariance.any():
+            continue
+        if fused.add(each.id, camera, position, covariance, each.pose_ambiguity):
+            taken.append(each.id)
+    return taken
+
+
+def fused_to_ros(marker_id: int, fused: FusedPosition) -> MarkerDetection:
+    """Return a fused position as a MarkerDetection, in a fixed frame."""
+    message = MarkerDetection(id=marker_id, confirmed=True, confidence=1.0)
+    x, y, z = fused.position.tolist()
+    message.pose.position = Point(x=x, y=y, z=z)
+    covariance = np.zeros((6, 6))
+    covariance[:3, :3] = fused.covariance
+    message.pose_covariance = covariance.ravel()
+    return message
+
+
+def fused_from_ros(message: MarkerDetection) -> FusedPosition | None:
+    """Return the fused position in a MarkerDetection; None when its numbers are none."""
+    place = message.pose.position
+    position = np.array([place.x, place.y, place.z])
+    covariance = np.array(message.pose_covariance).reshape(6, 6)[:3, :3]
+    if not np.isfinite(position).all() or not np.isfinite(covariance).all():
+        return None
+    if np.linalg.eigvalsh((covariance + covariance.T) / 2.0)[0] <= 0.0:
+        return None
+    return FusedPosition(position, covariance, 1)
 
 
 def poses_to_ros(header: Header, sightings: Iterable[Sighting]) -> PoseArray:

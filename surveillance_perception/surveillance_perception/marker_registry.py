@@ -11,8 +11,8 @@ from typing import Any
 from surveillance_runtime.place import problem_in_name
 from surveillance_runtime.yaml_file import KeyPath, YamlFile, read_yaml_file
 
-_KEYS = ('room', 'x', 'y', 'connections')
-_EXPECTED = "expected 'room', 'x', 'y' and 'connections'"
+_KEYS = ('room', 'x', 'y', 'connections', 'hangs_at')
+_EXPECTED = "expected 'room', 'x', 'y' and 'connections' (and 'hangs_at', where that is known)"
 
 
 @dataclass(frozen=True)
@@ -24,20 +24,22 @@ class MarkedPlace:
         x: A point inside it, metres, world frame.
         y: The same.
         connections: The place behind each door.
+        hangs_at: Where the marker itself is: x, y, z in metres, world frame; None: not known.
     """
 
     room: str
     x: float
     y: float
     connections: Mapping[str, str]
+    hangs_at: tuple[float, float, float] | None = None
 
 
 def read_registry(path: Path) -> dict[int, MarkedPlace]:
     """Read what the markers stand for.
 
     Args:
-        path: A YAML file: `markers`, a mapping from id to `room`, `x`, `y` and `connections`, which
-            is a mapping from door to place.
+        path: A YAML file: `markers`, a mapping from id to `room`, `x`, `y`, `connections`, which is
+            a mapping from door to place, and perhaps `hangs_at`.
 
     Raises:
         YamlFileError: The file cannot be read, or something in it is not as expected.
@@ -76,7 +78,17 @@ def _place(entry: Any, file: YamlFile, where: KeyPath) -> MarkedPlace:
         behind[door] = _name('place', place, file, (*at, door))
         if behind[door] == room:
             raise file.error((*at, door), f'leads from {room} to itself')
-    return MarkedPlace(room, x, y, behind)
+    hangs_at = None
+    if 'hangs_at' in entry:
+        hangs_at = _point(entry['hangs_at'], file, (*where, 'hangs_at'))
+    return MarkedPlace(room, x, y, behind, hangs_at)
+
+
+def _point(value: Any, file: YamlFile, where: KeyPath) -> tuple[float, float, float]:
+    if not isinstance(value, list) or len(value) != 3:
+        raise file.error(where, f'expected [x, y, z] in metres, got {value!r}')
+    x, y, z = (_metres(each, file, where) for each in value)
+    return x, y, z
 
 
 def _metres(value: Any, file: YamlFile, where: KeyPath) -> float:

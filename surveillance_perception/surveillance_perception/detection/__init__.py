@@ -8,6 +8,7 @@ from surveillance_perception.detection.detector import (
     MarkerDetector,
 )
 from surveillance_perception.detection.dictionaries import DICTIONARY_NAMES, dictionary_named
+from surveillance_perception.detection.fusion import FusedPosition, FusedPositions
 from surveillance_perception.detection.marker_stream import (
     Confirmation,
     MarkerStream,
@@ -22,6 +23,8 @@ __all__ = [
     'Confirmation',
     'Detection',
     'DetectorSettings',
+    'FusedPosition',
+    'FusedPositions',
     'MarkerDetector',
     'MarkerPose',
     'MarkerStream',

@@ -1,0 +1,155 @@
+"""Where markers are: fused by the arm's controller, checked by the marker server, sent as tf."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from geometry_msgs.msg import Point
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import Image, JointState
+from std_msgs.msg import Header
+
+from surveillance_interfaces.msg import MarkerDetection, MarkerDetectionArray
+from surveillance_perception import aruco_detector_node
+from surveillance_perception.arm_controller_node import ArmController
+from surveillance_perception.aruco_detector_node import ArucoDetector
+from surveillance_perception.conversions import image_to_ros
+from surveillance_perception.detection.camera_model import CameraModel
+from surveillance_perception.detection.dictionaries import dictionary_named
+from surveillance_perception.marker_server_node import MarkerServer
+from surveillance_perception.testing.marker_scene import (
+    Degradation,
+    Panel,
+    backdrop_of,
+    image_of,
+)
+from surveillance_runtime.qos import SENSOR_QOS
+from surveillance_runtime.robot_arm import ARM
+
+
+class Log:
+    """A logger that keeps its warnings."""
+
+    def __init__(self) -> None:
+        self.warnings: list[str] = []
+
+    def warn(self, text: str, **_options: Any) -> None:
+        self.warnings.append(text)
+
+    def __getattr__(self, _name: str) -> Any:
+        return lambda *_arguments, **_options: None
+
+
+def seen(marker_id: int, *place: float, deviation: float = 0.02) -> MarkerDetection:
+    """Return a confirmed marker at a place, with a covariance."""
+    x, y, z = place
+    message = MarkerDetection(id=marker_id, confirmed=True)
+    message.pose.position = Point(x=x, y=y, z=z)
+    message.pose_covariance = (np.eye(6) * deviation**2).ravel()
+    return message
+
+
+def test_marker_that_hangs_elsewhere_is_told_once(
+    graph: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / 'markers.yaml'
+    place = '{room: %s, x: 0, y: 0, connections: {D: C}, hangs_at: [1.0, 2.0, 1.5]}'
+    file.write_text(f'markers:\n  3: {place % "A"}\n  4: {place % "B"}\n')
+    node = graph.add(MarkerServer, parameters={'markers_file': str(file)})
+    log = Log()
+    monkeypatch.setattr(node, 'get_logger', lambda: log)
+    markers = graph.node.create_publisher(MarkerDetectionArray, 'arm/markers', 10)
+    graph.until(markers.get_subscription_count)
+    nowhere = seen(3, math.nan, 0.0, 0.0)
+    where = [nowhere, seen(3, 1.05, 2.0, 1.5), seen(4, 1.0, 3.0, 1.5), seen(9, 0.0, 0.0, 0.0)]
+    for _ in range(2):
+        markers.publish(MarkerDetectionArray(detections=where))
+    graph.until(lambda: log.warnings)
+    assert log.warnings == [
+        'marker 4 (B) is seen at (1.00, 3.00, 1.50), 1.00 m from where the file has it: '
+        '(1.00, 2.00, 1.50)'
+    ]
+
+
+def test_arm_tells_where_markers_are_in_the_frame_of_the_odometry(graph: Any) -> None:
+    node = graph.add(ArmController)
+    fused = graph.listen(MarkerDetectionArray, 'arm/markers')
+    states = graph.node.create_publisher(JointState, 'joint_states', SENSOR_QOS)
+    odometry = graph.node.create_publisher(Odometry, 'odom', SENSOR_QOS)
+    shown = graph.node.create_publisher(MarkerDetectionArray, 'aruco_detector/detections', 10)
+    base = Odometry(header=Header(frame_id='odom'))
+    base.pose.pose.position.x, base.pose.pose.orientation.w = 2.0, 1.0
+    home = JointState(name=list(ARM.names), position=list(ARM.home), velocity=[0.0] * 5)
+
+    def rests() -> bool:
+        states.publish(home)
+        odometry.publish(base)
+        return node._rest_since is not None and node._base is not None
+
+    graph.until(rests)
+    stamp = graph.node.get_clock().now().to_msg()
+    graph.until(shown.get_subscription_count)
+    unknown = MarkerDetection(id=8, confirmed=True)
+    message = MarkerDetectionArray(detections=[seen(7, 0.0, 0.0, 3.0), unknown])
+    message.header.stamp = stamp
+    shown.publish(message)
+    graph.until(lambda: fused)
+    (marker,) = fused[0].detections
+    camera = ARM.camera_frame(ARM.home)
+    expected = camera[:3, 3] + 3.0 * camera[:3, 2] + [2.0, 0.0, 0.0]
+    place = marker.pose.position
+    assert (fused[0].header.frame_id, marker.id) == ('odom', 7)
+    assert [place.x, place.y, place.z] == pytest.approx(expected.tolist(), abs=1e-6)
+    assert 0.02 < math.sqrt(marker.pose_covariance[0]) < 0.1
+
+
+def room() -> Any:
+    """Return an image of markers 12 and 17."""
+    generator = np.random.default_rng(3)
+    camera = CameraModel.from_field_of_view(320, 240, math.radians(60))
+    panels = [Panel(12, 1.5, offset=(-60.0, 0.0)), Panel(17, 1.5, offset=(60.0, 0.0))]
+    scene = backdrop_of('plain', camera, generator)
+    dictionary = dictionary_named('DICT_5X5_100')
+    return image_of(panels, camera, dictionary, scene, Degradation(), generator)
+
+
+def look(graph: Any, node: ArucoDetector, times: int) -> None:
+    """Show the room to a detector until it has looked several times."""
+    images = graph.node.create_publisher(Image, 'camera/rgb/image_raw', 5)
+    answers = graph.listen(MarkerDetectionArray, 'aruco_detector/detections')
+    graph.until(lambda: images.get_subscription_count())
+    for count in range(times):
+        stamp = graph.node.get_clock().now().to_msg()
+        images.publish(image_to_ros(room(), Header(frame_id='lens', stamp=stamp)))
+        graph.until(lambda count=count: len(answers) > count)
+
+
+def test_markers_are_frames_of_tf_where_tf2_msgs_is_installed(
+    graph: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    node = graph.add(ArucoDetector, parameters={'confirmation_frames': 1})
+    sent: list[Any] = []
+    # the type that an installed ROS 2 brings; the wheels lack it
+    monkeypatch.setattr(aruco_detector_node, 'TFMessage', SimpleNamespace)
+    monkeypatch.setattr(node, '_transforms', SimpleNamespace(publish=sent.append))
+    look(graph, node, 1)
+    graph.until(lambda: sent)
+    frames = {each.child_frame_id: each for each in sent[0].transforms}
+    assert set(frames) == {'marker_12', 'marker_17'}
+    assert frames['marker_12'].header.frame_id == 'lens'
+    place = frames['marker_12'].transform.translation
+    assert math.hypot(place.x, place.y, place.z) == pytest.approx(1.5, rel=0.02)
+
+
+def test_candidates_left_unread_are_told_once(graph: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    node = graph.add(ArucoDetector, parameters={'max_candidates': 1})
+    log = Log()
+    monkeypatch.setattr(node, 'get_logger', lambda: log)
+    look(graph, node, 3)
+    assert len(log.warnings) == 1
+    assert 'left unread to bound the work (max_candidates)' in log.warnings[0]
