@@ -141,7 +141,10 @@ class ClockRate:
         """
         if executed and action in DRIVING and not self._is_driving:
             self._commands.note(simulated)
+        was_driving = self._is_driving
         self._executed[action] = executed
+        if was_driving and not self._is_driving:
+            self._commands.end()
 
     @property
     def _is_driving(self) -> bool:

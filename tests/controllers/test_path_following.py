@@ -156,3 +156,22 @@ def test_a_robot_that_touches_something_may_leave_it() -> None:
     behind = np.array([[-0.2, 0.0]])
     assert room_ahead(behind, 0.0, 0.26, 1.0) == 1.0
     assert room_ahead(-behind, 0.0, 0.26, 1.0) < 0.05
+
+
+def test_acceleration_and_jerk_keep_their_limits_on_a_free_path() -> None:
+    robot = DriveParameters()
+    follower = PathFollower([[0, 0], [4, 0]], robot)
+    pose, speeds = (0.0, 0.0, 0.0), [0.0]
+    for _ in range(200):
+        guidance = follower.step(pose, np.zeros((0, 2)), 0.1)
+        if guidance.done:
+            break
+        speeds.append(guidance.velocity.speed)
+        pose = (pose[0] + 0.1 * guidance.velocity.speed, 0.0, 0.0)
+    assert guidance.done
+    assert max(speeds) == pytest.approx(robot.speed, abs=0.01)
+    accelerations = np.diff(speeds) / 0.1
+    assert np.abs(accelerations).max() <= robot.acceleration + 1e-9
+    # Where the wanted speed is met, the acceleration may end within one step.
+    assert np.diff(accelerations).max() / 0.1 <= robot.jerk + 1e-6
+    assert min(speeds) >= 0.0

@@ -117,7 +117,6 @@ def test_a_drive_has_its_command_at_every_step_also_while_the_robot_stands() -> 
     assert rate.due(0.2, 0.04, moving=False) == 0.0, 'the robot is told to stand, and again'
     rate.command(False, 0.2)
     rate.goals('follow_path', 0.2, executed=False)
-    rate.command(False, 0.2)
     assert rate.due(0.2, 0.05, moving=False) > 0.0
     assert rate.due(0.7, 0.06, moving=False) > 0.0, 'nobody drives'
 

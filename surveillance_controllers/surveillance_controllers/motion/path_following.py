@@ -32,6 +32,7 @@ class DriveParameters:
         turn: Top turning speed, rad/s.
         acceleration: Of the speed, m/s^2.
         turn_acceleration: Of the turning speed, rad/s^2.
+        jerk: Greatest change of the acceleration, m/s^3; only to avoid a contact it brakes at once.
         shortest_look: Least distance of the point steered to, metres.
         longest_look: Greatest distance of the point steered to, metres.
         look_time: The point lies this many seconds ahead at the present speed, within the two.
@@ -52,6 +53,7 @@ class DriveParameters:
     turn: float = 1.5
     acceleration: float = 0.8
     turn_acceleration: float = 3.0
+    jerk: float = 4.0
     shortest_look: float = 0.25
     longest_look: float = 0.8
     look_time: float = 1.2
@@ -103,11 +105,12 @@ class PathFollower:
     def __init__(self, path: ArrayLike, parameters: DriveParameters | None = None) -> None:
         self.parameters = parameters or DriveParameters()
         given = np.asarray(path, dtype=float)[:, :2]
-        keep = np.concatenate(([True], np.any(np.diff(given, axis=0) != 0, axis=1)))
+        keep = np.concatenate(([True], np.hypot(*np.diff(given, axis=0).T) > 1e-6))
         self.path: Points = given[keep]
         self._along = geometry.distances_along(self.path)
         self.progress = 0.0
         self._velocity = Velocity()
+        self._acceleration = 0.0
 
     @property
     def length(self) -> float:
@@ -132,7 +135,7 @@ class PathFollower:
         bearing = math.atan2(target[1] - pose[1], target[0] - pose[0])
         side = angle_between(pose[2], bearing)
         if abs(side) > p.turn_first:
-            return self._guide(*self._turn(side, seen, dt), False, off_path)
+            return self._guide(*self._turn(side, seen, dt), False, off_path, dt)
         distance = max(float(np.hypot(*(target - position))), 1e-6)
         curvature = 2 * math.sin(side) / distance
         wanted = min(
@@ -148,8 +151,7 @@ class PathFollower:
         wanted = max(wanted, min(p.creep, remaining / max(dt, 1e-6)))
         safe = self._safe_speed(seen, curvature, math.inf)
         blocked = safe < 0.02
-        speed = self._ramped(self._velocity.speed, min(wanted, safe), p.acceleration * dt)
-        speed = min(speed, safe)
+        speed = min(self._sped(min(wanted, safe), dt), safe)
         turn = speed * curvature
         if abs(turn) > p.turn:
             turn = math.copysign(p.turn, turn)
@@ -159,7 +161,7 @@ class PathFollower:
             # Until it turns as it should, the robot goes another way than the arc looked at.
             late = abs(turn - limited) / p.turn_acceleration
             speed = self._safely(speed, limited, seen, speed * (late + p.latency))
-        return self._guide(speed, limited, blocked, off_path)
+        return self._guide(speed, limited, blocked, off_path, dt)
 
     def step_with(
         self,
@@ -188,8 +190,8 @@ class PathFollower:
         cos, sin = math.cos(pose[2]), math.sin(pose[2])
         wanted = choose(way @ np.array([[cos, -sin], [sin, cos]]), self._velocity)
         turn = self._ramped(self._velocity.turn, wanted.turn, p.turn_acceleration * dt)
-        speed = self._ramped(self._velocity.speed, wanted.speed, p.acceleration * dt)
-        return self._guide(self._safely(speed, turn, seen), turn, False, off_path)
+        speed = self._sped(wanted.speed, dt)
+        return self._guide(self._safely(speed, turn, seen), turn, False, off_path, dt)
 
     def _remaining(self, position: Points) -> float:
         """Return how far the end is, metres; 0 when it is reached."""
@@ -261,12 +263,14 @@ class PathFollower:
         """
         p = self.parameters
         turn = self._ramped(self._velocity.turn, 0.0, p.turn_acceleration * dt)
-        speed = self._ramped(self._velocity.speed, 0.0, p.acceleration * dt)
-        self._velocity = Velocity(self._safely(speed, turn, seen), turn)
+        speed = self._sped(0.0, dt)
+        self._take(Velocity(self._safely(speed, turn, seen), turn), dt)
         return self._velocity
 
-    def _guide(self, speed: float, turn: float, blocked: bool, off_path: float) -> Guidance:
-        self._velocity = Velocity(float(speed), float(turn))
+    def _guide(
+        self, speed: float, turn: float, blocked: bool, off_path: float, dt: float
+    ) -> Guidance:
+        self._take(Velocity(float(speed), float(turn)), dt)
         return Guidance(self._velocity, False, blocked, self.progress, off_path)
 
     def _turn(self, side: float, seen: Points, dt: float) -> tuple[float, float]:
@@ -274,8 +278,37 @@ class PathFollower:
         top = min(p.turn, math.sqrt(2 * p.turn_acceleration * abs(side)))
         wanted = math.copysign(top, side)
         turn = self._ramped(self._velocity.turn, wanted, p.turn_acceleration * dt)
-        speed = self._ramped(self._velocity.speed, 0.0, p.acceleration * dt)
+        speed = self._sped(0.0, dt)
         return self._safely(speed, turn, seen), turn
+
+    def _sped(self, wanted: float, dt: float) -> float:
+        """Return the next speed towards a wanted one, within the limits of acceleration and jerk.
+
+        Args:
+            wanted: Speed, m/s.
+            dt: Time since the last step, seconds.
+        """
+        if dt <= 0.0:
+            return self._velocity.speed
+        p = self.parameters
+        gap = wanted - self._velocity.speed
+        # So that the acceleration can end where the speed is as wanted.
+        top = min(p.acceleration, math.sqrt(2 * p.jerk * abs(gap)))
+        acceleration = self._ramped(self._acceleration, math.copysign(top, gap), p.jerk * dt)
+        step = acceleration * dt
+        if gap * step > 0 and abs(step) > abs(gap):
+            return wanted
+        speed = self._velocity.speed + step
+        # An acceleration that ends does not turn the way around.
+        return speed if speed * self._velocity.speed > 0 or speed * wanted > 0 else 0.0
+
+    def _take(self, velocity: Velocity, dt: float) -> None:
+        """Remember what is commanded now, and the acceleration that it asks for."""
+        if dt > 0.0:
+            top = self.parameters.acceleration
+            asked = (velocity.speed - self._velocity.speed) / dt
+            self._acceleration = min(max(asked, -top), top)
+        self._velocity = velocity
 
     @staticmethod
     def _ramped(now: float, wanted: float, change: float) -> float:
