@@ -11,6 +11,7 @@ import contextlib
 import ctypes
 import mmap
 import os
+import platform
 import shutil
 import struct
 import subprocess
@@ -22,6 +23,8 @@ _STEPPED = r"""
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <fcntl.h>
+#include <pthread.h>
+#include <semaphore.h>
 #include <stdlib.h>
 #include <sys/mman.h>
 #include <sys/time.h>
@@ -42,6 +45,30 @@ int clock_gettime(clockid_t clock, struct timespec *at) {
   int failed = real(clock, at);
   if (!failed && clock == CLOCK_REALTIME) at->tv_sec += offset();
   return failed;
+}
+
+// What a thread waits for on the real-time clock is a time of the stepped one. Times of the other
+// clocks are those since the start of the machine: they are small.
+static const struct timespec *unstepped(const struct timespec *at, struct timespec *real) {
+  if (at->tv_sec < 500000000) return at;
+  *real = *at;
+  real->tv_sec -= offset();
+  return real;
+}
+
+int pthread_cond_timedwait(pthread_cond_t *condition, pthread_mutex_t *mutex,
+                           const struct timespec *at) {
+  static int (*wait)(pthread_cond_t *, pthread_mutex_t *, const struct timespec *);
+  struct timespec real;
+  if (!wait) wait = dlvsym(RTLD_NEXT, "pthread_cond_timedwait", "GLIBC_2.3.2");
+  return wait(condition, mutex, unstepped(at, &real));
+}
+
+int sem_timedwait(sem_t *semaphore, const struct timespec *at) {
+  static int (*wait)(sem_t *, const struct timespec *);
+  struct timespec real;
+  if (!wait) wait = dlsym(RTLD_NEXT, "sem_timedwait");
+  return wait(semaphore, unstepped(at, &real));
 }
 
 int gettimeofday(struct timeval *restrict at, void *restrict zone) {
@@ -117,8 +144,9 @@ class SteppedClock:
 
     @staticmethod
     def may_be_made() -> bool:
-        """Tell whether there is a compiler."""
-        return sys.platform == 'linux' and shutil.which('cc') is not None
+        """Tell whether there is a compiler, and the libc that its library is written for."""
+        known = sys.platform == 'linux' and platform.machine() == 'x86_64'
+        return known and platform.libc_ver()[0] == 'glibc' and shutil.which('cc') is not None
 
     def step(self, seconds: int) -> None:
         """Set the clock forward, or back."""
