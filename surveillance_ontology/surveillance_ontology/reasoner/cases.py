@@ -20,7 +20,7 @@ from surveillance_ontology.reasoner.case_search import CaseSearch, StoppedError
 from surveillance_ontology.reasoner.datatypes import literal_of, value_of
 
 _NEGATIVE = (ax.NegativeObjectPropertyAssertion, ax.NegativeDataPropertyAssertion)
-MOST_STEPS = 200_000
+MOST_STEPS = 100_000
 """Facts that may be added in all searches for one answer; some seconds."""
 
 
