@@ -43,7 +43,7 @@ def page(behaviour: str, speed: float) -> Iterator[Viewer]:
 def main() -> None:
     """Draw all pictures."""
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / 'docs/images'
-    with page('patrol', 2.0) as viewer:
+    with page('patrol', 1.0) as viewer:
         viewer.until(lambda: viewer.count('[data-marker]'), 180)
         viewer.js("document.querySelector('#camera-section').scrollIntoView()")
         viewer.until(lambda: viewer.js("return document.querySelector('#camera').naturalWidth"), 60)

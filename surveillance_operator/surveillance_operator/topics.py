@@ -46,7 +46,7 @@ TRAIL_STEP, TRAIL_POINTS = 0.05, 3000
 KEPT_TRANSITIONS = 60
 SAME_MOMENT = 0.03
 """Most seconds between the stamps of a pose and a scan that belong together."""
-SAME_VIEW = 0.3
+SAME_VIEW = 0.8
 """Most seconds between the stamps of an image and of the arm's joints, which stand still."""
 STILL = 0.01
 """Metres and radians within which the robot counts as standing still between two poses."""
@@ -173,8 +173,8 @@ def _on_detections(message: MarkerDetectionArray, old: Snapshot) -> Fields:
     for number, point in conversions.confirmed_from(message).items():
         ahead, left, _ = frame[:3, :3] @ point + frame[:3, 3]
         placed[number] = (
-            round(x + ahead * math.cos(yaw) - left * math.sin(yaw), 2),
-            round(y + ahead * math.sin(yaw) + left * math.cos(yaw), 2),
+            round(float(x + ahead * math.cos(yaw) - left * math.sin(yaw)), 2),
+            round(float(y + ahead * math.sin(yaw) + left * math.cos(yaw)), 2),
         )
     return {**fields, 'markers': placed} if placed != old.markers else fields
 
