@@ -30,6 +30,7 @@ from surveillance_behaviour.policy.graph import GraphError
 from surveillance_behaviour.policy.world import Decision, World
 from surveillance_behaviour.world_model import Experience, WorldModel
 from surveillance_fsm import Interrupt
+from surveillance_runtime.suggestions import nearest
 
 
 class Decider:
@@ -42,7 +43,8 @@ class Decider:
         battery: The battery.
         experience: What the robot has learned; default: nothing yet.
         generator: Chance, for the policies that need it.
-        warn: Told once when no robot can keep to the threshold on this map.
+        warn: Told once when no robot can keep to the threshold on this map, and when the rules
+            name a class that the ontology does not have.
     """
 
     def __init__(
@@ -56,12 +58,14 @@ class Decider:
         warn: Callable[[str], None] = lambda sentence: None,
     ) -> None:
         self.settings = settings
+        self._ontology = ontology
         self.model = WorldModel(settings, ontology, places, experience, generator)
         self._battery = battery
         self._lock = threading.Lock()
         self._leg: Decision | None = None
         self._warn = warn
         self._warned: object = None
+        self._checked_rules: tuple[str, ...] = ()
 
     @property
     def experience(self) -> Experience:
@@ -113,7 +117,22 @@ class Decider:
             if warning:
                 self._warned = of_what
                 self._warn(warning)
+        self._check_rules(interrupt)
         return world
+
+    def _check_rules(self, interrupt: Interrupt) -> None:
+        """Say which class of the rules no place can ever be in."""
+        classes = self.settings.rules.classes
+        if classes == self._checked_rules:
+            return
+        known = self._ontology.place_classes(interrupt)
+        self._checked_rules = classes
+        for name in classes:
+            if name not in known:
+                self._warn(
+                    f'rooms_priority: the ontology has no class {name!r} of places, expected '
+                    f'{nearest(name, known)}; this rule never applies'
+                )
 
     def begin(self, now: float, interrupt: Interrupt) -> str:
         """Look for the first time; where the robot is.

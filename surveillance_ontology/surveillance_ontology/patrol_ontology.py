@@ -224,6 +224,17 @@ class PatrolOntology:
         (answer,) = self._carry_out([self._request('QUERY IND CLASS', 'LOCATION')])
         return _names(answer)
 
+    def place_classes(self) -> tuple[str, ...]:
+        """Return the names of the classes that a place can be in.
+
+        Raises:
+            ArmorServiceCallError: The server does not answer.
+            ArmorServiceInternalError: It refuses.
+        """
+        (answer,) = self._carry_out([self._request('QUERY CLASS CLASS', 'LOCATION')])
+        below = (name for name in _names(answer) if not name.endswith('Nothing'))
+        return ('LOCATION', *below)
+
     def doors(self) -> dict[str, set[str]]:
         """Return the places that each door leads into.
 

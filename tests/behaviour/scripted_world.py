@@ -170,6 +170,9 @@ class World:
     def wait_until_built(self, interrupt: Interrupt) -> None:
         self._call('wait_until_built', interrupt)
 
+    def place_classes(self, interrupt: Interrupt) -> tuple[str, ...]:
+        return ('LOCATION', 'ROOM', 'CORRIDOR', 'URGENT')
+
     def set_urgency_threshold(self, seconds: float, interrupt: Interrupt) -> None:
         self._call('set_urgency_threshold', interrupt)
         self.threshold = seconds

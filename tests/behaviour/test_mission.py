@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from surveillance_behaviour.decision import Rules
 from surveillance_behaviour.mission.mission_log import (
     MissionRecord,
     read,
@@ -184,3 +185,14 @@ def test_a_threshold_that_nobody_can_keep_to_is_warned_of_once(machine: str) -> 
         'urgency_threshold is 40 s',
     ]
     assert 'shortest tour of all places takes 69.6 s' in warnings[0]
+
+
+def test_a_rule_of_a_class_that_the_ontology_does_not_have_is_told_once(machine: str) -> None:
+    world = World()
+    mission_settings = settings()
+    mission_settings.choice.rules = Rules(('URGANT', 'CORRIDOR'))
+    Run(machine, world, mission_settings).until(100.0)
+    assert [text for text in world.said if 'rooms_priority' in text] == [
+        "rooms_priority: the ontology has no class 'URGANT' of places, expected 'URGENT'; "
+        'this rule never applies'
+    ]

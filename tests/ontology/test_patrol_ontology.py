@@ -62,6 +62,10 @@ def ontology(armor: ArmorClient) -> PatrolOntology:
     return ontology
 
 
+def test_the_classes_of_places_are_those_below_location(ontology: PatrolOntology) -> None:
+    assert set(ontology.place_classes()) == {'LOCATION', 'ROOM', 'CORRIDOR', 'URGENT'}
+
+
 def test_a_snapshot_is_what_the_ontology_infers(ontology: PatrolOntology) -> None:
     found = ontology.snapshot(110.7, RULES)
     assert (found.place, found.seen_at, found.reachable) == ('E', 100, ('C1', 'C2'))

@@ -126,6 +126,11 @@ class ArmorKnowledge:
         with self._talking(interrupt):
             self._ontology.set_urgency_threshold(seconds)
 
+    def place_classes(self, interrupt: fsm.Interrupt) -> tuple[str, ...]:
+        """Return the classes that a place can be in."""
+        with self._talking(interrupt):
+            return self._ontology.place_classes()
+
     def await_place(self, place: str, seconds: float, interrupt: fsm.Interrupt) -> str:
         """Wait until the robot is in ``place``; return where it is then, empty when nobody says."""
         found = self._whereabouts.await_place(place, seconds, interrupt)

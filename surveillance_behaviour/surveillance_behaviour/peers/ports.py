@@ -64,6 +64,9 @@ class Ontology(Protocol):
     def set_urgency_threshold(self, seconds: float, interrupt: Interrupt) -> None:
         """Set the time after which a place becomes URGENT."""
 
+    def place_classes(self, interrupt: Interrupt) -> tuple[str, ...]:
+        """Return the classes that a place can be in."""
+
     def snapshot(
         self,
         now: float,
