@@ -18,7 +18,7 @@ from surveillance_simulation.camera.rendering import Renderer
 from surveillance_simulation.robot.base import Base, BaseModel
 from surveillance_simulation.robot.lidar import LidarModel
 from surveillance_simulation.robot.robot import Robot
-from surveillance_simulation.world.people import PeopleModel
+from surveillance_simulation.world.people import People, PeopleModel
 from surveillance_simulation.world.world import Obstacle, Panel, World, read_world
 
 __all__ = [
@@ -29,6 +29,7 @@ __all__ = [
     'LidarModel',
     'Obstacle',
     'Panel',
+    'People',
     'PeopleModel',
     'Renderer',
     'Robot',
