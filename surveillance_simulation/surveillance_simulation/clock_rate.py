@@ -47,7 +47,7 @@ class ClockRateModel:
     idle_step: float = 0.5
     window: float = 0.05
     estimate_window: float = 0.45
-    patience: float = 1.0
+    patience: float = 3.0
 
     @property
     def period(self) -> float:
