@@ -39,6 +39,10 @@ _UNDER_WAY = (
 )
 
 
+LOOK_PERIOD = 0.5
+"""Real seconds between two looks whether a program that time waits for is to be given up."""
+
+
 class Simulator(PatrolNode):
     """Steps the robot in time, carries out its commands and publishes its sensors' measurements.
 
@@ -90,7 +94,7 @@ class Simulator(PatrolNode):
         steady = RclpyClock(clock_type=ClockType.STEADY_TIME)
         self._sensors.publish(self._stamp())
         self._timer = self.create_timer(rate.period, self._tick, clock=steady)
-        self.create_timer(rate.patience, self._go_on, clock=steady)
+        self.create_timer(LOOK_PERIOD, self._go_on, clock=steady)
         if self._drives_clock:
             self._told_of_clock = False
             self.create_timer(1.0, self._look_for_another_clock, clock=steady)
