@@ -250,7 +250,7 @@ class CaseReasoner:
         if not self.consistent():
             return
         rules = self._rules
-        search = self._search if self.names_individuals else CaseSearch(rules, self._left)
+        search = self._search if self.names_individuals else CaseSearch(rules, 4 * self._left)
         base = self._base if search is self._search else search.mark()
         possible: dict[str, set[str]] = {}
         known_models: dict[str, set[str]] = {}

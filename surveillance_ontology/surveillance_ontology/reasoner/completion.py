@@ -48,6 +48,7 @@ class Completion:
         engine = self._engine
         self.unsupported = None
         if not engine.consistent or not self._is_wanted():
+            self._forget_classes()
             return
         assertions = [axiom for axiom in axioms if is_assertion(axiom)]
         if len(assertions) > _MOST_ASSERTIONS:
@@ -58,6 +59,7 @@ class Completion:
         reasoner = CaseReasoner([*self._schema, *assertions])
         if not reasoner.consistent():
             engine.take_from_cases(None)
+            self._forget_classes()
             return
         engine.take_from_cases(list(reasoner.facts(self._is_known)))
         if engine.consistent and (reasoner.names_individuals or not self._compared):
@@ -66,6 +68,11 @@ class Completion:
             known.complete(list(found))
             self._compared = True
         self._report(reasoner)
+
+    def _forget_classes(self) -> None:
+        if self._compared:
+            self._compared = False
+            self._classification.complete(())
 
     def entails(self, axioms: Iterable[Axiom], fact: Axiom) -> bool:
         """Tell whether a fact that was not derived follows all the same."""
