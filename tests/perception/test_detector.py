@@ -199,6 +199,20 @@ def test_crowd_of_markers_is_read_whole_and_a_bound_is_told():
     assert bounded.left_out >= 70
 
 
+def test_crowd_of_blurred_markers_of_fourteen_pixels_is_read():
+    sheet = np.full((1200, 1800), 225, np.uint8)
+    for index in range(96):
+        row, column = divmod(index, 12)
+        top, left = 50 + row * 140, 50 + column * 140
+        sheet[top : top + 84, left : left + 84] = DICTIONARY.generateImageMarker(index, 84)
+    small = cv2.GaussianBlur(
+        cv2.resize(sheet, (300, 200), interpolation=cv2.INTER_AREA), (0, 0), 0.9
+    )
+    found = [each.marker_id for each in DETECTOR.detect(small)]
+    assert set(found) <= set(range(96))
+    assert len(found) == len(set(found)) >= 93
+
+
 def test_any_image_is_looked_at_without_an_error_of_opencv():
     generator = np.random.default_rng(11)
     marker = DICTIONARY.generateImageMarker(3, 63)
