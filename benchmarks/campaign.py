@@ -9,8 +9,8 @@
 nodes at a time get SIGKILL, SIGSTOP or SIGTERM; now and then the launcher is killed with all it
 started, and started again with `--resume`. A node that was hit is back when another process answers
 for it. Now and then it is the whole machine: everything is stopped for a while and goes on, the
-disk of the run is full, the clock is set forward or back (`machine_faults`); after that the next
-visit has to come within a minute. At the end three things must agree:
+disk of the run is full, with `--clock-steps` the clock is set forward or back (`machine_faults`);
+after that the next visit has to come within a minute. At the end three things must agree:
 
 - the simulator's `ground_truth`: where the robot really was, and when;
 - the mission's record: a visit that the truth does not know is *invented*; a visit that a reader
@@ -264,7 +264,7 @@ class Campaign:
         self._disk = self._clock = None
         if SmallDisk.may_be_made():
             self._disk = SmallDisk(scratch / 'disk', DISK)
-        if SteppedClock.may_be_made():
+        if chosen.clock_steps and SteppedClock.may_be_made():
             self._clock = SteppedClock(scratch)
         self._began: dict[int, float] = {}
         self.watcher = Watcher(self._domain)
@@ -523,6 +523,7 @@ def main(words: Sequence[str] | None = None) -> int:
     )
     parser.add_argument('--cuts', type=int, default=2, help='with --network: cuts of 120 s')
     parser.add_argument('--machine', type=float, default=0.15, help='share of hits on the machine')
+    parser.add_argument('--clock-steps', action='store_true', help='set the clock, too')
     parser.add_argument('--freeze', type=float, default=30.0, help='how long those last, s')
     parser.add_argument('--quick', action='store_true', help='25 s of hits')
     parser.add_argument('--keep', type=Path, default=ROOT / 'runs', help='folder for the log')
