@@ -244,21 +244,7 @@ class ValueSet:
     @property
     def only(self) -> Value | None:
         """The value of a set of one value; None of any other set."""
-        if self.size != 1:
-            return None
-        for part in self.parts.values():
-            for one in part:
-                if one.listed:
-                    return next(iter(one.listed))
-        ((layer, ((low, high),)),) = self.intervals.items()
-        if layer in ('float', 'double') and low.key != high.key:
-            return None
-        if layer in ('float', 'double'):
-            return (layer, low.key)
-        if layer == 'whole':
-            return int(math.ceil(low.key) + (low.side > 0 and math.ceil(low.key) == low.key))
-        found: Value = low.key
-        return found
+        return next(self.members()) if self.size == 1 else None
 
     def within(self, other: ValueSet) -> bool:
         """Tell whether every value is in another set."""

@@ -84,3 +84,20 @@ def test_sets_agree_with_single_values() -> None:
 )
 def test_sizes(data_range: DataRange, size: int) -> None:
     assert values_of(data_range).size == size
+
+
+def test_the_only_value_of_a_set_in_several_pieces() -> None:
+    """Between 0.2 and 0.4 lies no whole number, between 0.5 and 1.5 there is one."""
+    spans = tuple(
+        DatatypeRestriction(
+            XSD + 'decimal',
+            (
+                (XSD + 'minExclusive', Literal(low, XSD + 'decimal')),
+                (XSD + 'maxExclusive', Literal(high, XSD + 'decimal')),
+            ),
+        )
+        for low, high in (('0.2', '0.4'), ('0.5', '1.5'))
+    )
+    found = value_set(DataIntersectionOf((XSD + 'integer', DataUnionOf(spans))))
+    assert found is not None
+    assert found.only == 1
