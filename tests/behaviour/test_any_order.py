@@ -130,7 +130,12 @@ class AnyOrder(RuleBasedStateMachine):
 
     @rule(door=st.sampled_from(DOORS))
     def door_closes(self, door: str) -> None:
-        # Of the ring E, C1, C2 one door at a time, so that there is a way home.
+        # Of the ring E, C1, C2 one door at a time, so that there is a way home; and nobody shuts
+        # the robot in, which could only wait there until its battery is empty.
+        rooms = {self.world.is_in, *(decision.place for decision in self.world.decisions[-1:])}
+        ways_out = [self.world.rooms[room] for room in rooms]
+        if [door] in map(list, ways_out):
+            return
         if not (door in ('D5', 'D6', 'D7') and self.world.closed & {'D5', 'D6', 'D7'}):
             self.world.closed.add(door)
 
