@@ -78,7 +78,7 @@ def test_watch_fits_eighty_columns_and_its_keys_change_it(mission: Started, term
     watch = terminal('watch', rows=30)
     shown = watch.until('q quit', 'e events', 'battery', 'decision', 'R1')
     assert '…' not in shown.splitlines()[0]
-    assert shown.splitlines()[-1].endswith('e events')
+    assert shown.rstrip().endswith('e events')
     watch.type('d')
     watch.until('policy tour', 'chosen')
     watch.type('n')
