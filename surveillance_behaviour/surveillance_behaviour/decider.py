@@ -61,7 +61,10 @@ class Decider:
         self._ontology = ontology
         self.model = WorldModel(settings, ontology, places, experience, generator)
         self._battery = battery
-        self._lock = threading.Lock()
+        self._looking = threading.Lock()
+        # A request is taken in the executor's thread, which brings the answers that a look waits
+        # for: it must not wait for the look.
+        self._saving = threading.Lock()
         self._leg: Decision | None = None
         self._warn = warn
         self._warned: object = None
@@ -109,7 +112,7 @@ class Decider:
         Raises:
             PeerError: The ontology cannot be asked.
         """
-        with self._lock:
+        with self._looking:
             world = self.model.refresh(now, interrupt, avoided)
         of_what = world.threshold, world.graph.places
         if of_what != self._warned:
@@ -183,8 +186,7 @@ class Decider:
         return decision
 
     def _save(self) -> None:
-        # A request and a decision come from two threads.
-        with self._lock:
+        with self._saving:
             self.experience.save()
 
     def why_charge(self) -> str:

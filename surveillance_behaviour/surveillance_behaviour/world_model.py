@@ -99,7 +99,7 @@ class Experience:
         if self.path is None:
             return
         kept = {
-            'visits': {place: round(at, 3) for place, at in self.visits.items()},
+            'visits': {place: round(at, 3) for place, at in self.visits.copy().items()},
             'leg_times': self.leg_times.to_json(),
             'draw': self.draw.to_json(),
             'sent_to_charge': self.sent_to_charge,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from pathlib import Path
 
 import pytest
@@ -51,3 +52,27 @@ def test_the_ontology_knows_until_when_the_robot_was_in_a_place() -> None:
     told.begin(1.0, NOBODY)
     told.decide(20.0, NOBODY)
     assert world.visited_at['E'] == 20.0
+
+
+def test_a_request_is_taken_while_somebody_looks(tmp_path: Path) -> None:
+    world = World()
+    told = decider(world, tmp_path / 'mission.jsonl')
+    told.begin(1.0, NOBODY)
+    answered, asked, right = threading.Event(), threading.Event(), world.snapshot
+
+    def snapshot(*args: object) -> object:
+        asked.set()
+        assert answered.wait(20.0)
+        return right(*args)  # type: ignore[arg-type]
+
+    world.snapshot = snapshot  # type: ignore[method-assign, assignment]
+    looking = threading.Thread(target=told.look, args=(2.0, NOBODY))
+    looking.start()
+    assert asked.wait(20.0)
+    requesting = threading.Thread(target=told.request, args=('R4',))
+    requesting.start()
+    requesting.join(20.0)
+    taken = not requesting.is_alive()
+    answered.set()
+    looking.join()
+    assert taken, 'the request waits for an answer that its own thread would bring'
