@@ -67,7 +67,7 @@ def test_every_node_may_leave_and_come_back(robot: Robot, graph: Any) -> None:
         robot.time.at(moment, lambda name=name: robot.leave(name))
         robot.time.at(moment + 8.0, lambda name=name: robot.arrive(name))
         moment += 50.0
-    robot.until(moment + 180.0, timeout=110.0)
+    robot.until(moment + 300.0, timeout=110.0)
     assert robot.visited(since=moment) == PLACES
     assert any(message.waiting_for_help for message in status)
     assert robot.summary().restarts == 1
