@@ -11,6 +11,7 @@ import importlib
 import io
 import json
 import os
+import signal
 from collections.abc import Callable
 from pathlib import Path
 
@@ -35,7 +36,12 @@ HELP = Path(__file__).with_name('package_help.json')
 
 def main_of(name: str) -> Callable[[list[str]], int]:
     """Return what carries a command out; imports its module."""
-    module = importlib.import_module(COMMANDS[name][0])
+    # A Ctrl-C waits: in the middle of an import a library may make an error of its own of it.
+    signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    try:
+        module = importlib.import_module(COMMANDS[name][0])
+    finally:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])
     return lambda argv: int(module.main(argv) or 0)
 
 

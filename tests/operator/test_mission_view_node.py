@@ -140,9 +140,9 @@ def test_why_a_topic_cannot_be_used_is_known(graph: Any) -> None:
 
 
 def test_the_next_mission_begins_with_an_empty_picture(graph: Any) -> None:
-    view = graph.add(MissionViewNode)
-    status = say(graph, 'mission_status', MissionStatus(state='FIRST'))
-    battery = say(graph, 'battery_level', UInt8(data=50))
+    view = graph.add(MissionViewNode, namespace='alone')
+    status = say(graph, '/alone/mission_status', MissionStatus(state='FIRST'))
+    battery = say(graph, '/alone/battery_level', UInt8(data=50))
     graph.until(lambda: view.snapshot.battery == 50 and view.snapshot.nodes)
     for publisher in (status, battery):
         graph.node.destroy_publisher(publisher)
@@ -160,7 +160,7 @@ def test_the_next_mission_begins_with_an_empty_picture(graph: Any) -> None:
     graph.until(reported)
     assert view.see().status == frozen.status
 
-    say(graph, 'mission_status', MissionStatus(state='SECOND'))
+    say(graph, '/alone/mission_status', MissionStatus(state='SECOND'))
     graph.until(lambda: view.snapshot.status and view.snapshot.status.state == 'SECOND')
     assert view.snapshot.battery is None
     assert any('waiting for the next mission' in text for _, text in view.snapshot.events)
