@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from typing import TypeVar
 
 from surveillance_ontology.owl import axioms as ax
 from surveillance_ontology.owl import expressions as ex
@@ -18,7 +19,7 @@ from surveillance_ontology.owl.axiom_text import axiom_text
 from surveillance_ontology.owl.axioms import Axiom
 from surveillance_ontology.owl.expressions import ClassExpression, PropertyExpression
 from surveillance_ontology.owl.vocabulary import NOTHING, OWL, THING, TOP_LITERAL, local_name
-from surveillance_ontology.reasoner.datatypes import value_of
+from surveillance_ontology.reasoner.datatypes import unfolded, value_of
 from surveillance_ontology.reasoner.property_chains import AnyRole, Chains, IrregularError
 from surveillance_ontology.reasoner.translation import directed, negated, normal
 from surveillance_ontology.reasoner.value_sets import EVERY, ValueSet, point, value_set
@@ -80,6 +81,9 @@ class ValueCount:
     n: int
     prop: str
     values: ValueSet
+
+
+_Counted = TypeVar('_Counted', Count, ValueCount)
 
 
 @dataclass(frozen=True, slots=True)
@@ -246,22 +250,20 @@ class CaseRules:
 
     def positive(self, expression: ClassExpression) -> int:
         """Return a concept whose members are in the class; 0 for owl:Thing."""
-        expression = normal(expression)
-        if expression == THING:
-            return 0
-        if isinstance(expression, str):
-            return self.concept(expression)
-        if isinstance(expression, ex.ObjectOneOf) and len(expression.individuals) == 1:
-            return self.nominal(expression.individuals[0])
-        known = self._positive.get(expression)
-        if known is None:
-            name = self.fresh()
-            known = self._positive[expression] = self.concept(name)
-            self.include(name, expression)
-        return known
+        return self._named(expression, self._positive, self.include)
 
     def recognised(self, expression: ClassExpression) -> int:
         """Return a concept that all members of the class have; 0 for owl:Thing."""
+        return self._named(
+            expression, self._recognised, lambda name, found: self.include(found, name)
+        )
+
+    def _named(
+        self,
+        expression: ClassExpression,
+        known: dict[ClassExpression, int],
+        define: Callable[[str, ClassExpression], None],
+    ) -> int:
         expression = normal(expression)
         if expression == THING:
             return 0
@@ -269,56 +271,31 @@ class CaseRules:
             return self.concept(expression)
         if isinstance(expression, ex.ObjectOneOf) and len(expression.individuals) == 1:
             return self.nominal(expression.individuals[0])
-        known = self._recognised.get(expression)
-        if known is None:
+        if expression not in known:
             name = self.fresh()
-            known = self._recognised[expression] = self.concept(name)
-            self.include(expression, name)
-        return known
+            known[expression] = self.concept(name)  # first: the class may contain itself
+            define(name, expression)
+        return known[expression]
 
-    def _counted(self, table: dict[int, Count], n: int, role: int, concept: int) -> int:
-        key = (id(table), n, role, concept)
+    def _counted(self, table: dict[int, _Counted], count: _Counted) -> int:
+        key = (id(table), count)
         known = self._counts.get(key)
         if known is None:
-            if n > _MOST:
+            if count.n > _MOST:
                 raise NotCoveredError(f'numbers above {_MOST} are not counted by cases')
             known = self._counts[key] = self.concept(self.fresh())
-            table[known] = Count(n, role, concept)
-        return known
-
-    def _counted_values(
-        self, table: dict[int, ValueCount], n: int, prop: str, values: ValueSet
-    ) -> int:
-        key = (id(table), n, prop, values)
-        known = self._counts.get(key)
-        if known is None:
-            if n > _MOST:
-                raise NotCoveredError(f'numbers above {_MOST} are not counted by cases')
-            known = self._counts[key] = self.concept(self.fresh())
-            table[known] = ValueCount(n, prop, values)
+            table[known] = count
         return known
 
     def values(self, data_range: ex.DataRange) -> ValueSet:
         """Return the values of a data range."""
-        found = value_set(self._defined(data_range, ()))
+        try:
+            found = value_set(unfolded(data_range, self._datatypes))
+        except ValueError as error:
+            raise NotCoveredError(str(error)) from None
         if found is None:
             raise NotCoveredError('a data range is not supported')
         return found
-
-    def _defined(self, data_range: ex.DataRange, seen: tuple[str, ...]) -> ex.DataRange:
-        if isinstance(data_range, str):
-            if data_range in seen:
-                raise NotCoveredError('a datatype is defined by itself')
-            definition = self._datatypes.get(data_range)
-            if definition is None:
-                return data_range
-            return self._defined(definition, (*seen, data_range))
-        if isinstance(data_range, (ex.DataIntersectionOf, ex.DataUnionOf)):
-            kind = type(data_range)
-            return kind(tuple(self._defined(operand, seen) for operand in data_range.operands))
-        if isinstance(data_range, ex.DataComplementOf):
-            return ex.DataComplementOf(self._defined(data_range.operand, seen))
-        return data_range
 
     # --- inclusions ---
 
@@ -589,7 +566,7 @@ class _Clause:
                     raise NotCoveredError('a property with chains is counted')
                 concept = rules.recognised(one.filler)
                 role = rules.role(one.prop)
-                self._heads.append(rules._counted(rules.at_most, one.n, role, concept))
+                self._heads.append(rules._counted(rules.at_most, Count(one.n, role, concept)))
         elif isinstance(one, (ex.ObjectExactCardinality, ex.DataExactCardinality)):
             self._both.append(_exactly(one))
         else:
@@ -600,24 +577,24 @@ class _Clause:
         rules = self._rules
         if n > 1 and rules.complex_role(prop):
             raise NotCoveredError('a property with chains is counted')
-        self._heads.append(rules._counted(rules.at_least, n, rules.role(prop), concept))
+        self._heads.append(rules._counted(rules.at_least, Count(n, rules.role(prop), concept)))
 
     def _take_values(self, one: ClassExpression) -> bool:
         rules = self._rules
         if isinstance(one, ex.DataHasValue):
             values = point(value_of(one.literal))
             table = rules.values_at_least
-            self._heads.append(rules._counted_values(table, 1, one.prop, values))
+            self._heads.append(rules._counted(table, ValueCount(1, one.prop, values)))
         elif isinstance(one, ex.DataSomeValuesFrom):
             values = rules.values(one.range)
             table = rules.values_at_least
-            self._heads.append(rules._counted_values(table, 1, one.prop, values))
+            self._heads.append(rules._counted(table, ValueCount(1, one.prop, values)))
         elif isinstance(one, ex.DataMinCardinality):
             if one.n == 0:
                 return False
             values = rules.values(one.range)
             table = rules.values_at_least
-            self._heads.append(rules._counted_values(table, one.n, one.prop, values))
+            self._heads.append(rules._counted(table, ValueCount(one.n, one.prop, values)))
         elif isinstance(one, ex.DataAllValuesFrom):
             self._never.append((one.prop, ~rules.values(one.range)))
         elif isinstance(one, ex.DataMaxCardinality):
@@ -626,7 +603,7 @@ class _Clause:
                 self._never.append((one.prop, values))
             else:
                 table = rules.values_at_most
-                self._heads.append(rules._counted_values(table, one.n, one.prop, values))
+                self._heads.append(rules._counted(table, ValueCount(one.n, one.prop, values)))
         else:
             raise NotCoveredError('a class expression is not known')
         return True

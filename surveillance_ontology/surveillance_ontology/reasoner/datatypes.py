@@ -13,7 +13,7 @@ import datetime
 import math
 import re
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from fractions import Fraction
 from functools import cache
 from typing import Any, TypeAlias
@@ -28,7 +28,7 @@ from surveillance_ontology.owl.expressions import (
     DataUnionOf,
     Literal,
 )
-from surveillance_ontology.owl.vocabulary import OWL, RDF, RDFS, TOP_LITERAL, XSD
+from surveillance_ontology.owl.vocabulary import OWL, RDF, RDFS, TOP_LITERAL, XSD, local_name
 
 Value: TypeAlias = 'int | Fraction | str | tuple[Any, ...]'
 
@@ -439,3 +439,30 @@ def _wider() -> dict[str, set[str]]:
 
 
 _WIDER = _wider()
+
+
+def unfolded(
+    data_range: DataRange, definitions: Mapping[str, DataRange], seen: tuple[str, ...] = ()
+) -> DataRange:
+    """Return a data range with the ranges in place of the datatypes that are defined by them.
+
+    Args:
+        data_range: The range.
+        definitions: The ranges of defined datatypes, by name.
+        seen: The datatypes whose definitions it stands in.
+
+    Raises:
+        ValueError: A datatype is defined by itself.
+    """
+    if isinstance(data_range, str):
+        if data_range not in definitions:
+            return data_range
+        if data_range in seen:
+            raise ValueError(f'the datatype {local_name(data_range)} is defined by itself')
+        return unfolded(definitions[data_range], definitions, (*seen, data_range))
+    if isinstance(data_range, (DataIntersectionOf, DataUnionOf)):
+        kind = type(data_range)
+        return kind(tuple(unfolded(each, definitions, seen) for each in data_range.operands))
+    if isinstance(data_range, DataComplementOf):
+        return DataComplementOf(unfolded(data_range.operand, definitions, seen))
+    return data_range

@@ -43,7 +43,7 @@ from surveillance_ontology.reasoner.clauses import (
     Term,
     property_atom,
 )
-from surveillance_ontology.reasoner.datatypes import Test, range_test, value_of
+from surveillance_ontology.reasoner.datatypes import Test, range_test, unfolded, value_of
 from surveillance_ontology.reasoner.swrl_builtins import builtin
 from surveillance_ontology.reasoner.value_sets import EVERY, ValueSet, value_set
 
@@ -386,30 +386,16 @@ class Translation:
         Raises:
             UnsupportedError: The range is not supported.
         """
-        data_range = self._defined(data_range, ())
+        try:
+            data_range = unfolded(data_range, self._datatypes)
+        except ValueError as error:
+            raise UnsupportedError(str(error)) from None
         if data_range == TOP_LITERAL:
             return None
         test, values = range_test(data_range), value_set(data_range)
         if test is None or values is None:
             raise UnsupportedError(f'the data range {expression_text(data_range)} is not supported')
         return test, values
-
-    def _defined(self, data_range: ex.DataRange, seen: tuple[str, ...]) -> ex.DataRange:
-        if isinstance(data_range, str):
-            definition = self._datatypes.get(data_range)
-            if definition is None:
-                return data_range
-            if data_range in seen:
-                raise UnsupportedError(
-                    f'the datatype {local_name(data_range)} is defined by itself'
-                )
-            return self._defined(definition, (*seen, data_range))
-        if isinstance(data_range, (ex.DataIntersectionOf, ex.DataUnionOf)):
-            kind = type(data_range)
-            return kind(tuple(self._defined(operand, seen) for operand in data_range.operands))
-        if isinstance(data_range, ex.DataComplementOf):
-            return ex.DataComplementOf(self._defined(data_range.operand, seen))
-        return data_range
 
     # --- antecedents ---
 
