@@ -51,7 +51,7 @@ from rclpy.node import Node  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
 
 from benchmarks.whole_stack import ros_arguments  # noqa: E402
-from launcher import node_table  # noqa: E402
+from surveillance_runtime import node_table  # noqa: E402
 from surveillance_runtime.testing import claim_domain  # noqa: E402
 
 STRANGE_FLOATS = (

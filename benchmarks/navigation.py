@@ -38,7 +38,7 @@ from scipy.sparse.csgraph import dijkstra
 from skimage.graph import MCP_Geometric
 from whole_stack import ROOT, Stack, ros_arguments
 
-from launcher import node_table, run
+from launcher import run
 from surveillance_controllers import geometry
 from surveillance_controllers.motion.driving import Drive, State
 from surveillance_controllers.motion.localisation import Scan
@@ -50,6 +50,7 @@ from surveillance_controllers.planning.grid_planning import (
     NoPathError,
     PlanningParameters,
 )
+from surveillance_runtime import node_table
 from surveillance_runtime.place import generation as place_generation
 from surveillance_runtime.place import occupancy_grid
 from surveillance_simulation.robot.robot import Robot

@@ -20,7 +20,7 @@ if str(ROOT) not in sys.path:
 
 import rclpy  # noqa: E402
 
-from launcher import node_table  # noqa: E402
+from surveillance_runtime import node_table  # noqa: E402
 from surveillance_runtime.node import PatrolNode  # noqa: E402
 from surveillance_runtime.process import ExecutorThread  # noqa: E402
 from surveillance_runtime.testing import claim_domain  # noqa: E402

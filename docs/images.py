@@ -29,11 +29,11 @@ from sensor_msgs.msg import Image, JointState  # noqa: E402
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint  # noqa: E402
 from whole_stack import Stack  # noqa: E402
 
-from launcher import node_table  # noqa: E402
 from surveillance_fsm.ros import ServiceCaller  # noqa: E402
 from surveillance_interfaces.srv import PlaceObstacle, SetDoor, SetMarker  # noqa: E402
 from surveillance_operator import map_command  # noqa: E402
 from surveillance_operator.watch.view import MissionView  # noqa: E402
+from surveillance_runtime import node_table  # noqa: E402
 from surveillance_runtime.qos import SENSOR_QOS  # noqa: E402
 from surveillance_runtime.robot_arm import ARM  # noqa: E402
 

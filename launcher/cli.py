@@ -11,9 +11,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
-from launcher import node_table, package_commands, system
+from launcher import package_commands, system
 from launcher.environment import CHECKOUT, Environment, clean_environ
 from launcher.instance_lock import claim
+from surveillance_runtime import node_table
 
 if TYPE_CHECKING:
     from launcher.run import Run
@@ -358,6 +359,7 @@ def _node(argv: list[str]) -> int:
     _enter(['node', *argv])
     from launcher import run as runs
     from surveillance_runtime.configuration import split_arguments
+    from surveillance_runtime.run_parameters import full_name
 
     run = wanted_run(options)
     run.check()
@@ -365,7 +367,7 @@ def _node(argv: list[str]) -> int:
     merged = runs.configuration(CONFIG, run, more=given)
     runs.check_assignments(merged, [node])
     renamed = any('__ns:=' in word or '__node:=' in word for word in rest)
-    name = given.full_name(node.name) if renamed else runs.full_name(run, node.name)
+    name = given.full_name(node.name) if renamed else full_name(run.namespace, node.name)
     file = runs.parameters_in_memory(name, merged.resolve(node.name, name))
     arguments = runs.ros_arguments([file], run)
     arguments += [word for word in given.rest if word not in ('--ros-args', '--')]

@@ -13,8 +13,8 @@ import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 
-from launcher.node_table import RUN_NODES, Node
 from launcher.system import LaunchError
+from surveillance_runtime.node_table import RUN_NODES, Node
 
 
 def claim(

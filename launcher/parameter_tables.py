@@ -16,8 +16,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from launcher import node_table, package_commands
+from launcher import package_commands
 from launcher.environment import CHECKOUT
+from surveillance_runtime import node_table
 from surveillance_runtime.configuration import (
     SCHEMA,
     Configuration,

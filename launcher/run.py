@@ -18,16 +18,16 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
-from launcher import node_table, run_folder
+from launcher import run_folder
 from launcher.instance_lock import claim
 from launcher.log_merge import ROS_FORMAT, MergedLog
 from launcher.supervisor import Program, Supervisor
 from launcher.system import LaunchError
 from surveillance_behaviour.mission import mission_log
+from surveillance_runtime import node_table
 from surveillance_runtime.configuration import (
     Configuration,
     Entry,
-    Layer,
     RosArguments,
     Setting,
     argument_layer,
@@ -36,6 +36,16 @@ from surveillance_runtime.configuration import (
 )
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.place import read_place_file
+from surveillance_runtime.run_parameters import (
+    BEHAVIOUR_NODE,
+    for_node,
+    full_name,
+    mode_entries,
+    place_file,
+    record_entries,
+    run_layers,
+    write_parameters,
+)
 from surveillance_runtime.yaml_file import YamlFileError
 
 CHILD = Path(__file__).with_name('child.py')
@@ -47,7 +57,6 @@ LOCAL_ROS = {
     'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
 }
 """How nodes find each other where the environment says nothing else."""
-PLACES = {'surveillance': 'seven_rooms.yaml', 'patrol': 'patrol_world.yaml'}
 RECORD = 'mission.jsonl'
 ONTOLOGIES = 'ontologies'
 STORE = 'armor_store'
@@ -58,7 +67,6 @@ RECORDING, PLACE = 'recording', 'place.yaml'
 COMPOSED_SHARE = 3
 MEMORY = 2048
 """Megabytes that a node may hold, unless the command line says otherwise."""
-BEHAVIOUR_NODE = 'robot_behavior'
 NOTHING_RECORDED = 'Mission: nothing was recorded.'
 EXIT_NOTHING_DONE = 1
 """The exit code of a run that had all its time and in which the mission did not begin."""
@@ -164,15 +172,6 @@ class Run:
         return tuple(node_table.find(name) for name in names)
 
 
-def parameter_files(config: Path, run: Run) -> list[Path]:
-    """Return the files that every node gets, in ROS's order: a later one wins."""
-    place = run.place or config / PLACES[run.behaviour]
-    files = [config / 'parameters.yaml', place]
-    if run.parameters is not None:
-        files.append(run.parameters)
-    return [path.resolve() for path in files]
-
-
 def configuration(
     config: Path, run: Run, folder: Path | None = None, more: RosArguments | None = None
 ) -> Configuration:
@@ -190,7 +189,7 @@ def configuration(
     try:
         merged = _merged(config, run, folder, more)
         merged.check()
-        merged.place('simulator', full_name(run, 'simulator'))
+        merged.place('simulator', full_name(run.namespace, 'simulator'))
         _check_behaviour(merged, run)
     except YamlFileError as error:
         raise LaunchError(f'parameter file {error}') from None
@@ -202,51 +201,42 @@ def configuration(
 def _merged(
     config: Path, run: Run, folder: Path | None, more: RosArguments | None
 ) -> Configuration:
-    files = parameter_files(config, run)
-    layers = [file_layer(path) for path in files[:2]]
-    if run.behaviour == 'patrol':
-        # the place's file is for the simulator: the robot learns its map from the markers
-        origin = '--behaviour patrol'
-        layers.append(Layer(origin, (Entry('/**', 'map_source', 'markers', origin),)))
-    if folder is not None:
-        layers.append(Layer('this run', tuple(_folders_of(folder.resolve()))))
-    layers += [file_layer(path) for path in files[2:]]
-    layers += [file_layer(path) for path in (more.files if more else ())]
-    layers.append(Layer('the command line', tuple(_option_entries(run, folder))))
-    layers.append(argument_layer((*run.assignments, *(more.assignments if more else ()))))
-    return Configuration(tuple(layers))
+    files = [run.parameters] if run.parameters is not None else []
+    layers = run_layers(
+        config,
+        run.behaviour,
+        place=run.place,
+        chosen=_folders_of(folder.resolve()) if folder is not None else (),
+        files=[*files, *(Path(file) for file in (more.files if more else ()))],
+        options=_option_entries(run, folder),
+    )
+    assignments = (*run.assignments, *(more.assignments if more else ()))
+    return Configuration((*layers, argument_layer(assignments)))
 
 
 def _folders_of(folder: Path) -> Iterator[Entry]:
     """Yield where the nodes of a run write, if the user's file names no other place."""
     for name, part in (('ontologies_folder', ONTOLOGIES), ('store', STORE)):
-        yield Entry('/**/armor_server', name, str(folder / part), 'this run')
+        yield for_node('armor_server', name, str(folder / part), 'this run')
     for node in ('battery_controller', 'motion_controller'):
-        yield Entry(f'/**/{node}', 'state_file', str(folder / f'{node}.json'), 'this run')
+        yield for_node(node, 'state_file', str(folder / f'{node}.json'), 'this run')
 
 
 def _option_entries(run: Run, folder: Path | None) -> Iterator[Entry]:
     """Yield what the options say as parameters, for the nodes that they concern."""
-    node = f'/**/{BEHAVIOUR_NODE}'
-    if run.behaviour != 'surveillance':
-        yield Entry(node, 'behaviour', run.behaviour, f'--behaviour {run.behaviour}')
     if folder is not None:
-        yield Entry(node, 'record', str(folder / RECORD), 'this run')
-        yield Entry('/**/reasoner', 'record', str(folder / RECORD), 'this run')
-        yield Entry('/**/initial_state', 'record', str(folder / RECORD), 'this run')
+        yield from record_entries(folder / RECORD)
         yield from _observer_entries(run, folder)
     # Without one that was asked for, the mode is what the parameter files say.
     if run.mode:
-        for each in node_table.NODES:
-            if each.console:
-                yield Entry(f'/**/{each.name}', 'execution_mode', run.mode, f'--mode {run.mode}')
-                # In a whole run one console reads for all.
-                own = run.mode != 'MANUAL' or folder is None
-                yield Entry(f'/**/{each.name}', 'console', own, f'--mode {run.mode}')
+        # In a whole run one console reads for all.
+        yield from mode_entries(run.mode, prompts=run.mode != 'MANUAL' or folder is None)
 
 
 def _check_behaviour(merged: Configuration, run: Run) -> None:
-    given = merged.resolve(BEHAVIOUR_NODE, full_name(run, BEHAVIOUR_NODE)).get('behaviour')
+    given = merged.resolve(BEHAVIOUR_NODE, full_name(run.namespace, BEHAVIOUR_NODE)).get(
+        'behaviour'
+    )
     if given is not None and given.value != run.behaviour:
         raise LaunchError(
             f'{given.origin}: behaviour {given.value}, but the run is one of {run.behaviour}: '
@@ -279,53 +269,26 @@ def with_mode_of(run: Run, merged: Configuration) -> Run:
     modes = set()
     for node in node_table.NODES:
         if node.name in node_table.RUN_NODES and node.console:
-            setting = merged.resolve(node.name, full_name(run, node.name)).get('execution_mode')
+            setting = merged.resolve(node.name, full_name(run.namespace, node.name)).get(
+                'execution_mode'
+            )
             modes.add(setting.value if setting is not None else node_table.DEFAULT_MODE)
     mode = modes.pop()
     return run if modes or mode == node_table.DEFAULT_MODE else replace(run, mode=mode)
 
 
-def full_name(run: Run, node: str) -> str:
-    """Return a node's name in the graph of a run."""
-    namespace = (run.namespace or '').strip('/')
-    return f'/{namespace}/{node}' if namespace else f'/{node}'
-
-
 def _observer_entries(run: Run, folder: Path) -> Iterator[Entry]:
     """Yield what the recorder and the page are told."""
-    recorder, page, origin = f'/**/{RECORDER}', f'/**/{PAGE}', 'this run'
-    yield Entry(recorder, 'folder', str(folder / RECORDING), origin)
-    yield Entry(recorder, 'keep', float(run.keep), '--keep')
+    yield for_node(RECORDER, 'folder', str(folder / RECORDING), 'this run')
+    yield for_node(RECORDER, 'keep', float(run.keep), '--keep')
     if run.web or run.web_control:
-        yield Entry(page, 'control', run.web_control, '--web-control')
+        yield for_node(PAGE, 'control', run.web_control, '--web-control')
         # Made here, so that a page that is started again keeps it.
-        yield Entry(page, 'token', secrets.token_urlsafe(24), origin)
+        yield for_node(PAGE, 'token', secrets.token_urlsafe(24), 'this run')
     if run.web_address is not None:
         host, _, port = run.web_address.rpartition(':')
-        yield Entry(page, 'host', host.strip('[]') or '127.0.0.1', '--web-address')
-        yield Entry(page, 'port', int(port), '--web-address')
-
-
-def write_parameters(
-    folder: Path, run: Run, merged: Configuration, nodes: Sequence[node_table.Node]
-) -> dict[str, Path]:
-    """Write one file for each node with all its parameters and where each came from.
-
-    Raises:
-        LaunchError: A file cannot be written.
-    """
-    files = {}
-    for node in nodes:
-        path = folder / f'{node.name}.yaml'
-        try:
-            folder.mkdir(exist_ok=True)
-            path.touch(mode=0o600)  # the page's token may be in it
-            name = full_name(run, node.name)
-            path.write_text(resolved_text(name, merged.resolve(node.name, name)), 'utf-8')
-        except OSError as error:
-            raise LaunchError(f'{path}: cannot be written: {error.strerror}') from None
-        files[node.name] = path
-    return files
+        yield for_node(PAGE, 'host', host.strip('[]') or '127.0.0.1', '--web-address')
+        yield for_node(PAGE, 'port', int(port), '--web-address')
 
 
 def parameters_in_memory(name: str, settings: Mapping[str, Setting]) -> Path:
@@ -497,44 +460,12 @@ def run_mission(run: Run, config: Path, runs: Path, resume: Path | None = None) 
     deleted = run_folder.prune(runs, run.keep * 1e9)
     state = run_folder.RunState(folder, options_of(run))
     merged = configuration(config, run, folder)
-    files = write_parameters(folder / 'parameters', run, merged, (*nodes, *observers))
-    environ = node_environ(run, folder / 'ros')
-    manual = run.mode == 'MANUAL'
-    if run.composed:
-        own = [files[node.name] for node in nodes]
-        words = command(nodes, _merged_arguments(own, run), os.getpid())
-        # Everything together may hold what the nodes may hold by themselves, and shares much.
-        memory = run.memory * 2**20 * COMPOSED_SHARE
-        programs = [
-            Program(COMPOSED, words, environ, takes_input=manual, watched=True, memory=memory)
-        ]
-    else:
-        programs = [
-            Program(
-                node.name,
-                command([node], _merged_arguments([files[node.name]], run), os.getpid()),
-                environ,
-                takes_input=node.name == node_table.CONSOLE,
-                leads=node.name == BEHAVIOUR_NODE,
-                says_up=True,
-                watched=True,
-                memory=run.memory * 2**20,
-            )
-            for node in nodes
-        ]
-    place = parameter_files(config, run)[1]
+    everyone = (*nodes, *observers)
+    files = write_parameters(folder / 'parameters', run.namespace, merged, everyone)
+    programs = _programs(run, nodes, observers, files, node_environ(run, folder / 'ros'))
+    place = place_file(config, run.behaviour, run.place)
     shutil.copyfile(place, folder / PLACE)
-    # What only listens shares a process; the page, which strangers talk to, has its own.
-    for together in ((RECORDER, MARKERS), (PAGE,)):
-        if members := [node for node in observers if node.name in together]:
-            own = [files[node.name] for node in members]
-            words = command(members, _merged_arguments(own, run), os.getpid())
-            observer = Program(members[0].name, words, environ, says_up=True, watched=True)
-            programs.append(replace(observer, memory=run.memory * 2**20))
-    names = [
-        *(node.name for node in (*nodes, *observers)),
-        *([COMPOSED] if run.composed else []),
-    ]
+    names = [*(node.name for node in everyone), *([COMPOSED] if run.composed else [])]
     log = MergedLog(None, names, path=folder / 'launch.log')
     log.say(
         f'{run.behaviour} in mode {run.mode or node_table.DEFAULT_MODE}, '
@@ -550,7 +481,67 @@ def run_mission(run: Run, config: Path, runs: Path, resume: Path | None = None) 
     log.say(f'watch it in a second terminal: {watch_command(run)}')
     call = alarm_caller(run.alarm, log)
     log.listen(lambda name, text: call(text) if name == BEHAVIOUR_NODE and HELP in text else None)
-    supervisor = Supervisor(programs, log, on_trouble=call)
+    code = _supervised(run, nodes, Supervisor(programs, log, on_trouble=call), folder, log)
+    for line in what_to_look_at(folder):
+        log.plain(line)
+    log.close()
+    state.end()
+    for descriptor in claims:
+        os.close(descriptor)
+    return code
+
+
+def _programs(
+    run: Run,
+    nodes: Sequence[node_table.Node],
+    observers: Sequence[node_table.Node],
+    files: Mapping[str, Path],
+    environ: Mapping[str, str],
+) -> list[Program]:
+    """Return the processes of a run, each with the nodes that share it."""
+
+    def program(members: Sequence[node_table.Node]) -> Program:
+        own = [files[node.name] for node in members]
+        words = command(members, _merged_arguments(own, run), os.getpid())
+        memory = run.memory * 2**20
+        return Program(members[0].name, words, environ, says_up=True, watched=True, memory=memory)
+
+    if run.composed:
+        everything = program(nodes)
+        programs = [
+            replace(
+                everything,
+                name=COMPOSED,
+                takes_input=run.mode == 'MANUAL',
+                says_up=False,
+                # Together they may hold what each may hold by itself, and share much.
+                memory=everything.memory * COMPOSED_SHARE,
+            )
+        ]
+    else:
+        programs = [
+            replace(
+                program([node]),
+                takes_input=node.name == node_table.CONSOLE,
+                leads=node.name == BEHAVIOUR_NODE,
+            )
+            for node in nodes
+        ]
+    # What only listens shares a process; the page, which strangers talk to, has its own.
+    for together in ((RECORDER, MARKERS), (PAGE,)):
+        if members := [node for node in observers if node.name in together]:
+            programs.append(program(members))
+    return programs
+
+
+def _supervised(
+    run: Run,
+    nodes: Sequence[node_table.Node],
+    supervisor: Supervisor,
+    folder: Path,
+    log: MergedLog,
+) -> int:
+    """Run the processes to the end, print the summary; return the exit code."""
     console = None
     if any(node.name == node_table.CONSOLE for node in nodes):
         from launcher.console import OperatorConsole
@@ -568,12 +559,6 @@ def run_mission(run: Run, config: Path, runs: Path, resume: Path | None = None) 
         log.plain(done)
         if supervisor.time_is_over and done == NOTHING_RECORDED:
             code = code or EXIT_NOTHING_DONE
-    for line in what_to_look_at(folder):
-        log.plain(line)
-    log.close()
-    state.end()
-    for descriptor in claims:
-        os.close(descriptor)
     return code
 
 

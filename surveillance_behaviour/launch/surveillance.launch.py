@@ -9,6 +9,9 @@ Arguments: `mode`, `behaviour`, `map`, `params`, `record`, `namespace`, `log_lev
 
 from __future__ import annotations
 
+import atexit
+import shutil
+import tempfile
 from pathlib import Path
 
 from ament_index_python.packages import get_package_share_directory
@@ -18,35 +21,38 @@ from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
 from launch import LaunchContext, LaunchDescription
-from surveillance_runtime.configuration import Configuration, file_layer
-from surveillance_runtime.place import read_place_file
+from surveillance_runtime.configuration import Configuration
+from surveillance_runtime.node_table import (
+    BEHAVIOURS,
+    DEFAULT_MODE,
+    LOG_LEVELS,
+    MODES,
+    find,
+    select,
+)
+from surveillance_runtime.run_parameters import (
+    full_name,
+    mode_entries,
+    record_entries,
+    run_layers,
+    write_parameters,
+)
 
-# Executables of each package, by what brings them in.
-ALWAYS = {
-    'surveillance_behaviour': ['robot_behavior'],
-    'surveillance_ontology': ['armor_server', 'ontology_map_builder'],
-    'surveillance_controllers': ['battery_controller', 'planner_controller', 'motion_controller'],
-}
-PATROL = {
-    'surveillance_behaviour': ['reasoner', 'initial_state'],
-    'surveillance_perception': ['aruco_detector', 'marker_server', 'arm_controller'],
-}
-SIMULATION = {'surveillance_simulation': ['simulator']}
 EXIT_CANNOT_START = 2
-PLACES = {'surveillance': 'seven_rooms.yaml', 'patrol': 'patrol_world.yaml'}
+MARKERS = 'mission_markers'
 
 ARGUMENTS = [
     DeclareLaunchArgument(
         'mode',
-        default_value='SIMULATED',
-        choices=['SIMULATED', 'RANDOM', 'MANUAL'],
+        default_value=DEFAULT_MODE,
+        choices=list(MODES),
         description='How the controllers work. For MANUAL start the prompt in a terminal of its '
-        'own: ros2 run surveillance_controllers console',
+        'own: ros2 run surveillance_operator console',
     ),
     DeclareLaunchArgument(
         'behaviour',
-        default_value='surveillance',
-        choices=['surveillance', 'patrol'],
+        default_value=BEHAVIOURS[0],
+        choices=list(BEHAVIOURS),
         description='The state machine that patrols.',
     ),
     DeclareLaunchArgument(
@@ -55,65 +61,56 @@ ARGUMENTS = [
     DeclareLaunchArgument('params', default_value='', description='Further parameter file.'),
     DeclareLaunchArgument('record', default_value='', description='File for the mission record.'),
     DeclareLaunchArgument('namespace', default_value='', description='Namespace of all nodes.'),
-    DeclareLaunchArgument('log_level', default_value='info', description='Least severity logged.'),
+    DeclareLaunchArgument(
+        'log_level',
+        default_value='info',
+        choices=list(LOG_LEVELS),
+        description='Least severity logged.',
+    ),
 ]
 
 
 def start_nodes(context: LaunchContext) -> list[Node]:
-    """Return the nodes that the arguments ask for, each with the parameter files and started
-    again.
+    """Return the nodes that the arguments ask for, each with one file of parameters.
+
+    Raises:
+        ParameterError, YamlFileError: One line about the first thing that is wrong with the
+            parameters or the place; then no node is started.
     """
-
-    def argument(name: str) -> str:
-        return str(LaunchConfiguration(name).perform(context))
-
-    mode, behaviour = argument('mode'), argument('behaviour')
-    config = Path(get_package_share_directory('surveillance_behaviour'), 'config')
-    files = [str(config / 'parameters.yaml'), argument('map') or str(config / PLACES[behaviour])]
-    files += [argument('params')] if argument('params') else []
-    check(files)
-    parts = [ALWAYS]
-    if behaviour == 'patrol':
-        parts.append(PATROL)
-    if behaviour == 'patrol' or mode == 'SIMULATED':
-        parts.append(SIMULATION)
-    own: dict[str, dict[str, object]] = {
-        'robot_behavior': {'behaviour': behaviour, 'record': argument('record')},
-        'reasoner': {'record': argument('record')},
-        'initial_state': {'record': argument('record')},
-    }
-    for controller in ALWAYS['surveillance_controllers']:
-        own[controller] = {'execution_mode': mode, 'console': False}
+    given = {each.name: LaunchConfiguration(each.name).perform(context) for each in ARGUMENTS}
+    mode, behaviour, namespace = given['mode'], given['behaviour'], given['namespace']
+    record = record_entries(Path(given['record'])) if given['record'] else ()
+    merged = Configuration(
+        run_layers(
+            Path(get_package_share_directory('surveillance_behaviour'), 'config'),
+            behaviour,
+            place=Path(given['map']) if given['map'] else None,
+            files=[Path(given['params'])] if given['params'] else [],
+            options=[*mode_entries(mode, prompts=False), *record],
+        )
+    )
+    merged.check()
+    merged.place('simulator', full_name(namespace, 'simulator'))
+    folder = Path(tempfile.mkdtemp(prefix='surveillance-'))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    nodes = (*select(mode, behaviour), find(MARKERS))
+    files = write_parameters(folder, namespace, merged, nodes)
     return [
         Node(
-            package=package,
-            executable=name,
-            name=name,
-            namespace=argument('namespace'),
-            parameters=[*files, own.get(name, {})],
-            ros_arguments=['--log-level', argument('log_level')],
+            package=node.package,
+            executable=node.name,
+            name=node.name,
+            namespace=namespace,
+            parameters=[str(files[node.name])],
+            ros_arguments=['--log-level', given['log_level']],
             output='screen',
             emulate_tty=True,
             respawn=True,
             respawn_delay=1.0,
             on_exit=stop_if_unusable,
         )
-        for part in parts
-        for package, names in part.items()
-        for name in names
+        for node in nodes
     ]
-
-
-def check(files: list[str]) -> None:
-    """Look at all parameters and the place before a node starts, as `launch.py` does.
-
-    Raises:
-        ParameterError, YamlFileError: One line about the first thing that is wrong.
-    """
-    read_place_file(files[1])
-    merged = Configuration(tuple(file_layer(path) for path in files))
-    merged.check()
-    merged.place()
 
 
 def stop_if_unusable(event: ProcessExited, _context: LaunchContext) -> list[Shutdown] | None:

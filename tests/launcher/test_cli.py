@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from launcher.cli import main, make_parser, runs_folder
-from launcher.node_table import NODES
+from surveillance_runtime.node_table import NODES
 from tests.launcher.conftest import ROOT
 
 

@@ -8,9 +8,9 @@ import signal
 import pytest
 
 from launcher.instance_lock import claim, runtime_folder
-from launcher.node_table import select
 from launcher.run import Run, ros_domain
 from launcher.system import LaunchError
+from surveillance_runtime.node_table import select
 
 RANDOM = select('RANDOM')
 

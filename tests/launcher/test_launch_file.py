@@ -1,61 +1,150 @@
-"""The launch file for an installed ROS starts what `launch.py` starts."""
+"""The launch file for an installed ROS starts what `launch.py` starts, with the same values.
+
+`launch` and `launch_ros` are in no Python package index: stand-ins take the calls, with the names
+that the originals give to their arguments.
+"""
 
 from __future__ import annotations
 
-import ast
+import dataclasses
+import runpy
+import sys
+import types
+from pathlib import Path
+from typing import Any
 
 import pytest
 
-from launcher.node_table import BEHAVIOURS, DEFAULT_MODE, MODES, select
-from launcher.run import PLACES
+from launcher.run import Run, configuration
+from surveillance_runtime.configuration import Configuration, file_layer
+from surveillance_runtime.node_table import BEHAVIOURS, MODES, find, select
+from surveillance_runtime.parameters import ParameterError
+from surveillance_runtime.yaml_file import YamlFileError
 from tests.launcher.conftest import ROOT
 
 SOURCE = ROOT / 'surveillance_behaviour' / 'launch' / 'surveillance.launch.py'
+PER_RUN = {'record', 'console', 'ontologies_folder', 'store', 'state_file'}
 
 
-@pytest.fixture(scope='module')
-def tree() -> ast.Module:
-    return ast.parse(SOURCE.read_text())
+@dataclasses.dataclass
+class Argument:
+    name: str
+    default_value: str
+    description: str
+    choices: list[str] | None = None
 
 
-@pytest.fixture(scope='module')
-def constants(tree) -> dict[str, object]:
-    found = {}
-    for statement in tree.body:
-        if isinstance(statement, ast.Assign) and isinstance(statement.targets[0], ast.Name):
-            try:
-                found[statement.targets[0].id] = ast.literal_eval(statement.value)
-            except ValueError:
-                continue
-    return found
+@dataclasses.dataclass
+class StartedNode:
+    package: str
+    executable: str
+    name: str
+    namespace: str
+    parameters: list[str]
+    ros_arguments: list[str]
+    output: str
+    emulate_tty: bool
+    respawn: bool
+    respawn_delay: float
+    on_exit: Any
+
+
+@dataclasses.dataclass
+class Configured:
+    name: str
+
+    def perform(self, context: dict[str, str]) -> str:
+        return context[self.name]
+
+
+@pytest.fixture
+def start(monkeypatch, tmp_path):
+    """Return what runs the launch file with some arguments and gives the nodes it starts."""
+    stand_ins = {
+        'launch': {'LaunchContext': dict, 'LaunchDescription': list},
+        'launch.actions': {
+            'DeclareLaunchArgument': Argument,
+            'OpaqueFunction': lambda function: function,
+            'Shutdown': lambda reason: reason,
+        },
+        'launch.events': {},
+        'launch.events.process': {'ProcessExited': types.SimpleNamespace},
+        'launch.substitutions': {'LaunchConfiguration': Configured},
+        'launch_ros': {},
+        'launch_ros.actions': {'Node': StartedNode},
+        'ament_index_python': {},
+        'ament_index_python.packages': {'get_package_share_directory': lambda _: str(ROOT)},
+    }
+    for name, content in stand_ins.items():
+        module = types.ModuleType(name)
+        vars(module).update(content)
+        monkeypatch.setitem(sys.modules, name, module)
+    monkeypatch.setattr('tempfile.mkdtemp', lambda **_: str(tmp_path))
+
+    def run(**given: str) -> list[StartedNode]:
+        description = runpy.run_path(str(SOURCE))['generate_launch_description']()
+        *arguments, opaque = description
+        values = {each.name: each.default_value for each in arguments}
+        for each in arguments:
+            assert each.choices is None or given.get(each.name, each.default_value) in each.choices
+        return opaque({**values, **given})
+
+    return run
+
+
+def settings(node: StartedNode) -> dict[str, object]:
+    """Return what a node reads from its file."""
+    full_name = f'{node.namespace}/{node.name}' if node.namespace else f'/{node.name}'
+    merged = Configuration((file_layer(node.parameters[0]),))
+    return {name: each.value for name, each in merged.resolve(node.name, full_name).items()}
 
 
 @pytest.mark.parametrize('behaviour', BEHAVIOURS)
 @pytest.mark.parametrize('mode', MODES)
-def test_it_starts_the_same_nodes(constants, mode, behaviour):
-    parts = [constants['ALWAYS']]
-    if behaviour == 'patrol':
-        parts.append(constants['PATROL'])
-    if behaviour == 'patrol' or mode == 'SIMULATED':
-        parts.append(constants['SIMULATION'])
-    listed = {(package, name) for part in parts for package in part for name in part[package]}
-    assert listed == {(node.package, node.name) for node in select(mode, behaviour)}
+def test_it_starts_the_same_nodes_with_the_same_values(start, mode, behaviour):
+    started = start(mode=mode, behaviour=behaviour)
+    wanted = (*select(mode, behaviour), find('mission_markers'))
+    assert [(n.package, n.executable) for n in started] == [(n.package, n.name) for n in wanted]
+    merged = configuration(ROOT / 'config', Run(mode=mode, behaviour=behaviour))
+    for node in started:
+        same = {
+            name: each.value
+            for name, each in merged.resolve(node.name, f'/{node.name}').items()
+            if name not in PER_RUN
+        }
+        assert {k: v for k, v in settings(node).items() if k not in PER_RUN} == same
 
 
-def test_it_knows_the_same_places(constants):
-    assert constants['PLACES'] == PLACES
+def test_the_users_place_parameters_record_and_namespace_reach_the_nodes(start, tmp_path):
+    own = tmp_path / 'own.yaml'
+    own.write_text('/**: {ros__parameters: {urgency_threshold: 33}}')
+    office = str(ROOT / 'config' / 'office.yaml')
+    nodes = start(map=office, params=str(own), record='/tmp/it.jsonl', namespace='/robot1')
+    by_name = {node.name: settings(node) for node in nodes}
+    assert by_name['robot_behavior']['record'] == '/tmp/it.jsonl'
+    assert 33 in [values.get('urgency_threshold') for values in by_name.values()]
+    assert 'office.yaml' in Path(nodes[1].parameters[0]).read_text()
 
 
-def test_its_arguments_have_the_same_values_and_defaults(tree):
-    arguments = {}
-    for call in ast.walk(tree):
-        if isinstance(call, ast.Call) and getattr(call.func, 'id', '') == 'DeclareLaunchArgument':
-            name = ast.literal_eval(call.args[0])
-            arguments[name] = {k.arg: ast.literal_eval(k.value) for k in call.keywords}
-    assert arguments['mode']['default_value'] == DEFAULT_MODE
-    assert set(arguments['mode']['choices']) == set(MODES)
-    assert set(arguments['behaviour']['choices']) == set(BEHAVIOURS)
-    assert all(argument['description'] for argument in arguments.values())
+@pytest.mark.parametrize(
+    ('given', 'error', 'said'),
+    [
+        ({'map': '/no.yaml'}, YamlFileError, r'/no.yaml: .*No such file'),
+        ({'params': 'TYPO'}, ParameterError, r'own.yaml:1: .*urgency_treshold.*urgency_threshold'),
+    ],
+)
+def test_what_is_wrong_is_said_before_a_node_starts(start, tmp_path, given, error, said):
+    own = tmp_path / 'own.yaml'
+    own.write_text('/**: {ros__parameters: {urgency_treshold: 33}}')
+    with pytest.raises(error, match=said):
+        start(**{key: str(own) if value == 'TYPO' else value for key, value in given.items()})
+
+
+def test_a_node_that_cannot_start_ends_the_launch_and_another_one_does_not(start):
+    on_exit = start()[0].on_exit
+    refused = types.SimpleNamespace(returncode=2, process_name='armor_server-1')
+    assert on_exit(refused, {}) == ['armor_server-1 cannot start as it is configured']
+    assert on_exit(types.SimpleNamespace(returncode=-9, process_name='armor_server-1'), {}) is None
 
 
 def test_it_is_installed_with_the_parameter_files():

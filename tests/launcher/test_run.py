@@ -12,7 +12,6 @@ import yaml
 
 from launcher.cli import CONFIG, make_parser, wanted_run
 from launcher.log_merge import MergedLog
-from launcher.node_table import DEFAULT_MODE
 from launcher.run import (
     MARKERS,
     PAGE,
@@ -25,17 +24,17 @@ from launcher.run import (
     configuration,
     node_environ,
     options_of,
-    parameter_files,
     resumed,
     ros_arguments,
     run_from,
     summary,
     watch_command,
     with_mode_of,
-    write_parameters,
 )
 from launcher.run_folder import RunState, make_folder
 from surveillance_behaviour.mission.mission_log import MissionRecord
+from surveillance_runtime.node_table import DEFAULT_MODE
+from surveillance_runtime.run_parameters import place_file, run_layers, write_parameters
 
 
 def error_of(run: Run) -> str:
@@ -92,17 +91,18 @@ def test_a_missing_or_binary_parameter_file_is_named(tmp_path):
 def test_every_place_and_parameter_file_of_the_project_can_be_run():
     for behaviour in ('surveillance', 'patrol'):
         run = Run(behaviour=behaviour)
-        files = parameter_files(CONFIG, run)
-        assert all(file.exists() for file in files)
-        Run(place=files[1]).check()
+        configuration(CONFIG, run)
+        Run(place=place_file(CONFIG, behaviour)).check()
     Run(parameters=CONFIG / 'parameters.yaml').check()
 
 
 def test_the_users_file_comes_after_the_projects_and_the_launchers_own_last(tmp_path):
     own = tmp_path / 'own.yaml'
-    run = Run(parameters=own, place=tmp_path / 'place.yaml')
-    names = [path.name for path in parameter_files(CONFIG, run)]
-    assert names == ['parameters.yaml', 'place.yaml', 'own.yaml']
+    own.write_text('/**: {ros__parameters: {}}')
+    place = CONFIG / 'office.yaml'
+    layers = run_layers(CONFIG, 'surveillance', place=place, files=[own])
+    sources = [Path(layer.source).name for layer in layers]
+    assert sources == ['parameters.yaml', 'office.yaml', 'this run', 'own.yaml', 'options']
 
 
 def settings_of(node: str, run: Run) -> dict[str, object]:
@@ -141,7 +141,7 @@ def test_an_assignment_that_no_started_node_takes_is_refused():
 
 
 def test_the_default_mode_stands_in_the_first_file_and_for_all_nodes():
-    first = parameter_files(CONFIG, Run())[0]
+    first = CONFIG / 'parameters.yaml'
     every = yaml.safe_load(first.read_text())['/**']['ros__parameters']
     assert every['execution_mode'] == DEFAULT_MODE
 
@@ -149,8 +149,8 @@ def test_the_default_mode_stands_in_the_first_file_and_for_all_nodes():
 def test_a_run_folder_on_a_full_disk_is_named(tmp_path):
     (tmp_path / 'armor_server.yaml').symlink_to('/dev/full')
     run = Run()
-    with pytest.raises(LaunchError, match=r'armor_server.yaml: cannot be written: No space left'):
-        write_parameters(tmp_path, run, configuration(CONFIG, run), run.nodes())
+    with pytest.raises(OSError, match=r'cannot be written: No space left.*armor_server.yaml'):
+        write_parameters(tmp_path, None, configuration(CONFIG, run), run.nodes())
 
 
 @pytest.mark.parametrize('composed', [False, True])

@@ -2,8 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from launcher.node_table import DEFAULT_MODE, MODES, NODES, find, select
-from launcher.system import LaunchError
+from surveillance_runtime.node_table import DEFAULT_MODE, MODES, NODES, find, select
 from tests.launcher.conftest import ROOT
 
 SEED = {
@@ -53,15 +52,15 @@ def test_only_and_without():
         'video_source',
     ]
     assert set(names('RANDOM', without=['motion_controller'])) == SEED - {'motion_controller'}
-    with pytest.raises(LaunchError, match='no node is left'):
+    with pytest.raises(ValueError, match='no node is left'):
         select('RANDOM', only=['armor_server'], without=['armor_server'])
 
 
 @pytest.mark.parametrize('options', [{'only': ['armour']}, {'without': ['armour']}])
 def test_an_unknown_name_is_told_with_the_known_ones(options):
-    with pytest.raises(LaunchError, match=r"unknown node 'armour'.*armor_server"):
+    with pytest.raises(ValueError, match=r"unknown node 'armour'.*armor_server"):
         select('RANDOM', **options)
-    with pytest.raises(LaunchError, match="'x'"):
+    with pytest.raises(ValueError, match="'x'"):
         find('x')
 
 

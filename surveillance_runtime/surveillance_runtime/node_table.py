@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from launcher.system import LaunchError
-
 MODES = ('SIMULATED', 'RANDOM', 'MANUAL')
 DEFAULT_MODE = 'SIMULATED'
 BEHAVIOURS = ('surveillance', 'patrol')
@@ -183,12 +181,12 @@ def find(name: str) -> Node:
     """Return the node called `name`.
 
     Raises:
-        LaunchError: there is no such node.
+        ValueError: there is no such node.
     """
     try:
         return BY_NAME[name]
     except KeyError:
-        raise LaunchError(f'unknown node {name!r}: expected one of {", ".join(BY_NAME)}') from None
+        raise ValueError(f'unknown node {name!r}: expected one of {", ".join(BY_NAME)}') from None
 
 
 def select(
@@ -206,7 +204,7 @@ def select(
         without: nodes to leave out, because they run elsewhere.
 
     Raises:
-        LaunchError: an unknown name, or nothing is left to start.
+        ValueError: an unknown name, or nothing is left to start.
     """
     wanted = {find(name).name for name in only}
     left_out = {find(name).name for name in without}
@@ -218,5 +216,5 @@ def select(
             wanted.add('simulator')
     chosen = tuple(node for node in NODES if node.name in wanted - left_out)
     if not chosen:
-        raise LaunchError('no node is left to start: check --only and --without')
+        raise ValueError('no node is left to start: check --only and --without')
     return chosen

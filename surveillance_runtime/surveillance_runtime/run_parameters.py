@@ -1,0 +1,120 @@
+"""The parameters of one run of the robot: where they come from, and which source wins.
+
+Weakest first: `parameters.yaml`, the place's file, what the behaviour needs, what the run itself
+chooses, the user's files, the options. `launch.py` and the launch file for an installed ROS use
+this alike, so that a robot gets the same values from both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+
+from surveillance_runtime.configuration import (
+    Configuration,
+    Entry,
+    Layer,
+    file_layer,
+    resolved_text,
+)
+from surveillance_runtime.node_table import NODES, Node
+
+BEHAVIOUR_NODE = 'robot_behavior'
+PLACES = {'surveillance': 'seven_rooms.yaml', 'patrol': 'patrol_world.yaml'}
+
+
+def place_file(config: Path, behaviour: str, place: Path | None = None) -> Path:
+    """Return the file of the place: the one that is asked for, else the behaviour's own."""
+    return (place or config / PLACES[behaviour]).resolve()
+
+
+def run_layers(
+    config: Path,
+    behaviour: str,
+    *,
+    place: Path | None = None,
+    chosen: Iterable[Entry] = (),
+    files: Iterable[Path] = (),
+    options: Iterable[Entry] = (),
+) -> tuple[Layer, ...]:
+    """Return the sources of a run's parameters, the weakest first.
+
+    Args:
+        config: The folder with `parameters.yaml` and the places.
+        behaviour: One of `node_table.BEHAVIOURS`.
+        place: The file of the place, None for the behaviour's own.
+        chosen: What the run chooses where the user says nothing, as the folders that it writes to.
+        files: The user's parameter files; a later one wins.
+        options: What options say as parameters.
+
+    Raises:
+        YamlFileError, ParameterError: A file cannot be used.
+    """
+    layers = [file_layer(config / 'parameters.yaml')]
+    layers.append(file_layer(place_file(config, behaviour, place)))
+    if behaviour == 'patrol':
+        # The place's file is for the simulator: the robot learns its map from the markers.
+        origin = '--behaviour patrol'
+        layers.append(Layer(origin, (Entry('/**', 'map_source', 'markers', origin),)))
+    layers.append(Layer('this run', tuple(chosen)))
+    layers += [file_layer(path.resolve()) for path in files]
+    layers.append(Layer('options', (*_behaviour_entries(behaviour), *options)))
+    return tuple(layers)
+
+
+def _behaviour_entries(behaviour: str) -> Iterator[Entry]:
+    if behaviour != 'surveillance':
+        yield for_node(BEHAVIOUR_NODE, 'behaviour', behaviour, f'--behaviour {behaviour}')
+
+
+def mode_entries(mode: str, *, prompts: bool) -> Iterator[Entry]:
+    """Yield what a mode means to the nodes that have one.
+
+    Args:
+        mode: One of `node_table.MODES`.
+        prompts: Whether each of them may ask at a prompt of its own.
+    """
+    for node in NODES:
+        if node.console:
+            yield for_node(node.name, 'execution_mode', mode, f'--mode {mode}')
+            yield for_node(node.name, 'console', prompts, f'--mode {mode}')
+
+
+def record_entries(record: Path) -> Iterator[Entry]:
+    """Yield where the nodes that write the mission's record find it."""
+    for node in (BEHAVIOUR_NODE, 'reasoner', 'initial_state'):
+        yield for_node(node, 'record', str(record), 'this run')
+
+
+def for_node(node: str, name: str, value: object, origin: str) -> Entry:
+    """Return the entry of one node's parameter, in whatever namespace the node is."""
+    return Entry(f'/**/{node}', name, value, origin)
+
+
+def full_name(namespace: str | None, node: str) -> str:
+    """Return a node's name in the graph."""
+    names = [*(namespace or '').strip('/').split('/'), node]
+    return '/' + '/'.join(name for name in names if name)
+
+
+def write_parameters(
+    folder: Path, namespace: str | None, merged: Configuration, nodes: Sequence[Node]
+) -> dict[str, Path]:
+    """Write one file for each node with all its parameters and where each came from.
+
+    Raises:
+        OSError: A file cannot be written.
+    """
+    files = {}
+    for node in nodes:
+        path = folder / f'{node.name}.yaml'
+        name = full_name(namespace, node.name)
+        try:
+            folder.mkdir(exist_ok=True)
+            path.touch(mode=0o600)  # the page's token may be in it
+            path.write_text(resolved_text(name, merged.resolve(node.name, name)), 'utf-8')
+        except OSError as error:
+            why = f'cannot be written: {error.strerror}'
+            raise OSError(error.errno, why, str(path)) from None
+        files[node.name] = path
+    return files
