@@ -40,7 +40,7 @@ from surveillance_ontology.owl.axioms import (  # noqa: E402
     Axiom,
     Declaration,
 )
-from surveillance_ontology.reasoner.cases import NotAskableError  # noqa: E402
+from surveillance_ontology.reasoner.cases import UnsupportedError  # noqa: E402
 
 BASE = 'http://example.org/'
 ENDINGS = ('.owl', '.rdf', '.ttl', '.ofn', '.owx', '.nt')
@@ -63,7 +63,7 @@ def follows(kb: KnowledgeBase, axiom: Axiom) -> bool | None:
     """Tell whether an axiom follows; None where that cannot be asked for."""
     try:
         return kb.entails(axiom)
-    except NotAskableError:
+    except UnsupportedError:
         return None
 
 

@@ -22,16 +22,12 @@ from surveillance_ontology.armor_client import (
     ArmorServiceInternalError,
     FactSubscription,
 )
-from surveillance_ontology.patrol_ontology import DOORS, PatrolOntology
+from surveillance_ontology.patrol_ontology import DOORS, OntologyNotReadyError, PatrolOntology
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import STATE_QOS
 
 RETRY_PERIOD = 0.1
 """Pause before the ontology is asked again where the robot is, seconds."""
-
-
-class KnowledgeError(Exception):
-    """Map or ontology do not answer, or not what is needed; the text is one line."""
 
 
 class MapKnowledge:
@@ -71,7 +67,7 @@ class MapKnowledge:
             Shape (3,), metres, world frame.
 
         Raises:
-            KnowledgeError: The map does not answer.
+            OntologyNotReadyError: The map does not answer.
         """
         request = RoomPosition.Request(room_name=place)
         with answered():
@@ -85,11 +81,11 @@ class MapKnowledge:
         """Return the point of a place that the robot can reach, shape (3,), metres, world frame.
 
         Raises:
-            KnowledgeError: The map has no such place, or does not answer.
+            OntologyNotReadyError: The map has no such place, or does not answer.
         """
         point = self.find_position(place, interrupt)
         if point is None:
-            raise KnowledgeError(f'the map has no place {place!r}')
+            raise OntologyNotReadyError(f'the map has no place {place!r}')
         return point
 
     # --- what the ontology knows ---
@@ -98,7 +94,7 @@ class MapKnowledge:
         """Return the ontology, once the map is built.
 
         Raises:
-            KnowledgeError: It is not built within the deadline.
+            OntologyNotReadyError: It is not built within the deadline.
         """
         with self._connecting, answered():
             if self._ontology is None:
@@ -129,7 +125,7 @@ class MapKnowledge:
             on_change: Is called after the change is known here: `doors` has it.
 
         Raises:
-            KnowledgeError: The map is not built yet.
+            OntologyNotReadyError: The map is not built yet.
         """
         self.connect(interrupt)
         self._on_doors.append(on_change)
@@ -145,7 +141,7 @@ class MapKnowledge:
                 the ontology was loaded or dropped.
 
         Raises:
-            KnowledgeError: The map is not built yet.
+            OntologyNotReadyError: The map is not built yet.
         """
         pattern = self.connect(interrupt).robot_place_facts
         assert self._armor is not None
@@ -157,7 +153,7 @@ class MapKnowledge:
         """Return the places that each door leads into, as the ontology has them now.
 
         Raises:
-            KnowledgeError: The ontology does not answer.
+            OntologyNotReadyError: The ontology does not answer.
         """
         self.connect(interrupt)
         subscription = self._doors
@@ -168,7 +164,9 @@ class MapKnowledge:
             with self._changed:
                 while not (facts := subscription.facts):
                     if interrupt.is_set() or not self._changed.wait(deadline - time.monotonic()):
-                        raise KnowledgeError(f'the ontology named no door in {self._timeout:g} s')
+                        raise OntologyNotReadyError(
+                            f'the ontology named no door in {self._timeout:g} s'
+                        )
         finally:
             unsubscribe()
         rooms_of: dict[str, set[str]] = {}
@@ -181,7 +179,7 @@ class MapKnowledge:
         """Return every place with its point.
 
         Raises:
-            KnowledgeError: Map or ontology do not answer.
+            OntologyNotReadyError: Map or ontology do not answer.
         """
         names = {place for places in self.doors(interrupt).values() for place in places}
         for name in names ^ self._known.keys():
@@ -197,7 +195,7 @@ class MapKnowledge:
         """Return the place that the robot is in, from whoever knows it, or else from the ontology.
 
         Raises:
-            KnowledgeError: Nobody knows within the deadline, or the ontology does not answer.
+            OntologyNotReadyError: Nobody knows within the deadline, or there is no answer.
         """
         deadline = time.monotonic() + self._timeout
         while not self._robot_place:
@@ -207,7 +205,7 @@ class MapKnowledge:
                 return found[0]
             if time.monotonic() >= deadline or interrupt.wait(RETRY_PERIOD):
                 what = f'several places: {", ".join(found)}' if found else 'no place'
-                raise KnowledgeError(f'the ontology has the robot in {what}')
+                raise OntologyNotReadyError(f'the ontology has the robot in {what}')
         return self._robot_place
 
     def _on_robot_place(self, message: RobotPlace) -> None:
@@ -225,8 +223,8 @@ class MapKnowledge:
 
 @contextmanager
 def answered() -> Iterator[None]:
-    """Turn what a peer did not answer into a `KnowledgeError`."""
+    """Turn what a peer did not answer into a `OntologyNotReadyError`."""
     try:
         yield
     except (CallError, ArmorServiceCallError, ArmorServiceInternalError) as error:
-        raise KnowledgeError(str(error)) from error
+        raise OntologyNotReadyError(str(error)) from error

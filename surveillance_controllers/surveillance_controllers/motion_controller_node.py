@@ -19,12 +19,13 @@ from surveillance_controllers.geometry import Points
 from surveillance_controllers.manual import commands
 from surveillance_controllers.manual.commands import MOTION, ParsedCommand
 from surveillance_controllers.manual.requests import CommandConsole, RequestQueue
-from surveillance_controllers.map_knowledge import KnowledgeError, MapKnowledge
+from surveillance_controllers.map_knowledge import MapKnowledge
 from surveillance_controllers.motion.arrival import MotionFailedError, place_reached
 from surveillance_controllers.motion.place_recording import PlaceRecorder
 from surveillance_controllers.stimuli import glide
 from surveillance_fsm.ros import GoalAbortedError, GoalRun, GoalServer
 from surveillance_interfaces.action import Control, FollowPath
+from surveillance_ontology.patrol_ontology import OntologyNotReadyError
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
 
@@ -129,7 +130,7 @@ class MotionController(PatrolNode):
             end = self._move(path, run, report, 'move through via points')
             if not run.interrupt.is_set():
                 self._arrive(path[-1], end, run)
-        except (MotionFailedError, KnowledgeError) as failure:
+        except (MotionFailedError, OntologyNotReadyError) as failure:
             if isinstance(failure, MotionFailedError):
                 end = failure.end
             point = conversions.point_from(path[0] if end is None else end)

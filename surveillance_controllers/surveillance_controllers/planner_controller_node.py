@@ -20,9 +20,10 @@ from surveillance_controllers.geometry import Points
 from surveillance_controllers.manual import commands
 from surveillance_controllers.manual.commands import PLANNER, ParsedCommand, Point3
 from surveillance_controllers.manual.requests import CommandConsole, RequestQueue
-from surveillance_controllers.map_knowledge import KnowledgeError, MapKnowledge
+from surveillance_controllers.map_knowledge import MapKnowledge
 from surveillance_fsm.ros import GoalAbortedError, GoalRun, GoalServer
 from surveillance_interfaces.action import ComputePath, Plan
+from surveillance_ontology.patrol_ontology import OntologyNotReadyError
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
@@ -82,7 +83,7 @@ class PlannerController(PatrolNode):
         try:
             target = self._knowledge.position(goal.target, run.interrupt)
             start = self._start(goal.target, run)
-        except KnowledgeError as error:
+        except OntologyNotReadyError as error:
             raise GoalAbortedError(f'no way to {goal.target!r}: {error}') from error
         for what, point in (('the robot', start), (f'place {goal.target!r}', target)):
             if not self._settings.environment.contains(point):

@@ -11,7 +11,6 @@ from surveillance_fsm.concurrence import Concurrence
 from surveillance_fsm.container import Container
 from surveillance_fsm.control import is_shutdown, set_shutdown_check
 from surveillance_fsm.exceptions import (
-    HistoryError,
     InvalidConstructionError,
     InvalidStateError,
     InvalidTransitionError,
@@ -47,7 +46,6 @@ __all__ = [
     'Clock',
     'Concurrence',
     'Container',
-    'HistoryError',
     'Interrupt',
     'InvalidConstructionError',
     'InvalidStateError',

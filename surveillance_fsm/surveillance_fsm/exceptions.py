@@ -46,12 +46,11 @@ class MissingKeyError(InvalidUserCodeError, KeyError):
     """A declared userdata key was read before anything wrote it (a ``KeyError``, as in SMACH)."""
 
 
-class HistoryError(SmachError):
-    """A record or a checkpoint cannot be written or read, or does not fit the machine."""
-
-
 class MachineFileError(SmachError):
-    """A machine cannot be read from data, or written as data; the message names the place."""
+    """A machine, a record or a checkpoint cannot be read from data or written as data.
+
+    Also: it does not fit the machine. The message names the place.
+    """
 
 
 def describe(error: BaseException) -> str:

@@ -25,7 +25,7 @@ from typing import IO, Any, NamedTuple
 
 from surveillance_fsm.clock import WALL_CLOCK, Clock, Interrupt, elapsed_of
 from surveillance_fsm.container import Container
-from surveillance_fsm.exceptions import HistoryError, describe, shown
+from surveillance_fsm.exceptions import MachineFileError, describe, shown
 from surveillance_fsm.execution import History, RawTransition
 from surveillance_fsm.log import logerr, logwarn
 from surveillance_fsm.state import State
@@ -264,19 +264,19 @@ def read_record(path: str | Path) -> list[Transition]:
     """Read what a `Recorder` wrote; a last line that was cut off is left out.
 
     Raises:
-        HistoryError: The file is not such a record; the message names file and line.
+        MachineFileError: The file is not such a record; the message names file and line.
     """
     try:
         lines = Path(path).read_text(encoding='utf-8').split('\n')
     except (OSError, UnicodeDecodeError) as error:
-        raise HistoryError(f'{path}: {error}') from error
+        raise MachineFileError(f'{path}: {error}') from error
     try:
         header = json.loads(lines[0])
         known = header['format'] == RECORD_FORMAT and header['version'] == RECORD_VERSION
     except (ValueError, KeyError, TypeError):
         known = False
     if not known:
-        raise HistoryError(f'{path}:1: not a {RECORD_FORMAT} of version {RECORD_VERSION}')
+        raise MachineFileError(f'{path}:1: not a {RECORD_FORMAT} of version {RECORD_VERSION}')
     transitions = []
     for number, line in enumerate(lines[1:], start=2):
         if not line:
@@ -286,7 +286,7 @@ def read_record(path: str | Path) -> list[Transition]:
         except (ValueError, TypeError) as error:
             if number == len(lines):
                 break
-            raise HistoryError(f'{path}:{number}: {error}') from error
+            raise MachineFileError(f'{path}:{number}: {error}') from error
     return transitions
 
 
@@ -314,7 +314,7 @@ def replay(machine: Container, transitions: Iterable[Transition]) -> Iterator[St
         transitions: The record.
 
     Raises:
-        HistoryError: A transition that the machine cannot make.
+        MachineFileError: A transition that the machine cannot make.
     """
     root = structure_of(machine)
     containers = {inner.path: inner for inner in root.walk()}
@@ -322,7 +322,7 @@ def replay(machine: Container, transitions: Iterable[Transition]) -> Iterator[St
     for transition in transitions:
         container = containers.get(transition.path)
         if container is None:
-            raise HistoryError(
+            raise MachineFileError(
                 f"Transition {transition.sequence}: no container '{transition.path}'"
             )
         _check_transition(container, transition)
@@ -386,14 +386,14 @@ def _check_transition(container: Structure, transition: Transition) -> None:
     what = f'Transition {transition.sequence} in {container.path!r}'
     states = container.members
     if transition.from_state not in states:
-        raise HistoryError(f'{what}: no state {transition.from_state!r}')
+        raise MachineFileError(f'{what}: no state {transition.from_state!r}')
     if transition.kind in ('interrupt', 'resume'):
         if transition.to_state not in states:
-            raise HistoryError(f'{what}: no state {transition.to_state!r}')
+            raise MachineFileError(f'{what}: no state {transition.to_state!r}')
         return
     if transition.kind == 'ended':
         if transition.outcome not in states[transition.from_state].get_registered_outcomes():
-            raise HistoryError(
+            raise MachineFileError(
                 f'{what}: {transition.from_state!r} has no outcome {transition.outcome!r}'
             )
         return
@@ -409,7 +409,7 @@ def _check_transition(container: Structure, transition: Transition) -> None:
         # An iterator that was preempted, or an interrupt's state that ended where the container
         # was about to end.
         return
-    raise HistoryError(
+    raise MachineFileError(
         f'{what}: {transition.from_state!r} does not lead to {transition.to_state!r} by '
         f'{transition.outcome!r}'
     )
@@ -433,7 +433,7 @@ def capture(machine: Container, leave_out: Iterable[str] = ()) -> dict[str, Any]
         A dictionary that JSON can hold.
 
     Raises:
-        HistoryError: A value cannot be kept; the message names its key.
+        MachineFileError: A value cannot be kept; the message names its key.
     """
     with machine.control.condition:
         return {
@@ -494,9 +494,11 @@ def _kept(
         try:
             kept[key] = _encoded(value)
         except ValueError as error:
-            raise HistoryError(f"{what} key '{key}' of '{path}' cannot be kept: {error}") from None
+            raise MachineFileError(
+                f"{what} key '{key}' of '{path}' cannot be kept: {error}"
+            ) from None
         except RecursionError:
-            raise HistoryError(
+            raise MachineFileError(
                 f"{what} key '{key}' of '{path}' cannot be kept: it is nested too deep, or holds "
                 'itself'
             ) from None
@@ -559,29 +561,29 @@ def restore(machine: Container, checkpoint: dict[str, Any]) -> None:
         checkpoint: What `capture` gave.
 
     Raises:
-        HistoryError: It is not a checkpoint, or not of this machine; nothing is changed then.
+        MachineFileError: It is not a checkpoint, or not of this machine; nothing is changed then.
     """
     path = machine.get_name()
     if machine.is_running():
-        raise HistoryError(f"'{path}' is running: it cannot take a checkpoint over")
+        raise MachineFileError(f"'{path}' is running: it cannot take a checkpoint over")
     if (
         not isinstance(checkpoint, dict)
         or checkpoint.get('format') != CHECKPOINT_FORMAT
         or checkpoint.get('version') != CHECKPOINT_VERSION
     ):
-        raise HistoryError(f'not a {CHECKPOINT_FORMAT} of version {CHECKPOINT_VERSION}')
+        raise MachineFileError(f'not a {CHECKPOINT_FORMAT} of version {CHECKPOINT_VERSION}')
     todo: list[Callable[[], None]] = []
     try:
         _plan(machine, path, checkpoint.get('machine'), todo)
     except RecursionError:
-        raise HistoryError('damaged: nested too deep') from None
+        raise MachineFileError('damaged: nested too deep') from None
     for step in todo:
         step()
 
 
 def _expect(holds: bool, path: str, what: str, value: object) -> None:
     if not holds:
-        raise HistoryError(f"damaged at '{path}': expected {what}, not {shown(value)[:80]}")
+        raise MachineFileError(f"damaged at '{path}': expected {what}, not {shown(value)[:80]}")
 
 
 def _plan(state: State, path: str, entry: Any, todo: list[Callable[[], None]]) -> None:
@@ -592,7 +594,9 @@ def _plan(state: State, path: str, entry: Any, todo: list[Callable[[], None]]) -
     if not isinstance(state, Container):
         for key in ('at', 'states', 'raised', 'userdata'):
             if key in entry:
-                raise HistoryError(f"'{path}' is not a container, but the checkpoint has '{key}'")
+                raise MachineFileError(
+                    f"'{path}' is not a container, but the checkpoint has '{key}'"
+                )
         return
     userdata = _read_values(path, 'userdata', entry.get('userdata', {}))
     children = children_of(state)
@@ -602,7 +606,7 @@ def _plan(state: State, path: str, entry: Any, todo: list[Callable[[], None]]) -
     _expect(isinstance(raised, list), path, 'a list of interrupts', raised)
     for label in raised:
         if not isinstance(label, str) or label not in state.fsm_branches:
-            raise HistoryError(f"'{path}' has no interrupt {shown(label)}")
+            raise MachineFileError(f"'{path}' has no interrupt {shown(label)}")
     branches = tuple(state.fsm_branches[label] for label in raised)
 
     def resume() -> None:
@@ -614,7 +618,7 @@ def _plan(state: State, path: str, entry: Any, todo: list[Callable[[], None]]) -
     _expect(isinstance(states, dict), path, 'an object of states', states)
     for label, inside in states.items():
         if label not in children:
-            raise HistoryError(
+            raise MachineFileError(
                 f"'{path}' has no state '{label}': its states are {sorted(children)}"
             )
         _plan(children[label], f'{path}/{label}', inside, todo)
@@ -627,7 +631,7 @@ def _read_values(path: str, what: str, values: Any) -> dict[str, Any]:
         try:
             read[key] = _decoded(value)
         except (KeyError, TypeError, ValueError, RecursionError) as error:
-            raise HistoryError(
+            raise MachineFileError(
                 f"damaged at '{path}': {what} key '{key}': {describe(error)}"
             ) from None
     return read
@@ -637,7 +641,7 @@ def _read_place(state: Container, path: str, at: Any) -> History:
     """Return where a container goes on.
 
     Raises:
-        HistoryError: It is none of its states.
+        MachineFileError: It is none of its states.
     """
     _expect(isinstance(at, dict), path, 'a place as an object', at)
     current, leaving = at.get('current', ''), at.get('leaving', False)
@@ -653,12 +657,12 @@ def _read_place(state: Container, path: str, at: Any) -> History:
     for label, leaves in ((current, leaving), *saved):
         _expect(isinstance(label, str) and type(leaves) is bool, path, 'a place', label)
         if not (state.together or leaves or label in labels):
-            raise HistoryError(
+            raise MachineFileError(
                 f"'{path}' has no state '{label}' to resume in: its states are {sorted(labels)}"
             )
     for label, outcome in outcomes.items():
         if label not in state.fsm_states:
-            raise HistoryError(f"'{path}' has no state '{label}'")
+            raise MachineFileError(f"'{path}' has no state '{label}'")
         _expect(isinstance(outcome, str), f'{path}/{label}', 'an outcome', outcome)
     places = [(label, leaves) for label, leaves in saved]
     return History(current, leaving, places, index, repeat, dict(outcomes))
@@ -670,7 +674,7 @@ def save(machine: Container, path: str | Path, leave_out: Iterable[str] = ()) ->
     When it returns, the checkpoint is on the disk, and outlives a failure of power.
 
     Raises:
-        HistoryError: A value cannot be kept, see `capture`.
+        MachineFileError: A value cannot be kept, see `capture`.
         OSError: The file cannot be written.
     """
     target = Path(path)
@@ -702,15 +706,15 @@ def load(machine: Container, path: str | Path) -> None:
     """Restore a machine from a file that `save` wrote.
 
     Raises:
-        HistoryError: The file cannot be read, or does not fit the machine.
+        MachineFileError: The file cannot be read, or does not fit the machine.
     """
     try:
         text = Path(path).read_bytes().decode('utf-8', 'surrogatepass')
         restore(machine, json.loads(text))
     except RecursionError:
-        raise HistoryError(f'{path}: damaged: nested too deep') from None
-    except (OSError, ValueError, HistoryError) as error:
-        raise HistoryError(f'{path}: {describe(error)}') from error
+        raise MachineFileError(f'{path}: damaged: nested too deep') from None
+    except (OSError, ValueError, MachineFileError) as error:
+        raise MachineFileError(f'{path}: {describe(error)}') from error
 
 
 class Checkpointer:
@@ -742,7 +746,7 @@ class Checkpointer:
                 save(self._machine, self._path, self._leave_out)
         except OSError as error:
             logwarn(f'Checkpoint {self._path} cannot be written: {error.strerror}')
-        except HistoryError as error:
+        except MachineFileError as error:
             logerr(f'Checkpoint {self._path} cannot be written: {error}')
 
     def _ended(self, *_: Any) -> None:

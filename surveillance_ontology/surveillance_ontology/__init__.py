@@ -17,13 +17,12 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from surveillance_ontology.documents.rdf_xml import OntologyFileError
     from surveillance_ontology.documents.reading import (
         OntologyDocument,
-        OntologyFileError,
         read_ontology,
     )
     from surveillance_ontology.documents.writing import (
-        OntologyWriteError,
         ontology_bytes,
         write_ontology,
     )
@@ -35,8 +34,7 @@ _HOME = {
     'Explanation': 'reasoner.explanation',
     'KnowledgeBase': 'knowledge_base',
     'OntologyDocument': 'documents.reading',
-    'OntologyFileError': 'documents.reading',
-    'OntologyWriteError': 'documents.writing',
+    'OntologyFileError': 'documents.rdf_xml',
     'ontology_bytes': 'documents.writing',
     'read_ontology': 'documents.reading',
     'write_ontology': 'documents.writing',
@@ -47,7 +45,6 @@ __all__ = [
     'KnowledgeBase',
     'OntologyDocument',
     'OntologyFileError',
-    'OntologyWriteError',
     'ontology_bytes',
     'read_ontology',
     'write_ontology',

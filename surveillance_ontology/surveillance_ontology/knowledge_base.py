@@ -588,7 +588,7 @@ class KnowledgeBase:
         Unlike `holds` it searches a model without the axiom, which takes longer.
 
         Raises:
-            NotAskableError: The axiom is a key, a rule, a datatype definition or about anonymous
+            UnsupportedError: The axiom is a key, a rule, a datatype definition or about anonymous
                 individuals, or compares data properties.
         """
         return self.holds(axiom) or bool(entails(self._told.axioms, axiom))

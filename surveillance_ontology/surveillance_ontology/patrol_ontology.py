@@ -53,7 +53,9 @@ RETRY_PERIOD = 0.05
 
 
 class OntologyNotReadyError(Exception):
-    """The ontology does not know (yet) what was asked for, or contradicts itself; one clause."""
+    """The ontology, or the map in it, does not answer, does not know (yet) what was asked for, or
+    contradicts itself; the text is one line.
+    """
 
 
 class Waiting(Protocol):

@@ -25,7 +25,7 @@ from surveillance_operator.recording.bag import (
     repair,
 )
 from surveillance_operator.recording.images import IMAGES, ImageRecorder
-from surveillance_operator.recording.schemas import UnknownTypeError, definition, message_class
+from surveillance_operator.recording.schemas import definition, message_class
 from surveillance_operator.recording.timeline import TimelineWriter
 from surveillance_runtime.node import PatrolNode, StartError
 from surveillance_runtime.process import run_node
@@ -154,7 +154,7 @@ class MissionRecorder(PatrolNode):
                 TopicType(topic, kind, definition(kind), reliable, latched, depth, type_hash)
             )
             subscription = PolledSubscription(self, message_class(kind), topic, qos, raw=True)
-        except UnknownTypeError as error:
+        except ValueError as error:
             self._unknown.add(topic)
             self.get_logger().warn(f'topic {topic} is not recorded: {error}')
             return

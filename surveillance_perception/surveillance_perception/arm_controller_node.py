@@ -18,10 +18,9 @@ from surveillance_interfaces.action import ScanSurroundings
 from surveillance_interfaces.msg import MarkerDetectionArray
 from surveillance_interfaces.srv import MarkerRoutine, PointCamera
 from surveillance_perception.arm.driver import ArmDriver
-from surveillance_perception.arm.kinematics import UnreachableError, in_base, look_at
+from surveillance_perception.arm.kinematics import ArmMotionError, in_base, look_at
 from surveillance_perception.arm.parameters import arm_settings
 from surveillance_perception.arm.scan import scan
-from surveillance_perception.arm.trajectory import ArmMotionError
 from surveillance_perception.arm.view_coverage import View
 from surveillance_perception.conversions import (
     base_pose_from_ros,
@@ -45,7 +44,7 @@ _POSES = {
     MarkerRoutine.Request.RIGHT: 'right',
     MarkerRoutine.Request.BACK: 'back',
 }
-_FAILURES = (ArmMotionError, UnreachableError, ValueError)
+_FAILURES = (ArmMotionError, ValueError)
 
 
 class ArmController(PatrolNode):

@@ -66,14 +66,14 @@ def test_a_checkpoint_of_another_machine_is_refused_and_changes_nothing():
         }
     }
     saved['machine']['userdata'] = {'a': 1}
-    with pytest.raises(checkpoint.HistoryError, match=r"'StateMachine/INNER'.*'GONE'"):
+    with pytest.raises(checkpoint.MachineFileError, match=r"'StateMachine/INNER'.*'GONE'"):
         checkpoint.restore(first.root, saved)
     assert 'a' not in first.root.userdata
     saved['machine']['states'] = {'OTHER': {}}
-    with pytest.raises(checkpoint.HistoryError, match="no state 'OTHER'"):
+    with pytest.raises(checkpoint.MachineFileError, match="no state 'OTHER'"):
         checkpoint.restore(first.root, saved)
     saved['machine'] = {'raised': ['NIX']}
-    with pytest.raises(checkpoint.HistoryError, match="no interrupt 'NIX'"):
+    with pytest.raises(checkpoint.MachineFileError, match="no interrupt 'NIX'"):
         checkpoint.restore(first.root, saved)
 
 
@@ -81,9 +81,9 @@ def test_a_checkpoint_of_another_machine_is_refused_and_changes_nothing():
 def test_a_file_that_is_no_checkpoint_is_named(tmp_path, text):
     path = tmp_path / 'broken.json'
     path.write_text(text)
-    with pytest.raises(checkpoint.HistoryError, match=r'broken\.json'):
+    with pytest.raises(checkpoint.MachineFileError, match=r'broken\.json'):
         checkpoint.load(CheckpointedWorld().root, path)
-    with pytest.raises(checkpoint.HistoryError, match=r'absent\.json'):
+    with pytest.raises(checkpoint.MachineFileError, match=r'absent\.json'):
         checkpoint.load(CheckpointedWorld().root, tmp_path / 'absent.json')
 
 
@@ -172,7 +172,7 @@ class Number(int):
 @pytest.mark.parametrize('value', [object(), [object()], Number(3), circle(), {'a': print}])
 def test_what_cannot_be_kept_is_refused_with_its_key_when_it_is_written(value, tmp_path, caplog):
     machine = machine_with(fine=1, robot=value)
-    with pytest.raises(checkpoint.HistoryError, match="userdata key 'robot' of 'StateMachine'"):
+    with pytest.raises(checkpoint.MachineFileError, match="userdata key 'robot' of 'StateMachine'"):
         checkpoint.save(machine, tmp_path / 'at')
     assert list(tmp_path.iterdir()) == []
     checkpoint.save(machine, tmp_path / 'at', leave_out=['robot'])
@@ -221,7 +221,7 @@ def test_a_damaged_checkpoint_is_an_error_of_one_line_that_changes_nothing(old, 
     assert old in text
     path.write_text(text.replace(old, new))
     machine = machine_with()
-    with pytest.raises(checkpoint.HistoryError) as caught:
+    with pytest.raises(checkpoint.MachineFileError) as caught:
         checkpoint.load(machine, path)
     assert '\n' not in str(caught.value)
     assert str(path) in str(caught.value)

@@ -10,8 +10,8 @@ import pytest
 
 import surveillance_fsm as fsm
 from surveillance_fsm import history as record
+from surveillance_fsm.exceptions import MachineFileError
 from surveillance_fsm.history import (
-    HistoryError,
     Recorder,
     TransitionFeed,
     play,
@@ -67,7 +67,9 @@ def test_a_replay_stops_where_the_machine_is_another(tmp_path):
     other.set_name('PATROL')
     with other:
         fsm.StateMachine.add('CHOOSE', Answer('go', 'done'), {'go': 'done'})
-    with pytest.raises(HistoryError, match="Transition 1 in 'PATROL': 'CHOOSE' does not lead to"):
+    with pytest.raises(
+        MachineFileError, match="Transition 1 in 'PATROL': 'CHOOSE' does not lead to"
+    ):
         list(replay(other, read_record(path)))
 
 
@@ -110,12 +112,12 @@ def test_a_record_that_was_cut_off_is_read_as_far_as_it_goes(tmp_path):
     assert len(read_record(path)) == 8
     lines = whole.splitlines(keepends=True)
     path.write_text(''.join([lines[0], '{broken\n', *lines[2:]]))
-    with pytest.raises(HistoryError, match=r'record\.jsonl:2: '):
+    with pytest.raises(MachineFileError, match=r'record\.jsonl:2: '):
         read_record(path)
     path.write_text('something else\n')
-    with pytest.raises(HistoryError, match=r'record\.jsonl:1: not a surveillance-fsm-record'):
+    with pytest.raises(MachineFileError, match=r'record\.jsonl:1: not a surveillance-fsm-record'):
         read_record(path)
-    with pytest.raises(HistoryError, match=r'absent\.jsonl'):
+    with pytest.raises(MachineFileError, match=r'absent\.jsonl'):
         read_record(tmp_path / 'absent.jsonl')
 
 

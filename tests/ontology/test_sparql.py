@@ -19,7 +19,7 @@ from surveillance_ontology.armor.client import (
     checked,
 )
 from surveillance_ontology.armor.service import ArmorService
-from surveillance_ontology.armor.sparql_engine import SparqlEngine, SparqlTimeoutError
+from surveillance_ontology.armor.sparql_engine import SparqlEngine
 from surveillance_ontology.armor.sparql_graph import GraphChanges, GraphUpdate, Version
 from surveillance_ontology.owl.axioms import ObjectPropertyAssertion
 
@@ -125,7 +125,7 @@ def test_the_time_asked_for_is_the_querys_own(monkeypatch: pytest.MonkeyPatch) -
     try:
         rows = engine.select(Version(0, True, 0), update, QUERY, 20.0, 1000.0, 10)
         assert [[bound.value for bound in row] for row in rows] == [['urn:c']]
-        with pytest.raises(SparqlTimeoutError):
+        with pytest.raises(TimeoutError):
             engine.select(Version(0, True, 1), update, QUERY, 20.0, 50.0, 10)
     finally:
         engine.close()

@@ -13,12 +13,11 @@ from hypothesis import strategies as st
 from surveillance_perception.arm.driver import ArmDriver
 from surveillance_perception.arm.kinematics import (
     AIM_TOLERANCE,
-    UnreachableError,
+    ArmMotionError,
     direction_of,
     look_at,
 )
 from surveillance_perception.arm.trajectory import (
-    ArmMotionError,
     ArmState,
     motion_to,
     motion_to_rest,
@@ -58,19 +57,19 @@ def test_point_beyond_the_limits_is_refused_and_says_what_is_left():
         home=(0.0,) * 5,
     )
     look_at(narrow, np.array([4.0, 0.5, 0.8]), np.zeros(5))
-    with pytest.raises(UnreachableError, match=r'cannot look at \(-4.00, 0.00, 0.80\): .* degrees'):
+    with pytest.raises(ArmMotionError, match=r'cannot look at \(-4.00, 0.00, 0.80\): .* degrees'):
         look_at(narrow, np.array([-4.0, 0.0, 0.8]), np.zeros(5))
 
 
 @pytest.mark.parametrize('target', [[math.nan, 0, 0], [math.inf, 0, 0], [1.0, 2.0]])
 def test_what_is_no_point_is_refused(target):
-    with pytest.raises(UnreachableError, match='three finite numbers'):
+    with pytest.raises(ArmMotionError, match='three finite numbers'):
         look_at(ARM, np.array(target), HOME)
 
 
 def test_point_at_the_lens_is_refused():
     lens = ARM.camera_frame(HOME)[:3, 3]
-    with pytest.raises(UnreachableError):
+    with pytest.raises(ArmMotionError):
         look_at(ARM, lens, HOME)
 
 

@@ -141,7 +141,7 @@ class Nav2Motion:
 
         Raises:
             MotionFailedError: No place is within reach.
-            KnowledgeError: Map or ontology do not answer.
+            OntologyNotReadyError: Map or ontology do not answer.
         """
         return place_reached(self._knowledge.places(run.interrupt), end, self._place_reach)
 

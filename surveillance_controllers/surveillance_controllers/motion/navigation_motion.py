@@ -9,7 +9,7 @@ import numpy as np
 
 from surveillance_controllers import conversions
 from surveillance_controllers.geometry import Points, Pose, point_of
-from surveillance_controllers.map_knowledge import KnowledgeError, MapKnowledge
+from surveillance_controllers.map_knowledge import MapKnowledge
 from surveillance_controllers.motion.arrival import MotionFailedError
 from surveillance_controllers.motion.base_interface import RobotBase
 from surveillance_controllers.motion.driving import Drive, Spin, State
@@ -20,6 +20,7 @@ from surveillance_controllers.planning.grid_planning import NoPathError
 from surveillance_fsm import Interrupt
 from surveillance_fsm.ros import CallError, GoalCaller, GoalRun
 from surveillance_interfaces.action import ComputePath
+from surveillance_ontology.patrol_ontology import OntologyNotReadyError
 from surveillance_runtime.node import PatrolNode
 
 
@@ -121,7 +122,7 @@ class NavigationMotion:
                     self._knowledge.watch_doors(stopping, self._news.set)
                     watched = True
                 self._base.set_positions(self._knowledge.places(stopping))
-            except KnowledgeError as error:
+            except OntologyNotReadyError as error:
                 self._node.get_logger().debug(f'places as they were: {error}')
                 stopping.wait(RETRY_PERIOD)
             else:

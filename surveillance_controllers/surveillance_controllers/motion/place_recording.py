@@ -10,12 +10,13 @@ from builtin_interfaces.msg import Time
 from std_msgs.msg import Header
 
 from surveillance_controllers.geometry import Points
-from surveillance_controllers.map_knowledge import KnowledgeError, MapKnowledge, answered
+from surveillance_controllers.map_knowledge import MapKnowledge, answered
 from surveillance_controllers.motion.arrival import nearest_place
 from surveillance_controllers.state_file import StateFile
 from surveillance_fsm import Interrupt
 from surveillance_interfaces.msg import OntologyMap, RobotPlace
 from surveillance_ontology.armor_client import FactSubscription
+from surveillance_ontology.patrol_ontology import OntologyNotReadyError
 from surveillance_runtime.conversions import nanoseconds_of
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import STATE_QOS
@@ -116,7 +117,7 @@ class PlaceRecorder:
                 return
             try:
                 wait = self._catch_up()
-            except KnowledgeError as error:
+            except OntologyNotReadyError as error:
                 self._node.get_logger().debug(f'where the robot is was not written: {error}')
                 stopping.wait(RETRY_PERIOD)
             else:
@@ -129,7 +130,7 @@ class PlaceRecorder:
             Seconds after which to look again; None: when something has changed.
 
         Raises:
-            KnowledgeError: Map or ontology do not answer.
+            OntologyNotReadyError: Map or ontology do not answer.
         """
         stopping = self._node.stopping
         if self._facts is None:

@@ -9,12 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from surveillance_controllers.map_knowledge import KnowledgeError, MapKnowledge
+from surveillance_controllers.map_knowledge import MapKnowledge
 from surveillance_controllers.motion.place_regions import Segment
 from surveillance_fsm import Interrupt
 from surveillance_fsm.ros import CallError, ServiceCaller
 from surveillance_interfaces.msg import DoorStates
 from surveillance_interfaces.srv import SetDoor
+from surveillance_ontology.patrol_ontology import OntologyNotReadyError
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import STATE_QOS
 
@@ -61,7 +62,7 @@ class DoorWatch:
             return {}
         try:
             return self._knowledge.doors(interrupt)
-        except KnowledgeError as error:
+        except OntologyNotReadyError as error:
             self._node.get_logger().warn(f'doors as their contacts report them: {error}')
             return {}
 
@@ -110,7 +111,7 @@ class DoorWatch:
             self._knowledge.connect(self._node.stopping)
             for door in sorted(self._contacts ^ self._told):
                 self._tell(door, is_open=door not in self._contacts)
-        except (KnowledgeError, CallError):
+        except (OntologyNotReadyError, CallError):
             return False
         return True
 

@@ -134,7 +134,7 @@ class NavigationPlanning:
 
         Raises:
             GoalAbortedError: There is no route.
-            KnowledgeError: Map or ontology do not answer.
+            OntologyNotReadyError: Map or ontology do not answer.
         """
         place = self._knowledge.robot_place(run.interrupt)
         positions = self._knowledge.places(run.interrupt)

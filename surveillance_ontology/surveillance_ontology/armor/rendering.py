@@ -15,7 +15,7 @@ from functools import lru_cache
 from surveillance_ontology.armor.protocol import DirectiveError, ExitCode
 from surveillance_ontology.owl.expressions import Literal
 from surveillance_ontology.owl.vocabulary import OWL, RDF, RDFS, XSD
-from surveillance_ontology.reasoner.datatypes import IllFormedLiteralError, parse_value
+from surveillance_ontology.reasoner.datatypes import parse_value
 
 MAX_NAME = 2048
 PREFIXES = {'owl': OWL, 'xsd': XSD, 'rdf': RDF, 'rdfs': RDFS}
@@ -184,7 +184,7 @@ def _is_of(wanted: str, literal: Literal) -> bool:
         return literal.datatype == XSD + 'string' or bool(literal.language)
     try:
         parse_value(literal)
-    except IllFormedLiteralError:
+    except ValueError:
         return False
     return literal.datatype in ((XSD + 'boolean',) if wanted == 'boolean' else _NUMBERS)
 

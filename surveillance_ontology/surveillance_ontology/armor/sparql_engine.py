@@ -59,10 +59,6 @@ class SparqlError(Exception):
     """A query that cannot be answered: one line."""
 
 
-class SparqlTimeoutError(SparqlError):
-    """A query that was stopped at its time limit."""
-
-
 class SparqlEngine:
     """Runs queries in processes of its own; threads may share it."""
 
@@ -92,7 +88,7 @@ class SparqlEngine:
             rows: Most rows.
 
         Raises:
-            SparqlTimeoutError: Stopped at the time limit.
+            TimeoutError: Stopped at the time limit.
             SparqlError: Not a valid SELECT query, too many rows, too much memory.
         """
         deadline = time.monotonic() + limit
@@ -245,4 +241,4 @@ class _Worker:
         descriptor = self._in if writing else self._out
         reading, to_write = ([], [descriptor]) if writing else ([descriptor], [])
         if remaining <= 0 or not any(select.select(reading, to_write, [], remaining)):
-            raise SparqlTimeoutError('the query ran into its time limit')
+            raise TimeoutError('the query ran into its time limit')

@@ -14,7 +14,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from surveillance_ontology.documents.rdf_xml import RdfSyntaxError
+from surveillance_ontology.documents.rdf_xml import OntologyFileError
 
 _OWL_XML = re.compile(rb'<(?:\w+:)?Ontology\b[^>]*\bhttp://www\.w3\.org/2002/07/owl#', re.DOTALL)
 _TURTLE = re.compile(rb'\s*(?:@prefix|@base|prefix|base)\s', re.IGNORECASE)
@@ -42,14 +42,14 @@ def owl_xml_to_ntriples(data: bytes, iri: str) -> bytes:
         iri: The ontology's IRI where the document names none.
 
     Raises:
-        RdfSyntaxError: Not well-formed, declares entities, or imports another document.
+        OntologyFileError: Not well-formed, declares entities, or imports another document.
     """
     import owlready2
 
     entity = data.find(b'<!ENTITY')
     if entity >= 0:
         line = data.count(b'\n', 0, entity) + 1
-        raise RdfSyntaxError('entities are not read in OWL/XML; write the IRIs out', line, 1)
+        raise OntologyFileError('entities are not read in OWL/XML; write the IRIs out', line, 1)
     with _one_at_a_time, _untold():
         world = owlready2.World()
         try:
@@ -61,13 +61,13 @@ def owl_xml_to_ntriples(data: bytes, iri: str) -> bytes:
             place = _PLACE.search(str(error))
             if place is None:
                 reason = str(error).splitlines()[0]
-                raise RdfSyntaxError(f'not read as OWL/XML: {reason}') from None
+                raise OntologyFileError(f'not read as OWL/XML: {reason}') from None
             line, column = int(place[1]), int(place[2]) + 1
-            raise RdfSyntaxError(
+            raise OntologyFileError(
                 f'not well-formed OWL/XML: {error.__cause__}', line, column
             ) from None
         except (FileNotFoundError, ValueError, TypeError) as error:
-            raise RdfSyntaxError(f'not read as OWL/XML: {error}') from None
+            raise OntologyFileError(f'not read as OWL/XML: {error}') from None
         finally:
             world.close()
     return triples.getvalue()
@@ -93,6 +93,6 @@ def turtle_to_ntriples(data: bytes, iri: str) -> bytes:
         return bytes(pyoxigraph.serialize(quads, format=pyoxigraph.RdfFormat.N_TRIPLES) or b'')
     except SyntaxError as error:
         message = str(error.msg).rpartition(': ')[2]
-        raise RdfSyntaxError(
+        raise OntologyFileError(
             f'not Turtle: {message}', error.lineno or 0, error.offset or 0
         ) from None

@@ -10,7 +10,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from surveillance_ontology.documents.rdf_xml import RdfSyntaxError
+from surveillance_ontology.documents.nodes import IllFormedError
+from surveillance_ontology.documents.rdf_xml import OntologyFileError
 from surveillance_ontology.owl import axioms as ax
 from surveillance_ontology.owl import expressions as ex
 from surveillance_ontology.owl.axioms import Axiom
@@ -41,10 +42,6 @@ class _Call:
     place: int
 
 
-class _NotUnderstoodError(Exception):
-    """A construct that is not part of the language; the text says which."""
-
-
 class FunctionalSyntax:
     """Reads one document.
 
@@ -58,7 +55,7 @@ class FunctionalSyntax:
         prefixes: The prefixes that the document declares.
 
     Raises:
-        RdfSyntaxError: With line and column.
+        OntologyFileError: With line and column.
     """
 
     def __init__(self, text: str) -> None:
@@ -74,10 +71,10 @@ class FunctionalSyntax:
 
     # --- tokens ---
 
-    def _fail(self, message: str, place: int) -> RdfSyntaxError:
+    def _fail(self, message: str, place: int) -> OntologyFileError:
         line = self._text.count('\n', 0, place) + 1
         column = place - self._text.rfind('\n', 0, place)
-        return RdfSyntaxError(message, line, column)
+        return OntologyFileError(message, line, column)
 
     def _read_tokens(self) -> Iterator[tuple[str, str, int]]:
         text, place = self._text, 0
@@ -186,8 +183,8 @@ class FunctionalSyntax:
         except KeyError as error:
             self.unsupported.append(f'line {line}: {error.args[0]} is not understood')
             return
-        except (_NotUnderstoodError, ValueError, TypeError, IndexError) as error:
-            reason = str(error) if isinstance(error, _NotUnderstoodError) else 'its parts'
+        except (ValueError, TypeError, IndexError) as error:
+            reason = str(error) if isinstance(error, IllFormedError) else 'its parts'
             self.unsupported.append(f'line {line}: {call.name} is not understood: {reason}')
             return
         self.axioms[axiom] = None
@@ -204,7 +201,7 @@ class FunctionalSyntax:
 
 def _need(value: Any, kind: type, what: str) -> Any:
     if not isinstance(value, kind) or isinstance(value, bool):
-        raise _NotUnderstoodError(f'expected {what}, got {value}')
+        raise IllFormedError(f'expected {what}, got {value}')
     return value
 
 
@@ -231,7 +228,7 @@ def _cls(value: Any) -> ex.ClassExpression:
     call = _need(value, _Call, 'a class')
     make = _CLASSES.get(call.name)
     if make is None:
-        raise _NotUnderstoodError(f'{call.name} is no class')
+        raise IllFormedError(f'{call.name} is no class')
     made: ex.ClassExpression = make(call.parts)
     return made
 
@@ -242,20 +239,20 @@ def _range(value: Any) -> ex.DataRange:
     call = _need(value, _Call, 'a data range')
     make = _RANGES.get(call.name)
     if make is None:
-        raise _NotUnderstoodError(f'{call.name} is no data range')
+        raise IllFormedError(f'{call.name} is no data range')
     made: ex.DataRange = make(call.parts)
     return made
 
 
 def _all(read: Callable[[Any], Any], values: Any, fewest: int = 2) -> tuple[Any, ...]:
     if len(values) < fewest:
-        raise _NotUnderstoodError(f'expected at least {fewest} parts, got {len(values)}')
+        raise IllFormedError(f'expected at least {fewest} parts, got {len(values)}')
     return tuple(map(read, values))
 
 
 def _exactly(values: Any, *reads: Callable[[Any], Any]) -> list[Any]:
     if len(values) != len(reads):
-        raise _NotUnderstoodError(f'expected {len(reads)} parts, got {len(values)}')
+        raise IllFormedError(f'expected {len(reads)} parts, got {len(values)}')
     return [read(value) for read, value in zip(reads, values, strict=True)]
 
 
@@ -270,7 +267,7 @@ def _group(record: Callable[..., Any], read: Callable[[Any], Any], fewest: int =
 def _counted(record: Callable[..., Any], prop: Any, filler: Any) -> Callable[[Any], Any]:
     def make(values: Any) -> Any:
         if len(values) not in (2, 3):
-            raise _NotUnderstoodError(f'expected 2 or 3 parts, got {len(values)}')
+            raise IllFormedError(f'expected 2 or 3 parts, got {len(values)}')
         number = _need(values[0], int, 'a number')
         rest = [filler(values[2])] if len(values) == 3 else []
         return record(number, prop(values[1]), *rest)

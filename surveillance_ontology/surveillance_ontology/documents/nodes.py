@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from surveillance_ontology.documents.rdf_xml import Graph, Node, RdfSyntaxError
+from surveillance_ontology.documents.rdf_xml import Graph, Node, OntologyFileError
 from surveillance_ontology.owl import axioms as ax
 from surveillance_ontology.owl import expressions as ex
 from surveillance_ontology.owl.axioms import Axiom
@@ -44,7 +44,7 @@ _CARDINALITIES = (
 BUILT_IN = (OWL, RDF, RDFS, XSD, SWRL)
 
 
-class IllFormedError(RdfSyntaxError):
+class IllFormedError(OntologyFileError):
     """A class expression or data range that says nothing: its axiom is left out, and reported."""
 
 
@@ -100,9 +100,9 @@ class NodeReader:
     def _report(self, node: str, what: str) -> None:
         self.unsupported.append(self._where(node) + what)
 
-    def _fail(self, node: str, message: str) -> RdfSyntaxError:
+    def _fail(self, node: str, message: str) -> OntologyFileError:
         place = self._places.get(node) or self._places.get(self._subject_read, (0, 0))
-        return RdfSyntaxError(message, *place)
+        return OntologyFileError(message, *place)
 
     def _ill_formed(self, node: str, message: str) -> IllFormedError:
         self._open.clear()
@@ -182,7 +182,7 @@ class NodeReader:
     def data_range(self, node: Node) -> ex.DataRange:
         """Return the data range a node stands for."""
         if not isinstance(node, str):
-            raise RdfSyntaxError(f'expected a data range, got the literal {node.lexical!r}')
+            raise OntologyFileError(f'expected a data range, got the literal {node.lexical!r}')
         if not node.startswith('_:'):
             return node
         properties = self._nodes.get(node, {})
@@ -208,7 +208,7 @@ class NodeReader:
     def expression(self, node: Node) -> ex.ClassExpression:
         """Return the class expression a node stands for."""
         if not isinstance(node, str):
-            raise RdfSyntaxError(f'expected a class, got the literal {node.lexical!r}')
+            raise OntologyFileError(f'expected a class, got the literal {node.lexical!r}')
         if not node.startswith('_:'):
             return node
         known = self._expressions.get(node)

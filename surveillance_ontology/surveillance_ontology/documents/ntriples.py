@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from surveillance_ontology.documents.rdf_xml import Graph, Node, RdfSyntaxError
+from surveillance_ontology.documents.rdf_xml import Graph, Node, OntologyFileError
 from surveillance_ontology.owl.expressions import Literal
 from surveillance_ontology.owl.vocabulary import RDF, XSD
 
@@ -37,14 +37,14 @@ def parse_ntriples(data: bytes) -> Graph:
     """Parse a document.
 
     Raises:
-        RdfSyntaxError: With line and column, for a line that is no triple or bytes that are not
+        OntologyFileError: With line and column, for a line that is no triple or bytes that are not
             UTF-8.
     """
     try:
         text = data.decode('utf-8-sig')
     except UnicodeDecodeError as error:
         line = data.count(b'\n', 0, error.start) + 1
-        raise RdfSyntaxError(f'not UTF-8: {error.reason}', line, 1) from None
+        raise OntologyFileError(f'not UTF-8: {error.reason}', line, 1) from None
     graph = Graph()
     for number, statement in enumerate(text.split('\n'), 1):
         if not statement.strip() or statement.lstrip().startswith('#'):
@@ -52,7 +52,7 @@ def parse_ntriples(data: bytes) -> Graph:
         found = _STATEMENT.match(statement.rstrip('\r'))
         if found is None:
             column = len(statement) - len(statement.lstrip()) + 1
-            raise RdfSyntaxError(
+            raise OntologyFileError(
                 'expected an RDF/XML document or an N-Triples statement'
                 f' `<subject> <predicate> object .`, got {statement.strip()[:60]!r}',
                 number,
@@ -70,7 +70,7 @@ def parse_ntriples(data: bytes) -> Graph:
             else:
                 value = _unescape(found[4]) if found[4] is not None else found[5]
         except (ValueError, OverflowError) as error:
-            raise RdfSyntaxError(str(error), number, 1) from None
+            raise OntologyFileError(str(error), number, 1) from None
         graph.places.setdefault(subject, (number, 1))
         graph.triples.append((subject, _unescape(found[3]), value))
     return graph

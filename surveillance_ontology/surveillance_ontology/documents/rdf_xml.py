@@ -31,12 +31,25 @@ _SYNTAX = {
 }
 
 
-class RdfSyntaxError(ValueError):
-    """A document that is not what it should be; `line` and `column` from 1, 0 when not known."""
+class OntologyFileError(ValueError):
+    """A document that cannot be read, or an ontology that cannot be written.
 
-    def __init__(self, message: str, line: int = 0, column: int = 0) -> None:
+    Its text is one line: path, line and column where they are known, and what was expected.
+
+    Attributes:
+        message: What was wrong.
+        line, column: From 1; 0 when not known.
+        path: The document; '' when not known.
+    """
+
+    def __init__(self, message: str, line: int = 0, column: int = 0, path: str = '') -> None:
         super().__init__(message)
-        self.message, self.line, self.column = message, line, column
+        self.message = ' '.join(message.split())
+        self.line, self.column, self.path = line, column, path
+
+    def __str__(self) -> str:
+        place = f':{self.line}:{self.column}' if self.line else ''
+        return f'{self.path}{place}: {self.message}' if self.path else self.message
 
 
 @dataclass
@@ -67,12 +80,14 @@ class _Frame:
 
 
 def resolve(base: str, reference: str) -> str:
-    """Return an IRI reference against a base IRI (RFC 3986); raises RdfSyntaxError for a forbidden
-    character.
+    """Return an IRI reference against a base IRI (RFC 3986).
+
+    Raises:
+        OntologyFileError: It has a forbidden character.
     """
     found = _FORBIDDEN.search(reference)
     if found:
-        raise RdfSyntaxError(f'IRI {reference!r} contains {found.group()!r}')
+        raise OntologyFileError(f'IRI {reference!r} contains {found.group()!r}')
     if _ABSOLUTE.match(reference):
         return reference
     stem = base.partition('#')[0]
@@ -83,7 +98,7 @@ def resolve(base: str, reference: str) -> str:
     try:
         return urljoin(stem, reference)
     except ValueError as error:
-        raise RdfSyntaxError(f'IRI {reference!r} with base {stem!r}: {error}') from None
+        raise OntologyFileError(f'IRI {reference!r} with base {stem!r}: {error}') from None
 
 
 _TAG = re.compile(rb'<(?:[^"\'>]|"[^"]*"|\'[^\']*\')*>')
@@ -108,9 +123,9 @@ class _Reader:
         parser.ExternalEntityRefHandler = self.external
         self.parser = parser
 
-    def fail(self, message: str) -> RdfSyntaxError:
+    def fail(self, message: str) -> OntologyFileError:
         parser = self.parser
-        return RdfSyntaxError(message, parser.CurrentLineNumber, parser.CurrentColumnNumber + 1)
+        return OntologyFileError(message, parser.CurrentLineNumber, parser.CurrentColumnNumber + 1)
 
     def external(self, *_: object) -> int:
         raise self.fail('external entities are refused')
@@ -132,7 +147,7 @@ class _Reader:
     def resolve(self, base: str, reference: str) -> str:
         try:
             return resolve(base, reference)
-        except RdfSyntaxError as error:
+        except OntologyFileError as error:
             raise self.fail(error.message) from None
 
     def emit(self, subject: str, predicate: str, value: Node, reified: str = '') -> None:
@@ -316,20 +331,20 @@ def parse_rdf_xml(data: bytes, base: str) -> Graph:
     """Parse a document.
 
     Raises:
-        RdfSyntaxError: With line and column, for anything that is not RDF/XML or would expand
+        OntologyFileError: With line and column, for anything that is not RDF/XML or would expand
             entities.
     """
     reader = _Reader(base, data)
     try:
         reader.parser.Parse(data, True)
     except expat.ExpatError as error:
-        raise RdfSyntaxError(
+        raise OntologyFileError(
             f'not well-formed XML: {expat.ErrorString(error.code)}', error.lineno, error.offset + 1
         ) from None
-    except RdfSyntaxError:
+    except OntologyFileError:
         raise
     except (LookupError, ValueError) as error:
-        raise RdfSyntaxError(f'its encoding cannot be read: {error}', 1, 1) from None
+        raise OntologyFileError(f'its encoding cannot be read: {error}', 1, 1) from None
     if not reader.seen_root:
-        raise RdfSyntaxError('the document holds no element', 1, 1)
+        raise OntologyFileError('the document holds no element', 1, 1)
     return reader.graph

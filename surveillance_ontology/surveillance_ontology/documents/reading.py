@@ -11,7 +11,7 @@ from surveillance_ontology.documents import foreign_formats
 from surveillance_ontology.documents.functional_syntax import FunctionalSyntax, is_functional
 from surveillance_ontology.documents.mapping import Mapping
 from surveillance_ontology.documents.ntriples import parse_ntriples
-from surveillance_ontology.documents.rdf_xml import Graph, RdfSyntaxError, parse_rdf_xml
+from surveillance_ontology.documents.rdf_xml import Graph, OntologyFileError, parse_rdf_xml
 from surveillance_ontology.memory import uncollected
 from surveillance_ontology.owl.axioms import Axiom, Import
 from surveillance_ontology.owl.vocabulary import local_name
@@ -19,18 +19,6 @@ from surveillance_ontology.owl.vocabulary import local_name
 _NTRIPLES = re.compile(rb'<[^\s<>]*>\s+[<_]')
 _ENDINGS = ('.owl', '.rdf', '.ttl', '.ofn', '.owx', '.xml', '.nt')
 DEFAULT_SIZE_LIMIT = 256 * 1024 * 1024
-
-
-class OntologyFileError(ValueError):
-    """A document that cannot be read. `str()` is one line: path, line, column and what was
-    expected.
-    """
-
-    def __init__(self, path: str, line: int, column: int, message: str) -> None:
-        message = ' '.join(message.split())
-        place = f':{line}:{column}' if line else ''
-        super().__init__(f'{path}{place}: {message}')
-        self.path, self.line, self.column, self.message = path, line, column, message
 
 
 @dataclass(frozen=True)
@@ -117,9 +105,9 @@ def _read(source: str | Path | bytes, iri: str, size_limit: int) -> OntologyDocu
             with open(source, 'rb') as file:
                 data = file.read(size_limit + 1)
         except OSError as error:
-            raise OntologyFileError(name, 0, 0, error.strerror or str(error)) from None
+            raise OntologyFileError(error.strerror or str(error), path=name) from None
     if len(data) > size_limit:
-        raise OntologyFileError(name, 0, 0, f'larger than the limit of {size_limit} bytes')
+        raise OntologyFileError(f'larger than the limit of {size_limit} bytes', path=name)
     start = data.lstrip(b'\xef\xbb\xbf \t\r\n')
     if is_functional(start):
         return _functional(name, data)
@@ -127,10 +115,11 @@ def _read(source: str | Path | bytes, iri: str, size_limit: int) -> OntologyDocu
         with uncollected():
             graph, form = _parsed(data, start, iri)
             mapping = Mapping(graph)
-    except RdfSyntaxError as error:
-        raise OntologyFileError(name, error.line, error.column, error.message) from None
+    except OntologyFileError as error:
+        error.path = name
+        raise
     except RecursionError:
-        raise OntologyFileError(name, 0, 0, 'class expressions nest too deeply') from None
+        raise OntologyFileError('class expressions nest too deeply', path=name) from None
     return OntologyDocument(
         list(mapping.axioms), mapping.unsupported, form, mapping.iri, graph.prefixes
     )
@@ -139,10 +128,11 @@ def _read(source: str | Path | bytes, iri: str, size_limit: int) -> OntologyDocu
 def _functional(name: str, data: bytes) -> OntologyDocument:
     try:
         read = FunctionalSyntax(data.decode('utf-8-sig'))
-    except RdfSyntaxError as error:
-        raise OntologyFileError(name, error.line, error.column, error.message) from None
+    except OntologyFileError as error:
+        error.path = name
+        raise
     except UnicodeDecodeError as error:
-        raise OntologyFileError(name, 0, 0, f'its encoding cannot be read: {error}') from None
+        raise OntologyFileError(f'its encoding cannot be read: {error}', path=name) from None
     return OntologyDocument(
         list(read.axioms), read.unsupported, 'functional', read.iri, read.prefixes
     )
@@ -151,7 +141,7 @@ def _functional(name: str, data: bytes) -> OntologyDocument:
 def _parsed(data: bytes, start: bytes, iri: str) -> tuple[Graph, str]:
     """Return the document as triples, and its format."""
     if not start:
-        raise RdfSyntaxError('the document is empty', 1, 1)
+        raise OntologyFileError('the document is empty', 1, 1)
     if foreign_formats.is_owl_xml(start):
         return parse_ntriples(foreign_formats.owl_xml_to_ntriples(data, iri)), 'owlxml'
     if start[:1] != b'<' and foreign_formats.is_turtle(start):

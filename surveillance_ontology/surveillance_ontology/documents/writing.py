@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from xml.sax.saxutils import escape, quoteattr
 
-from surveillance_ontology.documents.rdf_xml import Node, Triple
+from surveillance_ontology.documents.rdf_xml import Node, OntologyFileError, Triple
 from surveillance_ontology.documents.triples import triples_of
 from surveillance_ontology.owl.axioms import (
     Axiom,
@@ -25,10 +25,6 @@ FORMATS = ('rdfxml', 'ntriples')
 _PREFIXES = {'rdf': RDF, 'rdfs': RDFS, 'owl': OWL, 'xsd': XSD, 'swrl': SWRL}
 _LOCAL = re.compile(r'[^\W\d][\w.\-]*$')
 _NOT_XML = re.compile('[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]')
-
-
-class OntologyWriteError(ValueError):
-    """An ontology that the format cannot hold, or a file that cannot be written; one line."""
 
 
 def write_ontology(
@@ -49,7 +45,7 @@ def write_ontology(
         prefixes: Further namespace prefixes for RDF/XML.
 
     Raises:
-        OntologyWriteError: The directory is not writable, the format is unknown, or RDF/XML cannot
+        OntologyFileError: The directory is not writable, the format is unknown, or RDF/XML cannot
             hold a property IRI or a character.
     """
     data = ontology_bytes(axioms, iri, format, prefixes)
@@ -68,7 +64,7 @@ def write_ontology(
     except OSError as error:
         if temporary:
             Path(temporary).unlink(missing_ok=True)
-        raise OntologyWriteError(f'{target}: {error.strerror or error}') from None
+        raise OntologyFileError(error.strerror or str(error), path=str(target)) from None
     directory = os.open(target.parent, os.O_RDONLY)
     try:
         os.fsync(directory)
@@ -88,7 +84,7 @@ def ontology_bytes(
         return ''.join(map(_ntriple, triples)).encode()
     if format == 'rdfxml':
         return _RdfXml(list(triples), iri, prefixes or {}).document().encode()
-    raise OntologyWriteError(f'format {format!r}: expected one of {", ".join(FORMATS)}')
+    raise OntologyFileError(f'format {format!r}: expected one of {", ".join(FORMATS)}')
 
 
 # --- N-Triples ---
@@ -197,7 +193,7 @@ class _RdfXml:
             local = found.group() if found else ''
         namespace = iri[: len(iri) - len(local)]
         if not local or not namespace:
-            raise OntologyWriteError(f'RDF/XML cannot name <{iri}>; save it as N-Triples (.nt)')
+            raise OntologyFileError(f'RDF/XML cannot name <{iri}>; save it as N-Triples (.nt)')
         prefix = self._namespaces.get(namespace)
         if prefix is None:
             prefix = self._namespaces[namespace] = f'ns{len(self._namespaces)}'
@@ -286,7 +282,7 @@ def _nameable(iri: str) -> bool:
 def _checked(text: str) -> str:
     found = _NOT_XML.search(text)
     if found:
-        raise OntologyWriteError(
+        raise OntologyFileError(
             f'RDF/XML cannot hold the character {found.group()!r} in {text[:40]!r};'
             ' save it as N-Triples (.nt)'
         )

@@ -19,8 +19,9 @@ from surveillance_ontology.owl.axiom_text import axiom_text
 from surveillance_ontology.owl.axioms import Axiom
 from surveillance_ontology.owl.expressions import ClassExpression, PropertyExpression
 from surveillance_ontology.owl.vocabulary import NOTHING, OWL, THING, TOP_LITERAL, local_name
+from surveillance_ontology.reasoner.clauses import UnsupportedError
 from surveillance_ontology.reasoner.datatypes import unfolded, value_of
-from surveillance_ontology.reasoner.property_chains import AnyRole, Chains, IrregularError
+from surveillance_ontology.reasoner.property_chains import AnyRole, Chains
 from surveillance_ontology.reasoner.translation import directed, negated, normal
 from surveillance_ontology.reasoner.value_sets import EVERY, ValueSet, point, value_set
 
@@ -29,12 +30,7 @@ Heads = tuple[tuple[int, int], ...]
 """Alternatives: pairs of place (0: the individual, 1: the related one) and concept."""
 _FRESH = 'urn:case:'
 _MOST = 300
-_CIRCLE = 'its property chains depend on each other in a circle'
 _NONE: frozenset[int] = frozenset()
-
-
-class NotCoveredError(Exception):
-    """Part of an axiom that reasoning by cases does not take; the text says which."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,7 +160,7 @@ class CaseRules:
     def _attempt(self, axiom: Axiom, take: Callable[[Axiom], None]) -> None:
         try:
             take(axiom)
-        except NotCoveredError as reason:
+        except UnsupportedError as reason:
             self.gaps[f'{axiom_text(axiom)}: {reason}'] = None
 
     # --- numbers ---
@@ -196,7 +192,7 @@ class CaseRules:
         """Return the number of a role."""
         iri, inverted = prop if isinstance(prop, tuple) else directed(prop)
         if iri in (f'{OWL}topObjectProperty', f'{OWL}bottomObjectProperty'):
-            raise NotCoveredError(f'owl:{local_name(iri)} is not reasoned about by cases')
+            raise UnsupportedError(f'owl:{local_name(iri)} is not reasoned about by cases')
         number = self._roles.get(iri)
         if number is None:
             number = self._roles[iri] = len(self.role_names)
@@ -242,7 +238,7 @@ class CaseRules:
         """Return the automaton of a property, from state 0 to state 1."""
         try:
             found = self._chains.steps((prop, False))
-        except IrregularError:
+        except UnsupportedError:
             return [(0, self.role(prop), 1)]
         return [(a, None if step is None else self.role(step), b) for a, step, b in found]
 
@@ -282,7 +278,7 @@ class CaseRules:
         known = self._counts.get(key)
         if known is None:
             if count.n > _MOST:
-                raise NotCoveredError(f'numbers above {_MOST} are not counted by cases')
+                raise UnsupportedError(f'numbers above {_MOST} are not counted by cases')
             known = self._counts[key] = self.concept(self.fresh())
             table[known] = count
         return known
@@ -292,9 +288,9 @@ class CaseRules:
         try:
             found = value_set(unfolded(data_range, self._datatypes))
         except ValueError as error:
-            raise NotCoveredError(str(error)) from None
+            raise UnsupportedError(str(error)) from None
         if found is None:
-            raise NotCoveredError('a data range is not supported')
+            raise UnsupportedError('a data range is not supported')
         return found
 
     # --- inclusions ---
@@ -334,10 +330,7 @@ class CaseRules:
             rule = EdgeRule(frozenset((concept,)), self.role(role), _NONE, ((_Y, target),))
             self.edge_rule(rule)
             return
-        try:
-            steps = self._chains.steps(role)
-        except IrregularError:
-            raise NotCoveredError(_CIRCLE) from None
+        steps = self._chains.steps(role)
         states = {0: concept, 1: self.concept(self.fresh())}
         self.node_rule(frozenset((states[1],)), ((_X, target),))
         for before, _, after in steps:
@@ -361,7 +354,7 @@ class CaseRules:
     def mark(self, prop: PropertyExpression) -> int:
         """Return a concept of whoever is related to itself by the role."""
         if self.complex_role(prop):
-            raise NotCoveredError('a property with chains is asked for itself')
+            raise UnsupportedError('a property with chains is asked for itself')
         found = self.marks.setdefault(abs(self.role(prop)), [])
         if not found:
             found.append(self.concept(self.fresh()))
@@ -415,10 +408,7 @@ class CaseRules:
 
     def _check_chains(self, axiom: Axiom) -> None:
         if isinstance(axiom, ax.SubPropertyChainOf):
-            try:
-                self._chains.steps(directed(axiom.sup))
-            except IrregularError:
-                raise NotCoveredError(_CIRCLE) from None
+            self._chains.steps(directed(axiom.sup))
 
     def _axiom(self, axiom: Axiom) -> None:
         if isinstance(axiom, ax.SubClassOf):
@@ -438,10 +428,10 @@ class CaseRules:
         elif isinstance(axiom, ax.HasKey):
             roles = tuple(self.role(prop) for prop in axiom.object_props)
             if any(map(self.complex_role, axiom.object_props)):
-                raise NotCoveredError('a key uses a property with chains')
+                raise UnsupportedError('a key uses a property with chains')
             self.keys.append(KeyRule(self.recognised(axiom.cls), roles, axiom.data_props))
         elif isinstance(axiom, ax.Rule):
-            raise NotCoveredError('rules are not used in reasoning by cases')
+            raise UnsupportedError('rules are not used in reasoning by cases')
         else:
             self._property_axiom(axiom)
 
@@ -461,13 +451,13 @@ class CaseRules:
             self._exclude(role, -role)
         elif isinstance(axiom, ax.DisjointObjectProperties):
             if any(map(self.complex_role, axiom.props)):
-                raise NotCoveredError('a property with chains is disjoint from another')
+                raise UnsupportedError('a property with chains is disjoint from another')
             for place, first in enumerate(axiom.props):
                 for second in axiom.props[place + 1 :]:
                     self._exclude(self.role(first), self.role(second))
         elif isinstance(axiom, (ax.FunctionalObjectProperty, ax.InverseFunctionalObjectProperty)):
             if self.complex_role(axiom.prop):
-                raise NotCoveredError('a property with chains is functional')
+                raise UnsupportedError('a property with chains is functional')
             role = self.role(axiom.prop)
             if isinstance(axiom, ax.InverseFunctionalObjectProperty):
                 role, self.has_inverse = -role, True
@@ -563,7 +553,7 @@ class _Clause:
                 self._every.append((one.prop, negated(normal(one.filler))))
             else:
                 if rules.complex_role(one.prop):
-                    raise NotCoveredError('a property with chains is counted')
+                    raise UnsupportedError('a property with chains is counted')
                 concept = rules.recognised(one.filler)
                 role = rules.role(one.prop)
                 self._heads.append(rules._counted(rules.at_most, Count(one.n, role, concept)))
@@ -576,7 +566,7 @@ class _Clause:
     def _some(self, n: int, prop: PropertyExpression, concept: int) -> None:
         rules = self._rules
         if n > 1 and rules.complex_role(prop):
-            raise NotCoveredError('a property with chains is counted')
+            raise UnsupportedError('a property with chains is counted')
         self._heads.append(rules._counted(rules.at_least, Count(n, rules.role(prop), concept)))
 
     def _take_values(self, one: ClassExpression) -> bool:
@@ -605,7 +595,7 @@ class _Clause:
                 table = rules.values_at_most
                 self._heads.append(rules._counted(table, ValueCount(one.n, one.prop, values)))
         else:
-            raise NotCoveredError('a class expression is not known')
+            raise UnsupportedError('a class expression is not known')
         return True
 
     def _take_complement(self, one: ClassExpression) -> bool:
@@ -626,7 +616,7 @@ class _Clause:
         elif isinstance(one, ex.DataHasValue):
             self._never.append((one.prop, point(value_of(one.literal))))
         else:
-            raise NotCoveredError('a class expression is not known')
+            raise UnsupportedError('a class expression is not known')
         return True
 
     # --- relations: at most one is spelt out, the others become concepts ---

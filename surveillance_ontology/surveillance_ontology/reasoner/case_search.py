@@ -15,6 +15,7 @@ from itertools import combinations, count
 from typing import Any, TypeAlias
 
 from surveillance_ontology.reasoner.case_rules import CaseRules, Count, EdgeRule, Heads, ValueCount
+from surveillance_ontology.reasoner.clauses import StoppedError
 from surveillance_ontology.reasoner.datatypes import Value
 from surveillance_ontology.reasoner.value_sets import ValueSet, point
 
@@ -24,10 +25,6 @@ Alternative: TypeAlias = tuple[Any, ...]
 """('concept', x, concept), ('same', x, y), ('root', y, key), ('narrow', v, values) or
 ('same value', v, w)."""
 _MISSING = object()
-
-
-class StoppedError(Exception):
-    """The search took more steps than it may."""
 
 
 class _ClashError(Exception):

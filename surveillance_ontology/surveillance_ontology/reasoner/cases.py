@@ -15,8 +15,9 @@ from surveillance_ontology.owl import expressions as ex
 from surveillance_ontology.owl.axioms import Axiom
 from surveillance_ontology.owl.expressions import ClassExpression, PropertyExpression
 from surveillance_ontology.owl.vocabulary import NOTHING, THING, TOP_LITERAL
-from surveillance_ontology.reasoner.case_rules import CaseRules, NotCoveredError
-from surveillance_ontology.reasoner.case_search import CaseSearch, StoppedError
+from surveillance_ontology.reasoner.case_rules import CaseRules
+from surveillance_ontology.reasoner.case_search import CaseSearch
+from surveillance_ontology.reasoner.clauses import StoppedError, UnsupportedError
 from surveillance_ontology.reasoner.datatypes import literal_of, value_of
 
 _NEGATIVE = (ax.NegativeObjectPropertyAssertion, ax.NegativeDataPropertyAssertion)
@@ -69,7 +70,7 @@ class CaseReasoner:
     def _concept(self, expression: ClassExpression) -> int:
         try:
             return self._rules.positive(expression)
-        except NotCoveredError as reason:
+        except UnsupportedError as reason:
             self.gaps[f'an assertion: {reason}'] = None
             return 0
 
@@ -314,10 +315,6 @@ def _without(axiom: Axiom) -> ClassExpression:
 # --- any axiom ---
 
 
-class NotAskableError(ValueError):
-    """Whether an axiom of this kind follows cannot be asked for."""
-
-
 def entails(axioms: Iterable[Axiom], goal: Axiom | None) -> bool | None:
     """Tell whether an axiom (None: a contradiction) follows: its denial contradicts the others.
 
@@ -326,7 +323,7 @@ def entails(axioms: Iterable[Axiom], goal: Axiom | None) -> bool | None:
         found.
 
     Raises:
-        NotAskableError: The goal is a key, a rule, a datatype definition or about anonymous
+        UnsupportedError: The goal is a key, a rule, a datatype definition or about anonymous
             individuals, or compares data properties.
     """
     axioms = list(axioms)
@@ -348,7 +345,7 @@ Denial = tuple[Axiom, ...]
 def _denials(goal: Axiom) -> Iterator[Denial]:
     """Return assertions one of which must hold where an axiom does not."""
     if '_:' in repr(goal):
-        raise NotAskableError('an axiom about anonymous individuals')
+        raise UnsupportedError('an axiom about anonymous individuals')
     if isinstance(goal, ax.SubClassOf):
         yield (_member(goal.sub, ex.ObjectComplementOf(goal.sup)),)
     elif isinstance(goal, ax.EquivalentClasses):
@@ -427,7 +424,7 @@ def _property_denials(goal: Axiom) -> Iterator[Denial]:
         outside = ex.DataComplementOf(goal.range)
         yield (_member(ex.DataSomeValuesFrom(goal.prop, outside)),)
     else:
-        raise NotAskableError(f'an axiom of the kind {type(goal).__name__}')
+        raise UnsupportedError(f'an axiom of the kind {type(goal).__name__}')
 
 
 def _member(*classes: ClassExpression) -> ax.ClassAssertion:

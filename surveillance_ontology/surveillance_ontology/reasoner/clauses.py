@@ -19,6 +19,15 @@ from surveillance_ontology.reasoner.value_sets import ValueSet
 if TYPE_CHECKING:
     from surveillance_ontology.reasoner.contexts import Contexts
 
+
+class UnsupportedError(Exception):
+    """The reasoner does not take something into account; the text says what, or why not."""
+
+
+class StoppedError(Exception):
+    """A search ended early: at its first find, or after as many steps as it may take."""
+
+
 Fact: TypeAlias = 'tuple[Any, ...]'
 Premises: TypeAlias = 'tuple[Fact, ...]'
 Support: TypeAlias = Callable[..., Iterable[Premises]]

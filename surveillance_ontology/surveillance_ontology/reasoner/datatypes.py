@@ -67,13 +67,9 @@ _PATTERNS = {
 }
 
 
-class IllFormedLiteralError(ValueError):
-    """A lexical form outside the lexical space of its datatype."""
-
-
 def _number(text: str) -> int | Fraction:
     if len(text) > _MAX_DIGITS:
-        raise IllFormedLiteralError
+        raise ValueError
     fraction = Fraction(text)
     return fraction.numerator if fraction.denominator == 1 else fraction
 
@@ -85,7 +81,7 @@ def _floating(space: str, text: str) -> Value:
     elif _FLOAT.fullmatch(text):
         number = float(text)
     else:
-        raise IllFormedLiteralError
+        raise ValueError
     return floating_value(space, number)
 
 
@@ -106,14 +102,14 @@ def floating_value(space: str, number: float) -> Value:
 def _moment(text: str) -> Value:
     found = _MOMENT.fullmatch(text)
     if not found:
-        raise IllFormedLiteralError
+        raise ValueError
     try:
         moment = datetime.datetime.fromisoformat(found[1].removeprefix('-'))
     except ValueError:
-        raise IllFormedLiteralError from None
+        raise ValueError from None
     seconds: int | Fraction = (moment - datetime.datetime(1, 1, 1)) // datetime.timedelta(seconds=1)
     if found[1].startswith('-'):
-        raise IllFormedLiteralError
+        raise ValueError
     if found[2]:
         seconds += Fraction('0' + found[2])
     zone = found[3]
@@ -129,7 +125,7 @@ def parse_value(literal: Literal) -> Value:
     """Return the value a literal denotes.
 
     Raises:
-        IllFormedLiteralError: The lexical form is outside the datatype's lexical space.
+        ValueError: The lexical form is outside the datatype's lexical space.
     """
     datatype, text = literal.datatype, literal.lexical
     if datatype == RDF + 'langString' or literal.language:
@@ -143,31 +139,31 @@ def parse_value(literal: Literal) -> Value:
         if bounds is not None:
             text = text.strip()
             if not _INTEGER.fullmatch(text) or len(text) > _MAX_DIGITS:
-                raise IllFormedLiteralError
+                raise ValueError
             number = int(text)
             low, high = bounds
             if (low is not None and number < low) or (high is not None and number > high):
-                raise IllFormedLiteralError
+                raise ValueError
             return number
         if name in _STRINGS:
             pattern = _PATTERNS.get(name)
             if pattern is not None and not pattern.fullmatch(text):
-                raise IllFormedLiteralError
+                raise ValueError
             return text
         if name == 'decimal':
             if not _DECIMAL.fullmatch(text.strip()):
-                raise IllFormedLiteralError
+                raise ValueError
             return _number(text.strip())
         if name == 'boolean':
             if text.strip() not in ('true', 'false', '0', '1'):
-                raise IllFormedLiteralError
+                raise ValueError
             return ('boolean', text.strip() in ('true', '1'))
         if name in ('float', 'double'):
             return _floating(name, text.strip())
         if name in ('dateTime', 'dateTimeStamp'):
             value = _moment(text.strip())
             if name == 'dateTimeStamp' and value[1] != 'utc':  # type: ignore[index]
-                raise IllFormedLiteralError
+                raise ValueError
             return value
         if name == 'anyURI':
             return ('anyURI', text.strip())
@@ -176,9 +172,9 @@ def parse_value(literal: Literal) -> Value:
     elif datatype == OWL + 'rational':
         numerator, _, denominator = text.partition('/')
         if not (_INTEGER.fullmatch(numerator.strip()) and _INTEGER.fullmatch(denominator.strip())):
-            raise IllFormedLiteralError
+            raise ValueError
         if int(denominator) <= 0:
-            raise IllFormedLiteralError
+            raise ValueError
         fraction = Fraction(int(numerator), int(denominator))
         return fraction.numerator if fraction.denominator == 1 else fraction
     return ('other', datatype, text)
@@ -190,7 +186,7 @@ def value_of(literal: Literal) -> Value:
     """
     try:
         return parse_value(literal)
-    except (IllFormedLiteralError, ValueError, ZeroDivisionError):
+    except (ValueError, ZeroDivisionError):
         return ('ill-formed', literal.datatype, literal.lexical)
 
 

@@ -23,13 +23,10 @@ from surveillance_ontology.reasoner.clauses import (
     Predicate,
     PredicateAtom,
     Program,
+    StoppedError,
 )
 from surveillance_ontology.reasoner.joins import JoinContext, compile_call
 from surveillance_ontology.reasoner.value_sets import ValueSet
-
-
-class _FoundError(Exception):
-    """Ends a search at its first find."""
 
 
 class OpenCases:
@@ -121,11 +118,11 @@ class OpenCases:
             elif arguments[0] == arguments[1]:
                 return
             found.append(next(iter(pairs[0])))
-            raise _FoundError
+            raise StoppedError
 
         try:
             compile_call(self._context, rest, None, (), terms, look)()
-        except _FoundError:
+        except StoppedError:
             return found[0]
         return None
 

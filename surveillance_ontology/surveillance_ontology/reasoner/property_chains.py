@@ -24,21 +24,19 @@ from surveillance_ontology.reasoner.clauses import (
     Program,
     SameAtom,
     Term,
+    UnsupportedError,
 )
 from surveillance_ontology.reasoner.contexts import Role, closure, turned
 
 AnyRole: TypeAlias = tuple[Any, bool]
 Step: TypeAlias = tuple[int, 'AnyRole | None', int]
 _X, _Y = 0, 1
+_CIRCLE = 'its property chains depend on each other in a circle'
 
 
 def spell_out_chains(program: Program) -> None:
     """Add the steps of every chain to a program's clauses."""
     _Spelling(program).run()
-
-
-class IrregularError(Exception):
-    """Property chains depend on each other in a circle."""
 
 
 class Chains:
@@ -76,7 +74,7 @@ class Chains:
         """Return the automaton of a role: its steps from state 0 to state 1.
 
         Raises:
-            IrregularError: The role's chains use a role that depends on it.
+            UnsupportedError: The role's chains use a role that depends on it.
         """
         found: list[Step] = []
         self._accept(role, 0, 1, found, (), count(2))
@@ -94,11 +92,11 @@ class Chains:
         """Add the steps between two states of a role's own that its chains make.
 
         Raises:
-            IrregularError: The role's chains use a role that depends on it.
+            UnsupportedError: The role's chains use a role that depends on it.
         """
         below = self.roles_below(role)
         if any(one in above for one in below):
-            raise IrregularError
+            raise UnsupportedError(_CIRCLE)
         equal = [one for one in below if role in self.roles_below(one)]
         stack = (*above, *equal)
         steps.append((first, role, last))
@@ -132,7 +130,7 @@ class Chains:
         """Leads from one state to another along a role, through states of its own."""
         if not self.is_complex(role):
             if role in above:
-                raise IrregularError
+                raise UnsupportedError(_CIRCLE)
             steps.append((here, role, there))
             return
         first, last = next(fresh), next(fresh)
@@ -225,9 +223,9 @@ class _Spelling:
     ) -> None:
         try:
             steps = self._chains.steps(role)
-        except IrregularError:
+        except UnsupportedError as reason:
             text = 'the ontology' if clause.origin is None else axiom_text(clause.origin)
-            sentence = f'{text}: its property chains depend on each other in a circle'
+            sentence = f'{text}: {reason}'
             if sentence not in self._program.unsupported:
                 self._program.unsupported.append(sentence)
             return

@@ -41,6 +41,7 @@ from surveillance_ontology.reasoner.clauses import (
     RangeAtom,
     SameAtom,
     Term,
+    UnsupportedError,
     property_atom,
 )
 from surveillance_ontology.reasoner.datatypes import Test, range_test, unfolded, value_of
@@ -212,10 +213,6 @@ _RELATING = (
     ex.DataMinCardinality,
     ex.DataHasValue,
 )
-
-
-class UnsupportedError(Exception):
-    """Part of an axiom is outside the fragment; the text says which."""
 
 
 class _Terms:

@@ -13,16 +13,12 @@ _BASIC = {'boolean': 'bool', 'octet': 'byte', 'float': 'float32', 'double': 'flo
 _SLOT = re.compile(r'(?:sequence<)?([\w/]+)')
 
 
-class UnknownTypeError(ValueError):
-    """A type that is not installed here; the message names it."""
-
-
 @cache
 def message_class(name: str) -> Any:
     """Return the class of a type such as `std_msgs/msg/Bool`.
 
     Raises:
-        UnknownTypeError: It is not installed here.
+        ValueError: It is not installed here.
     """
     try:
         package, kind, short = name.split('/')
@@ -34,7 +30,7 @@ def message_class(name: str) -> Any:
         owner = getattr(module, action)
         return getattr(owner if hasattr(owner, part) else owner.Impl, part)
     except (ImportError, ValueError, AttributeError):
-        raise UnknownTypeError(f'type {name} is not installed here') from None
+        raise ValueError(f'type {name} is not installed here') from None
 
 
 @cache
@@ -42,7 +38,7 @@ def definition(name: str) -> str:
     """Return a type's definition, followed by those of the types that it uses.
 
     Raises:
-        UnknownTypeError: It, or one that it uses, is not installed here.
+        ValueError: It, or one that it uses, is not installed here.
     """
     found: dict[str, str] = {}
 
@@ -82,10 +78,10 @@ def _inner(slot: str) -> str | None:
     for kind in ('msg', 'action', 'srv'):
         try:
             message_class(f'{package}/{kind}/{short}')
-        except UnknownTypeError:
+        except ValueError:
             continue
         return f'{package}/{kind}/{short}'
-    raise UnknownTypeError(f'type {match.group(1)} is not installed here')
+    raise ValueError(f'type {match.group(1)} is not installed here')
 
 
 def _type(slot: str) -> str:

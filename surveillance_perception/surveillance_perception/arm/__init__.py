@@ -1,10 +1,9 @@
 """The arm that carries the camera: where it looks, how it moves, and scans of all around."""
 
 from surveillance_perception.arm.driver import ArmDriver
-from surveillance_perception.arm.kinematics import Aim, UnreachableError, look_at
+from surveillance_perception.arm.kinematics import Aim, ArmMotionError, look_at
 from surveillance_perception.arm.scan import ScanOutcome, ScanPlan, scan
 from surveillance_perception.arm.trajectory import (
-    ArmMotionError,
     ArmState,
     ArmTrajectory,
     motion_to,
@@ -19,7 +18,6 @@ __all__ = [
     'ArmTrajectory',
     'ScanOutcome',
     'ScanPlan',
-    'UnreachableError',
     'View',
     'coverage',
     'look_at',

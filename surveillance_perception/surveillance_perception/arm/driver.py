@@ -8,8 +8,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from surveillance_perception.arm.kinematics import ArmMotionError
 from surveillance_perception.arm.trajectory import (
-    ArmMotionError,
     ArmState,
     ArmTrajectory,
     motion_to,

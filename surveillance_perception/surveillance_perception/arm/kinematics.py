@@ -31,8 +31,8 @@ _SETTLED = 1e-4
 _FEWEST = 12
 
 
-class UnreachableError(ValueError):
-    """No joint positions within the limits do what was asked; the message is one line."""
+class ArmMotionError(Exception):
+    """A motion cannot reach its goal, or did not; the message is one line."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,11 +59,11 @@ def look_at(arm: Arm, target: Array, start: Array) -> Aim:
         start: (n,) joint positions from which the way should be short, rad.
 
     Raises:
-        UnreachableError: The point cannot be looked at within the joints' limits.
+        ArmMotionError: The point cannot be looked at within the joints' limits.
     """
     target = np.asarray(target, dtype=float)
     if target.shape != (3,) or not np.isfinite(target).all():
-        raise UnreachableError('the point to look at must be three finite numbers')
+        raise ArmMotionError('the point to look at must be three finite numbers')
     home = np.array(arm.home)
     azimuth = math.atan2(target[1], target[0])
     turned = home.copy()
@@ -84,7 +84,7 @@ def look_at(arm: Arm, target: Array, start: Array) -> Aim:
             if distance < NEAREST
             else f'{math.degrees(best.error):.1f} degrees are left at the limits of the joints'
         )
-        raise UnreachableError(f'cannot look at ({x:.2f}, {y:.2f}, {z:.2f}): {why}')
+        raise ArmMotionError(f'cannot look at ({x:.2f}, {y:.2f}, {z:.2f}): {why}')
     return best
 
 

@@ -6,8 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from surveillance_perception.arm.driver import ArmDriver
-from surveillance_perception.arm.kinematics import UnreachableError, direction_of, look_at
-from surveillance_perception.arm.trajectory import ArmMotionError
+from surveillance_perception.arm.kinematics import ArmMotionError, direction_of, look_at
 from surveillance_perception.arm.view_coverage import View, coverage, views_covering
 from surveillance_runtime.robot_arm import Array
 
@@ -86,7 +85,7 @@ def scan(
     for index, view in enumerate(plan.views):
         try:
             positions = _aim(driver, view)
-        except UnreachableError:
+        except ArmMotionError:
             outcome.unreachable += 1
             continue
         tell(index, view, False)

@@ -7,14 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 import ruckig
 
+from surveillance_perception.arm.kinematics import ArmMotionError
 from surveillance_runtime.robot_arm import Arm, Array
 
 SAMPLE_PERIOD = 0.05
 """Seconds between the points of a trajectory."""
-
-
-class ArmMotionError(Exception):
-    """A motion cannot reach its goal, or did not; the message is one line."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from surveillance_ontology.documents.reading import OntologyFileError, read_ontology
+from surveillance_ontology.documents.rdf_xml import OntologyFileError
+from surveillance_ontology.documents.reading import read_ontology
 from surveillance_ontology.owl import axioms as ax
 from surveillance_ontology.owl import expressions as ex
 

@@ -31,7 +31,8 @@ from surveillance_ontology.armor.reference import (
 )
 from surveillance_ontology.armor.rendering import parse_entity, shown
 from surveillance_ontology.armor.session import Session
-from surveillance_ontology.documents.reading import OntologyFileError, read_ontology
+from surveillance_ontology.documents.rdf_xml import OntologyFileError
+from surveillance_ontology.documents.reading import read_ontology
 from surveillance_ontology.knowledge_base import KnowledgeBase
 from surveillance_ontology.owl.axioms import Axiom
 from surveillance_ontology.reasoner.java_reasoning import JavaKnowledgeBase, JavaReasonerError
@@ -233,12 +234,12 @@ def _write(
             axioms = list(dict.fromkeys([*axioms, *ref.kb.facts()]))
         origin = ref.origin
     # Late, as what LOAD WEB needs: a server that starts again is to be back at once.
-    from surveillance_ontology.documents.writing import OntologyWriteError, write_ontology
+    from surveillance_ontology.documents.writing import write_ontology
 
     form = 'ntriples' if target.suffix.lower() == '.nt' else origin.format
     try:
         write_ontology(axioms, ref.kb.iri, target, form, origin.prefixes)
-    except OntologyWriteError as error:
+    except OntologyFileError as error:
         raise DirectiveError(f'SAVE: {error}') from None
     return DirectiveResponse()
 

@@ -12,7 +12,6 @@ from surveillance_ontology.armor.session import Session
 from surveillance_ontology.armor.sparql_engine import (
     Binding,
     SparqlError,
-    SparqlTimeoutError,
 )
 from surveillance_ontology.armor.sparql_graph import GraphUpdate, Version
 from surveillance_ontology.owl.vocabulary import XSD
@@ -106,7 +105,7 @@ def _select(session: Session, ref: Reference, parts: tuple[str, ...]) -> list[li
             limit,
             session.settings.sparql_rows,
         )
-    except SparqlTimeoutError:
+    except TimeoutError:
         raise DirectiveError(
             f'QUERY SPARQL: stopped after {seconds * 1000:g} ms', timeout=True
         ) from None
