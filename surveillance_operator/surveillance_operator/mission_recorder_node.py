@@ -1,13 +1,14 @@
 """The node `mission_recorder`: writes all topics of a mission to a recording, and its time line.
 
 It takes serialised messages as they came and never looks into them. Topics are found as they
-appear. Of images only a few are taken, see `recording.images`, unless all are asked for.
+appear. Of images only a few are taken, see `recording.images`, unless all are asked for. On a full
+disk it says so once, and goes on when there is space again.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from surveillance_operator.recording import timeline
 from surveillance_operator.recording.bag import (
     NAME,
     BagWriter,
+    DiskFullError,
     RecordingError,
     TopicType,
     prune,
@@ -33,6 +35,8 @@ from surveillance_runtime.process import run_node
 DRAIN_PERIOD, SEAL_PERIOD, FEED_PERIOD = 0.15, 0.6, 0.4
 """Seconds between two looks at all queues, two chunks, and two lines of the time line."""
 PRUNE_PERIOD = 60.0
+RETRY_PERIOD = 3.0
+"""Seconds after which a recording that could not be written is tried again."""
 QUEUE = 2000
 """Messages of one topic that may come within `DRAIN_PERIOD`; a latched topic brings its own."""
 
@@ -65,10 +69,15 @@ class MissionRecorder(PatrolNode):
         megabytes = self.parameter('segment_size', 128.0, 'Megabytes of a file.', minimum=0.1)
         seconds = self.parameter('segment_age', 3600.0, 'Seconds of a file.', minimum=1.0)
         path = Path(folder)
+        self._bag = BagWriter(path, segment_bytes=int(megabytes * 1e6), segment_seconds=seconds)
+        self._timeline = TimelineWriter(path.with_name(timeline.NAME))
+        self._waits_for_disk = False
+        self._next_seal = self._next_line = self._next_prune = 0.0
         try:
-            self._bag = BagWriter(path, segment_bytes=int(megabytes * 1e6), segment_seconds=seconds)
-            self._timeline = TimelineWriter(path.with_name(timeline.NAME))
-        except (RecordingError, OSError) as error:
+            self._bag.seal()
+        except DiskFullError:
+            pass  # it is tried again
+        except RecordingError as error:
             raise StartError(str(error)) from error
         self._images = ImageRecorder(self, self._bag, image_period)
         self._subscriptions_by_topic: dict[str, PolledSubscription] = {}
@@ -80,9 +89,12 @@ class MissionRecorder(PatrolNode):
 
     def _repair(self) -> None:
         """Mend what earlier runs left torn."""
-        for folder in sorted(self._bag.folder.resolve().parents[1].glob(f'*/{NAME}')):
+        own = self._bag.folder.resolve()
+        for folder in sorted(own.parents[1].glob(f'*/{NAME}')):
             if self.stopping.is_set():
                 return
+            if folder.resolve() == own:
+                continue
             try:
                 for line in repair(folder):
                     self.get_logger().info(f'repaired {line}')
@@ -90,29 +102,44 @@ class MissionRecorder(PatrolNode):
                 self.get_logger().warn(f'{folder}: cannot be repaired: {error.strerror}')
 
     def _record(self) -> None:
-        next_seal = next_line = next_prune = 0.0
+        while not self.stopping.wait(DRAIN_PERIOD):
+            self._attempt(self._record_once)
+        self._attempt(self._end)
+
+    def _attempt(self, work: Callable[[], None]) -> None:
+        """Write; what fails is said once, and tried again after a pause."""
         try:
-            while not self.stopping.wait(DRAIN_PERIOD):
-                now = time.monotonic()
-                self._drain()
-                if now >= next_line:
-                    next_line = now + FEED_PERIOD
-                    self._timeline.add(self._feed.see(), time.time())
-                if now >= next_seal:
-                    next_seal = now + SEAL_PERIOD
-                    self._bag.seal()
-                    self._find_topics()
-                    self._images.attend()
-                if now >= next_prune and self._bag.folder.name == NAME:
-                    next_prune = now + PRUNE_PERIOD
-                    prune(self._bag.folder.resolve().parents[1], self._keep * 1e9)
+            work()
         except (RecordingError, OSError) as error:
-            self.fail(f'recording ended: {error}')
-        finally:
-            self._drain()
+            if not self._waits_for_disk:
+                self._waits_for_disk = True
+                self.get_logger().warn(f'nothing is recorded at present: {error}')
+            self._next_line = self._next_seal = 0.0
+            self.stopping.wait(RETRY_PERIOD)
+
+    def _record_once(self) -> None:
+        now = time.monotonic()
+        self._drain()
+        if now >= self._next_line:
             self._timeline.add(self._feed.see(), time.time())
-            self._bag.close()
-            self._timeline.close()
+            self._next_line = now + FEED_PERIOD
+        if now >= self._next_seal:
+            self._bag.seal()
+            self._next_seal = now + SEAL_PERIOD
+            if self._waits_for_disk:
+                self._waits_for_disk = False
+                self.get_logger().info('the recording goes on')
+            self._find_topics()
+            self._images.attend()
+        if now >= self._next_prune and self._bag.folder.name == NAME:
+            self._next_prune = now + PRUNE_PERIOD
+            prune(self._bag.folder.resolve().parents[1], self._keep * 1e9)
+
+    def _end(self) -> None:
+        self._drain()
+        self._bag.close()
+        self._timeline.add(self._feed.see(), time.time())
+        self._timeline.close()
 
     def _drain(self) -> None:
         self._images.drain()

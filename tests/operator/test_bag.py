@@ -19,8 +19,16 @@ from std_msgs.msg import String
 
 from surveillance_interfaces.msg import FactChange, FactChanges
 from surveillance_operator.recording import bag
-from surveillance_operator.recording.bag import BagWriter, TopicType, prune, repair, segments
+from surveillance_operator.recording.bag import (
+    BagWriter,
+    DiskFullError,
+    TopicType,
+    prune,
+    repair,
+    segments,
+)
 from surveillance_operator.recording.schemas import definition, message_class
+from tests.operator.conftest import Disk
 
 TYPE = 'std_msgs/msg/String'
 TOPIC = TopicType('/words', TYPE, definition(TYPE), latched=True, depth=1)
@@ -136,6 +144,26 @@ def test_definitions_name_all_that_a_type_uses() -> None:
     assert 'uint8[16] uuid' in feedback
     with pytest.raises(match='no_msgs/msg/None is not installed'):
         message_class('no_msgs/msg/None')
+
+
+def test_a_full_disk_costs_what_comes_while_it_is_full(disk: Disk, tmp_path: Path) -> None:
+    folder = tmp_path / 'recording'
+    writer = write(folder, ['before'])
+    disk.full = True
+    writer.write('/words', serialize_message(String(data='lost')), 1, 1)
+    for _ in range(2):
+        with pytest.raises(DiskFullError, match='No space left'):
+            writer.seal()
+    disk.full = False
+    writer.write('/words', serialize_message(String(data='after')), 2 * 10**18, 2 * 10**18)
+    writer.seal()
+    writer.close()
+    assert read(folder) == ['before', 'after']
+    assert sorted(path.name for path in folder.iterdir()) == [
+        'metadata.yaml',
+        'recording_0.mcap',
+        'recording_1.mcap',
+    ]
 
 
 def test_own_types_are_read_with_the_definitions_in_the_file(tmp_path: Path) -> None:

@@ -7,8 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from nav_msgs.msg import OccupancyGrid
 from PIL import Image as PictureFile
+from rcl_interfaces.msg import Log
 from rclpy.serialization import deserialize_message
 from rosbags.highlevel import AnyReader
 from sensor_msgs.msg import CompressedImage, Image, LaserScan
@@ -16,10 +18,12 @@ from std_msgs.msg import String
 
 from surveillance_interfaces.action import FollowPath
 from surveillance_interfaces.msg import Decision
+from surveillance_operator import mission_recorder_node
 from surveillance_operator.mission_recorder_node import MissionRecorder
 from surveillance_operator.recording.reading import messages
 from surveillance_operator.recording.timeline import Timeline
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
+from tests.operator.conftest import Disk
 
 
 def test_every_message_comes_back_as_it_was_published(graph: Any, tmp_path: Path) -> None:
@@ -67,6 +71,30 @@ def test_every_message_comes_back_as_it_was_published(graph: Any, tmp_path: Path
             if connection.topic == '/follow_path/_action/feedback':
                 assert read.feedback.position.x == 2.5
     assert Timeline(timeline).at(1e12)[2]['decision']['place'] == 'R3'
+
+
+def test_a_full_disk_is_waited_for(
+    graph: Any, disk: Disk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(mission_recorder_node, 'RETRY_PERIOD', 0.05)
+    folder = tmp_path / 'recording'
+    words = graph.node.create_publisher(String, '/words', STATE_QOS)
+    said = graph.listen(Log, '/rosout')
+    disk.full = True
+    recorder = graph.add(MissionRecorder, parameters={'folder': str(folder)})
+    graph.until(lambda: any('nothing is recorded' in line.msg for line in said))
+    disk.full = False
+    graph.until(lambda: any('goes on' in line.msg for line in said))
+    graph.until(words.get_subscription_count)
+    words.publish(String(data='after'))
+    disk.full = True
+    graph.until(lambda: sum('nothing is recorded' in line.msg for line in said) == 2)
+    disk.full = False
+    graph.until(lambda: sum('goes on' in line.msg for line in said) == 2)
+    graph.remove(recorder)
+    assert recorder.failure is None
+    assert len([line for line in said if line.name == 'mission_recorder']) <= 5
+    assert [channel.topic for _, channel, _ in messages(folder)].count('/words') <= 1
 
 
 def test_an_image_a_second_is_kept_where_somebody_looks(graph: Any, tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -65,6 +66,24 @@ def test_a_torn_last_line_is_left_out(tmp_path: Path) -> None:
     line = Timeline(path)
     assert len(line.times) == 5
     assert line.line(4)[0] == 0.0
+
+
+def test_a_full_disk_tears_no_line_that_others_follow(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / 'timeline.jsonl'
+    writer = TimelineWriter(path)
+    writer.add(Snapshot(now=0.0), 1000.0)
+    write = os.write
+    with monkeypatch.context() as full:
+        full.setattr(os, 'write', lambda file, data: write(file, data[:20]))
+        with pytest.raises(OSError, match='No space left'):
+            writer.add(Snapshot(now=1.0, pose=(1.0, 0.0, 0.0)), 1001.0)
+    writer.add(Snapshot(now=2.0, pose=(1.0, 0.0, 0.0)), 1002.0)
+    writer.close()
+    line = Timeline(path)
+    assert line.times == [1000.0, 1002.0]
+    assert line.at(1002.0)[2]['pose'] == [1.0, 0.0, 0.0]
 
 
 @pytest.mark.parametrize('content', [None, '', 'no time line\n'])

@@ -7,13 +7,16 @@ sealed as a chunk, so that a killed process loses no more; `repair` gives such a
 
 from __future__ import annotations
 
+import contextlib
+import errno
 import fcntl
 import json
 import os
 import shutil
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, field
+from io import BufferedWriter
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +39,10 @@ INFINITE = {'sec': 9223372036, 'nsec': 854775807}
 
 class RecordingError(ValueError):
     """A recording cannot be written or read, or there is none; one line that says which."""
+
+
+class DiskFullError(RecordingError):
+    """A recording cannot be written until there is space again."""
 
 
 @dataclass(frozen=True)
@@ -85,8 +92,8 @@ class BagWriter:
         folder: Where to; made when it is missing, continued with a new segment when it exists.
         segment_bytes, segment_seconds: Limits of a segment in size and age.
 
-    Raises:
-        RecordingError: The folder cannot be written.
+    Its methods raise `RecordingError` when a file cannot be written, `DiskFullError` for want of
+    space. The next call tries again, with a new segment.
     """
 
     def __init__(
@@ -100,16 +107,8 @@ class BagWriter:
         self._segment_bytes, self._segment_seconds = segment_bytes, segment_seconds
         self._topics: dict[str, TopicType] = {}
         self._closed: list[_Segment] = []
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            repair(folder)  # what this run's last recorder left when it was killed
-            for path in segments(folder):
-                segment, topics = _scan(path)
-                self._closed.append(segment)
-                self._topics.update(topics)
-            self._open()
-        except OSError as error:
-            raise RecordingError(f'{folder}: cannot be written: {error.strerror}') from None
+        self._file: BufferedWriter | None = None
+        self._knows_folder = False
 
     def add_topic(self, topic: TopicType) -> None:
         """Announce a topic before its first message."""
@@ -123,47 +122,65 @@ class BagWriter:
             data: Serialised.
             received, published: Nanoseconds since 1970.
         """
-        channel = self._channels.get(topic)
-        if channel is None:
-            channel = self._channels[topic] = self._register(self._topics[topic])
-        self._writer.add_message(channel, received, data, published)
-        self._segment.add(topic, received)
+        with self._segment_to_write():
+            channel = self._channels.get(topic)
+            if channel is None:
+                channel = self._channels[topic] = _register(self._writer, self._topics[topic])
+            self._writer.add_message(channel, received, data, published)
+            self._segment.add(topic, received)
 
     def seal(self) -> None:
-        """Give all that came to the operating system; begin another segment if it is time."""
-        try:
+        """Give all that came to the operating system; end the segment if it is time."""
+        with self._segment_to_write() as file:
             # The library ends a chunk at its size alone; it has no public way to end one in time.
             self._writer._Writer__finalize_chunk()  # type: ignore[attr-defined]
-            self._file.flush()
+            file.flush()
             aged = time.monotonic() - self._opened > self._segment_seconds
-            if self._segment.counts and (aged or self._file.tell() > self._segment_bytes):
-                self._finish()
-                self._open()
-        except OSError as error:
-            raise RecordingError(
-                f'{self.folder / self._segment.path}: cannot be written: {error.strerror}'
-            ) from None
+            if self._segment.counts and (aged or file.tell() > self._segment_bytes):
+                self._finish(file)
 
     def close(self) -> None:
         """End the segment and write the metadata."""
-        self._finish()
+        if self._file is not None:
+            with self._segment_to_write() as file:
+                self._finish(file)
 
-    def _open(self) -> None:
+    @contextlib.contextmanager
+    def _segment_to_write(self) -> Iterator[BufferedWriter]:
+        """Give the file of the present segment; let go of it when it takes no more."""
+        try:
+            if self._file is None:
+                self._file = self._begin_segment()
+            yield self._file
+        except OSError as error:
+            if self._file is not None:
+                with contextlib.suppress(OSError):
+                    self._file.close()
+            self._file, self._knows_folder = None, False
+            full = error.errno in (errno.ENOSPC, errno.EDQUOT)
+            kind = DiskFullError if full else RecordingError
+            raise kind(f'{self.folder}: cannot be written: {error.strerror}') from None
+
+    def _begin_segment(self) -> BufferedWriter:
+        if not self._knows_folder:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            _, self._closed, topics = _take_up(self.folder)
+            self._topics = {**topics, **self._topics}
+            self._knows_folder = True
         numbers = [int(path.stem.rsplit('_', 1)[1]) for path in segments(self.folder)]
         self._segment = _Segment(f'{self.folder.name}_{max(numbers, default=-1) + 1}.mcap')
-        self._file = open(self.folder / self._segment.path, 'wb')  # noqa: SIM115 - kept open
+        file = open(self.folder / self._segment.path, 'wb')  # noqa: SIM115 - kept open
         # Held for as long as it is written: nobody repairs or deletes it meanwhile.
-        fcntl.flock(self._file, fcntl.LOCK_EX)
-        self._writer = _writer(self._file)
+        fcntl.flock(file, fcntl.LOCK_EX)
+        self._writer = _writer(file)
         self._channels: dict[str, int] = {}
         self._opened = time.monotonic()
+        return file
 
-    def _register(self, topic: TopicType) -> int:
-        return _register(self._writer, topic)
-
-    def _finish(self) -> None:
+    def _finish(self, file: BufferedWriter) -> None:
         self._writer.finish()  # type: ignore[no-untyped-call]
-        self._file.close()
+        file.close()
+        self._file = None
         if self._segment.counts:
             self._closed.append(self._segment)
         else:
@@ -186,6 +203,11 @@ def repair(folder: Path) -> list[str]:
     Returns:
         What was repaired, a line each; nothing for a recording that is whole or being written.
     """
+    return _take_up(folder)[0]
+
+
+def _take_up(folder: Path) -> tuple[list[str], list[_Segment], dict[str, TopicType]]:
+    """Repair a recording; return what was repaired, its segments, and its topics by name."""
     done: list[str] = []
     found: list[_Segment] = []
     topics: dict[str, TopicType] = {}
@@ -194,7 +216,7 @@ def repair(folder: Path) -> list[str]:
             try:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError:
-                return done
+                return done, found, topics
             if not _is_whole(path):
                 segment = _rewritten(path)
                 done.append(f'{path}: {segment.count} messages saved')
@@ -209,7 +231,7 @@ def repair(folder: Path) -> list[str]:
             path.unlink()
     if found and (done or not (folder / METADATA).exists()):
         write_metadata(folder, found, topics)
-    return done
+    return done, found, topics
 
 
 def prune(runs: Path, keep_bytes: float) -> list[Path]:
@@ -377,6 +399,9 @@ def _rewritten(path: Path) -> _Segment:
                         number, record.log_time, record.data, record.publish_time, record.sequence
                     )
                     segment.add(name, record.log_time)
+        except OSError:  # the disk is full: the torn file stays
+            temporary.unlink()
+            raise
         except Exception:  # where it is torn, any of the readers' errors may come
             pass
         writer.finish()  # type: ignore[no-untyped-call]

@@ -8,6 +8,7 @@ reads little. A torn last line is ignored.
 from __future__ import annotations
 
 import bisect
+import errno
 import json
 import os
 import re
@@ -36,8 +37,8 @@ class TimelineWriter:
     """
 
     def __init__(self, path: Path) -> None:
-        _cut_torn_line(path)
-        self._file = open(path, 'ab', buffering=0)  # noqa: SIM115 - kept open
+        self._path = path
+        self._descriptor: int | None = None
         self._framer = Framer(without=LEFT_OUT)
         self._whole = 0.0
         self._before: Snapshot | None = None
@@ -48,6 +49,9 @@ class TimelineWriter:
         Args:
             snapshot: What is known.
             at: Seconds since 1970.
+
+        Raises:
+            OSError: The file takes no more; the next line will hold everything.
         """
         changed = self._framer.patch(snapshot)
         whole = at - self._whole >= WHOLE_PERIOD
@@ -57,12 +61,27 @@ class TimelineWriter:
             self._whole, changed = at, self._framer.whole()
         line = json.dumps({'now': round(snapshot.now, 2), 'p': changed}, separators=(',', ':'))
         head = f'{{"t":{at:.3f},"k":{int(whole)},"e":"{self._event(snapshot)}",'
-        os.write(self._file.fileno(), (head + line[1:] + '\n').encode())
+        try:
+            self._append((head + line[1:] + '\n').encode())
+        except OSError:
+            self._whole = 0.0
+            self.close()
+            raise
         self._before = snapshot
+
+    def _append(self, line: bytes) -> None:
+        if self._descriptor is None:
+            _cut_torn_line(self._path)
+            flags = os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC
+            self._descriptor = os.open(self._path, flags, 0o644)
+        if os.write(self._descriptor, line) != len(line):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(self._path))
 
     def close(self) -> None:
         """Close the file; nothing is lost without it."""
-        self._file.close()
+        if self._descriptor is not None:
+            os.close(self._descriptor)
+            self._descriptor = None
 
     def _event(self, snapshot: Snapshot) -> str:
         """Return the most important thing that happened since the last line."""
