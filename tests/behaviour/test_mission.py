@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import resource
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -42,6 +43,37 @@ def test_a_visit_that_could_not_be_told_is_told_later(
     assert [visit.text('place') for visit in visits] == [place for _, place in world.arrivals]
     last = {visit.text('place'): visit.time for visit in visits[:-1]}
     assert all(world.visited_at[place] >= int(time) for place, time in last.items())
+
+
+def test_the_ontology_is_told_of_no_visit_that_the_record_lacks(
+    machine: str, tmp_path: Path
+) -> None:
+    world = World()
+    right = world.snapshot
+    cut_short: list[tuple[float, str]] = []
+    told: list[str] = []
+
+    def faults(name: str) -> None:
+        if name in ('follow', 'control') and world.clock.time > 60.0 and not cut_short:
+            world.is_in = next(place for place in world.rooms if place != world.is_in)
+            cut_short.append((world.clock.time, world.is_in))
+            raise PeerError(name, 'scripted fault')
+
+    def snapshot(*args: Any) -> object:
+        found = right(*args)
+        for at, place in cut_short:
+            if world.visited_at[place] >= at:
+                told.append(place)
+                events = read(tmp_path / 'record')
+                visits = [e.text('place') for e in events if e.name == 'visit' and e.time >= at]
+                assert place in visits
+        return found
+
+    world.snapshot = snapshot  # type: ignore[method-assign, assignment]
+    world.faults = faults
+    with MissionRecord(tmp_path / 'record') as record:
+        Run(machine, world, settings(), record).until(100.0)
+    assert told
 
 
 def test_an_ontology_built_anew_is_told_of_the_visits(machine: str) -> None:

@@ -124,6 +124,7 @@ class Mission:
             PeerError: Who decides cannot be asked.
             NowhereToGoError: Nothing can be reached.
         """
+        self._notice_place(interrupt)
         decisions, now = self.ports.decisions, self.now()
         avoided = self.recovery.avoided(now)
         decision = decisions.decide(now, interrupt, avoided, to_charge=to_charge)
@@ -138,6 +139,16 @@ class Mission:
         self.note('decision', place=decision.place, rule=decision.rule, reason=decision.reason)
         return decision
 
+    def _notice_place(self, interrupt: Interrupt) -> None:
+        """Record where the robot stands, if a drive ended elsewhere than it was to.
+
+        The decision tells it to the ontology, whose visits are in the record first.
+        """
+        here = self.ports.ontology.await_place(self.place, 0.0, interrupt)
+        if here not in (self.place, ''):
+            self.place = here
+            self.note('visit', place=here, distance=0.0)
+
     def departs(self) -> None:
         """Note that the robot leaves its place; until it arrives it may be anywhere."""
         self.astray = True
@@ -145,10 +156,10 @@ class Mission:
 
     def arrived(self, place: str, distance: float, path: Sequence[Point] = ()) -> None:
         """Note that the robot is in ``place``, after ``distance`` metres along ``path``."""
+        self._visit(place, distance, path)
         self.ports.decisions.arrived(place, self.now(), distance)
         self.recovery.arrived(place)
         self.failure = None
-        self._visit(place, distance, path)
         self.say(f'arrived in {place}')
 
     def make_sure_of(self, place: str, interrupt: Interrupt) -> None:
@@ -164,8 +175,8 @@ class Mission:
 
     def came_back(self, distance: float) -> None:
         """Note that the robot is again where it was last known to be."""
-        self.ports.decisions.saw(self.place, self.now())
         self._visit(self.place, distance)
+        self.ports.decisions.saw(self.place, self.now())
         self.say(f'back in {self.place}')
 
     def _visit(self, place: str, distance: float, path: Sequence[Point] = ()) -> None:
