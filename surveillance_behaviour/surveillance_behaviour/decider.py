@@ -27,6 +27,7 @@ from surveillance_behaviour.decision import (
 from surveillance_behaviour.peers.ports import Ontology, Places
 from surveillance_behaviour.policy.battery_reserve import Battery
 from surveillance_behaviour.policy.graph import GraphError
+from surveillance_behaviour.policy.plan import LEG_CHANGE
 from surveillance_behaviour.policy.world import Decision, World
 from surveillance_behaviour.world_model import Experience, WorldModel
 from surveillance_fsm import Interrupt
@@ -67,7 +68,9 @@ class Decider:
         self._saving = threading.Lock()
         self._leg: Decision | None = None
         self._warn = warn
-        self._warned: object = None
+        self._warned = False
+        self._checked_threshold: object = None
+        self._checked_seconds = 0.0
         self._checked_rules: tuple[str, ...] = ()
 
     @property
@@ -114,14 +117,26 @@ class Decider:
         """
         with self._looking:
             world = self.model.refresh(now, interrupt, avoided)
-        of_what = world.threshold, world.graph.places
-        if of_what != self._warned:
-            warning = tour_warning(world.graph.tour.length, world.threshold)
-            if warning:
-                self._warned = of_what
-                self._warn(warning)
+        self._check_threshold(world)
         self._check_rules(interrupt)
         return world
+
+    def _check_threshold(self, world: World) -> None:
+        """Warn of a threshold that no robot can keep to.
+
+        The shortest tour takes long on a large map. It is looked for anew only when places or
+        threshold have changed, or what all legs take together, by more than `LEG_CHANGE`.
+        """
+        of_what = world.threshold, world.graph.places
+        seconds = sum(sum(ways.values()) for ways in world.graph.legs.values())
+        alike = abs(seconds - self._checked_seconds) <= LEG_CHANGE * self._checked_seconds
+        if of_what == self._checked_threshold and (self._warned or alike):
+            return
+        self._checked_threshold, self._checked_seconds = of_what, seconds
+        warning = tour_warning(world.graph.tour.length, world.threshold)
+        self._warned = bool(warning)
+        if warning:
+            self._warn(warning)
 
     def _check_rules(self, interrupt: Interrupt) -> None:
         """Say which class of the rules no place can ever be in."""

@@ -14,7 +14,7 @@ import difflib
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from surveillance_behaviour.policy.battery_reserve import Battery, BatteryLimits, reserve
 from surveillance_behaviour.policy.policies import DEFAULT_POLICY, Scores, make_policy
@@ -268,7 +268,7 @@ def known_place(place: str, places: Sequence[str]) -> str:
 
 
 def why_not(place: str, world: World, battery: Battery, settings: DecisionSettings) -> WhyNot:
-    """Tell why `decide` would not send the robot to ``place`` now.
+    """Tell why `decide` would not send the robot to ``place`` now; changes nothing of that.
 
     Raises:
         ValueError: There is no such place.
@@ -277,7 +277,8 @@ def why_not(place: str, world: World, battery: Battery, settings: DecisionSettin
     if place == world.place:
         return WhyNot(f'the robot is in {place} already')
     try:
-        decision = decide(world, battery, settings)
+        asked = replace(world, memory=world.memory.for_a_question())
+        decision = decide(asked, battery, settings)
     except NowhereToGoError as error:
         return WhyNot(str(error), _premises(place, world, ''))
     if decision.place == place:

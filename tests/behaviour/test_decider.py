@@ -76,3 +76,26 @@ def test_a_request_is_taken_while_somebody_looks(tmp_path: Path) -> None:
     answered.set()
     looking.join()
     assert taken, 'the request waits for an answer that its own thread would bring'
+
+
+def test_the_shortest_tour_is_looked_for_when_the_map_changes_not_with_each_leg(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    world, lengths, warnings = World(), [], []  # type: ignore[var-annotated]
+
+    def warning(tour: float, threshold: float) -> str:
+        lengths.append(tour)
+        return 'too short' if threshold < tour else ''
+
+    monkeypatch.setattr('surveillance_behaviour.decider.tour_warning', warning)
+    settings = DecisionSettings(urgency_threshold=1e6)
+    told = Decider(settings, world, world, world.battery, warn=warnings.append)
+    told.begin(1.0, NOBODY)
+    for drive in range(5):
+        told.experience.leg_times.observe('E', 'C1', 8.0 + 0.1 * drive, 5.0, 5.0)
+        told.look(2.0 + drive, NOBODY)
+    assert len(lengths) <= 2, 'a tour for each leg that was learned'
+    settings.urgency_threshold = 1.0
+    told.look(10.0, NOBODY)
+    told.look(11.0, NOBODY)
+    assert warnings == ['too short']

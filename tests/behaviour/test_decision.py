@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import random
+
 import pytest
 
 from surveillance_behaviour.decision import (
@@ -15,6 +17,8 @@ from surveillance_behaviour.decision import (
 )
 from surveillance_behaviour.policy.battery_reserve import Battery
 from surveillance_behaviour.policy.graph import PatrolGraph
+from surveillance_behaviour.policy.policies import POLICIES
+from surveillance_behaviour.policy.world import PolicyMemory
 
 from .worlds import seven_rooms, world
 
@@ -153,3 +157,30 @@ def test_a_threshold_below_the_tour_is_warned_of() -> None:
         tour_warning(69.648, 60.0)
     )
     assert tour_warning(69.648, 70.0) == ''
+
+
+@pytest.mark.parametrize('policy', POLICIES)
+def test_a_question_changes_no_decision(policy: str) -> None:
+    def decisions(*, asked: bool) -> list[str]:
+        graph, memory, settings = seven_rooms(), PolicyMemory(random.Random(3)), DecisionSettings()
+        settings.policy, settings.rules = policy, Rules(())
+        place, now, visited_at, taken = 'C1', 100.0, {'C1': 100.0}, []
+        for _ in range(12):
+            here = world(
+                place=place,
+                now=now,
+                reachable=tuple(graph.legs[place]),
+                visited_at=visited_at,
+                graph=graph,
+                memory=memory,
+            )
+            for other in graph.places if asked else ():
+                why_not(other, here, Battery(), settings)
+            decision = decide(here, Battery(), settings)
+            now += graph.legs[place][decision.place]
+            place = decision.place
+            visited_at = {**visited_at, place: now}
+            taken.append(place)
+        return taken
+
+    assert decisions(asked=True) == decisions(asked=False)

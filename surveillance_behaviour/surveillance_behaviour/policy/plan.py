@@ -154,6 +154,7 @@ class Plan:
     """
 
     _met: list[bool]
+    _thinks = True
 
     def __init__(self, world: World, before: Plan | None = None) -> None:
         self._key = world.threshold, world.rules
@@ -193,6 +194,12 @@ class Plan:
             )
         )
 
+    def for_a_question(self) -> Plan:
+        """Return a copy that says where its course leads from now on, and thinks no further."""
+        plan = copy(self)
+        plan._guide, plan._met, plan._thinks = copy(self._guide), self._met.copy(), False
+        return plan
+
     def advance(self, world: World) -> tuple[int, int] | None:
         """Think on, and return the place to go to and the target that it leads to, as indices.
 
@@ -204,7 +211,7 @@ class Plan:
             self._moves += 1
             self._met[self._state.place] = self._state.met[self._state.place] = True
         self._take_switch()
-        if not self._finished():
+        if self._thinks and not self._finished():
             self._think(MORE_WORK, MORE_SECONDS, lead=self._lead())
         if not isinstance(self._guide, RoundGuide):
             return None

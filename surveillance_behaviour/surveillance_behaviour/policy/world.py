@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Mapping
+from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -27,6 +28,11 @@ class PolicyMemory:
     generator: random.Random = field(default_factory=random.Random)
     plan: Any = None
     passes: dict[tuple[str, ...], int] = field(default_factory=dict)
+
+    def for_a_question(self) -> PolicyMemory:
+        """Return a copy to answer a question with, which changes nothing of the next choice."""
+        plan = self.plan.for_a_question() if self.plan is not None else None
+        return PolicyMemory(copy(self.generator), plan, self.passes.copy())
 
 
 @dataclass(frozen=True, eq=False)
