@@ -18,18 +18,20 @@ from sensor_msgs.msg import LaserScan
 
 from surveillance_controllers import conversions
 from surveillance_controllers.geometry import Points
-from surveillance_controllers.motion.base_interface import Transforms, share_of_speed
+from surveillance_controllers.motion.base_interface import Transforms
 from surveillance_controllers.motion.path_following import Velocity, room_ahead
 from surveillance_controllers.motion.robot_parameters import lidar_mount
+from surveillance_controllers.motion.sensor_age import STANDSTILL, WATCH_PERIOD, SensorAge
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import Described, declare_fields
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import SENSOR_QOS
+from surveillance_runtime.robot_base import ROBOT_DECELERATION
 
 HORIZON = 3.0
 """How far ahead is looked, metres."""
-PERIOD = 0.05
-"""Time between two looks at the age of what was heard, seconds."""
+LATENCY = 0.15
+"""Time between seeing and braking, seconds: a period of the lidar and a half."""
 
 
 @dataclass(frozen=True)
@@ -39,22 +41,25 @@ class MonitorSettings:
     Attributes:
         radius: Of the robot, metres.
         margin: Kept free beside it, metres.
-        deceleration: With which the base brakes, m/s^2.
-        longest_silence: Age of a scan or a command from which on the robot stands, seconds.
+        deceleration: With which the base brakes when it must, m/s^2.
+        longest_silence: The robot stands when a scan or a command is overdue by this, seconds.
     """
 
     radius: float = 0.25
     margin: float = 0.02
-    deceleration: float = 0.8
-    longest_silence: float = 0.25
+    deceleration: float = ROBOT_DECELERATION
+    longest_silence: float = STANDSTILL
 
 
 _SETTINGS = {
     'radius': Described('Radius of the robot, m.', 0.01, 20.0, name='robot_radius'),
     'margin': Described('Kept free beside the robot, m.', 0.0, 20.0),
-    'deceleration': Described('With which the base brakes, m/s^2.', 0.01, 20.0),
+    'deceleration': Described(
+        'With which the base brakes when it must, m/s^2.', *(0.05, 20.0), name='robot_deceleration'
+    ),
     'longest_silence': Described(
-        'The robot stands when scan or cmd_vel is older, and is slower before, s of ROS time.',
+        'The robot stands when scan or cmd_vel is overdue by this, and brakes before, '
+        's of ROS time.',
         0.05,
         10.0,
     ),
@@ -79,7 +84,11 @@ def allowed(wanted: Velocity, seen: Points, settings: MonitorSettings) -> Veloci
         curvature = -curvature
     reach = settings.radius + settings.margin
     room = room_ahead(ahead, curvature, reach, HORIZON)
-    speed = math.sqrt(2.0 * settings.deceleration * room) if room < HORIZON else math.inf
+    if room >= HORIZON:
+        return wanted
+    # Braking begins after the latency.
+    late = settings.deceleration * LATENCY
+    speed = math.sqrt(late**2 + 2.0 * settings.deceleration * room) - late
     share = min(1.0, speed / abs(wanted.speed))
     return Velocity(wanted.speed * share, wanted.turn * share)
 
@@ -94,12 +103,13 @@ class CollisionMonitor(PatrolNode):
         self._frames = Transforms(self)
         self._wanted = Velocity()
         self._seen: Points | None = None
-        self._heard = {'scan': -math.inf, 'cmd_vel': -math.inf}
+        settings = self._settings
+        self._age = SensorAge(('scan', 'cmd_vel'), settings.deceleration, settings.longest_silence)
         self._stands_for = ''
         self._base = self.create_publisher(Twist, 'cmd_vel_monitored', 1)
         self.create_subscription(Twist, 'cmd_vel', self._on_command, 1)
         self.create_subscription(LaserScan, 'scan', self._on_scan, SENSOR_QOS)
-        self.create_timer(PERIOD, self._on_time)
+        self.create_timer(WATCH_PERIOD, self._on_time)
 
     def _now(self) -> float:
         return float(self.get_clock().now().nanoseconds) / 1e9
@@ -110,7 +120,7 @@ class CollisionMonitor(PatrolNode):
             self.get_logger().error(f'cmd_vel: {speed} m/s, {turn} rad/s: expected finite numbers')
             speed = turn = 0.0
         self._wanted = Velocity(speed, turn)
-        self._heard['cmd_vel'] = self._now()
+        self._age.hear('cmd_vel', self._now())
         self._pass_on()
 
     def _on_scan(self, message: LaserScan) -> None:
@@ -120,31 +130,27 @@ class CollisionMonitor(PatrolNode):
         except ValueError as error:
             self.get_logger().error(f'scan: {error}')
             return
-        self._heard['scan'] = self._now()
+        self._age.hear('scan', self._now())
         if self._wanted.speed != 0.0:
             self._pass_on()
 
     def _on_time(self) -> None:
-        if self._wanted != Velocity() and self._share()[0] < 1.0:
+        if self._wanted != Velocity() and self._age.share(self._wanted.speed, self._now()) < 1.0:
             self._pass_on()
 
-    def _share(self) -> tuple[float, str]:
-        """Return the part of the speed that the age of what was heard leaves, and the topic."""
-        now = self._now()
-        age, topic = max((now - at, topic) for topic, at in self._heard.items())
-        return share_of_speed(age, self._settings.longest_silence), topic
-
     def _pass_on(self) -> None:
-        share, topic = self._share()
-        if share == 0.0 or self._seen is None:
+        now = self._now()
+        if self._seen is None or self._age.share(self._wanted.speed, now) == 0.0:
+            topic = self._age.left(now)[1]
             velocity, why = Velocity(), f'nothing on the topic {topic}'
+            if topic == 'cmd_vel':
+                self._wanted, why = Velocity(), ''
         else:
             velocity = allowed(self._wanted, self._seen, self._settings)
             near = abs(velocity.speed) < 0.5 * abs(self._wanted.speed)
             why = 'something is in the way' if near else ''
+            share = self._age.share(velocity.speed, now)
             velocity = Velocity(share * velocity.speed, share * velocity.turn)
-        if share == 0.0 and topic == 'cmd_vel':
-            self._wanted, why = Velocity(), ''
         if why != self._stands_for:
             self._stands_for = why
             if why:

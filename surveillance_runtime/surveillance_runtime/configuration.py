@@ -25,7 +25,6 @@ import yaml
 
 from surveillance_runtime.parameters import ParameterError, ParameterSpec
 from surveillance_runtime.place.floor_plan import FloorPlan
-from surveillance_runtime.place.place_file import ROBOT_RADIUS
 from surveillance_runtime.place.regions import Regions, check_passable
 from surveillance_runtime.place.rooms import (
     GEOMETRY_KEYS,
@@ -34,6 +33,7 @@ from surveillance_runtime.place.rooms import (
     PlaceError,
     make_place,
 )
+from surveillance_runtime.robot_base import ROBOT_RADIUS
 from surveillance_runtime.suggestions import nearest
 from surveillance_runtime.yaml_file import YamlFile, YamlFileError, read_yaml_file, with_exponent
 

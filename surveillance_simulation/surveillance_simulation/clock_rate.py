@@ -25,6 +25,8 @@ DRIVING = ('follow_path', 'motion/controller')
 """Actions during which the mission waits for the robot."""
 MIN_STEP = 0.001
 """The shortest step of time, seconds."""
+LONGEST_DEBT = 0.5
+"""What a busy machine falls behind by more than this is not caught up with, simulated seconds."""
 
 
 @dataclass(frozen=True)
@@ -205,7 +207,7 @@ class ClockRate:
             self._owed = min(self._owed + elapsed * model.ceiling, step)
         else:
             # What a busy machine falls behind is caught up with, but not without bound.
-            self._owed = min(self._owed + elapsed * model.speed, 5 * step)
+            self._owed = min(self._owed + elapsed * model.speed, max(LONGEST_DEBT, step))
         if self._owed < step - 1e-9:
             return 0.0
         self._owed -= step

@@ -6,6 +6,7 @@ import math
 import threading
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -39,6 +40,9 @@ _UNDER_WAY = (
 )
 
 
+OBEYS_WITHIN = 0.02
+"""At a set speed of time the base is moved on this often, real seconds: a command is obeyed then,
+not with the next measurement."""
 LOOK_PERIOD = 0.5
 """Real seconds between two looks whether a program that time waits for is to be given up."""
 
@@ -68,6 +72,11 @@ class Simulator(PatrolNode):
         )
         self._changing = threading.RLock()
         self._drives_clock = rate.speed != 1.0 or bool(self.get_parameter('use_sim_time').value)
+        # As fast as possible, there is a measurement after each step of time.
+        self._measurement_period = rate.step if rate.speed else 0.0
+        self._next_measurement = self._measurement_period
+        if rate.speed:
+            rate = replace(rate, step=min(rate.step, OBEYS_WITHIN * rate.speed))
         self._rate = ClockRate(rate, time.monotonic())
         self._sensors = SensorFeed(self, self.robot, drives_clock=self._drives_clock)
         try:
@@ -106,15 +115,24 @@ class Simulator(PatrolNode):
 
     def _tick(self) -> None:
         with self._changing:
-            passed = self._rate.due(self.robot.time, time.monotonic(), moving=self.robot.is_moving)
+            measure = self._advance()
             if self._rate.is_waiting:
                 # The answer wakes it: useless ticks would take the time that the answer needs.
                 self._timer.cancel()
-            if not passed:
-                return
+        if measure:
+            self._sensors.publish(self._stamp())
+            self._camera.tick()
+
+    def _advance(self) -> bool:
+        """Move the robot on by the time that is due; return whether it is time to measure."""
+        while passed := self._rate.due(
+            self.robot.time, time.monotonic(), moving=self.robot.is_moving
+        ):
             self.robot.advance(passed)
-        self._sensors.publish(self._stamp())
-        self._camera.tick()
+            if self.robot.time >= self._next_measurement - 1e-9:
+                self._next_measurement = self.robot.time + self._measurement_period
+                return True
+        return False
 
     def _go_on(self) -> None:
         if self._rate.is_waiting:

@@ -35,6 +35,9 @@ _BASE = {
     'speed': Described('Greatest speed, m/s.', 0.01, 20.0),
     'turn_speed': Described('Greatest turn speed, rad/s.', 0.01, 20.0),
     'acceleration': Described('Greatest acceleration, m/s^2.', 0.01, 20.0),
+    'deceleration': Described(
+        'With which the base brakes when it must, m/s^2.', *(0.05, 20.0), name='robot_deceleration'
+    ),
     'turn_acceleration': Described('Greatest turning acceleration, rad/s^2.', 0.01, 20.0),
     'command_timeout': Described(
         'Seconds without a command after which the base stops.', 0.01, 20.0

@@ -14,10 +14,8 @@ from sensor_msgs.msg import LaserScan
 
 from surveillance_controllers.geometry import composed
 from surveillance_controllers.motion.base_interface import (
-    LONGEST_SILENCE,
     RobotBase,
     Transforms,
-    share_of_speed,
 )
 from surveillance_controllers.motion.driving import Drive, Spin
 from surveillance_controllers.motion.localisation import Localiser, Scan
@@ -74,13 +72,6 @@ def test_without_scans_or_odometry_the_robot_is_told_to_stand(
     graph.until(lambda: drives(*both))
     graph.until(lambda: not drives((scans, scan())), timeout=5.0)
     assert 'nothing on the topic' in capfd.readouterr().err
-    assert LONGEST_SILENCE < 0.3
-
-
-def test_the_speed_falls_with_the_age_of_what_was_seen() -> None:
-    assert [share_of_speed(age, 0.25) for age in (0.0, 0.1, 0.15)] == [1.0, 1.0, 1.0]
-    assert share_of_speed(0.2, 0.25) == pytest.approx(0.5)
-    assert [share_of_speed(age, 0.25) for age in (0.25, 1.0, math.inf)] == [0.0, 0.0, 0.0]
 
 
 def test_messages_that_are_not_sound_end_nothing(

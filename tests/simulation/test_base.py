@@ -31,6 +31,20 @@ def test_it_accelerates_to_the_wanted_speed_and_no_further() -> None:
     assert base.speed == pytest.approx(0.6)
 
 
+@pytest.mark.parametrize('way', [1.0, -1.0])
+def test_it_brakes_harder_than_it_speeds_up(way: float) -> None:
+    model = BaseModel(acceleration=1.0, deceleration=2.0)
+    base = Base(two_rooms(), (1.5, 1.0, 0.0), model)
+    drive(base, 0.4 * way, 0.0, 0.5)
+    assert base.speed == pytest.approx(0.4 * way)
+    drive(base, 0.2 * way, 0.0, DT)
+    assert base.speed == pytest.approx(0.3 * way)
+    drive(base, -0.5 * way, 0.0, 0.15)
+    assert base.speed == pytest.approx(0.0), 'to a stand first'
+    drive(base, -0.5 * way, 0.0, 3 * DT)
+    assert 0.05 < -base.speed * way <= 0.15 + 1e-9
+
+
 def test_a_turn_follows_the_exact_arc() -> None:
     radius = 0.5
     base = Base(two_rooms(), (1.5, 0.5, 0.0), BaseModel(acceleration=1e6, turn_acceleration=1e6))

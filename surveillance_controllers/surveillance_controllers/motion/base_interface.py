@@ -6,7 +6,6 @@ the robot is (`amcl_pose`) and what stands about that the map does not have (`ob
 
 from __future__ import annotations
 
-import math
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -24,20 +23,17 @@ from surveillance_controllers.motion.driving import Drive, Spin, State
 from surveillance_controllers.motion.localisation import Scan
 from surveillance_controllers.motion.navigator import Navigator
 from surveillance_controllers.motion.path_following import Velocity
+from surveillance_controllers.motion.sensor_age import WATCH_PERIOD, SensorAge
 from surveillance_controllers.planning.grid_planning import NoPathError
 from surveillance_fsm import Interrupt
 from surveillance_interfaces.msg import DoorStates
 from surveillance_runtime.conversions import cloud_from_points, seconds_of
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
+from surveillance_runtime.robot_base import ROBOT_DECELERATION
 
-LONGEST_SILENCE = 0.25
-"""A robot whose lidar or odometry has been silent for longer is told to stand, seconds of ROS time;
-scans come at 10 Hz."""
 BASE_FRAMES = ('base_link', 'base_footprint', '')
 """Frames at the robot's centre."""
-WATCH_PERIOD = 0.05
-"""Time between two looks at that, seconds."""
 POSE_PERIOD = 0.19
 """Least time between two messages on amcl_pose, seconds: with every second scan at 10 Hz."""
 
@@ -46,18 +42,6 @@ try:
     from tf2_msgs.msg import TFMessage
 except ImportError:
     TFMessage = None
-
-
-def share_of_speed(age: float, longest: float = LONGEST_SILENCE) -> float:
-    """Return the part of its speed that a robot may keep by the age of what it saw, 0 to 1.
-
-    One message may be late: the part falls from 1 at 0.6 of the longest silence to 0 at its end.
-
-    Args:
-        age: Of what was heard last, seconds.
-        longest: Age from which on the robot stands, seconds.
-    """
-    return min(max((longest - age) / (0.4 * longest), 0.0), 1.0)
 
 
 class RobotBase:
@@ -70,6 +54,7 @@ class RobotBase:
         on_place: Told in the executor's thread in which place a scan found the robot, when that
             changed (None: not known any more), and the scan's stamp; must not block.
         mount: Where the lidar sits on the robot; None: as `tf_static` says of the scan's frame.
+        deceleration: With which the base brakes when it must, m/s^2.
     """
 
     def __init__(
@@ -79,6 +64,7 @@ class RobotBase:
         sensor_timeout: float,
         on_place: Callable[[str | None, Any], None],
         mount: Pose | None = None,
+        deceleration: float = ROBOT_DECELERATION,
     ) -> None:
         self._node = node
         self._navigator = navigator
@@ -95,7 +81,7 @@ class RobotBase:
         self._obstacles = node.create_publisher(PointCloud2, 'obstacles', STATE_QOS)
         self._tf = Transforms(node)
         self._mount = mount
-        self._heard = {'scan': -math.inf, 'odom': -math.inf}
+        self._age = SensorAge(('scan', 'odom'), deceleration)
         self._wanted = Velocity()
         self._silent = ''
         node.create_timer(WATCH_PERIOD, self._watch)
@@ -221,7 +207,7 @@ class RobotBase:
         with self._refusing('odom'):
             pose = conversions.pose_from(message.pose.pose)
             with self._lock:
-                self._heard['odom'] = self._now()
+                self._age.hear('odom', self._now())
                 self._navigator.move(pose)
 
     def _on_initial_pose(self, message: PoseWithCovarianceStamped) -> None:
@@ -240,9 +226,9 @@ class RobotBase:
         measured = seconds_of(stamp)
         with self._stepped:
             before = self.place
-            self._heard['scan'] = self._now()
+            self._age.hear('scan', self._now())
             velocity = self._navigator.see(scan, measured)
-            if velocity is not None and self._navigator.task is not None and not self._is_blind():
+            if velocity is not None and self._navigator.task is not None:
                 self._command(velocity)
             self._publish_pose(measured, stamp)
             if self.place != before:
@@ -263,7 +249,7 @@ class RobotBase:
 
     def _command(self, velocity: Velocity) -> None:
         self._wanted = velocity
-        self._publish_command(1.0)
+        self._publish_command(self._age.share(velocity.speed, self._now()))
 
     def _publish_command(self, share: float) -> None:
         wanted = self._wanted
@@ -273,32 +259,21 @@ class RobotBase:
     def _now(self) -> float:
         return float(self._node.get_clock().now().nanoseconds) / 1e9
 
-    def _oldest(self) -> tuple[float, str]:
-        """Return the age of what was heard longest ago, seconds, and its topic."""
-        now = self._now()
-        return max((now - at, topic) for topic, at in self._heard.items())
-
-    def _is_blind(self) -> bool:
-        return self._oldest()[0] > LONGEST_SILENCE
-
     def _watch(self) -> None:
         with self._lock:
             moving = self._wanted != Velocity()
             if not (moving or self._silent):
                 return
-            age, topic = self._oldest()
-            share = share_of_speed(age)
+            now = self._now()
+            share = self._age.share(self._wanted.speed, now)
             if moving and share < 1.0:
                 self._publish_command(share)
-            silent = topic if share == 0.0 else ''
+            silent = self._age.left(now)[1] if share == 0.0 else ''
             if silent:
                 self._wanted = Velocity()
-            if silent != self._silent:
-                self._silent = silent
-                if silent:
-                    self._node.get_logger().warn(
-                        f'nothing on the topic {silent} for {LONGEST_SILENCE:g} s: the robot stands'
-                    )
+            if silent and not self._silent:
+                self._node.get_logger().warn(f'nothing on the topic {silent}: the robot stands')
+            self._silent = silent
 
     def _publish_pose(self, measured: float, stamp: Any) -> None:
         navigator = self._navigator

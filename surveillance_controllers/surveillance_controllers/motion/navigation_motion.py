@@ -49,7 +49,14 @@ class NavigationMotion:
         self._planner = GoalCaller(node, ComputePath, 'compute_path')
         navigator = Navigator(settings.doors, guesses=[settings.station])
         tell = recorder.tell if settings.track_place else lambda _place, _stamp: None
-        self._base = RobotBase(node, navigator, settings.sensor_timeout, tell, settings.lidar_mount)
+        self._base = RobotBase(
+            node,
+            navigator,
+            settings.sensor_timeout,
+            tell,
+            settings.lidar_mount,
+            settings.drive.deceleration,
+        )
         self._base.set_positions(settings.positions)
         knowledge.assume(settings.positions)
         self._news = Interrupt()

@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 
 from surveillance_controllers import geometry
 from surveillance_controllers.geometry import Points, Pose, angle_between
+from surveillance_runtime.robot_base import ROBOT_DECELERATION
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,8 @@ class DriveParameters:
         margin: Gap kept between the robot and what the lidar sees, metres.
         speed: Top speed, m/s.
         turn: Top turning speed, rad/s.
-        acceleration: Of the speed, m/s^2.
+        acceleration: Of the speed, m/s^2; also with which a drive brakes.
+        deceleration: With which the base brakes when it must, m/s^2.
         turn_acceleration: Of the turning speed, rad/s^2.
         jerk: Greatest change of the acceleration, m/s^3; only to avoid a contact it brakes at once.
         shortest_look: Least distance of the point steered to, metres.
@@ -52,6 +54,7 @@ class DriveParameters:
     speed: float = 0.6
     turn: float = 1.5
     acceleration: float = 0.8
+    deceleration: float = ROBOT_DECELERATION
     turn_acceleration: float = 3.0
     jerk: float = 4.0
     shortest_look: float = 0.25

@@ -28,6 +28,11 @@ _DRIVE = {
     'speed': Described('SIMULATED: Top speed, m/s.', 0.01, 20.0),
     'turn': Described('SIMULATED: Top turning speed, rad/s.', 0.01, 20.0),
     'acceleration': Described('SIMULATED: Acceleration, m/s^2.', 0.01, 20.0),
+    'deceleration': Described(
+        'SIMULATED: With which the base brakes when it must, m/s^2.',
+        *(0.05, 20.0),
+        name='robot_deceleration',
+    ),
     'turn_acceleration': Described('SIMULATED: Turning acceleration, rad/s^2.', 0.01, 20.0),
     'tolerance': Described('SIMULATED: The end is reached within this distance, m.', 0.01, 20.0),
 }

@@ -14,11 +14,9 @@ from surveillance_runtime.place.rooms import (
     PlaceError,
     make_place,
 )
+from surveillance_runtime.robot_base import ROBOT_RADIUS
 from surveillance_runtime.suggestions import nearest
 from surveillance_runtime.yaml_file import YamlFile, read_parameter_file
-
-ROBOT_RADIUS = 0.22
-"""Of the simulated robot, metres: the default of the simulator's `robot_radius`."""
 
 
 @dataclass(frozen=True)

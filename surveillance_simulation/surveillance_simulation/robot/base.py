@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from surveillance_runtime.place.floor_plan import Pose
+from surveillance_runtime.robot_base import ROBOT_DECELERATION, ROBOT_RADIUS
 from surveillance_simulation.world.world import World
 
 _CONTACT = 1e-3
@@ -31,17 +32,19 @@ class BaseModel:
         radius: Radius of the robot, metres.
         speed: Greatest forward and backward speed, m/s.
         turn_speed: Greatest turning speed, rad/s.
-        acceleration: Greatest change of speed, m/s^2.
+        acceleration: Greatest increase of speed, m/s^2.
+        deceleration: Greatest decrease of speed, m/s^2.
         turn_acceleration: Greatest change of turning speed, rad/s^2.
         command_timeout: After this many seconds without a command the base stops.
         distance_error: Standard deviation of the odometry's distance per sqrt(m), metres.
         turn_error: Standard deviation of the odometry's heading per sqrt(rad), rad.
     """
 
-    radius: float = 0.22
+    radius: float = ROBOT_RADIUS
     speed: float = 0.6
     turn_speed: float = 1.5
     acceleration: float = 1.0
+    deceleration: float = ROBOT_DECELERATION
     turn_acceleration: float = 4.0
     command_timeout: float = 0.5
     distance_error: float = 0.004
@@ -105,9 +108,8 @@ class Base:
         if not self.is_moving:
             return
         wanted_speed, wanted_turn = self._wanted
-        change = self.model.acceleration * dt
         turn_change = self.model.turn_acceleration * dt
-        self.speed += min(max(wanted_speed - self.speed, -change), change)
+        self.speed = self._speed_after(dt, wanted_speed)
         self.turn_speed += min(max(wanted_turn - self.turn_speed, -turn_change), turn_change)
         distance, turn = self.speed * dt, self.turn_speed * dt
         reached = self._free_part(distance, turn)
@@ -128,6 +130,15 @@ class Base:
         self.travelled += abs(distance)
         self.turned += abs(turn)
         self._count(distance, turn)
+
+    def _speed_after(self, dt: float, wanted: float) -> float:
+        """Return the speed after `dt` seconds: it brakes at most to a stand, then speeds up."""
+        speed, model = self.speed, self.model
+        faster = wanted * speed >= 0.0 and abs(wanted) > abs(speed)
+        if faster:
+            return speed + math.copysign(min(abs(wanted - speed), model.acceleration * dt), wanted)
+        goal = wanted if wanted * speed > 0.0 else 0.0
+        return speed + math.copysign(min(abs(goal - speed), model.deceleration * dt), goal - speed)
 
     @property
     def is_moving(self) -> bool:

@@ -1,0 +1,71 @@
+"""A robot that sees nothing stands; one whose lidar is a little late drives on."""
+
+from __future__ import annotations
+
+import math
+import random
+
+import pytest
+
+from surveillance_controllers.motion.sensor_age import (
+    REACTION,
+    STANDSTILL,
+    WATCH_PERIOD,
+    SensorAge,
+)
+
+DECELERATION = 2.5
+
+
+@pytest.mark.parametrize('period', [0.02, 0.1, 0.2])
+@pytest.mark.parametrize('speed', [0.05, 0.2, 0.6])
+def test_a_robot_stands_in_time_after_the_first_missed_message(period: float, speed: float) -> None:
+    age = SensorAge(['scan'], DECELERATION)
+    for count in range(30):
+        age.hear('scan', count * period)
+    missed = 30 * period
+    at, driven, allowed = 29 * period, speed, speed
+    while driven > 0.0 and at < missed + 5.0:
+        at += WATCH_PERIOD
+        allowed = speed * age.share(speed, at)
+        driven = max(allowed, driven - DECELERATION * WATCH_PERIOD)
+    # The base obeys up to the reaction later than here.
+    assert at + REACTION <= missed + STANDSTILL + WATCH_PERIOD + 1e-9
+
+
+@pytest.mark.parametrize('rate', [5.0, 7.0, 10.0])
+def test_a_lidar_with_jitter_stops_nobody(rate: float) -> None:
+    rng = random.Random(1)
+    age = SensorAge(['scan', 'odom'], DECELERATION)
+    shares, now, due = [], 0.0, 0.0
+    while now < 60.0:
+        now = due + rng.uniform(0.0, 0.25) / rate  # each comes up to a quarter late
+        due += 1.0 / rate
+        shares.append(age.share(0.6, now))
+        age.hear('scan', now)
+        age.hear('odom', now)
+    assert min(shares[20:]) > 0.8
+    assert sum(shares[20:]) / len(shares[20:]) > 0.97
+
+
+def test_one_lost_scan_slows_a_slow_robot_by_nothing() -> None:
+    age = SensorAge(['scan'], DECELERATION)
+    for count in range(30):
+        age.hear('scan', 0.1 * count)
+    assert age.share(0.2, 2.9 + 0.2) == 1.0
+    assert age.share(0.6, 2.9 + 0.2) < 0.7
+
+
+def test_what_was_never_heard_lets_nobody_drive() -> None:
+    age = SensorAge(['scan', 'odom'], DECELERATION)
+    age.hear('scan', 1.0)
+    assert age.left(1.0) == (-math.inf, 'odom')
+    assert age.share(0.1, 1.0) == 0.0
+    assert age.share(0.0, 1.0) == 0.0
+
+
+def test_a_sensor_that_is_too_slow_lets_nobody_drive_fast() -> None:
+    age = SensorAge(['scan'], DECELERATION)
+    for count in range(30):
+        age.hear('scan', 1.0 * count)
+    assert age.share(0.6, 29.5) == 0.0
