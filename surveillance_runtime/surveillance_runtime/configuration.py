@@ -35,7 +35,13 @@ from surveillance_runtime.place.rooms import (
 )
 from surveillance_runtime.robot_base import ROBOT_RADIUS
 from surveillance_runtime.suggestions import nearest
-from surveillance_runtime.yaml_file import YamlFile, YamlFileError, read_yaml_file, with_exponent
+from surveillance_runtime.yaml_file import (
+    UNREADABLE,
+    YamlFile,
+    YamlFileError,
+    read_yaml_file,
+    with_exponent,
+)
 
 SCHEMA = Path(__file__).with_name('parameter_schema.json')
 PLACE_TABLES = ('map', 'room_positions', 'walls', 'doors', 'markers')
@@ -237,7 +243,7 @@ def argument_layer(assignments: Iterable[str]) -> Layer:
         pattern = '/**' if match['node'] is None else match['node']
         try:
             value = _argument_value(match['value'])
-        except (yaml.YAMLError, ValueError, RecursionError):
+        except (*UNREADABLE, RecursionError):
             raise ParameterError(
                 f'-p {_short(text)}: the value is not valid YAML; quote it'
             ) from None

@@ -299,8 +299,8 @@ class PatrolNode(Node):  # type: ignore[misc]
             try:
                 work()
             except Exception as error:
-                if self.stopping.is_set():
-                    return
+                if self.stopping.is_set() or not self.context.ok():
+                    return  # also of a node whose start failed after this thread's
                 traceback.print_exc()
                 self.fail(f'{type(error).__name__}: {error}')
 

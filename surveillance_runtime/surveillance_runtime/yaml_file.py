@@ -32,6 +32,8 @@ _KINDS = {
 _INT64 = 2**63
 _EXPONENT = re.compile(r'[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+\Z', re.ASCII)
 KeyPath = tuple[str, ...]
+UNREADABLE = (yaml.YAMLError, ValueError, LookupError, TypeError, AttributeError)
+"""What PyYAML raises for a value; the last three for a tag like `!!int` before something else."""
 
 
 class YamlFileError(ValueError):
@@ -174,7 +176,7 @@ class _Reader:
         line = node.start_mark.line + 1
         try:
             value = self._scalars.construct_object(node)
-        except (yaml.YAMLError, ValueError):
+        except UNREADABLE:
             raise YamlFileError(
                 f"{self.path}:{line}: '{node.value}' cannot be read as a value; quote it"
             ) from None

@@ -192,6 +192,16 @@ def test_a_pipe_is_no_parameter_file(tmp_path):
         file_layer(tmp_path / 'pipe')
 
 
+@pytest.mark.parametrize('value', ['!!int', '!!float', '!!bool', '!!timestamp x', '!own 5'])
+def test_a_tag_before_what_is_not_of_its_type_costs_one_line(tmp_path, value):
+    file = tmp_path / 'own.yaml'
+    file.write_text(f'/**:\n  ros__parameters:\n    urgency_threshold: {value}\n')
+    with pytest.raises(YamlFileError, match=r'own.yaml:3: .*cannot be read as a value'):
+        file_layer(file)
+    with pytest.raises(ParameterError, match=r'-p urgency_threshold.*not valid YAML'):
+        argument_layer([f'urgency_threshold:={value}'])
+
+
 @pytest.mark.parametrize(
     'text',
     ['a: ' + '[' * 5000 + ']' * 5000, 'a: ' + '{a: ' * 5000, 'a: [' + '1,' * 1_500_000 + ']'],
