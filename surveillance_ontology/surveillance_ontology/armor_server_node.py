@@ -36,7 +36,8 @@ SLICE = 0.005
 MOST_WAITING = 5000
 """Requests that are taken and wait; further ones wait in the middleware."""
 WORKERS = 4
-"""Threads for directives that may take long, and as many for SPARQL queries."""
+"""Threads for directives that may take long, and as many for `LONG_QUERIES`."""
+LONG_QUERIES = ('SPARQL', 'AT')
 
 
 class _Backlog:
@@ -156,7 +157,7 @@ class ArmorServer(PatrolNode):
         answer = self._service.execute_at_once(directive)
         if answer is None:
             # Queries that take all their time must not keep other slow directives waiting.
-            work = self._queries if directive.primary.upper() == 'SPARQL' else self._work
+            work = self._queries if directive.primary.upper() in LONG_QUERIES else self._work
             answer = await work.run(lambda: self._service.execute(directive))
         fill_response(response.armor_response, answer)
         return response

@@ -188,9 +188,49 @@ def test_a_query_reaches_no_other_machine(service: ArmorService, built: ArmorCli
             'QUERY SPARQL', f'SELECT * {{ SERVICE <{address}> {{ ?a ?b ?c }} }}'
         )
         assert not answer.success
+        assert 'SERVICE asks another machine; expected' in answer.error_description
         listener.setblocking(False)
         with pytest.raises(BlockingIOError):
             listener.accept()
+
+
+@pytest.mark.parametrize(
+    ('query', 'keyword'),
+    [
+        ('SELECT ?a { SERVICE SILENT <urn:a> { ?a ?b ?c } }', 'SERVICE'),
+        ('SELECT ?a { VALUES ?s { <urn:a> } service ?s { ?a ?b ?c } }', 'SERVICE'),
+        (r"""SELECT ?a { ?a ?b 'it\'s', "#" SERVICE<urn:a>{ ?a ?b ?c } }""", 'SERVICE'),
+        ('SELECT ?a FROM <file:///etc/passwd> { ?a ?b ?c }', 'FROM'),
+        ('SELECT ?a FROM NAMED <http://127.0.0.1/> { GRAPH ?g { ?a ?b ?c } }', 'FROM'),
+    ],
+)
+def test_a_query_that_leaves_the_ontology_is_refused(
+    service: ArmorService, built: ArmorClient, query: str, keyword: str
+) -> None:
+    answer = asker(service)('QUERY SPARQL', query)
+    assert (answer.success, answer.exit_code) == (False, 205)
+    assert answer.error_description.startswith(f'QUERY SPARQL: {keyword} ')
+
+
+@pytest.mark.parametrize(
+    'query',
+    [
+        'SELECT ?from { BIND("SERVICE <urn:a>" AS ?from) }',
+        "SELECT ?a { BIND('''a ' FROM''' AS ?a) } # SERVICE",
+        'PREFIX service: <urn:SERVICE#> SELECT ?a { VALUES ?a { service:from } }',
+    ],
+)
+def test_words_that_are_no_keywords_do_no_harm(built: ArmorClient, query: str) -> None:
+    assert len(built.query.sparql(query)) == 1
+
+
+def test_an_answer_of_many_long_texts_is_bounded(service: ArmorService, built: ArmorClient) -> None:
+    doubled = ' '.join(f'BIND(CONCAT(?t{n}, ?t{n}) AS ?t{n + 1})' for n in range(10))
+    text = 'x' * 1000
+    query = f'SELECT ?t10 {{ ?a ?b ?c . BIND("{text}" AS ?t0) {doubled} }}'
+    answer = asker(service)('QUERY SPARQL', query)
+    assert not answer.success
+    assert 'more than 67108864 characters' in answer.error_description
 
 
 def test_a_service_that_closes_stops_its_queries(service: ArmorService, built: ArmorClient) -> None:

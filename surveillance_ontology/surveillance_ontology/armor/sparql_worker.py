@@ -27,7 +27,17 @@ from surveillance_ontology.armor.sparql_engine import OUT_OF_MEMORY
 MOST_SHOWN = 160
 """Characters of the engine's own words about a query."""
 NO_FURTHER_FILES = 3
-"""Standard input, output and error; a query with SERVICE gets no socket."""
+"""Standard input, output and error: a query that reached for a file or a machine would get none."""
+MOST_CHARACTERS = 64 * 1024 * 1024
+"""In one answer; the server holds it in memory."""
+_NO_KEYWORDS = re.compile(
+    r"""("{3}|'{3})(?:[^\\]|\\.)*?\1|"(?:[^"\\]|\\.)*"|'(?:[^'\\]|\\.)*'"""
+    r"""|<[^<>"{}|^`\\\s]*>|#[^\r\n]*|[?$]\w+|[\w.-]*:[\w.:-]*""",
+    re.DOTALL,
+)
+"""Strings, IRIs, comments, variables and prefixed names (SPARQL 1.1, section 19.8)."""
+_OUTSIDE = {'SERVICE': 'asks another machine', 'FROM': 'names another graph'}
+"""Keywords of what a query may not do; some would give no rows and say nothing."""
 
 
 def serve(requests: BinaryIO, answers: BinaryIO) -> None:
@@ -65,6 +75,11 @@ def _rewritten(triples: bytes) -> list[Any]:
 
 
 def _answer(store: pyoxigraph.Store, forms: WrittenForms, query: str, most: int) -> dict[str, Any]:
+    words = _NO_KEYWORDS.sub(' ', query).upper()
+    for keyword, what in _OUTSIDE.items():
+        if re.search(rf'\b{keyword}\b', words):
+            return {'error': f'{keyword} {what}; expected a query of this ontology alone'}
+    characters = 0
     try:
         found = store.query(query)
         if not isinstance(found, pyoxigraph.QuerySolutions):
@@ -78,6 +93,9 @@ def _answer(store: pyoxigraph.Store, forms: WrittenForms, query: str, most: int)
             bound = zip(names, solution, strict=True)
             row = {name: term for name, term in bound if term is not None}
             rows.append([[name, *_term(reader.written(name, row))] for name in row])
+            characters += sum(len(text) for bound in rows[-1] for text in bound)
+            if characters > MOST_CHARACTERS:
+                return {'error': f'more than {MOST_CHARACTERS} characters'}
     except SyntaxError as error:
         return {'error': f'not valid SPARQL: {str(error)[:MOST_SHOWN]}'}
     except (ValueError, RuntimeError, OSError) as error:
