@@ -37,7 +37,6 @@ MODULES = {
         'Recorder',
         'read_record',
         'replay',
-        'play',
         'Checkpointer',
         'save',
         'load',

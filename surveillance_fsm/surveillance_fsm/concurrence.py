@@ -7,7 +7,6 @@ each state on a logical thread of its own, which the concurrence's thread watche
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable, Mapping
-from collections.abc import Sequence as Labels
 from typing import Any, Unpack
 
 from surveillance_fsm import log
@@ -41,7 +40,7 @@ from surveillance_fsm.execution import (
 )
 from surveillance_fsm.state import State, structure_version
 from surveillance_fsm.timeouts import LimitOptions, make_limits, supervise
-from surveillance_fsm.userdata import UserData, raw
+from surveillance_fsm.userdata import raw
 
 Outcomes = dict[str, str | None]
 ChildTerminationCallback = Callable[[Outcomes], bool | Iterable[str] | None]
@@ -304,15 +303,6 @@ class Concurrence(Container):
         """Return the labels of all states."""
         return list(self.fsm_states)
 
-    def set_initial_state(
-        self, initial_states: Labels[str], userdata: UserData | None = None
-    ) -> None:
-        """Add to the concurrence's userdata; all states always begin."""
-        for label in initial_states:
-            self[label]
-        if userdata is not None:
-            self.userdata.update(userdata)
-
     def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
         """Return the outcome map as (child outcome, label, outcome)."""
         return [
@@ -381,21 +371,12 @@ class ConcurrentFrame(Frame):
             self.note((SpecialStep(self.path, '', '', 'start'), '', run.now(), NO_USERDATA))
         return self._finish(self._run_states())
 
-    def proceed(self, outcome: Any) -> Any:
-        """Go on as if the interrupt's state that hangs had just returned `outcome`."""
-        node, stack = self.current, self.thread.stack
+    def run_on(self, outcome: Any) -> Any:
+        """Take `outcome` for that of the interrupt's state that hangs, and run to the end."""
+        node = self.current
         assert isinstance(node, Node)
-        try:
-            ending = self._end_branch(node, outcome)
-            return self._finish(self._run_states() if ending is None else ending)
-        except BaseException:
-            if self.container.fsm_frame is self:
-                self.container.fsm_frame = None
-            raise
-        finally:
-            self.ended = True
-            if stack and stack[-1] is self:
-                stack.pop()
+        ending = self._end_branch(node, outcome)
+        return self._finish(self._run_states() if ending is None else ending)
 
     def _finish(self, outcome: Any) -> Any:
         if outcome is not SUSPENDED:

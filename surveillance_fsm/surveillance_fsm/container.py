@@ -33,6 +33,7 @@ from surveillance_fsm.execution import (
     Frame,
     History,
     LeftBehindError,
+    Limits,
     Node,
     Run,
 )
@@ -43,7 +44,7 @@ from surveillance_fsm.state import (
     structure_version,
     this_thread,
 )
-from surveillance_fsm.timeouts import Limits, keep_out, limited, supervise
+from surveillance_fsm.timeouts import keep_out, limited, supervise
 from surveillance_fsm.userdata import Remapper, UserData, raw
 
 
@@ -138,8 +139,17 @@ class Container(State):
     def set_initial_state(
         self, initial_states: Sequence[str], userdata: UserData | None = None
     ) -> None:
-        """Choose the children a run begins with, and add to the container's userdata."""
-        raise NotImplementedError
+        """Choose the children a run begins with, and add to the container's userdata.
+
+        An iterator always begins with its only state, a concurrence with all.
+
+        Raises:
+            KeyError: There is no such state.
+        """
+        for label in initial_states:
+            self[label]
+        if userdata is not None:
+            self.userdata.update(userdata)
 
     def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
         """Transitions inside, as (outcome, from label, to label)."""

@@ -18,7 +18,7 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 from surveillance_fsm import log
 from surveillance_fsm.clock import WALL_CLOCK, Clock, Interrupt, elapsed_of
@@ -32,10 +32,6 @@ from surveillance_fsm.exceptions import (
 )
 from surveillance_fsm.state import State, this_thread
 from surveillance_fsm.userdata import Remapper
-
-if TYPE_CHECKING:
-    from surveillance_fsm.container import Container
-    from surveillance_fsm.timeouts import Limits, Watch
 
 LOWEST = float('-inf')
 """The priority of ordinary work, below that of every interrupt."""
@@ -83,6 +79,35 @@ RESUME = 'RESUME'
 RESUMPTION = Exit(RESUME)
 
 
+@dataclass(frozen=True)
+class Limits:
+    """What a container holds a state to.
+
+    Attributes:
+        timeout: Seconds of the machine's clock after which the state is asked to stop.
+        deadline: Seconds after which the machine goes on without the state.
+        retry: How often the state is executed again after a failure.
+        failures: The outcomes that count as one.
+        late_outcome: The outcome that running out of time has.
+    """
+
+    timeout: float | None
+    deadline: float | None
+    retry: int
+    failures: frozenset[str]
+    late_outcome: str
+
+
+class Enclosing(Protocol):
+    """What a node asks of the container that its state is in."""
+
+    def get_name(self) -> str:
+        """Return the container's path."""
+
+    def fsm_view(self, node: Node) -> Remapper:
+        """Make a state's view of the container's userdata."""
+
+
 class Node:
     """One state of a container as the loop needs it.
 
@@ -93,7 +118,6 @@ class Node:
         is_container: The state is one of the engine's containers.
         enter: What runs it; the state's own `execute` as a rule.
         execute: What the loop calls: `enter`, within the state's limits if it has any.
-        make_view: Makes a view.
         view: The state's view of the container's userdata.
         targets: Where each outcome leads.
         limits: Time limits and retries, if it has any.
@@ -118,7 +142,7 @@ class Node:
     kind = 'transition'
 
     def __init__(
-        self, container: Container, label: str, state: State, priority: float = LOWEST
+        self, container: Enclosing, label: str, state: State, priority: float = LOWEST
     ) -> None:
         self.container = container
         self.label = label
@@ -329,8 +353,8 @@ class Frame:
         """Run the container to its outcome, or to `SUSPENDED`."""
         raise NotImplementedError
 
-    def proceed(self, outcome: Any) -> Any:
-        """Go on as if the current state had just returned `outcome`, and run to the end."""
+    def run_on(self, outcome: Any) -> Any:
+        """Take `outcome` for that of the current state, and run to the end; see `proceed`."""
         raise NotImplementedError
 
     def preempt(self) -> None:
@@ -357,6 +381,20 @@ class Frame:
         """Wake the thread that runs the frame, if it waits: it was left behind."""
 
     # What they share.
+
+    def proceed(self, outcome: Any) -> Any:
+        """Go on as if the current state had just returned `outcome`, and run to the end."""
+        stack = self.thread.stack
+        try:
+            return self.run_on(outcome)
+        except BaseException:
+            if self.container.fsm_frame is self:
+                self.container.fsm_frame = None
+            raise
+        finally:
+            self.ended = True
+            if stack and stack[-1] is self:
+                stack.pop()
 
     def successor(self) -> Frame:
         """Return a copy for the thread that takes this execution over."""
@@ -472,6 +510,25 @@ class Run:
             self.condition.notify_all()
 
 
+@dataclass
+class Watch:
+    """Limits at work on a state that executes.
+
+    Attributes:
+        node: The state's node.
+        depth: Index in the thread's stack of the frame it runs in; -1 below a concurrence.
+        soft: When the state is asked to stop, on the machine's clock; None when it was, or never.
+        hard: When the machine goes on without it; None for never.
+        asked: The state was asked to stop.
+    """
+
+    node: Node
+    depth: int
+    soft: float | None
+    hard: float | None
+    asked: bool = False
+
+
 class ExecutionThread:
     """One logical thread of execution through nested containers.
 
@@ -499,7 +556,7 @@ class ExecutionThread:
         run: Run,
         path: str,
         wakeup: Interrupt,
-        root: Container | None = None,
+        root: State | None = None,
         leaf: Node | None = None,
     ) -> None:
         self.run = run
@@ -521,7 +578,7 @@ class ExecutionThread:
 
     # The side of the thread that executes.
 
-    def executes_next(self, container: Container, stack: list[Frame]) -> bool:
+    def executes_next(self, container: State, stack: list[Frame]) -> bool:
         """Tell whether `container` is what the engine executes next, not some user code."""
         if stack:
             current = stack[-1].current

@@ -23,7 +23,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import IO, Any, NamedTuple
 
-from surveillance_fsm.clock import WALL_CLOCK, Clock, Interrupt, elapsed_of
+from surveillance_fsm.clock import elapsed_of
 from surveillance_fsm.container import Container
 from surveillance_fsm.exceptions import MachineFileError, describe, shown
 from surveillance_fsm.execution import History, RawTransition
@@ -336,37 +336,6 @@ def replay(machine: Container, transitions: Iterable[Transition]) -> Iterator[St
             if place in containers:
                 active |= set(_entered(containers[place]))
         yield Step(transition, tuple(sorted(active)))
-
-
-def play(
-    steps: Iterable[Step],
-    show: Callable[[Step], object],
-    speed: float = 1.0,
-    clock: Clock = WALL_CLOCK,
-    interrupt: Interrupt | None = None,
-) -> bool:
-    """Show steps at the pace they were recorded at.
-
-    Args:
-        steps: What `replay` gives.
-        show: Takes each step when its time has come.
-        speed: How many times faster.
-        clock: Waits between steps.
-        interrupt: Ends it early.
-
-    Returns:
-        Whether all steps were shown.
-    """
-    interrupt = interrupt or Interrupt()
-    before: float | None = None
-    for step in steps:
-        time = step.transition.time
-        pause = 0.0 if before is None else max(0.0, (time - before) / speed)
-        before = time
-        if not clock.sleep(pause, interrupt):
-            return False
-        show(step)
-    return True
 
 
 def _entered(container: Structure) -> list[str]:

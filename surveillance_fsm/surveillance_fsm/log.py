@@ -1,7 +1,6 @@
-"""Where the engine's words go: the four log functions, replaceable with `set_loggers`.
+"""The log functions of the engine, replaceable with `set_loggers`.
 
-By default they feed the standard logger ``surveillance_fsm``. `chatty` tells whether
-anybody reads the info level, so that the engine formats nothing that nobody sees.
+By default they write to the standard logger ``surveillance_fsm``.
 """
 
 from __future__ import annotations
@@ -47,5 +46,5 @@ def reset_loggers() -> None:
 
 
 def chatty() -> bool:
-    """Tell whether transitions are worth a line: the info level is read by somebody."""
+    """Tell whether the info level is read, so that transitions are formatted for it."""
     return 'info' in _loggers or _standard.isEnabledFor(logging.INFO)

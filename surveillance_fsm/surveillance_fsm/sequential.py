@@ -98,27 +98,17 @@ class SequentialFrame(Frame):
             self._tell(_Move(None, None, target, 'start'))
         return self._run_from(target)
 
-    def proceed(self, outcome: Any) -> Any:
-        """Go on as if the current state had just returned `outcome`, and run to the end."""
+    def run_on(self, outcome: Any) -> Any:
+        """Take `outcome` for that of the current state, and run to the end."""
         node = self.current
         assert isinstance(node, Node)
-        stack = self.thread.stack
-        try:
-            watch = watch_of(self)
-            if watch is not None:
-                end_watch(self.thread, watch)
-                outcome = settle(node, self, watch, outcome)
-            self.current = target = node.target(outcome)
-            take_note(node.state)
-            return self._run_from(self._attend(node, outcome, target))
-        except BaseException:
-            if self.container.fsm_frame is self:
-                self.container.fsm_frame = None
-            raise
-        finally:
-            self.ended = True
-            if stack and stack[-1] is self:
-                stack.pop()
+        watch = watch_of(self)
+        if watch is not None:
+            end_watch(self.thread, watch)
+            outcome = settle(node, self, watch, outcome)
+        self.current = target = node.target(outcome)
+        take_note(node.state)
+        return self._run_from(self._attend(node, outcome, target))
 
     def _run_from(self, target: Any) -> Any:
         """Execute states from `target` on until one leads out of the container; the outcome."""

@@ -267,8 +267,7 @@ class StateMachine(Container):
                     f'{sorted(self.fsm_states)}'
                 )
             self._initial_state_label = label
-        if userdata is not None:
-            self.userdata.update(userdata)
+        super().set_initial_state((), userdata)
 
     def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
         """Return all transitions as (outcome, from label, to label or outcome)."""
@@ -537,15 +536,6 @@ class Iterator(Container):
         """Return the state's label."""
         return [self._state_label]
 
-    def set_initial_state(
-        self, initial_states: Labels[str], userdata: UserData | None = None
-    ) -> None:
-        """Add to the iterator's userdata; it always begins with its only state."""
-        for label in initial_states:
-            self[label]
-        if userdata is not None:
-            self.userdata.update(userdata)
-
     def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
         """Loop and break outcomes as (outcome, label, label or outcome of the iterator)."""
         edges: list[tuple[str, str, str | None]] = [
@@ -599,10 +589,10 @@ class IteratorFrame(SequentialFrame):
             data[iterator.items_label] = item
         return True
 
-    def proceed(self, outcome: Any) -> Any:
-        """Go on as if the current item had just ended with `outcome`."""
+    def run_on(self, outcome: Any) -> Any:
+        """Take `outcome` for that of the current item, and run to the end."""
         self.repeat = outcome is SUSPENDED
-        return super().proceed(outcome)
+        return super().run_on(outcome)
 
     def _end_of_loop(self, outcome: Any, target: Node | Exit) -> Node | Exit:
         """End the loop when a preempt came while it would go on.

@@ -10,12 +10,20 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, TypedDict
 
 from surveillance_fsm.clock import Interrupt
 from surveillance_fsm.exceptions import InvalidTransitionError
-from surveillance_fsm.execution import SUSPENDED, ExecutionThread, Frame, Node, Run, Work
+from surveillance_fsm.execution import (
+    SUSPENDED,
+    ExecutionThread,
+    Frame,
+    Limits,
+    Node,
+    Run,
+    Watch,
+    Work,
+)
 from surveillance_fsm.log import logerr, logwarn
 from surveillance_fsm.state import State, this_thread
 
@@ -41,25 +49,6 @@ class LimitOptions(TypedDict, total=False):
     deadline: float | None
     retry: int
     retry_on: Iterable[str]
-
-
-@dataclass(frozen=True)
-class Limits:
-    """What a container holds a state to.
-
-    Attributes:
-        timeout: Seconds of the machine's clock after which the state is asked to stop.
-        deadline: Seconds after which the machine goes on without the state.
-        retry: How often the state is executed again after a failure.
-        failures: The outcomes that count as one.
-        late_outcome: The outcome that running out of time has.
-    """
-
-    timeout: float | None
-    deadline: float | None
-    retry: int
-    failures: frozenset[str]
-    late_outcome: str
 
 
 def make_limits(
@@ -113,25 +102,6 @@ def make_limits(
             f'retry on (its outcomes are {sorted(outcomes)})'
         )
     return Limits(timeout, deadline, retry, frozenset(failures), late)
-
-
-@dataclass
-class Watch:
-    """Limits at work on a state that executes.
-
-    Attributes:
-        node: The state's node.
-        depth: Index in the thread's stack of the frame it runs in; -1 below a concurrence.
-        soft: When the state is asked to stop, on the machine's clock; None when it was, or never.
-        hard: When the machine goes on without it; None for never.
-        asked: The state was asked to stop.
-    """
-
-    node: Node
-    depth: int
-    soft: float | None
-    hard: float | None
-    asked: bool = False
 
 
 def limited(node: Node, limits: Limits) -> Callable[[Any], Any]:

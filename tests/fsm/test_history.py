@@ -14,7 +14,6 @@ from surveillance_fsm.exceptions import MachineFileError
 from surveillance_fsm.history import (
     Recorder,
     TransitionFeed,
-    play,
     read_record,
     replay,
     unfold,
@@ -119,35 +118,6 @@ def test_a_record_that_was_cut_off_is_read_as_far_as_it_goes(tmp_path):
         read_record(path)
     with pytest.raises(MachineFileError, match=r'absent\.jsonl'):
         read_record(tmp_path / 'absent.jsonl')
-
-
-def test_a_record_plays_at_its_pace(tmp_path):
-    clock, machine = FakeClock(leaps=True), patrol()
-    machine.set_clock(clock)
-    script(
-        machine,
-        {
-            'PATROL/CHOOSE': ['go', 'done'],
-            'PATROL/MOVE/PLAN': [lambda ud: clock.sleep(4.0, fsm.Interrupt()) and 'done'],
-            'PATROL/MOVE/FOLLOW': ['done'],
-        },
-    )
-    path = tmp_path / 'record.jsonl'
-    with Recorder(machine, path):
-        machine.execute()
-    transitions = read_record(path)
-    assert [t.duration for t in transitions] == [0.0, 4.0, 0.0, 4.0, 0.0]
-    player, shown = FakeClock(leaps=True), []
-    assert play(
-        replay(patrol(), transitions),
-        lambda step: shown.append(player.now()),
-        speed=2.0,
-        clock=player,
-    )
-    assert shown == [0.0, 2.0, 2.0, 2.0, 2.0]
-    stop = fsm.Interrupt()
-    stop.set()
-    assert not play(replay(patrol(), transitions), shown.append, clock=player, interrupt=stop)
 
 
 def test_a_feed_survives_its_consumer_and_reports_all_that_ran(caplog):
@@ -366,3 +336,15 @@ def test_the_record_is_json_that_others_can_read(tmp_path):
         'visits',
         'userdata',
     }
+
+
+def test_a_record_says_how_long_each_state_took_by_the_machines_clock(tmp_path):
+    clock, machine = FakeClock(leaps=True), patrol()
+    machine.set_clock(clock)
+    plan = [lambda ud: clock.sleep(4.0, fsm.Interrupt()) and 'done']
+    outcomes = {'CHOOSE': ['go', 'done'], 'MOVE/PLAN': plan, 'MOVE/FOLLOW': ['done']}
+    script(machine, {f'PATROL/{path}': turns for path, turns in outcomes.items()})
+    with Recorder(machine, tmp_path / 'record.jsonl'):
+        machine.execute()
+    transitions = read_record(tmp_path / 'record.jsonl')
+    assert [t.duration for t in transitions] == [0.0, 4.0, 0.0, 4.0, 0.0]

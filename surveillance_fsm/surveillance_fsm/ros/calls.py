@@ -422,9 +422,27 @@ class GoalCaller:
             CallInterruptedError: The interrupt was raised; the server was told to cancel and has
                 ended the goal, or had `cancel_timeout` to do so.
         """
-        what = f'action {self.name}'
         deadline = time.monotonic() + accept_timeout
-        await_ready(self.is_ready, deadline, interrupt, what)
+        await_ready(self.is_ready, deadline, interrupt, self._what)
+        # From before the goal is sent: a server that goes right after its yes is seen going.
+        watch = self._watch = _ServerWatch(Interrupt())
+        try:
+            deadline += self.round_trips.deadline(accept_timeout) - accept_timeout
+            handle = self._send(goal, deadline, interrupt, on_feedback)
+            if not handle.accepted:
+                return GoalEnd('rejected', None)
+            return self._await_end(handle, watch, result_timeout, interrupt)
+        finally:
+            self._watch = None
+
+    def _send(
+        self,
+        goal: Any,
+        deadline: float,
+        interrupt: Interrupt | None,
+        on_feedback: Callable[[Any], None] | None,
+    ) -> Any:
+        """Send a goal and wait for its yes or no; return the handle."""
         feedback = None
         if on_feedback is not None:
             told = on_feedback
@@ -432,46 +450,51 @@ class GoalCaller:
             def feedback(message: Any) -> None:
                 told(message.feedback)
 
-        # From before the goal is sent: a server that goes right after its yes is seen going.
-        wake = Interrupt()
-        watch = self._watch = _ServerWatch(wake)
         asked = time.monotonic()
-        deadline += self.round_trips.deadline(accept_timeout) - accept_timeout
         sent = self._client.send_goal_async(goal, feedback_callback=feedback)
         try:
-            handle = block_on(sent, deadline, interrupt, what)
+            handle = block_on(sent, deadline, interrupt, self._what)
         except CallError as error:
             if isinstance(error, CallTimeoutError):
                 self.round_trips.note_missed()
-            self._watch = None
             # The goal may be accepted yet; it must not run on unseen.
             sent.add_done_callback(_cancel_when_accepted)
             raise
         self.round_trips.note(time.monotonic() - asked)
         _show(self._node, self.name, self.round_trips)
-        if not handle.accepted:
-            self._watch = None
-            return GoalEnd('rejected', None)
-        ended = handle.get_result_async()
+        return handle
+
+    def _await_end(
+        self,
+        handle: Any,
+        watch: _ServerWatch,
+        result_timeout: float | None,
+        interrupt: Interrupt | None,
+    ) -> GoalEnd:
+        """Wait for the end of a goal that was accepted."""
+        wake, ended = watch.wake, handle.get_result_async()
         ended.add_done_callback(lambda _future: wake.set())
         remove = interrupt.subscribe(wake.set) if interrupt is not None else None
         try:
             lost = self._wait_for_end(handle, ended, watch, result_timeout, interrupt)
         finally:
-            self._watch = None
             if remove is not None:
                 remove()
         if not ended.done():
             if lost:
-                raise UnavailableError(f'{what}: the server went away before the goal ended')
+                raise UnavailableError(f'{self._what}: the server went away before the goal ended')
             self._cancel(handle, ended)
             if interrupt is not None and interrupt.is_set():
-                raise CallInterruptedError(f'{what}: interrupted')
-            raise CallTimeoutError(f'{what}: no result within {result_timeout:g} s')
+                raise CallInterruptedError(f'{self._what}: interrupted')
+            raise CallTimeoutError(f'{self._what}: no result within {result_timeout:g} s')
         response = ended.result()
         if response.status not in _STATUS:
-            raise UnavailableError(f'{what}: the server does not know the goal any more')
+            raise UnavailableError(f'{self._what}: the server does not know the goal any more')
         return GoalEnd(_STATUS[response.status], response.result)
+
+    @property
+    def _what(self) -> str:
+        return f'action {self.name}'
 
     def _cancel(self, handle: Any, ended: Future) -> None:
         done = threading.Event()

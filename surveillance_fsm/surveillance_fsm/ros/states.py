@@ -300,6 +300,19 @@ class SimpleActionState(RosState):
         return told
 
 
+def _declare_condition(state: RosState, cond_cb: Any) -> None:
+    """Check a condition, and declare the userdata keys that it declares itself.
+
+    Raises:
+        InvalidStateError: It cannot be called.
+    """
+    if not callable(cond_cb):
+        raise fsm.InvalidStateError(f'cond_cb {cond_cb!r} cannot be called')
+    if fsm.has_smach_interface(cond_cb):
+        state.register_input_keys(cond_cb.get_registered_input_keys())
+        state.register_output_keys(cond_cb.get_registered_output_keys())
+
+
 class MonitorState(RosState):
     """Looks at each message of a topic until one is not as it should be.
 
@@ -337,12 +350,7 @@ class MonitorState(RosState):
         qos: QoSProfile | int = 10,
     ) -> None:
         super().__init__(node, ['valid', 'invalid', 'preempted'], input_keys, output_keys, io_keys)
-        if not callable(cond_cb):
-            raise fsm.InvalidStateError(f'cond_cb {cond_cb!r} cannot be called')
-        declared: Any = cond_cb
-        if fsm.has_smach_interface(declared):
-            self.register_input_keys(declared.get_registered_input_keys())
-            self.register_output_keys(declared.get_registered_output_keys())
+        _declare_condition(self, cond_cb)
         self._topic = topic
         self._cond_cb = cond_cb
         self._max_checks = max_checks
@@ -441,12 +449,7 @@ class ConditionState(RosState):
         max_checks: int = 1,
     ) -> None:
         super().__init__(node, ['true', 'false', 'preempted'], input_keys)
-        declared: Any = cond_cb
-        if not callable(cond_cb):
-            raise fsm.InvalidStateError(f'cond_cb {cond_cb!r} cannot be called')
-        if fsm.has_smach_interface(declared):
-            self.register_input_keys(declared.get_registered_input_keys())
-            self.register_output_keys(declared.get_registered_output_keys())
+        _declare_condition(self, cond_cb)
         self._cond_cb = cond_cb
         if not isinstance(poll_rate, int | float) or not 0.0 < poll_rate < math.inf:
             raise fsm.InvalidStateError(f'poll_rate is {poll_rate!r}, expected hertz above 0')
