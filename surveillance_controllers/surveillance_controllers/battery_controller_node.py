@@ -29,11 +29,11 @@ from surveillance_controllers.controller_parameters import (
 )
 from surveillance_controllers.manual.commands import BATTERY, BATTERY_SET, ParsedCommand
 from surveillance_controllers.manual.requests import CommandConsole
-from surveillance_controllers.state_file import StateFile
 from surveillance_fsm.ros import ClockWait
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
+from surveillance_runtime.state_file import StateFile
 from surveillance_runtime.waiting import AwaitedEvent
 
 RECHARGE_STEPS = 50

@@ -24,6 +24,7 @@ from surveillance_runtime.node import PatrolNode, StartError
 from surveillance_runtime.place import PlaceError
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
+from surveillance_runtime.state_file import StateFile
 from surveillance_simulation import conversions, simulator_parameters
 from surveillance_simulation.clock_rate import DRIVING, PLANNING, ClockRate
 from surveillance_simulation.feeds.camera_feed import CameraFeed
@@ -70,11 +71,15 @@ class Simulator(PatrolNode):
             rng=np.random.default_rng(seed),
             people=People(world.plan, model, np.random.default_rng(seed)) if model.count else None,
         )
+        self._kept = StateFile(self, simulator_parameters.state_file(self))
+        if self._kept.found and not self.robot.restore(self._kept.found):
+            self.get_logger().warn('parameter state_file: its state is none of this place')
+        self._kept_pose = self.robot.base.pose
         self._changing = threading.RLock()
         self._drives_clock = rate.speed != 1.0 or bool(self.get_parameter('use_sim_time').value)
         # As fast as possible, there is a measurement after each step of time.
         self._measurement_period = rate.step if rate.speed else 0.0
-        self._next_measurement = self._measurement_period
+        self._next_measurement = self.robot.time + self._measurement_period
         if rate.speed:
             rate = replace(rate, step=min(rate.step, OBEYS_WITHIN * rate.speed))
         self._rate = ClockRate(rate, time.monotonic())
@@ -83,7 +88,7 @@ class Simulator(PatrolNode):
             self._camera = CameraFeed(self, self.robot, seed, self._changing, self._stamp)
         except (PlaceError, ImportError) as error:
             raise StartError(f'simulator: {error}') from None
-        FaultServices(self, self.robot, self._changing, self._sensors.tell_doors)
+        FaultServices(self, self.robot, self._changing, self._changed)
         commands = simulator_parameters.command_topic(self)
         self.create_subscription(Twist, commands, self._on_command, 1)
         self.create_subscription(
@@ -131,8 +136,18 @@ class Simulator(PatrolNode):
             self.robot.advance(passed)
             if self.robot.time >= self._next_measurement - 1e-9:
                 self._next_measurement = self.robot.time + self._measurement_period
+                if self._drives_clock or self.robot.base.pose != self._kept_pose:
+                    self._keep()
                 return True
         return False
+
+    def _keep(self) -> None:
+        self._kept_pose = self.robot.base.pose
+        self._kept.save(self.robot.state())
+
+    def _changed(self) -> None:
+        self._keep()
+        self._sensors.tell_doors()
 
     def _go_on(self) -> None:
         if self._rate.is_waiting:

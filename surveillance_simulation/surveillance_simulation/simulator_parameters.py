@@ -101,6 +101,18 @@ def place(node: PatrolNode) -> dict[str, Any]:
     return described
 
 
+def state_file(node: PatrolNode) -> str:
+    """Declare where the state is kept that outlives a process."""
+    path: str = node.parameter(
+        'state_file',
+        '',
+        "File that keeps the robot's pose, the time and the doors over a restart of the process; "
+        'empty: nothing is kept.',
+        read_only=True,
+    )
+    return path
+
+
 def clock_rate(node: PatrolNode) -> ClockRateModel:
     """Declare how simulated time goes."""
     return declare_fields(node, ClockRateModel(), _CLOCK_RATE)

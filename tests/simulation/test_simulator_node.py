@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -55,6 +57,40 @@ def ask(graph: Any, kind: Any, service: str, **request: Any) -> Any:
     assert client.wait_for_service(10)
     future = client.call_async(kind.Request(**request))
     return graph.until(lambda: future.done() and future.result())
+
+
+def test_a_killed_process_loses_neither_pose_nor_time_nor_doors(graph: Any, tmp_path: Path) -> None:
+    path = tmp_path / 'simulator.json'
+    first = simulator(graph, state_file=str(path))
+    ask(graph, SetDoor, 'set_door', door='D', open=False)
+    ask(graph, PushRobot, 'push_robot', dx=-0.5, dy=0.25, dyaw=1.0)
+    pose = first.robot.base.pose
+    graph.until(lambda: path.exists() and json.loads(path.read_text())['x'] == pose[0])
+    graph.until(lambda: json.loads(path.read_text())['time'] > 5.0)
+    graph.drop(first)
+    kept = json.loads(path.read_text())
+    second = simulator(graph, state_file=str(path))
+    assert second.robot.base.pose == pose
+    assert second.robot.base.odometry == first.robot.base.odometry
+    assert second.robot.time >= kept['time']
+    assert second.robot.world.closed_doors == {'D'}
+
+
+@pytest.mark.parametrize(
+    'state', ['[]', '{"x": 1.0}', '{"x": "far"}', '{"x": 1e308, "y": 0.0}', '{"x": NaN}']
+)
+def test_a_state_of_no_robot_in_this_place_begins_anew(
+    graph: Any, tmp_path: Path, state: str
+) -> None:
+    path = tmp_path / 'simulator.json'
+    whole = {
+        **dict.fromkeys(('y', 'yaw', 'odometry_x', 'odometry_y', 'odometry_yaw', 'time'), 0.0),
+        **{'closed': '', 'collisions': 0},
+    }
+    given = json.loads(state)
+    path.write_text(json.dumps({**whole, **given} if given and len(given) == 1 else given))
+    robot = simulator(graph, state_file=str(path)).robot
+    assert robot.base.pose == robot.world.plan.start
 
 
 def test_it_publishes_map_doors_clock_and_odometry(graph: Any) -> None:

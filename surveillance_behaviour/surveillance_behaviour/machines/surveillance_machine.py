@@ -6,6 +6,7 @@ states are this project's. One round of the machine is one room.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import surveillance_fsm as fsm
@@ -78,7 +79,7 @@ class ExploreTask(fsm.State):
         return 'explored'
 
     def _explore(self, interrupt: fsm.Interrupt) -> bool:
-        """Explore the place for its time, or what is left of it after a restart; whether it did."""
+        """Explore the place for what is left of its time since the last visit; whether it did."""
         mission = self.mission
         seconds = mission.settings.choice.exploration_seconds
         begin = mission.now() - min(mission.explored, seconds)
@@ -88,6 +89,7 @@ class ExploreTask(fsm.State):
                 return False
             explored = round(mission.now() - begin, 3)
             mission.note('exploring', place=mission.place, seconds=explored)
+        mission.explored = math.inf
         return True
 
 

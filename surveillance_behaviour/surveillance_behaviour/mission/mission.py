@@ -56,7 +56,7 @@ class Mission:
         pending: What was decided and not yet begun.
         failure: What did not work last, until something did.
         astray: Whether it has left its place and not arrived anywhere since.
-        explored: Seconds for which it explored its place before it was started again.
+        explored: Seconds for which it explored its place since it came there; inf: it is done.
     """
 
     def __init__(

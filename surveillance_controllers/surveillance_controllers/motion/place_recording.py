@@ -12,7 +12,6 @@ from std_msgs.msg import Header
 from surveillance_controllers.geometry import Points
 from surveillance_controllers.map_knowledge import MapKnowledge, answered
 from surveillance_controllers.motion.arrival import nearest_place
-from surveillance_controllers.state_file import StateFile
 from surveillance_fsm import Interrupt
 from surveillance_interfaces.msg import OntologyMap, RobotPlace
 from surveillance_ontology.armor_client import FactSubscription
@@ -20,6 +19,7 @@ from surveillance_ontology.patrol_ontology import OntologyNotReadyError
 from surveillance_runtime.conversions import nanoseconds_of
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import STATE_QOS
+from surveillance_runtime.state_file import StateFile
 
 RETRY_PERIOD = 0.3
 """Pause before map and ontology are asked again after they did not answer, seconds."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +16,8 @@ from surveillance_simulation.world.people import People
 from surveillance_simulation.world.world import World
 
 _PHYSICS_STEP = 0.05
+_STATE = ('x', 'y', 'yaw', 'odometry_x', 'odometry_y', 'odometry_yaw', 'time')
+"""Names of the numbers of a state: metres, rad, seconds."""
 
 
 class Robot:
@@ -61,6 +64,39 @@ class Robot:
     def is_moving(self) -> bool:
         """Whether the base moves or is told to, the arm moves, or people walk about."""
         return self.base.is_moving or self.arm.is_moving(self.time) or self._people is not None
+
+    def state(self) -> dict[str, float | str]:
+        """Return what must outlive a process: where the robot is, the time, and the closed doors.
+
+        The arm, obstacles and people begin anew.
+        """
+        numbers = (*self.base.pose, *self.base.odometry, self.time)
+        return dict(zip(_STATE, numbers, strict=True)) | {
+            'closed': '\n'.join(sorted(self.world.closed_doors)),
+            'collisions': self.base.collisions,
+        }
+
+    def restore(self, state: Mapping[str, float | str]) -> bool:
+        """Take up a state; return whether it is one that this place can have."""
+        try:
+            x, y, yaw, *odometry, time = (float(state[name]) for name in _STATE)
+            closed = str(state['closed']).splitlines()
+            collisions = int(state['collisions'])
+        except (KeyError, ValueError, OverflowError):
+            return False
+        finite = all(map(math.isfinite, (x, y, yaw, *odometry, time)))
+        doors = self.world.plan.doors
+        if not finite or time < 0.0 or any(door not in doors for door in closed):
+            return False
+        if not self.world.is_free(x, y, self.base.model.radius):
+            return False
+        for door in closed:
+            self.world.set_door(door, False)
+        self.base.pose = (x, y, yaw)
+        self.base.odometry = (odometry[0], odometry[1], odometry[2])
+        self.base.collisions = collisions
+        self.time = time
+        return True
 
     def scan(self) -> npt.NDArray[np.float32]:
         """Return the lidar's distances, see `lidar.scan`."""
