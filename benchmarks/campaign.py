@@ -71,6 +71,8 @@ SETTLED = 60.0
 """Seconds after its start from which a process's growth is watched."""
 DISK = 300
 """Megabytes of the disk that is filled up."""
+ASK_PERIOD = 0.1
+"""Seconds between two requests to a node that may not be there yet."""
 PATIENCE = 60.0
 """After how long a node that was hit counts as staying away, seconds."""
 
@@ -166,12 +168,21 @@ class Watcher:
         self.collisions = max(self.collisions, message.data)
 
     def answers(self, name: str, seconds: float = 1.0) -> bool:
-        """Tell whether a node answers a request for its parameters."""
+        """Tell whether a node answers a request for its parameters, which is made repeatedly."""
         client = self._clients.get(name)
         if client is None:
             client = self.node.create_client(ListParameters, f'/{name}/list_parameters')
             self._clients[name] = client
-        return self._ask(client, ListParameters.Request(), seconds) is not None
+        answered = threading.Event()
+        pending = []
+        deadline = time.monotonic() + seconds
+        while not answered.is_set() and time.monotonic() < deadline:
+            pending.append(client.call_async(ListParameters.Request()))
+            pending[-1].add_done_callback(lambda _: answered.set())
+            answered.wait(ASK_PERIOD)
+        for future in pending:
+            client.remove_pending_request(future)
+        return answered.is_set()
 
     def visited_at(self, reference: str, places: Sequence[str]) -> dict[str, int]:
         """Return what the ontology has as each place's last visit, seconds."""
@@ -343,13 +354,23 @@ class Campaign:
             self.results.hits[signal.Signals(kind).name] += 1
         before = {name: self.launcher.processes[name] for name in names}
         for name in names:
-            while time.monotonic() - began < PATIENCE:
-                if self.launcher.processes[name] != before[name] and self.watcher.answers(name):
-                    self.results.outages.append((name, time.monotonic() - began))
-                    break
-                time.sleep(0.05)
+            late = began + PATIENCE
+            while self.launcher.processes[name] == before[name] and time.monotonic() < late:
+                time.sleep(0.02)
+            if self.watcher.answers(name, late - time.monotonic()):
+                self.results.outages.append((name, time.monotonic() - began))
             else:
-                self.results.away.append(f'{name} after {signal.Signals(kind).name}')
+                self.results.away.append(
+                    f'{name} after {signal.Signals(kind).name}: {self._second_opinion(name)}'
+                )
+
+    def _second_opinion(self, name: str) -> str:
+        """Return whether a node that seems to be away is: somebody new asks it, too."""
+        other = Watcher(self._domain)
+        try:
+            return 'answers a new client' if other.answers(name, 10.0) else 'answers nobody'
+        finally:
+            other.close()
 
     def _hit_machine(self) -> None:
         faults: dict[str, Callable[[], None]] = {'freeze': self._freeze}

@@ -71,6 +71,13 @@ int sem_timedwait(sem_t *semaphore, const struct timespec *at) {
   return wait(semaphore, unstepped(at, &real));
 }
 
+int pthread_mutex_timedlock(pthread_mutex_t *mutex, const struct timespec *at) {
+  static int (*lock)(pthread_mutex_t *, const struct timespec *);
+  struct timespec real;
+  if (!lock) lock = dlsym(RTLD_NEXT, "pthread_mutex_timedlock");
+  return lock(mutex, unstepped(at, &real));
+}
+
 int gettimeofday(struct timeval *restrict at, void *restrict zone) {
   struct timespec now;
   clock_gettime(CLOCK_REALTIME, &now);

@@ -9,8 +9,10 @@ STOPPED_AFTER = 1.0
 """Seconds without a heartbeat after which a process that was stopped by a signal is given up."""
 STUCK_AFTER = 3.0
 """The same for one that uses no processor time, as in a deadlock."""
-BUSY_AFTER = 20.0
-"""The same for one that computes: a long piece of work, or an endless loop."""
+BUSY_AFTER = 3.5
+"""The same for one that computes, of its own processor time: an endless loop."""
+STARVED_AFTER = 20.0
+"""The same for one that gets little processor time, on a busy machine."""
 SILENT_START = 90.0
 """Seconds that a process may take until its first heartbeat."""
 BEAT = 'LAUNCH_HEARTBEAT'
@@ -61,22 +63,27 @@ class Heartbeats:
         self._beats = 0
         self._cpu: float | None = None
         self._idle_since: float | None = None
+        self._cpu_at_beat: float | None = None
 
     def beat(self, now: float) -> None:
         """Note a heartbeat."""
         self._last = now
         self._beats += 1
-        self._cpu = self._idle_since = None
+        self._cpu = self._idle_since = self._cpu_at_beat = None
 
     def excuse(self, now: float) -> None:
         """Begin to count anew: the watcher itself did not run."""
         self._last = now
-        self._cpu = self._idle_since = None
+        self._cpu = self._idle_since = self._cpu_at_beat = None
 
     def problem(self, now: float, look: Look | None) -> str:
         """Return why the process is to be ended, empty while it is not."""
         quiet = now - self._last
-        if look is None or quiet < STOPPED_AFTER:
+        if look is None:
+            return ''
+        if self._cpu_at_beat is None:
+            self._cpu_at_beat = look.cpu
+        if quiet < STOPPED_AFTER:
             return ''
         if look.state == 'T':
             return f'was stopped {quiet:.1f} s ago'
@@ -88,7 +95,8 @@ class Heartbeats:
         if look.state in ('R', 'D') or used > least:
             self._cpu, self._idle_since = look.cpu, now
         stuck = quiet >= STUCK_AFTER and now - self._idle_since >= 1.0
-        if stuck or quiet >= BUSY_AFTER:
+        loops = look.cpu - self._cpu_at_beat >= BUSY_AFTER
+        if stuck or loops or quiet >= STARVED_AFTER:
             return f'hangs: no heartbeat for {quiet:.1f} s'
         return ''
 

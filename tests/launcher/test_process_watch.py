@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from launcher.process_watch import (
-    BUSY_AFTER,
     SILENT_START,
+    STARVED_AFTER,
     STOPPED_AFTER,
     STUCK_AFTER,
     Heartbeats,
@@ -58,12 +58,18 @@ def test_a_process_that_only_sleeps_is_stuck():
     assert 'hangs' in after(STUCK_AFTER + 2.0, *looks)
 
 
-def test_a_process_that_waits_for_a_processor_or_computes_is_given_time():
+def test_a_process_that_gets_little_of_a_processor_is_given_time():
     waiting = [Look('R', 1.0, 0)] * 10
     assert after(STUCK_AFTER + 5.0, *waiting) == ''
-    computing = [Look('S', 0.5 * number, 0) for number in range(10)]
-    assert after(STUCK_AFTER + 5.0, *computing) == ''
-    assert 'hangs' in after(BUSY_AFTER + 0.1, *waiting)
+    slow = [Look('S', 0.3 * number, 0) for number in range(10)]
+    assert after(STUCK_AFTER + 5.0, *slow) == ''
+    assert 'hangs' in after(STARVED_AFTER + 0.1, *waiting)
+
+
+def test_an_endless_loop_is_found_by_its_own_time():
+    looping = [Look('R', 10.0 + 0.4 * number, 0) for number in range(11)]
+    assert 'hangs' in after(4.4, *looping)
+    assert after(3.0, *looping[:8]) == ''
 
 
 def test_a_start_may_take_long_but_not_for_ever():

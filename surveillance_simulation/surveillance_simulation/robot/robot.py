@@ -71,8 +71,10 @@ class Robot:
         The arm, obstacles and people begin anew.
         """
         numbers = (*self.base.pose, *self.base.odometry, self.time)
-        return dict(zip(_STATE, numbers, strict=True)) | {
-            'closed': '\n'.join(sorted(self.world.closed_doors)),
+        closed = '\n'.join(sorted(self.world.closed_doors))
+        return {
+            **dict(zip(_STATE, numbers, strict=True)),
+            'closed': closed,
             'collisions': self.base.collisions,
         }
 
