@@ -184,14 +184,23 @@ def test_names_that_rdf_xml_cannot_hold_are_saved_as_ntriples(ask: Ask) -> None:
     assert values == ['"1"^^xsd:long']
 
 
-def test_a_turtle_document_is_saved_as_one(service: ArmorService, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ('name', 'text'),
+    [
+        ('t.ttl', f'@prefix : <{IRI}#> .\n:R1 a :ROOM .\n'),
+        ('t.owl', f'Ontology(<{IRI}> ClassAssertion(<{IRI}#ROOM> <{IRI}#R1>))'),
+    ],
+)
+def test_a_document_of_a_format_that_is_only_read_is_saved_in_another(
+    service: ArmorService, tmp_path: Path, name: str, text: str
+) -> None:
     ask = asker(service)
-    (tmp_path / 't.ttl').write_text(f'@prefix : <{IRI}#> .\n:R1 a :ROOM .\n')
+    (tmp_path / name).write_text(text)
     args = (IRI, 'false', '', 'false')
-    assert ask('LOAD FILE', 't.ttl', *args).success
+    assert ask('LOAD FILE', name, *args).success
     ask('ADD IND CLASS', 'R2', 'ROOM')
     assert ask('SAVE', '').success
-    assert ask('LOAD FILE', 't.ttl', *args, reference='again').success
+    assert ask('LOAD FILE', name, *args, reference='again').success
     assert names(ask('QUERY IND CLASS', 'ROOM', reference='again')) == ['R1', 'R2']
 
 

@@ -38,7 +38,7 @@ from surveillance_ontology.owl.axioms import Axiom
 from surveillance_ontology.reasoner.java_reasoning import JavaKnowledgeBase, JavaReasonerError
 
 RELEASE_AFTER = 0.2
-WRITTEN = {'turtle': 'ntriples', 'owlxml': 'rdfxml'}
+WRITTEN = {'turtle': 'ntriples', 'owlxml': 'rdfxml', 'functional': 'rdfxml'}
 """What SAVE writes for formats that are only read: N-Triples is Turtle as well."""
 WEB_TIMEOUT = 20.0
 MAX_NAMED = 5
@@ -203,8 +203,8 @@ def _release(session: Session) -> None:
     differs='Without a path it is refused unless the parameter overwrite_loaded is set: ARMOR '
     'writes over the file that was loaded. Refused with 102 while another client is mounted. '
     'Written beside the file and renamed, so that a crash leaves the old file whole. '
-    'Turtle is written as N-Triples, OWL/XML as RDF/XML; a path that ends in .nt gets N-Triples, '
-    'which hold names that RDF/XML cannot.',
+    'Turtle is written as N-Triples, OWL/XML and functional syntax as RDF/XML; a path that ends '
+    'in .nt gets N-Triples, which hold names that RDF/XML cannot.',
     slow=True,
 )
 def _save(session: Session, request: DirectiveRequest, path: str) -> DirectiveResponse:
