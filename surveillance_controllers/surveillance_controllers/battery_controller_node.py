@@ -179,6 +179,9 @@ class RobotBattery:
         self._battery = battery
         self._change = change
         self._wait = ClockWait(node)
+        if since is not None:
+            # From then on no setting of the clock counts.
+            since += self._wait.elapsed() - self._wait.now()
         self._use = BatteryInUse(battery, settings.station, settings.dock_reach, since)
         self._states = node.create_publisher(BatteryState, 'battery_state', STATE_QOS)
         node.create_subscription(PoseWithCovarianceStamped, 'amcl_pose', self._on_pose, STATE_QOS)
@@ -192,7 +195,7 @@ class RobotBattery:
 
     def _on_pose(self, message: PoseWithCovarianceStamped) -> None:
         try:
-            self._use.see_pose(conversions.pose_from(message.pose.pose), self._wait.now())
+            self._use.see_pose(conversions.pose_from(message.pose.pose), self._wait.elapsed())
         except ValueError as error:
             self._node.get_logger().error(f'amcl_pose: {error}')
 
@@ -205,7 +208,7 @@ class RobotBattery:
         self._change(lambda: self._battery.set_level(self._battery.level - percent))
 
     def _update(self) -> None:
-        self._change(partial(self._use.advance, self._wait.now()))
+        self._change(partial(self._use.advance, self._wait.elapsed()))
         state = conversions.battery_state(self._battery, charging=self._use.docked)
         state.header.stamp = self._node.get_clock().now().to_msg()
         self._states.publish(state)

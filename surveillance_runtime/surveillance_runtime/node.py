@@ -21,6 +21,7 @@ from rcl_interfaces.msg import (
 )
 from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.client import Client
+from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import (
     PublisherEventCallbacks,
     QoSRequestedIncompatibleQoSInfo,
@@ -33,6 +34,7 @@ from rclpy.publisher import Publisher
 from rclpy.qos import qos_policy_name_from_kind
 from rclpy.service import Service
 from rclpy.subscription import Subscription
+from rclpy.timer import Timer
 
 from surveillance_fsm import Interrupt
 from surveillance_fsm.ros.waiting import CLIENT_QOS, SERVICE_QOS
@@ -242,6 +244,15 @@ class PatrolNode(Node):  # type: ignore[misc]
             SubscriptionEventCallbacks(incompatible_qos=on_mismatch, use_default_callbacks=False),
         )
         return super().create_subscription(msg_type, topic, *args, **kwargs)
+
+    def create_timer(self, *args: Any, **options: Any) -> Timer:
+        """Create a timer as rclpy does, but without `use_sim_time` on the steady clock.
+
+        One on the machine's clock rests for as long as that is set back.
+        """
+        if options.get('clock') is None and not self.get_parameter('use_sim_time').value:
+            options['clock'] = Clock(clock_type=ClockType.STEADY_TIME)
+        return super().create_timer(*args, **options)
 
     def create_service(
         self, srv_type: Any, name: str, callback: Callable[..., Any], **options: Any

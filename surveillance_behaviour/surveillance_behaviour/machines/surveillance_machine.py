@@ -25,6 +25,7 @@ from surveillance_behaviour.machines.shared_states import (
 from surveillance_behaviour.mission.mission import Mission
 from surveillance_behaviour.mission.recovery import Step
 from surveillance_behaviour.peers.ports import Point
+from surveillance_fsm.clock import elapsed_of
 
 NOTE_SECONDS = 1.0
 """The shortest time between two notes of how far a place is explored, seconds."""
@@ -82,12 +83,13 @@ class ExploreTask(fsm.State):
         """Explore the place for what is left of its time since the last visit; whether it did."""
         mission = self.mission
         seconds = mission.settings.choice.exploration_seconds
-        begin = mission.now() - min(mission.explored, seconds)
+        elapsed = elapsed_of(mission.clock)
+        begin = elapsed() - min(mission.explored, seconds)
         mission.explored = 0.0
-        while (left := begin + seconds - mission.now()) > 0.0:
+        while (left := begin + seconds - elapsed()) > 0.0:
             if not mission.clock.sleep(min(left, max(NOTE_SECONDS, seconds / 20.0)), interrupt):
                 return False
-            explored = round(mission.now() - begin, 3)
+            explored = round(elapsed() - begin, 3)
             mission.note('exploring', place=mission.place, seconds=explored)
         mission.explored = math.inf
         return True

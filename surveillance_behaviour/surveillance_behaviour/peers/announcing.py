@@ -39,6 +39,10 @@ class MissionClock:
         """Return the seconds of ROS time."""
         return self._wait.now()
 
+    def elapsed(self) -> float:
+        """Return the seconds that have passed since some moment, however the clock is set."""
+        return self._wait.elapsed()
+
     def sleep(self, seconds: float, interrupt: fsm.Interrupt) -> bool:
         """Wait; return False when the interrupt ended it early."""
         # A little later than it waits: time that stops a nanosecond early would wake nobody.

@@ -70,8 +70,8 @@ class GoalRun:
         return self._wait.sleep(seconds, self.interrupt)
 
     def now(self) -> float:
-        """Return ROS time in seconds."""
-        return self._wait.now()
+        """Return seconds as they pass in ROS time; only differences have a meaning."""
+        return self._wait.elapsed()
 
 
 Execute = Callable[[Any, GoalRun], Any]

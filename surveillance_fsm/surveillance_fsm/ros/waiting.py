@@ -8,6 +8,7 @@ node) and ``spawn`` (starts a thread that the node joins).
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -84,6 +85,9 @@ def set_preempt_handler(node: Node, container: Container, timeout: float = 5.0) 
 class ClockWait:
     """Sleeps on a node's clock that an `Interrupt` ends early.
 
+    How long a sleep lasts does not depend on the date: without `use_sim_time` it is counted by the
+    steady clock, so that setting the machine's clock neither ends a sleep nor prolongs it.
+
     Args:
         node: The node whose clock counts; wall time, or `/clock` under `use_sim_time`.
     """
@@ -106,7 +110,10 @@ class ClockWait:
         return float(self._clock.now().nanoseconds) / 1e9
 
     def elapsed(self) -> float:
-        """Return the seconds that have passed since some moment; a jump back takes none off."""
+        """Return the seconds that have passed since some moment; a jump back takes none off.
+
+        Without `use_sim_time` no setting of the machine's clock counts.
+        """
         return float(self._passed()) / 1e9
 
     def sleep(self, seconds: float, interrupt: Interrupt | None = None) -> bool:
@@ -121,17 +128,22 @@ class ClockWait:
         Returns:
             True when the whole time passed, False when the interrupt came first.
         """
-        deadline = self._passed() + round(seconds * 1e9)
+        remaining = round(seconds * 1e9)
+        follows_topic = self._follows_topic()
+        deadline = self._passed() + remaining
         remove = interrupt.subscribe(self._wake) if interrupt is not None else None
         try:
             with self._changed:
                 while True:
                     if interrupt is not None and interrupt.is_set():
                         return False
+                    if follows_topic != self._follows_topic():
+                        follows_topic = not follows_topic
+                        deadline = self._passed() + remaining
                     remaining = deadline - self._passed()
                     if remaining <= 0:
                         return True
-                    self._changed.wait(None if self._follows_topic() else remaining / 1e9)
+                    self._changed.wait(None if follows_topic else remaining / 1e9)
         finally:
             if remove is not None:
                 remove()
@@ -140,6 +152,8 @@ class ClockWait:
         return bool(self._clock.clock_type == ClockType.ROS_TIME and self._clock.ros_time_is_active)
 
     def _passed(self) -> int:
+        if not self._follows_topic():
+            return time.monotonic_ns()
         return int(self._clock.now().nanoseconds) + self._back
 
     def _on_jump(self, jump: Any) -> None:
