@@ -71,7 +71,7 @@ class Month:
         uri = 'http://bnc/exp-rob-lab/2022-23'
         self._ontology.build(self._place, str(DATA / 'surveillance.owl'), uri, int(START))
         names = sorted(self._place.positions)
-        self.record.start(START, 'surveillance', names[0], names)
+        self.record.write('start', START, machine='surveillance', place=names[0], places=names)
 
     def legs(self, seconds: float) -> Iterator[float]:
         """Patrol for so many seconds; yield the time after each leg."""
@@ -79,15 +79,19 @@ class Month:
         while now < START + seconds:
             now += LEG
             place = self._chance.choice(names)
-            self.record.decision(now - 11.0, place, 'CORRIDOR', f'{place} {REASON}')
+            self.record.write(
+                'decision', now - 11.0, place=place, rule='CORRIDOR', reason=f'{place} {REASON}'
+            )
             path = [[round(self._chance.uniform(0, 20), 2) for _ in range(2)] for _ in range(20)]
             self.record.write('visit', now, place=place, distance=5.5, path=path)
             for noted in (1.0, 2.0):
                 self.record.write('exploring', now + noted, place=place, seconds=noted)
             if self._chance.random() < 0.01:
-                self.record.failure(now + 2.0, 'moving', 'compute_path: no answer in time')
+                self.record.write(
+                    'failure', now + 2.0, what='moving', reason='compute_path: no answer in time'
+                )
             if self._chance.random() < 0.005:
-                self.record.recharge(now + 2.0, place, 120.0)
+                self.record.write('recharge', now + 2.0, place=place, seconds=120.0)
             self._ontology.record_place(place, int(now * 1e9))
             self._ontology.snapshot(now, CLASSES, visits={place: now})
             yield now

@@ -7,24 +7,20 @@ decision is published with its reason. It also offers `why_not` and `go_to`.
 
 from __future__ import annotations
 
-import random
 import threading
 from collections.abc import Sequence
 from typing import Any
 
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.task import Future
-from std_msgs.msg import Bool, UInt8
 
 from surveillance_behaviour import behaviour_parameters
 from surveillance_behaviour.charging import BatteryMonitor
-from surveillance_behaviour.decider import Decider
 from surveillance_behaviour.decision import NowhereToGoError
 from surveillance_behaviour.peers.announcing import DecisionTopic
-from surveillance_behaviour.peers.decision_services import DecisionServices
+from surveillance_behaviour.peers.decision_services import DecisionServices, make_decider
 from surveillance_behaviour.peers.ports import InterruptedWaitError, PeerError
-from surveillance_behaviour.peers.ros_ports import RosPlaces, ros_ontology
-from surveillance_behaviour.world_model import Experience
+from surveillance_behaviour.peers.ros_ports import RosPlaces, hear_battery, ros_ontology
 from surveillance_fsm import Interrupt
 from surveillance_fsm.ros import ClockWait
 from surveillance_interfaces.msg import MissionStatus
@@ -43,21 +39,18 @@ class Reasoner(PatrolNode):
         super().__init__('reasoner', **node_options)
         settings = behaviour_parameters.choice_settings(self, explores=False)
         deadlines = behaviour_parameters.deadlines(self, ('answer', 'build'))
-        seed = behaviour_parameters.random_seed(self)
-        experience = Experience.of_record(behaviour_parameters.record_path(self))
-        if experience.problem:
-            self.get_logger().warn(experience.problem)
         battery = BatteryMonitor()
-        self._decider = Decider(
+        self._wait = ClockWait(self)
+        self._decider = make_decider(
+            self,
             settings,
             ros_ontology(self, deadlines),
             RosPlaces(self, deadlines),
             battery,
-            experience,
-            random.Random(seed if seed >= 0 else None),
-            lambda warning: self.get_logger().warn(warning),
+            behaviour_parameters.record_path(self),
+            behaviour_parameters.random_seed(self),
+            self._wait.now,
         )
-        self._wait = ClockWait(self)
         self._decisions = DecisionTopic(self)
         self._avoided: frozenset[str] = frozenset()
         self._place = ''
@@ -66,13 +59,7 @@ class Reasoner(PatrolNode):
         self._sharing = threading.Lock()
         self._interrupt = Interrupt()
         self.stopping.subscribe(self._interrupt.set)
-        battery.watch(lambda: self._decider.learn_draw(self._wait.now()))
-        self.create_subscription(
-            UInt8, 'battery_level', lambda m: battery.set_level(float(m.data)), STATE_QOS
-        )
-        self.create_subscription(
-            Bool, 'state/battery_low', lambda m: battery.set_low(m.data), STATE_QOS
-        )
+        hear_battery(self, battery)
         self.create_subscription(MissionStatus, 'mission_status', self._on_status, STATE_QOS)
         self.create_service(
             Reason, 'reason', self._on_reason, callback_group=ReentrantCallbackGroup()

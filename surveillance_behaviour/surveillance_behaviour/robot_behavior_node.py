@@ -10,17 +10,14 @@ this node decides: it publishes `decision` and offers `why_not` and `go_to`; in 
 from __future__ import annotations
 
 import os
-import random
 from collections.abc import Sequence
 from typing import Any, cast
 
 from sensor_msgs.msg import BatteryState
-from std_msgs.msg import Bool, UInt8
 
 import surveillance_fsm as fsm
 from surveillance_behaviour import behaviour_parameters, conversions
 from surveillance_behaviour.charging import BatteryMonitor
-from surveillance_behaviour.decider import Decider
 from surveillance_behaviour.machines import MACHINES
 from surveillance_behaviour.mission.mission import Mission, MissionSettings
 from surveillance_behaviour.mission.mission_log import (
@@ -31,20 +28,21 @@ from surveillance_behaviour.mission.mission_log import (
     read,
 )
 from surveillance_behaviour.peers.announcing import DecisionTopic, MissionClock, RosAnnouncer
-from surveillance_behaviour.peers.decision_services import DecisionServices
-from surveillance_behaviour.peers.ports import Ontology, Ports
+from surveillance_behaviour.peers.decision_services import DecisionServices, make_decider
+from surveillance_behaviour.peers.ports import Ports
 from surveillance_behaviour.peers.ros_ports import (
+    Deadlines,
     RosMotion,
     RosPlaces,
     RosReasoner,
     RosRoutine,
+    hear_battery,
     ros_ontology,
 )
-from surveillance_behaviour.world_model import Experience
 from surveillance_fsm.ros import IntrospectionServer
 from surveillance_runtime.node import JOIN_SECONDS, PatrolNode, StartError
 from surveillance_runtime.process import run_node
-from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
+from surveillance_runtime.qos import SENSOR_QOS
 from surveillance_runtime.waiting import AwaitedWork
 
 
@@ -69,23 +67,8 @@ class RobotBehavior(PatrolNode):
         self._record = _open_record(path)
         self._mission_clock = MissionClock(self)
         self._work: AwaitedWork | None = None
-        patrols = self._behaviour == 'patrol'
         battery = BatteryMonitor()
-        ontology, places = ros_ontology(self, deadlines), RosPlaces(self, deadlines)
-        if patrols:
-            decisions: RosReasoner | Decider = RosReasoner(self, deadlines, ontology, battery)
-        else:
-            generator = random.Random(seed if seed >= 0 else None)
-            decisions = self._decider(settings, ontology, places, battery, path, generator)
-        self._announcer = RosAnnouncer(self, None if patrols else DecisionTopic(self))
-        ports = Ports(
-            ontology=ontology,
-            places=places,
-            announcer=self._announcer,
-            decisions=decisions,
-            motion=None if patrols else RosMotion(self, deadlines),
-            routine=RosRoutine(self, deadlines, battery, self._mission_clock) if patrols else None,
-        )
+        ports = self._ports(settings, deadlines, battery, path, seed)
         clock = cast(fsm.Clock, self._mission_clock)
         self.mission = Mission(
             self._behaviour, settings, ports, battery, clock, self._record, left_at
@@ -94,12 +77,7 @@ class RobotBehavior(PatrolNode):
         self._announcer.attach(self.mission, self.machine)
         self._introspection = IntrospectionServer(self, self.get_name(), self.machine, '/')
         self._introspection.start()
-        self.create_subscription(
-            UInt8, 'battery_level', lambda m: battery.set_level(float(m.data)), STATE_QOS
-        )
-        self.create_subscription(
-            Bool, 'state/battery_low', lambda m: battery.set_low(m.data), STATE_QOS
-        )
+        hear_battery(self, battery)
         self.create_subscription(
             BatteryState,
             'battery_state',
@@ -107,6 +85,37 @@ class RobotBehavior(PatrolNode):
             SENSOR_QOS,
         )
         self._machine_thread = self.spawn(self._run, name='machine')
+
+    def _ports(
+        self,
+        settings: MissionSettings,
+        deadlines: Deadlines,
+        battery: BatteryMonitor,
+        record: str,
+        seed: int,
+    ) -> Ports:
+        """Return the peers of the machine that runs; in `surveillance` this process decides."""
+        clock = self._mission_clock
+        ontology, places = ros_ontology(self, deadlines), RosPlaces(self, deadlines)
+        if self._behaviour == 'patrol':
+            self._announcer = RosAnnouncer(self, None)
+            reasoner = RosReasoner(self, deadlines, ontology, battery)
+            routine = RosRoutine(self, deadlines, battery, clock)
+            return Ports(ontology, places, self._announcer, reasoner, routine=routine)
+        self._announcer = RosAnnouncer(self, DecisionTopic(self))
+        decider = make_decider(
+            self, settings.choice, ontology, places, battery, record, seed, clock.now
+        )
+        self._work = AwaitedWork(self, 1)
+        DecisionServices(
+            self,
+            decider,
+            clock.now,
+            lambda: self.mission.recovery.avoided(self.mission.now()),
+            self._work,
+        )
+        motion = RosMotion(self, deadlines)
+        return Ports(ontology, places, self._announcer, decider, motion=motion)
 
     def on_stop(self) -> None:
         """Preempts the machine, so that what it started is cancelled while messages flow."""
@@ -142,39 +151,6 @@ class RobotBehavior(PatrolNode):
         except MissionLogError as error:
             self.get_logger().warn(f'what was begun before is begun anew: {error}')
             return None
-
-    def _decider(
-        self,
-        settings: MissionSettings,
-        ontology: Ontology,
-        places: RosPlaces,
-        battery: BatteryMonitor,
-        record: str,
-        generator: random.Random,
-    ) -> Decider:
-        """Who decides in this process, with the services that go with it."""
-        experience = Experience.of_record(record)
-        if experience.problem:
-            self.get_logger().warn(experience.problem)
-        decider = Decider(
-            settings.choice,
-            ontology,
-            places,
-            battery,
-            experience,
-            generator,
-            lambda warning: self.get_logger().warn(warning),
-        )
-        battery.watch(lambda: decider.learn_draw(self._mission_clock.now()))
-        self._work = AwaitedWork(self, 1)
-        DecisionServices(
-            self,
-            decider,
-            self._mission_clock.now,
-            lambda: self.mission.recovery.avoided(self.mission.now()),
-            self._work,
-        )
-        return decider
 
 
 def _open_record(path: str) -> MissionRecord | None:

@@ -704,9 +704,9 @@ class Checkpointer:
         self._leave_out = frozenset(leave_out)
         # A concurrence's children change places in threads of their own: the last word is kept.
         self._turn = threading.Lock()
-        for container in _containers(machine):
-            container.register_start_cb(self._changed)
-            container.register_transition_cb(self._changed)
+        for inner in structure_of(machine).walk():
+            inner.container.register_start_cb(self._changed)
+            inner.container.register_transition_cb(self._changed)
         machine.register_termination_cb(self._ended)
 
     def _changed(self, *_: Any) -> None:
@@ -720,12 +720,3 @@ class Checkpointer:
 
     def _ended(self, *_: Any) -> None:
         self._path.unlink(missing_ok=True)
-
-
-def _containers(state: State) -> list[Container]:
-    if not isinstance(state, Container):
-        return []
-    return [
-        state,
-        *(found for child in children_of(state).values() for found in _containers(child)),
-    ]

@@ -165,7 +165,7 @@ def test_a_question_changes_no_decision(policy: str) -> None:
         graph, memory, settings = seven_rooms(), PolicyMemory(random.Random(3)), DecisionSettings()
         settings.policy, settings.rules = policy, Rules(())
         place, now, visited_at, taken = 'C1', 100.0, {'C1': 100.0}, []
-        for _ in range(12):
+        for _ in range(8):
             here = world(
                 place=place,
                 now=now,
@@ -174,7 +174,7 @@ def test_a_question_changes_no_decision(policy: str) -> None:
                 graph=graph,
                 memory=memory,
             )
-            for other in graph.places if asked else ():
+            for other in ('R1', 'R4') if asked else ():
                 why_not(other, here, Battery(), settings)
             decision = decide(here, Battery(), settings)
             now += graph.legs[place][decision.place]

@@ -31,9 +31,11 @@ def path(tmp_path: Path) -> Path:
 
 def test_what_was_written_is_read_back(path: Path) -> None:
     with MissionRecord(path) as record:
-        record.start(0.0, 'surveillance', 'E', ['E', 'C1'])
-        record.decision(1.0, 'C1', 'URGENT', 'C1 went unvisited for 9.0 s')
-        record.visit(6.5, 'C1', 5.4)
+        record.write('start', 0.0, machine='surveillance', place='E', places=['E', 'C1'])
+        record.write(
+            'decision', 1.0, place='C1', rule='URGENT', reason='C1 went unvisited for 9.0 s'
+        )
+        record.write('visit', 6.5, place='C1', distance=5.4)
     events = read(path)
     assert [(event.name, event.time) for event in events] == [
         ('start', 0.0),
@@ -49,9 +51,9 @@ def test_a_killed_writer_loses_nothing(path: Path) -> None:
         'import os, signal, sys\n'
         'from surveillance_behaviour.mission.mission_log import MissionRecord\n'
         'record = MissionRecord(sys.argv[1])\n'
-        'record.start(0.0, "surveillance", "E", ["E"])\n'
+        'record.write("start", 0.0, machine="surveillance", place="E", places=["E"])\n'
         'for turn in range(50):\n'
-        '    record.visit(float(turn), "E", 1.0)\n'
+        '    record.write("visit", float(turn), place="E", distance=1.0)\n'
         'os.kill(os.getpid(), signal.SIGKILL)\n'
     )
     code = subprocess.run([sys.executable, '-c', program, str(path)], check=False).returncode
@@ -62,14 +64,14 @@ def test_a_killed_writer_loses_nothing(path: Path) -> None:
 @pytest.mark.parametrize('kept', [0, 1, 20])
 def test_a_torn_last_line_is_skipped_and_then_cut_off(path: Path, kept: int) -> None:
     with MissionRecord(path) as record:
-        record.start(0.0, 'patrol', 'E', ['E'])
-        record.visit(1.0, 'E')
+        record.write('start', 0.0, machine='patrol', place='E', places=['E'])
+        record.write('visit', 1.0, place='E', distance=0.0)
     whole = path.read_bytes()
     first = whole.index(b'\n') + 1
     os.truncate(path, first + kept)
     assert [event.name for event in read(path)] == ['start']
     with MissionRecord(path) as record:
-        record.visit(2.0, 'E')
+        record.write('visit', 2.0, place='E', distance=0.0)
     assert [(event.name, event.time) for event in read(path)] == [('start', 0.0), ('visit', 2.0)]
 
 
@@ -94,15 +96,15 @@ def test_files_that_cannot_be_used_are_named(tmp_path: Path) -> None:
 
 def test_the_summary_counts_everything(path: Path) -> None:
     with MissionRecord(path) as record:
-        record.start(100.0, 'surveillance', 'E', ['E', 'C1', 'R1'])
-        record.decision(101.0, 'C1', 'CORRIDOR', 'why')
-        record.visit(110.0, 'C1', 5.0)
-        record.decision(111.0, 'E', 'recharge', 'why')
-        record.failure(112.0, 'MOVE_TO_NEXT_ROOM', 'a door is closed')
-        record.visit(130.0, 'E', 5.5)
-        record.recharge(150.0, 'E', 20.0)
-        record.visit(160.0, 'C1', 5.0)
-        record.end(200.0)
+        record.write('start', 100.0, machine='surveillance', place='E', places=['E', 'C1', 'R1'])
+        record.write('decision', 101.0, place='C1', rule='CORRIDOR', reason='why')
+        record.write('visit', 110.0, place='C1', distance=5.0)
+        record.write('decision', 111.0, place='E', rule='recharge', reason='why')
+        record.write('failure', 112.0, what='MOVE_TO_NEXT_ROOM', reason='a door is closed')
+        record.write('visit', 130.0, place='E', distance=5.5)
+        record.write('recharge', 150.0, place='E', seconds=20.0)
+        record.write('visit', 160.0, place='C1', distance=5.0)
+        record.write('end', 200.0)
     summary = summarize(read(path))
     assert summary.seconds == 100.0
     assert summary.visits == {'E': 1, 'C1': 2, 'R1': 0}
@@ -117,15 +119,15 @@ def test_the_summary_counts_everything(path: Path) -> None:
 
 def test_a_restart_goes_on_and_another_clock_starts_anew(path: Path) -> None:
     with MissionRecord(path) as record:
-        record.start(0.0, 'surveillance', 'E', ['E', 'C1'])
-        record.visit(10.0, 'C1')
-        record.start(30.0, 'surveillance', 'C1', ['E', 'C1'])
-        record.visit(40.0, 'E')
+        record.write('start', 0.0, machine='surveillance', place='E', places=['E', 'C1'])
+        record.write('visit', 10.0, place='C1', distance=0.0)
+        record.write('start', 30.0, machine='surveillance', place='C1', places=['E', 'C1'])
+        record.write('visit', 40.0, place='E', distance=0.0)
     assert summarize(read(path)).unvisited == {'E': 40.0, 'C1': 30.0}
     assert summarize(read(path)).restarts == 1
     with MissionRecord(path) as record:
-        record.start(0.0, 'surveillance', 'E', ['E', 'C1'])
-        record.visit(5.0, 'C1')
+        record.write('start', 0.0, machine='surveillance', place='E', places=['E', 'C1'])
+        record.write('visit', 5.0, place='C1', distance=0.0)
     assert summarize(read(path)).unvisited == {'E': 40.0, 'C1': 30.0}
     assert summarize(read(path)).seconds == 45.0
 
@@ -164,10 +166,10 @@ def test_a_record_tells_where_its_mission_was_cut_off(
 
 def test_what_another_simulation_wrote_says_nothing(path: Path) -> None:
     with MissionRecord(path) as record:
-        record.decision(50.0, 'C1', 'URGENT', 'why')
-        record.start(60.0, 'surveillance', 'E', ['E'])
-        record.decision(61.0, 'C1', 'URGENT', 'why')
-        record.start(1.0, 'surveillance', 'C1', ['E', 'C1'])
+        record.write('decision', 50.0, place='C1', rule='URGENT', reason='why')
+        record.write('start', 60.0, machine='surveillance', place='E', places=['E'])
+        record.write('decision', 61.0, place='C1', rule='URGENT', reason='why')
+        record.write('start', 1.0, machine='surveillance', place='C1', places=['E', 'C1'])
     assert cut_off(read(path)) == CutOff(1.0, 'C1')
 
 
@@ -175,11 +177,13 @@ def test_a_long_record_is_read_from_its_last_file_and_sums_up_all(path: Path) ->
     whole = path.with_name('whole.jsonl')
     with MissionRecord(path, segment_bytes=3000) as record, MissionRecord(whole) as other:
         for each in (record, other):
-            each.start(0.0, 'patrol', 'E', ['E', 'C1', 'R1'])
+            each.write('start', 0.0, machine='patrol', place='E', places=['E', 'C1', 'R1'])
             for turn in range(300):
-                each.decision(2.0 * turn, 'C1', 'ROOM' if turn % 3 else 'recharge', 'because')
-                each.visit(2.0 * turn + 1.0, 'C1' if turn % 2 else 'R1', 1.5)
-            each.failure(700.0, 'moving', 'a door is closed')
+                rule = 'ROOM' if turn % 3 else 'recharge'
+                each.write('decision', 2.0 * turn, place='C1', rule=rule, reason='because')
+                place = 'C1' if turn % 2 else 'R1'
+                each.write('visit', 2.0 * turn + 1.0, place=place, distance=1.5)
+            each.write('failure', 700.0, what='moving', reason='a door is closed')
     packed = sorted(path.parent.glob('mission.jsonl.*.gz'))
     assert len(packed) >= 8
     assert path.stat().st_size < 6000
@@ -188,16 +192,16 @@ def test_a_long_record_is_read_from_its_last_file_and_sums_up_all(path: Path) ->
     assert account_of(read(path)).visits == account_of(read(whole)).visits
     assert list(read_all(path)) == read(whole)
     with MissionRecord(path, segment_bytes=3000) as record:
-        record.visit(800.0, 'E')
+        record.write('visit', 800.0, place='E', distance=0.0)
     assert summarize(read(path)).visits['E'] == 1
 
 
 def test_a_writer_that_was_killed_between_two_files_loses_nothing(path: Path) -> None:
     with MissionRecord(path) as record:
-        record.start(0.0, 'patrol', 'E', ['E'])
+        record.write('start', 0.0, machine='patrol', place='E', places=['E'])
     os.rename(path, path.with_name('mission.jsonl.next'))
     with MissionRecord(path) as record:
-        record.visit(1.0, 'E')
+        record.write('visit', 1.0, place='E', distance=0.0)
     assert [event.name for event in read(path)] == ['start', 'visit']
 
 
@@ -224,7 +228,7 @@ def test_no_finished_line_is_ever_lost(
     path = tmp_path_factory.mktemp('record') / 'mission.jsonl'
     with MissionRecord(path) as record:
         for seconds, place in legs:
-            record.visit(seconds, place)
+            record.write('visit', seconds, place=place, distance=0.0)
     content = path.read_bytes()
     path.write_bytes(content[: max(0, len(content) - cut)])
     finished = path.read_bytes().count(b'\n')

@@ -114,7 +114,7 @@ def test_places_that_the_ontology_calls_urgent_at_the_start_are_visited_first() 
 
 
 def test_a_map_that_is_too_large_has_no_exhaustive_bound() -> None:
-    assert rule_bound(grid(5, 5), 100.0) is None
+    assert rule_bound(grid(5, 5), 100.0, states=20_000) is None
 
 
 def test_costs_may_differ_by_direction() -> None:

@@ -225,8 +225,8 @@ def test_a_domain_and_quiet_transports_reach_the_nodes(tmp_path, monkeypatch):
 def test_a_summary_is_given_also_without_a_record(tmp_path):
     assert summary(tmp_path / 'none') == 'Mission: nothing was recorded.'
     with MissionRecord(tmp_path / 'record') as record:
-        record.start(0.0, 'surveillance', 'E', ['E', 'C1'])
-        record.visit(5.0, 'C1', 3.0)
+        record.write('start', 0.0, machine='surveillance', place='E', places=['E', 'C1'])
+        record.write('visit', 5.0, place='C1', distance=3.0)
     assert '2 places visited' in summary(tmp_path / 'record')
     (tmp_path / 'record').write_text('nonsense\n')
     assert 'Mission: ' in summary(tmp_path / 'record')

@@ -13,7 +13,6 @@ from functools import partial
 from typing import Any
 
 import surveillance_fsm as fsm
-from surveillance_behaviour.charging import charge
 from surveillance_behaviour.decision import RECHARGE
 from surveillance_behaviour.machines.shared_states import (
     FAILED,
@@ -22,6 +21,7 @@ from surveillance_behaviour.machines.shared_states import (
     Recover,
     WaitForHelp,
     add,
+    charge_here,
     check_arrival,
     check_path,
     path_length,
@@ -172,7 +172,7 @@ class Recharge(MissionState):
         super().__init__(mission, ['battery_full', 'not_at_dock'], output_keys=['target'])
 
     def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
-        mission, settings = self.mission, self.mission.settings
+        mission = self.mission
         self.charging = False
         if not mission.at_station():
             decision = mission.pending
@@ -182,18 +182,8 @@ class Recharge(MissionState):
             return 'not_at_dock' if decision.rule == RECHARGE else 'battery_full'
         self.charging = True
         ud.target = mission.place
-        began = mission.now()
         mission.say(f'charging in {mission.place} ({mission.battery.level_text()})')
-        charge(
-            mission.battery,
-            mission.charged_enough,
-            mission.clock,
-            interrupt,
-            stall_seconds=settings.charge_stall_seconds,
-            settle_seconds=settings.settle_seconds,
-            recharge=routine_of(self.mission).recharge,
-        )
-        mission.charged(mission.now() - began)
+        charge_here(mission, interrupt, routine_of(mission).recharge)
         return 'battery_full'
 
     def goal(self, ud: Any) -> str | None:

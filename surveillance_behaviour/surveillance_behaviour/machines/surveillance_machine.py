@@ -10,7 +10,6 @@ import math
 from typing import Any
 
 import surveillance_fsm as fsm
-from surveillance_behaviour.charging import charge
 from surveillance_behaviour.machines.shared_states import (
     FAILED,
     PREEMPTED,
@@ -18,6 +17,7 @@ from surveillance_behaviour.machines.shared_states import (
     Recover,
     WaitForHelp,
     add,
+    charge_here,
     check_arrival,
     check_path,
     path_length,
@@ -105,18 +105,10 @@ class RechargeTask(MissionState):
         super().__init__(mission, ['recharged'])
 
     def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
-        mission, began = self.mission, self.mission.now()
+        mission = self.mission
         why = mission.ports.decisions.why_charge()
         mission.say(f'charging in {mission.place} ({mission.battery.level_text()}, {why})')
-        charge(
-            mission.battery,
-            mission.charged_enough,
-            mission.clock,
-            interrupt,
-            stall_seconds=mission.settings.charge_stall_seconds,
-            settle_seconds=mission.settings.settle_seconds,
-        )
-        mission.charged(mission.now() - began)
+        charge_here(mission, interrupt)
         return 'recharged'
 
     def goal(self, ud: Any) -> str | None:

@@ -34,7 +34,7 @@ import os
 import shutil
 import zlib
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import TracebackType
@@ -176,32 +176,6 @@ class MissionRecord:
             return
         os.close(self._file)
         self._file = file
-
-    def start(self, time: float, machine: str, place: str, places: Sequence[str]) -> None:
-        """Note that a machine starts, or starts again, in ``place``; ``places`` are all to be
-        patrolled.
-        """
-        self.write('start', time, machine=machine, place=place, places=sorted(places))
-
-    def visit(self, time: float, place: str, distance: float = 0.0) -> None:
-        """Note that the robot arrived in ``place`` after ``distance`` metres."""
-        self.write('visit', time, place=place, distance=round(distance, 3))
-
-    def decision(self, time: float, place: str, rule: str, reason: str) -> None:
-        """``place`` was chosen by ``rule``."""
-        self.write('decision', time, place=place, rule=rule, reason=reason)
-
-    def recharge(self, time: float, place: str, seconds: float) -> None:
-        """Note that the robot was charged in ``place`` for ``seconds``."""
-        self.write('recharge', time, place=place, seconds=round(seconds, 3))
-
-    def failure(self, time: float, what: str, reason: str) -> None:
-        """Note that ``what`` (a state's label) failed because of ``reason``."""
-        self.write('failure', time, what=what, reason=reason)
-
-    def end(self, time: float) -> None:
-        """Note that the mission was told to end."""
-        self.write('end', time)
 
     def close(self) -> None:
         """Close the file; nothing is lost without it."""

@@ -13,6 +13,7 @@ from surveillance_behaviour import conversions
 from surveillance_behaviour.mission.mission import Mission
 from surveillance_behaviour.policy.world import Decision
 from surveillance_fsm.ros import ClockWait
+from surveillance_fsm.structure import structure_of
 from surveillance_interfaces.msg import Decision as DecisionMessage
 from surveillance_interfaces.msg import MissionStatus
 from surveillance_runtime.node import PatrolNode
@@ -113,9 +114,9 @@ class RosAnnouncer:
             )
 
         self._status = status
-        for container in containers(machine):
-            container.register_start_cb(lambda _data, _states: self._publish())
-            container.register_transition_cb(lambda _data, _states: self._publish())
+        for inner in structure_of(machine).walk():
+            inner.container.register_start_cb(lambda _data, _states: self._publish())
+            inner.container.register_transition_cb(lambda _data, _states: self._publish())
 
     def decision(self, decision: Decision) -> None:
         """Announce that a place was chosen."""
@@ -146,16 +147,6 @@ class RosAnnouncer:
     def _publish(self) -> None:
         with self._lock:
             self._topic.publish(self._status())
-
-
-def containers(state: fsm.State) -> list[fsm.Container]:
-    """Return a container and all containers inside it."""
-    if not isinstance(state, fsm.Container):
-        return []
-    found = [state]
-    for child in state.get_children().values():
-        found.extend(containers(child))
-    return found
 
 
 def active_path(state: fsm.State) -> list[str]:

@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from std_msgs.msg import Bool, UInt8
 from std_srvs.srv import Empty
 
 from surveillance_behaviour import conversions
@@ -103,6 +104,16 @@ def ros_ontology(node: PatrolNode, deadlines: Deadlines) -> ArmorKnowledge:
         whereabouts,
         deadlines.answer,
         transport.is_ready,
+    )
+
+
+def hear_battery(node: PatrolNode, battery: BatteryMonitor) -> None:
+    """Have a monitor follow the topics ``battery_level`` and ``state/battery_low``."""
+    node.create_subscription(
+        UInt8, 'battery_level', lambda m: battery.set_level(float(m.data)), STATE_QOS
+    )
+    node.create_subscription(
+        Bool, 'state/battery_low', lambda m: battery.set_low(m.data), STATE_QOS
     )
 
 
