@@ -466,7 +466,7 @@ def _test(argv: list[str]) -> int:
     if argv in (['-h'], ['--help']):
         print(_TEST_HELP)
         return 0
-    _enter(['test', *argv])
+    _enter(['test', *argv], extras=('test',))
     spread = any(a.startswith(('-n', '--numprocesses', '--pdb', '-p')) for a in argv)
     _exec(['-m', 'pytest', *([] if spread else ['-n', '2', '--dist', 'loadfile']), *argv])
     return 0
@@ -476,7 +476,7 @@ def _lint(argv: list[str]) -> int:
     Parser(
         prog='launch.py lint', description='Runs ruff check, ruff format --check and mypy.'
     ).parse_args(argv)
-    _enter(['lint'], extras=('lint',))
+    _enter(['lint'], extras=('test', 'lint'))
     import subprocess
 
     code = 0
@@ -506,7 +506,7 @@ def _environment(extras: Sequence[str]) -> Environment | None:
             'ROS 2 Jazzy is active in this shell, but this workspace is not built. Build it:\n'
             f'{system.colcon_advice(CHECKOUT)}\nor use a shell without ROS.'
         )
-    return Environment(CHECKOUT, ('test', *extras))
+    return Environment(CHECKOUT, extras)
 
 
 def _enter(argv: list[str], extras: Sequence[str] = ()) -> None:

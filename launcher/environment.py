@@ -13,13 +13,13 @@ import signal
 import subprocess
 import sys
 from collections import deque
-from collections.abc import Callable, Iterator, MutableMapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Iterator, MutableMapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from launcher import system
-from launcher.fingerprint import INTERFACES, Journal, current, requirements
-from launcher.progress import Step, lines_of
+from launcher.fingerprint import INTERFACES, Fingerprint, Journal, current, requirements
+from launcher.progress import Output, Step
 from launcher.system import LaunchError
 
 CHECKOUT = Path(__file__).resolve().parent.parent
@@ -52,7 +52,7 @@ class Environment:
         extras: groups of optional dependencies from `pyproject.toml`, beside what is already there.
     """
 
-    def __init__(self, checkout: Path = CHECKOUT, extras: Sequence[str] = ('test',)) -> None:
+    def __init__(self, checkout: Path = CHECKOUT, extras: Sequence[str] = ()) -> None:
         self.checkout = checkout
         self.venv = checkout / '.venv'
         self.python = self.venv / 'bin' / 'python'
@@ -121,14 +121,11 @@ class Environment:
         journal.extras = self._extras(journal)
         wanted = current(self.checkout, journal.extras)
         journal.python, journal.checkout = wanted.python, wanted.checkout
-        steps: list[tuple[str, Callable[[_Runner], None]]] = []
-        if fresh:
-            steps.append((VENV_STEP, self._make_venv))
+        titles = [VENV_STEP] if fresh else []
         if journal.packages != wanted.requirements or journal.working == PACKAGES_STEP:
-            needed = requirements(self.checkout, journal.extras)
-            steps.append((PACKAGES_STEP, lambda run: self._install_packages(run, needed)))
+            titles.append(PACKAGES_STEP)
         if journal.interfaces != wanted.interfaces or journal.working == INTERFACES_STEP:
-            steps.append((INTERFACES_STEP, self._install_interfaces))
+            titles.append(INTERFACES_STEP)
         if fresh and (free := shutil.disk_usage(self.checkout).free) < SPACE:
             raise LaunchError(
                 f'{self.venv}: the set-up needs {SPACE // 10**6} MB, {free // 10**6} MB are free '
@@ -136,36 +133,52 @@ class Environment:
             )
         print(f'Setting up {self.checkout.name}: once, and again after a change of dependencies.')
         if fresh:
-            print(f'It takes {SPACE // 10**6} MB of disk and about two minutes on two processors.')
-        for number, (title, work) in enumerate(steps, 1):
-            if title != VENV_STEP:
-                journal.working = title
-                journal.write(self.venv)
-            work(_Runner(self, Step(number, len(steps), title), lock))
-            if title == PACKAGES_STEP:
-                journal.packages = wanted.requirements
-            elif title == INTERFACES_STEP:
-                journal.interfaces = wanted.interfaces
+            print(f'It takes {SPACE // 10**6} MB of disk and about a minute on two processors.')
+        self._carry_out(titles, journal, wanted, lock)
         self._write_path_file()
         journal.working = ''
         journal.write(self.venv)
 
-    def _make_venv(self, run: _Runner) -> None:
-        run([_base_python(), '-m', 'venv', '--clear', str(self.venv)])
+    def _carry_out(
+        self, titles: Sequence[str], journal: Journal, wanted: Fingerprint, lock: int
+    ) -> None:
+        steps = {title: Step(i, len(titles), title) for i, title in enumerate(titles, 1)}
+        wheels = self.venv / 'wheels'
+        with ExitStack() as under_way:
 
-    def _install_packages(self, run: _Runner, packages: list[str]) -> None:
-        self._remove_half_installed()
-        run([*self._pip(), *packages])
+            def start(words: list[str]) -> _Command:
+                return under_way.enter_context(_Command(self, words, lock))
 
-    def _install_interfaces(self, run: _Runner) -> None:
-        self._remove_half_installed()
-        # -v shows the compiler's steps, which the progress display counts.
-        options = ['--no-deps', '--force-reinstall', '-v']
-        run([*self._pip(), *options, str(self.checkout / INTERFACES)])
+            if step := steps.get(VENV_STEP):
+                with step:
+                    start([_base_python(), '-m', 'venv', '--clear', str(self.venv)]).watch(step)
+            self._remove_half_installed()
+            if INTERFACES_STEP in steps:
+                shutil.rmtree(wheels, ignore_errors=True)
+                interfaces = str(self.checkout / INTERFACES)
+                # The compilers work while the packages are fetched: they need none of them.
+                build = start(self._pip('wheel', '-v', '--no-deps', '-w', str(wheels), interfaces))
+            if step := steps.get(PACKAGES_STEP):
+                journal.working = PACKAGES_STEP
+                journal.write(self.venv)
+                with step:
+                    needed = requirements(self.checkout, journal.extras)
+                    start(self._pip('install', *needed)).watch(step)
+                journal.packages = wanted.requirements
+            if step := steps.get(INTERFACES_STEP):
+                journal.working = INTERFACES_STEP
+                journal.write(self.venv)
+                with step:
+                    build.watch(step)
+                    (wheel,) = wheels.iterdir()
+                    options = ['--no-deps', '--force-reinstall']
+                    start(self._pip('install', *options, str(wheel))).watch(step)
+                shutil.rmtree(wheels)
+                journal.interfaces = wanted.interfaces
 
-    def _pip(self) -> list[str]:
+    def _pip(self, command: str, *words: str) -> list[str]:
         options = ['--disable-pip-version-check', '--no-input', '--progress-bar=off']
-        return [str(self.python), '-m', 'pip', 'install', *options]
+        return [str(self.python), '-m', 'pip', command, *options, *words]
 
     def _usable(self, journal: Journal, python: str) -> bool:
         """Tell whether the environment has a working pip and stands on this interpreter."""
@@ -218,41 +231,45 @@ class Environment:
             os.close(lock)
 
 
-class _Runner:
-    """Runs the command of one step, its output going to the progress display.
+class _Command:
+    """A command of the set-up, ended with the block that it is started in.
 
-    The command inherits the lock, so that the pip of a killed launcher still keeps others out.
+    It inherits the lock, so that the pip of a killed launcher still keeps others out.
     """
 
-    def __init__(self, environment: Environment, step: Step, lock: int) -> None:
-        self._checkout = environment.checkout
+    def __init__(self, environment: Environment, words: list[str], lock: int) -> None:
         self._log = environment.venv / 'setup.log'
-        self._step = step
-        self._lock = lock
+        self._process = subprocess.Popen(
+            words,
+            # pip would compile all of every package, which takes as long as to unpack it.
+            env={**clean_environ(), 'PIP_COMPILE': '0'},
+            cwd=environment.checkout,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            pass_fds=[lock],
+            start_new_session=True,
+        )
+        self._output = Output(self._process)
 
-    def __call__(self, command: list[str]) -> None:
-        output: deque[str] = deque(maxlen=400)
-        with self._step:
-            process = subprocess.Popen(
-                command,
-                env=clean_environ(),
-                cwd=self._checkout,
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.STDOUT,
-                pass_fds=[self._lock],
-                start_new_session=True,
-            )
-            try:
-                output.extend(lines_of(process, self._step))
-                code = process.wait()
-            except BaseException:
-                # With all that it started: compilers would go on without anybody to wait for them.
-                os.killpg(process.pid, signal.SIGTERM)
-                process.wait()
-                raise
-            if code != 0:
-                raise LaunchError(self._failure(list(output)))
+    def __enter__(self) -> _Command:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._process.poll() is None:
+            # With all that it started: compilers would go on without anybody to wait for them.
+            os.killpg(self._process.pid, signal.SIGTERM)
+            self._process.wait()
+
+    def watch(self, step: Step) -> None:
+        """Show what it does until it ends.
+
+        Raises:
+            LaunchError: It failed.
+        """
+        last = deque(self._output.lines(step), maxlen=400)
+        if self._process.wait() != 0:
+            raise LaunchError(self._failure(list(last)))
 
     def _failure(self, output: list[str]) -> str:
         with suppress(OSError):  # the disk may be full

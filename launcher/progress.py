@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import os
+import queue
 import re
-import selectors
 import shutil
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from types import TracebackType
@@ -102,24 +102,29 @@ class Step:
         self._stream.flush()
 
 
-def lines_of(process: subprocess.Popen[bytes], step: Step) -> Iterator[str]:
-    """Yield the lines that a process prints, while the step's clock is kept going."""
-    assert process.stdout is not None
-    rest = b''
-    with selectors.DefaultSelector() as selector:
-        selector.register(process.stdout, selectors.EVENT_READ)
+class Output:
+    """What a process prints, read as it comes, so that the process never waits to be heard."""
+
+    def __init__(self, process: subprocess.Popen[bytes]) -> None:
+        self._lines: queue.SimpleQueue[str | None] = queue.SimpleQueue()
+        threading.Thread(target=self._read, args=(process,), daemon=True).start()
+
+    def _read(self, process: subprocess.Popen[bytes]) -> None:
+        assert process.stdout is not None
+        with process.stdout as stream:
+            for line in stream:
+                self._lines.put(line.decode('utf-8', 'replace').rstrip())
+        self._lines.put(None)
+
+    def lines(self, step: Step) -> Iterator[str]:
+        """Yield the lines to the last one, while the step's clock is kept going."""
         while True:
-            if not selector.select(timeout=0.25):
+            try:
+                line = self._lines.get(timeout=0.25)
+            except queue.Empty:
                 step.tick()
                 continue
-            chunk = os.read(process.stdout.fileno(), 65536)
-            if not chunk:
-                break
-            *lines, rest = (rest + chunk).split(b'\n')
-            for line in lines:
-                text = line.decode('utf-8', 'replace').rstrip()
-                step.feed(text)
-                yield text
-    if rest:
-        yield rest.decode('utf-8', 'replace')
-    process.stdout.close()
+            if line is None:
+                return
+            step.feed(line)
+            yield line

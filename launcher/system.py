@@ -17,7 +17,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from launcher.progress import Step, lines_of
+from launcher.progress import Output, Step
 
 ROS_PREFIX = Path('/opt/ros/jazzy')
 WHEEL_PYTHONS = ((3, 11), (3, 12), (3, 13))
@@ -156,7 +156,7 @@ def install_packages(packages: Sequence[str]) -> None:
                 stderr=subprocess.STDOUT,
             ) as process,
         ):
-            output = list(lines_of(process, step))
+            output = list(Output(process).lines(step))
         # A repository that does not answer is no reason to stop: the packages may come from others.
         if process.returncode != 0 and command[0] == 'install':
             tail = '\n'.join(output[-4:])
