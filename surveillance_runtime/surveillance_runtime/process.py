@@ -8,7 +8,6 @@ running goal can be cancelled), and only then takes ROS down.
 from __future__ import annotations
 
 import contextlib
-import inspect
 import os
 import signal
 import sys
@@ -22,17 +21,14 @@ from typing import Any
 import rclpy
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
-from rclpy.executors import (
-    ExternalShutdownException,
-    ShutdownException,
-    SingleThreadedExecutor,
-)
+from rclpy.executors import ExternalShutdownException, ShutdownException
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from threadpoolctl import threadpool_limits
 
 from surveillance_runtime.configuration import RosArguments, argument_layer, split_arguments
 from surveillance_runtime.diagnostics import DiagnosticsThread
+from surveillance_runtime.executor import PatrolExecutor
 from surveillance_runtime.node import (
     JOIN_SECONDS,
     PatrolNode,
@@ -255,7 +251,7 @@ class ExecutorThread:
     """
 
     def __init__(self, context: Any = None) -> None:
-        self.executor = SingleThreadedExecutor(context=context)
+        self.executor = PatrolExecutor(context=context)
         self.error: BaseException | None = None
         self.lost: Exception | None = None
         self._thread: threading.Thread | None = None
@@ -301,19 +297,7 @@ class ExecutorThread:
         self.executor.create_task(lambda: None)
         if self._thread is not None:
             self._thread.join(JOIN_SECONDS)
-        _close_tasks(self.executor)
         self.executor.shutdown(timeout_sec=JOIN_SECONDS)
-
-
-def _close_tasks(executor: SingleThreadedExecutor) -> None:
-    """Close coroutines that never got their turn: Python would warn that they were not awaited.
-
-    rclpy offers no way to cancel what waits in an executor.
-    """
-    for task, *_ in list(getattr(executor, '_tasks', ())):
-        handler = getattr(task, '_handler', None)
-        if inspect.iscoroutine(handler):
-            handler.close()
 
 
 def _node_of(error: BaseException) -> Node | None:

@@ -1,0 +1,172 @@
+"""What a node may count on from the executor that spins it."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator
+
+import pytest
+import rclpy
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+from rclpy.task import Future
+from std_msgs.msg import Int32
+from std_srvs.srv import Trigger
+
+from surveillance_runtime.executor import PatrolExecutor
+from surveillance_runtime.testing import claim_domain
+
+PATIENCE = 20.0
+
+
+class Spun:
+    """Two nodes and the executor that spins them in this thread."""
+
+    def __init__(self) -> None:
+        self.context = rclpy.Context()
+        rclpy.init(context=self.context, domain_id=claim_domain())
+        self.executor = PatrolExecutor(context=self.context)
+        self.nodes = [self.node(name) for name in ('first', 'second')]
+
+    def node(self, name: str) -> Node:
+        node = Node(name, context=self.context, use_global_arguments=False)
+        self.executor.add_node(node)
+        return node
+
+    def until(self, condition: object) -> None:
+        end = time.monotonic() + PATIENCE
+        assert callable(condition)
+        while not condition():
+            assert time.monotonic() < end, 'too late'
+            self.executor.spin_once(timeout_sec=0.1)
+
+    def close(self) -> None:
+        self.executor.shutdown()
+        for node in self.nodes:
+            node.destroy_node()
+        rclpy.try_shutdown(context=self.context)
+
+
+@pytest.fixture
+def spun() -> Iterator[Spun]:
+    it = Spun()
+    yield it
+    it.close()
+
+
+def test_what_comes_and_goes_while_it_spins_is_heard(spun: Spun) -> None:
+    first, second = spun.nodes
+    heard: list[int] = []
+    publisher = first.create_publisher(Int32, 'numbers', 10)
+    for number in range(3):
+        listener = second.create_subscription(
+            Int32, 'numbers', lambda message: heard.append(message.data), 10
+        )
+        spun.until(lambda: publisher.get_subscription_count() == 1)
+        publisher.publish(Int32(data=number))
+        spun.until(lambda number=number: heard[-1:] == [number])
+        second.destroy_subscription(listener)
+        spun.until(lambda: publisher.get_subscription_count() == 0)
+    assert heard == [0, 1, 2]
+    third = spun.node('third')
+    told = third.create_publisher(Int32, 'others', 10)
+    others: list[int] = []
+    first.create_subscription(Int32, 'others', lambda message: others.append(message.data), 10)
+    spun.until(lambda: told.get_subscription_count() == 1)
+    told.publish(Int32(data=7))
+    spun.until(lambda: others == [7])
+    spun.nodes.append(third)
+
+
+def test_a_coroutine_waits_while_others_are_served_and_keeps_its_group(spun: Spun) -> None:
+    server, client = spun.nodes
+    gate, begun, ticks = Future(), [], []
+
+    async def slow(_request: object, response: Trigger.Response) -> Trigger.Response:
+        begun.append(time.monotonic())
+        response.message = await gate
+        return response
+
+    server.create_service(Trigger, 'slow', slow)
+    server.create_timer(0.01, lambda: ticks.append('its group'))
+    client.create_timer(0.01, lambda: ticks.append('another'))
+    caller = client.create_client(Trigger, 'slow', callback_group=ReentrantCallbackGroup())
+    spun.until(caller.service_is_ready)
+    answers = [caller.call_async(Trigger.Request()) for _ in range(2)]
+    spun.until(lambda: begun)
+    ticks.clear()
+    spun.until(lambda: len(ticks) >= 10)
+    assert set(ticks) == {'another'}
+    assert len(begun) == 1
+    threading.Timer(0.05, lambda: (gate.set_result('done'), spun.executor.wake())).start()
+    spun.until(lambda: all(answer.done() for answer in answers))
+    assert [answer.result().message for answer in answers] == ['done', 'done']
+    ticks.clear()
+    spun.until(lambda: set(ticks) == {'its group', 'another'})
+
+
+def test_a_waiting_coroutine_takes_no_processor_time(spun: Spun) -> None:
+    gate = Future()
+    task = spun.executor.create_task(lambda: None)
+    spun.until(task.done)
+
+    async def waits() -> str:
+        return str(await gate)
+
+    task = spun.executor.create_task(waits)
+    spun.executor.spin_once(timeout_sec=0.05)
+    used = time.process_time()
+    spun.executor.spin_once(timeout_sec=0.5)
+    spun.executor.spin_once(timeout_sec=0.5)
+    assert time.process_time() - used < 0.3
+    gate.set_result('now')
+    spun.until(task.done)
+    assert task.result() == 'now'
+
+
+def test_tasks_that_complete_one_another_all_end(spun: Spun) -> None:
+    futures = [Future() for _ in range(5)]
+
+    async def link(number: int) -> None:
+        if number:
+            await futures[number - 1]
+        futures[number].set_result(number)
+
+    tasks = [spun.executor.create_task(link, number) for number in reversed(range(5))]
+    spun.until(lambda: all(task.done() for task in tasks))
+
+
+def test_what_a_callback_raises_comes_out_and_the_others_are_called(spun: Spun) -> None:
+    first, second = spun.nodes
+    called: list[int] = []
+
+    def fails() -> None:
+        raise ValueError('no good')
+
+    timer = first.create_timer(0.01, fails)
+    second.create_timer(0.01, lambda: called.append(1))
+    with pytest.raises(ValueError, match='no good'):
+        spun.until(lambda: False)
+    timer.cancel()
+    spun.until(lambda: len(called) > 3)
+    spun.executor.create_task(lambda: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        spun.until(lambda: False)
+
+
+def test_a_guard_condition_calls_once_for_each_trigger_seen(spun: Spun) -> None:
+    called: list[int] = []
+    guard = spun.nodes[0].create_guard_condition(lambda: called.append(1))
+    guard.trigger()
+    spun.until(lambda: called)
+    for _ in range(5):
+        spun.executor.spin_once(timeout_sec=0.01)
+    assert len(called) == 1
+
+
+def test_the_end_of_the_context_ends_the_spinning(spun: Spun) -> None:
+    rclpy.try_shutdown(context=spun.context)
+    with pytest.raises(ExternalShutdownException):
+        spun.until(lambda: False)
