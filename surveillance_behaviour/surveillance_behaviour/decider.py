@@ -73,6 +73,39 @@ class Decider:
         self._checked_seconds = 0.0
         self._checked_rules: tuple[str, ...] = ()
 
+    @classmethod
+    def of_mission(
+        cls,
+        settings: DecisionSettings,
+        ontology: Ontology,
+        places: Places,
+        battery: BatteryMonitor,
+        now: Callable[[], float],
+        warn: Callable[[str], None],
+        *,
+        record: str,
+        seed: int,
+    ) -> Decider:
+        """Return a decider that knows what was learned before and learns the battery's draw.
+
+        Args:
+            settings: Shared with whoever changes them.
+            ontology: The ontology.
+            places: Where the places are.
+            battery: The battery.
+            now: Seconds on the mission's clock.
+            warn: See `Decider`; also told when what was learned cannot be read.
+            record: File of the mission record, see `Experience.of_record`.
+            seed: Makes the policies that draw repeatable; -1: another course each time.
+        """
+        experience = Experience.of_record(record)
+        if experience.problem:
+            warn(experience.problem)
+        generator = random.Random(seed if seed >= 0 else None)
+        decider = cls(settings, ontology, places, battery, experience, generator, warn)
+        battery.watch(lambda: decider.learn_draw(now()))
+        return decider
+
     @property
     def experience(self) -> Experience:
         """What the robot has learned."""

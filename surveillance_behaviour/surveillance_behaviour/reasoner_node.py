@@ -16,9 +16,10 @@ from rclpy.task import Future
 
 from surveillance_behaviour import behaviour_parameters
 from surveillance_behaviour.charging import BatteryMonitor
+from surveillance_behaviour.decider import Decider
 from surveillance_behaviour.decision import NowhereToGoError
 from surveillance_behaviour.peers.announcing import DecisionTopic
-from surveillance_behaviour.peers.decision_services import DecisionServices, make_decider
+from surveillance_behaviour.peers.decision_services import DecisionServices
 from surveillance_behaviour.peers.ports import InterruptedWaitError, PeerError
 from surveillance_behaviour.peers.ros_ports import RosPlaces, hear_battery, ros_ontology
 from surveillance_fsm import Interrupt
@@ -41,15 +42,15 @@ class Reasoner(PatrolNode):
         deadlines = behaviour_parameters.deadlines(self, ('answer', 'build'))
         battery = BatteryMonitor()
         self._wait = ClockWait(self)
-        self._decider = make_decider(
-            self,
+        self._decider = Decider.of_mission(
             settings,
             ros_ontology(self, deadlines),
             RosPlaces(self, deadlines),
             battery,
-            behaviour_parameters.record_path(self),
-            behaviour_parameters.random_seed(self),
             self._wait.now,
+            lambda warning: self.get_logger().warn(warning),
+            record=behaviour_parameters.record_path(self),
+            seed=behaviour_parameters.random_seed(self),
         )
         self._decisions = DecisionTopic(self)
         self._avoided: frozenset[str] = frozenset()

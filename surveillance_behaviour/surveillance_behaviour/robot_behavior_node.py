@@ -18,6 +18,7 @@ from sensor_msgs.msg import BatteryState
 import surveillance_fsm as fsm
 from surveillance_behaviour import behaviour_parameters, conversions
 from surveillance_behaviour.charging import BatteryMonitor
+from surveillance_behaviour.decider import Decider
 from surveillance_behaviour.machines import MACHINES
 from surveillance_behaviour.mission.mission import Mission, MissionSettings
 from surveillance_behaviour.mission.mission_log import (
@@ -28,7 +29,7 @@ from surveillance_behaviour.mission.mission_log import (
     read,
 )
 from surveillance_behaviour.peers.announcing import DecisionTopic, MissionClock, RosAnnouncer
-from surveillance_behaviour.peers.decision_services import DecisionServices, make_decider
+from surveillance_behaviour.peers.decision_services import DecisionServices
 from surveillance_behaviour.peers.ports import Ports
 from surveillance_behaviour.peers.ros_ports import (
     Deadlines,
@@ -103,8 +104,15 @@ class RobotBehavior(PatrolNode):
             routine = RosRoutine(self, deadlines, battery, clock)
             return Ports(ontology, places, self._announcer, reasoner, routine=routine)
         self._announcer = RosAnnouncer(self, DecisionTopic(self))
-        decider = make_decider(
-            self, settings.choice, ontology, places, battery, record, seed, clock.now
+        decider = Decider.of_mission(
+            settings.choice,
+            ontology,
+            places,
+            battery,
+            clock.now,
+            lambda warning: self.get_logger().warn(warning),
+            record=record,
+            seed=seed,
         )
         self._work = AwaitedWork(self, 1)
         DecisionServices(

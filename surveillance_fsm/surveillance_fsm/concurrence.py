@@ -15,8 +15,8 @@ from surveillance_fsm.container import (
     Container,
     forget,
     forget_progress,
-    stop_for_now,
-    take_note,
+    release_frame,
+    suspend,
 )
 from surveillance_fsm.exceptions import (
     InvalidStateError,
@@ -518,7 +518,7 @@ class ConcurrentFrame(Frame):
             if label not in self._left_behind:
                 state.recall_preempt()
         elif outcome is SUSPENDED:
-            take_note(state)
+            release_frame(state)
             return None
         elif label in self._making_way and isinstance(state, Container):
             # One that makes way is suspended; any other outcome is its own.
@@ -533,7 +533,7 @@ class ConcurrentFrame(Frame):
             self._told_to_stop.discard(label)
         forget_progress(state)
         self.outcomes[label] = outcome
-        take_note(state)
+        release_frame(state)
         return str(outcome)
 
     def _tell_end(self, label: str, outcome: str) -> None:
@@ -587,7 +587,7 @@ class ConcurrentFrame(Frame):
                 raise LeftBehindError
             self.thread.heeded()
             self.current = TOGETHER
-            take_note(branch.state)
+            release_frame(branch.state)
             gone, self.gone = self.gone is node, None
             pending = branch.state.preempt_requested() and not gone
             served = not pending or outcome == 'preempted'
@@ -648,11 +648,11 @@ class ConcurrentFrame(Frame):
         if isinstance(current, Node):
             self.cut = current
             self.thread.asked()
-            stop_for_now(current.state)
+            suspend(current.state)
             return
         going_on = [label for label, thread in self._threads.items() if not thread.done]
         self._making_way.update(going_on)
-        self._stop(self._threads, stop_for_now)
+        self._stop(self._threads, suspend)
 
     def woken(self) -> None:
         """Wake the thread that waits for the states: it was left behind."""

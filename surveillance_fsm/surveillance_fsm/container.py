@@ -44,7 +44,7 @@ from surveillance_fsm.state import (
     structure_version,
     this_thread,
 )
-from surveillance_fsm.timeouts import keep_out, limited, supervise
+from surveillance_fsm.timeouts import block_reentry, limited, supervise
 from surveillance_fsm.userdata import Remapper, UserData, raw
 
 
@@ -444,7 +444,7 @@ class Container(State):
             state.fsm_clock = clock
         left = getattr(state, 'fsm_left', None)
         if left is not None and left.is_going_on():
-            keep_out(node, left)
+            block_reentry(node, left)
         limits = node.limits = self.fsm_limits.get(label)
         if limits is not None:
             node.execute = limited(node, limits)
@@ -731,16 +731,16 @@ class Container(State):
         ]
 
 
-def stop_for_now(state: State) -> None:
-    """Ask a state to make way: a container keeps its history, any other state is preempted."""
+def suspend(state: State) -> None:
+    """Suspend a container, which keeps its history; preempt any other state."""
     if isinstance(state, Container):
         state.fsm_suspend()
     else:
         state.request_preempt()
 
 
-def let_go(state: State) -> None:
-    """Take `stop_for_now` back from a state that had not begun."""
+def recall_suspend(state: State) -> None:
+    """Take `suspend` back from a state that had not begun."""
     if isinstance(state, Container):
         state.fsm_aside = False
     else:
@@ -758,8 +758,8 @@ def forget(state: State) -> None:
             forget(branch.state)
 
 
-def take_note(state: State) -> None:
-    """Note that a state has ended, once its parent says so: a container lets its frame go."""
+def release_frame(state: State) -> None:
+    """Drop the frame of a container that has ended, once its parent has noted that."""
     if isinstance(state, Container):
         state.fsm_frame = None
 

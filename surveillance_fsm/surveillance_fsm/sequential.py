@@ -15,9 +15,9 @@ from surveillance_fsm.container import (
     Container,
     forget,
     forget_progress,
-    let_go,
-    stop_for_now,
-    take_note,
+    recall_suspend,
+    release_frame,
+    suspend,
 )
 from surveillance_fsm.exceptions import SmachError, describe
 from surveillance_fsm.execution import (
@@ -107,7 +107,7 @@ class SequentialFrame(Frame):
             end_watch(self.thread, watch)
             outcome = settle(node, self, watch, outcome)
         self.current = target = node.target(outcome)
-        take_note(node.state)
+        release_frame(node.state)
         return self._run_from(self._attend(node, outcome, target))
 
     def _run_from(self, target: Any) -> Any:
@@ -246,7 +246,7 @@ class SequentialFrame(Frame):
         """Take the request to make way back from a state that had not begun when it came."""
         cut = self.cut
         if cut is not None and cut is not ended:
-            let_go(cut.state)
+            recall_suspend(cut.state)
             if self.preempted is cut:
                 self.preempted = None  # It is asked again.
             self.cut = None
@@ -408,7 +408,7 @@ class SequentialFrame(Frame):
         if isinstance(current, Node) and self.cut is not current:
             self.cut = current
             self.thread.asked()
-            stop_for_now(current.state)
+            suspend(current.state)
 
     def where(self) -> History | None:
         """Return where the container would go on if its process ended now."""

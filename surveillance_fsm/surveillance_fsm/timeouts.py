@@ -2,7 +2,7 @@
 
 Whoever executes a machine watches its threads (`supervise`). When a state neither returns within
 its deadline nor heeds a preempt within its bound, the watcher leaves its thread behind, has another
-one go on where the state would have ended (`take_over`), and names the state in the log.
+one go on where the state would have ended (`abandon_thread`), and names the state in the log.
 """
 
 from __future__ import annotations
@@ -259,21 +259,21 @@ def _enforce(thread: ExecutionThread) -> None:
             return
         for watch in tuple(thread.watches):
             if watch.hard is not None and now >= watch.hard:
-                _go_on_without(thread, watch)
+                _enforce_deadline(thread, watch)
                 return
             if watch.soft is not None and now >= watch.soft:
                 watch.soft, watch.asked = None, True
                 watch.node.state.request_preempt()
         _, steady = _due(thread)
         if steady is not None and time.monotonic() >= steady:
-            _go_on_past(thread)
+            _abandon_unpreemptible(thread)
 
 
-def _go_on_without(thread: ExecutionThread, watch: Watch) -> None:
+def _enforce_deadline(thread: ExecutionThread, watch: Watch) -> None:
     limits = watch.node.limits
     assert limits is not None
     reason = f'did not return within its deadline of {limits.deadline:g} s'
-    take_over(thread, watch.depth, watch.node, limits.late_outcome, reason)
+    abandon_thread(thread, watch.depth, watch.node, limits.late_outcome, reason)
 
 
 # Going on without a state.
@@ -290,7 +290,7 @@ def stopped_outcome(node: Node) -> str | None:
     return None
 
 
-def _go_on_past(thread: ExecutionThread) -> None:
+def _abandon_unpreemptible(thread: ExecutionThread) -> None:
     """Go on without a state that ignores a preempt: with its preempted outcome, or its container's.
 
     Under the run's condition.
@@ -305,28 +305,28 @@ def _go_on_past(thread: ExecutionThread) -> None:
         forced = thread.stack[depth].forced
         outcome = forced[1] if forced is not None else stopped_outcome(node)
         if outcome is not None:
-            take_over(thread, depth, node, outcome, reason, culprit)
+            abandon_thread(thread, depth, node, outcome, reason, culprit)
             return
     leaf, forced = thread.leaf, thread.forced
     if leaf is not None:
         outcome = forced[1] if forced is not None else stopped_outcome(leaf)
         if outcome is not None:
-            take_over(thread, -1, leaf, outcome, reason, culprit)
+            abandon_thread(thread, -1, leaf, outcome, reason, culprit)
             return
     root = thread.stack[0].container if thread.stack else None
     outcomes = root.get_registered_outcomes() if root is not None else ()
     for ending in STOPPED:
         if ending in outcomes:
-            take_over(thread, -1, None, ending, reason, culprit)
+            abandon_thread(thread, -1, None, ending, reason, culprit)
             return
     error = InvalidTransitionError(
         f"State '{culprit}' {reason}, and no container around it can "
         f"end with 'preempted' or 'aborted'"
     )
-    take_over(thread, -1, None, error, reason, culprit)
+    abandon_thread(thread, -1, None, error, reason, culprit)
 
 
-def take_over(
+def abandon_thread(
     thread: ExecutionThread,
     depth: int,
     node: Node | None,
@@ -334,7 +334,7 @@ def take_over(
     reason: str,
     culprit: str | None = None,
 ) -> None:
-    """Leave the present thread behind and go on as if the state in frame `depth` had ended.
+    """Abandon the present thread, and go on as if the state in frame `depth` had ended.
 
     Under the run's condition.
 
@@ -367,7 +367,7 @@ def take_over(
         # The request stays with the state, so that the thread left behind ends some time.
         leaf.state.request_preempt()
         leaf.revoke()
-        keep_out(leaf, thread.work)
+        block_reentry(leaf, thread.work)
     if node is not None and node is not leaf:
         node.revoke()
     thread.stack = list(frames)
@@ -401,8 +401,8 @@ def _go_on(thread: ExecutionThread, frames: list[Frame], outcome: Any) -> Any:
     return outcome
 
 
-def keep_out(node: Node, left: Work) -> None:
-    """Let nobody into a state before the thread that was left behind in it has ended."""
+def block_reentry(node: Node, left: Work) -> None:
+    """Enter a state again only when the thread that was left behind in it has ended."""
     enter = node.state.execute
     unlimited = node.execute is node.enter
 

@@ -19,12 +19,10 @@ from array import array
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
-
-    from surveillance_runtime.node import PatrolNode
 
     Record = TypeVar('Record', bound=DataclassInstance)
 
@@ -186,8 +184,16 @@ class Described:
     name: str = ''
 
 
+class Declaring(Protocol):
+    """A node that declares parameters; see `PatrolNode.parameter`."""
+
+    @property
+    def parameter(self) -> Callable[..., Any]:
+        """Declare a parameter and return its value."""
+
+
 def declare_fields(
-    node: PatrolNode,
+    node: Declaring,
     record: Record,
     described: Mapping[str, Described],
     *,

@@ -1,57 +1,18 @@
-"""What the node that decides has beside the decision: what was learned, `why_not` and `go_to`."""
+"""The services `why_not` and `go_to`, offered by the node that decides."""
 
 from __future__ import annotations
 
-import random
 from collections.abc import Callable
 from typing import Any
 
 from rclpy.callback_groups import ReentrantCallbackGroup
 
-from surveillance_behaviour.charging import BatteryMonitor
 from surveillance_behaviour.decider import Decider
-from surveillance_behaviour.decision import DecisionSettings
-from surveillance_behaviour.peers.ports import InterruptedWaitError, Ontology, PeerError, Places
-from surveillance_behaviour.world_model import Experience
+from surveillance_behaviour.peers.ports import InterruptedWaitError, PeerError
 from surveillance_fsm import Interrupt
 from surveillance_interfaces.srv import GoTo, WhyNot
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.waiting import AwaitedWork
-
-
-def make_decider(
-    node: PatrolNode,
-    settings: DecisionSettings,
-    ontology: Ontology,
-    places: Places,
-    battery: BatteryMonitor,
-    record: str,
-    seed: int,
-    now: Callable[[], float],
-) -> Decider:
-    """Return who decides in this process; it knows what was learned before.
-
-    Args:
-        node: The node that decides.
-        settings: What a decision depends on.
-        ontology: The ontology.
-        places: Where the places are.
-        battery: The battery, from whose levels its draw is learned.
-        record: File of the mission record, see `Experience.of_record`.
-        seed: Makes the policies that draw repeatable; -1: another course each time.
-        now: Seconds on the mission's clock.
-    """
-    generator = random.Random(seed if seed >= 0 else None)
-    experience = Experience.of_record(record)
-
-    def warn(sentence: str) -> None:
-        node.get_logger().warn(sentence)
-
-    if experience.problem:
-        warn(experience.problem)
-    decider = Decider(settings, ontology, places, battery, experience, generator, warn)
-    battery.watch(lambda: decider.learn_draw(now()))
-    return decider
 
 
 class DecisionServices:
