@@ -128,7 +128,8 @@ class BatteryController(PatrolNode):
 
         charge = self._await_full if self._mode == 'SIMULATED' else self._fill
         try:
-            with charge_display(self._battery.level, bar=not self._console.has_terminal) as show:
+            say, bar = self.get_logger().info, not self._console.has_terminal
+            with charge_display(self._battery.level, say, bar=bar) as show:
                 charge(show)
         finally:
             with self._lock:

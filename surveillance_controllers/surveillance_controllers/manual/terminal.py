@@ -145,13 +145,14 @@ PLAIN_STEP = 10
 
 @contextmanager
 def charge_display(
-    start: float, stream: TextIO | None = None, *, bar: bool = True
+    start: float, say: Callable[[str], object], stream: TextIO | None = None, *, bar: bool = True
 ) -> Iterator[Callable[[float], None]]:
     """Show a charge while the context lasts.
 
     Args:
         start: Charge at the beginning, percent.
-        stream: Where to show it; standard output unless given.
+        say: Takes the lines that are said where no bar moves.
+        stream: Where the bar moves; standard output unless given.
         bar: Allows a moving bar. Give False where something else moves the terminal's cursor.
 
     Yields:
@@ -177,7 +178,7 @@ def charge_display(
         step = int(percent // PLAIN_STEP)
         if step > shown:
             shown = step
-            print(f'Charging: {step * PLAIN_STEP} %', file=stream, flush=True)
+            say(f'Charging: {step * PLAIN_STEP} %')
 
     shown = int(start // PLAIN_STEP) - 1
     show(start)
