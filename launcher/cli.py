@@ -9,11 +9,12 @@ import signal
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING
 
 from launcher import package_commands, system
 from launcher.environment import CHECKOUT, Environment, clean_environ
 from launcher.instance_lock import claim
+from launcher.options import Parser, make_parser, shared_options
 from surveillance_runtime import node_table
 
 if TYPE_CHECKING:
@@ -33,23 +34,8 @@ def runs_folder(checkout: Path = CHECKOUT) -> Path:
 CONFIG = CHECKOUT / 'config'
 RUNS = runs_folder()
 EXIT_BAD_INPUT = 2
-DEFAULT_KEEP = 20.0
 EXIT_INTERRUPTED = 130
 
-_DESCRIPTION = """\
-Patrols, with every node as a process of its own, until Ctrl-C; or does what COMMAND says. What the
-project needs is set up first, where it is not yet."""
-_COMMANDS = """\
-commands (each has its own --help):
-  run                       patrol: the same as without a command
-  node NAME [ROS args]      run one node by itself in this terminal
-  list                      name the nodes
-  params [NODE]             print every parameter's value and where it comes from
-  service                   write a systemd unit that keeps the robot running
-  setup                     set up and do no more
-  test [pytest args]        run the test suite
-  lint                      check format, lint and types
-"""
 _TEST_HELP = """\
 usage: launch.py test [pytest arguments]
 
@@ -57,201 +43,6 @@ Runs the whole test suite on two processes. Further words go to pytest:
   python3 launch.py test tests/fsm -k preempt
   python3 launch.py test -n 0 -x tests/launcher
 All that pytest takes: .venv/bin/python -m pytest --help"""
-
-
-class Parser(argparse.ArgumentParser):
-    """A parser whose errors are one line, like those of all the rest."""
-
-    def error(self, message: str) -> NoReturn:
-        raise ValueError(f'{message} (see {self.prog} --help)')
-
-
-def _names(text: str) -> list[str]:
-    names = [name for name in text.replace(' ', '').split(',') if name]
-    if not names:
-        raise argparse.ArgumentTypeError(f'{text!r} names no node')
-    return names
-
-
-def _seconds(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = 0.0
-    if not 0.0 < value < 1e9:
-        raise argparse.ArgumentTypeError(f'{text!r} is not a positive number of seconds')
-    return value
-
-
-def _gigabytes(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = -1.0
-    if not 0.0 <= value < 1e6:
-        raise argparse.ArgumentTypeError(f'{text!r} is not a number of gigabytes')
-    return value
-
-
-def _megabytes(text: str) -> int:
-    if not text.isdecimal() or not (int(text) == 0 or 100 <= int(text) < 10**7):
-        raise argparse.ArgumentTypeError(f'{text!r} is not a number of megabytes from 100, or 0')
-    return int(text)
-
-
-def _shared_options() -> argparse.ArgumentParser:
-    """Options of `run` and of `node`."""
-    parser = Parser(add_help=False)
-    parser.add_argument(
-        '--mode',
-        choices=node_table.MODES,
-        type=str.upper,
-        metavar='|'.join(node_table.MODES),
-        help='what stands in for the hardware: a simulated place, chance, or you at the console '
-        f'(default: {node_table.DEFAULT_MODE})',
-    )
-    parser.add_argument(
-        '--behaviour',
-        choices=node_table.BEHAVIOURS,
-        default='surveillance',
-        metavar='|'.join(node_table.BEHAVIOURS),
-        help='surveillance knows its map, patrol learns it from markers (default: surveillance)',
-    )
-    parser.add_argument(
-        '--map',
-        type=Path,
-        metavar='FILE',
-        help='the place (default: config/seven_rooms.yaml, for patrol config/patrol_world.yaml)',
-    )
-    parser.add_argument(
-        '--params',
-        type=Path,
-        metavar='FILE',
-        help='a ROS parameter file; what it says goes before config/parameters.yaml and the place',
-    )
-    parser.add_argument(
-        '-p',
-        dest='assignments',
-        action='append',
-        default=[],
-        metavar='[NODE:]NAME:=VALUE',
-        help='set a parameter; goes before every file',
-    )
-    parser.add_argument(
-        '--log-level',
-        choices=node_table.LOG_LEVELS,
-        type=str.lower,
-        metavar='|'.join(node_table.LOG_LEVELS),
-        help='the least severity that the nodes print (default: info)',
-    )
-    parser.add_argument(
-        '--namespace', metavar='NAME', help='goes before all names, for a second robot'
-    )
-    parser.add_argument(
-        '--domain',
-        type=int,
-        metavar='N',
-        help='ROS domain, 0 to 101: robots in different ones do not hear each other '
-        '(default: ROS_DOMAIN_ID, else 0)',
-    )
-    return parser
-
-
-def make_parser(*, help_too: bool = True) -> argparse.ArgumentParser:
-    """Return the parser of the whole command line."""
-    package_lines = ''.join(
-        f'  {name:<25} {purpose}\n' for name, (_, purpose) in package_commands.COMMANDS.items()
-    )
-    parser = Parser(
-        prog='launch.py',
-        description=_DESCRIPTION,
-        usage='%(prog)s [COMMAND] [options]',
-        epilog=_COMMANDS + package_lines,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        parents=[_shared_options()],
-        add_help=help_too,
-    )
-    parser.add_argument(
-        '--for',
-        dest='seconds',
-        type=_seconds,
-        metavar='SECONDS',
-        help='stop after this time (default: at Ctrl-C)',
-    )
-    parser.add_argument(
-        '--composed',
-        action='store_true',
-        help='all nodes in one process, which takes less memory and starts sooner',
-    )
-    parser.add_argument(
-        '--only',
-        type=_names,
-        action='extend',
-        default=[],
-        metavar='NODE,...',
-        help='start these nodes and no others: the rest runs elsewhere',
-    )
-    parser.add_argument(
-        '--without',
-        type=_names,
-        action='extend',
-        default=[],
-        metavar='NODE,...',
-        help='start all but these nodes, which run elsewhere',
-    )
-    parser.add_argument(
-        '--record',
-        metavar='off|DIR',
-        help='where the run keeps its recording, log and record; off: no recording (default: runs)',
-    )
-    parser.add_argument(
-        '--keep',
-        type=_gigabytes,
-        default=DEFAULT_KEEP,
-        metavar='GB',
-        help='delete the oldest recordings beyond this size (default: %(default)g)',
-    )
-    parser.add_argument(
-        '--web', action='store_true', help='show the mission in browsers, see the printed address'
-    )
-    parser.add_argument(
-        '--web-control', action='store_true', help='as --web, and let whoever has the token act'
-    )
-    parser.add_argument(
-        '--web-address',
-        metavar='HOST:PORT',
-        help='where the page is: beyond 127.0.0.1 it needs the token (default: 127.0.0.1:8080)',
-    )
-    parser.add_argument(
-        '--resume',
-        nargs='?',
-        const='',
-        metavar='RUN',
-        help='go on with this run (default: the last one), its record, ontology and levels; done '
-        'by itself after a launcher that was killed',
-    )
-    parser.add_argument(
-        '--fresh', action='store_true', help='begin anew also after a launcher that was killed'
-    )
-    parser.add_argument(
-        '--memory',
-        type=_megabytes,
-        default=2048,
-        metavar='MB',
-        help='a node that holds more is started again; 0: any (default: %(default)s)',
-    )
-    parser.add_argument(
-        '--alarm',
-        default='',
-        metavar='COMMAND',
-        help='run this, with one line as its last argument, when the robot needs somebody',
-    )
-    parser.add_argument(
-        '--network',
-        action='store_true',
-        help='hear nodes of other machines, which may then steer the robot (default: this machine)',
-    )
-    return parser
 
 
 def main(argv: Sequence[str]) -> int:
@@ -343,7 +134,7 @@ def _node(argv: list[str]) -> int:
         prog='launch.py node',
         usage='%(prog)s [options] NAME [--ros-args ...]',
         description='Runs one node in this terminal, with the parameters of config/.',
-        parents=[_shared_options()],
+        parents=[shared_options()],
     )
     parser.add_argument('name', metavar='NAME', help='see launch.py list')
     parser.add_argument(
@@ -400,7 +191,7 @@ def _params(argv: list[str]) -> int:
         prog='launch.py params',
         usage='%(prog)s [options] [NODE]',
         description='Prints the parameters that the nodes get, and where each value comes from.',
-        parents=[_shared_options()],
+        parents=[shared_options()],
     )
     parser.add_argument('name', nargs='?', metavar='NODE', help='of this node alone')
     parser.add_argument(

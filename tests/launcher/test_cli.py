@@ -6,7 +6,8 @@ import sys
 
 import pytest
 
-from launcher.cli import main, make_parser, runs_folder
+from launcher.cli import main, runs_folder
+from launcher.options import make_parser
 from surveillance_runtime.node_table import NODES
 from tests.launcher.conftest import ROOT
 

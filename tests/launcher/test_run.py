@@ -10,8 +10,9 @@ from pathlib import Path
 import pytest
 import yaml
 
-from launcher.cli import CONFIG, make_parser, wanted_run
+from launcher.cli import CONFIG, wanted_run
 from launcher.log_merge import MergedLog
+from launcher.options import make_parser
 from launcher.run import (
     MARKERS,
     PAGE,
