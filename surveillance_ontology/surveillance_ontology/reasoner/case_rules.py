@@ -499,19 +499,25 @@ class _Clause:
         """Add the rules of a disjunction."""
         if not all(map(self._take, _flat(disjuncts))):
             return
-        if len(self._both) == 1 and not (self._heads or self._every):
-            (both,) = self._both
-            for operand in both.operands:
+        if len(self._both) == 1 and not self._every and (not self._heads or self._excludes()):
+            for operand in self._both[0].operands:
                 self._apart(operand)
             return
         for both in self._both:
-            self._heads.append(self._rules.positive(both))
+            if _is_negative(both):
+                self._body.add(self._rules.recognised(negated(both)))
+            else:
+                self._heads.append(self._rules.positive(both))
         self._related()
+
+    def _excludes(self) -> bool:
+        return _is_negative(self._both[0])
 
     def _apart(self, operand: ClassExpression) -> None:
         """Add the disjunction with one operand instead of an intersection."""
         other = _Clause(self._rules)
         other._body |= self._body
+        other._heads += self._heads
         other._never += self._never
         other.add([operand])
 

@@ -19,6 +19,7 @@ from surveillance_ontology.reasoner.clauses import (
     Premises,
     Program,
     SameAtom,
+    Term,
 )
 from surveillance_ontology.reasoner.contexts import Contexts
 
@@ -34,6 +35,7 @@ class ContextIndex:
     Args:
         program: Whose predicates hold the facts.
         contexts: What classes together imply.
+        representative: From an individual to the one that stands for it, where that is another.
         enqueue, overdelete: Called with facts that follow, or may follow no longer.
         merge: Called with individuals that must be the same.
     """
@@ -42,11 +44,13 @@ class ContextIndex:
         self,
         program: Program,
         contexts: Contexts,
+        representative: dict[str, str],
         enqueue: Emit,
         overdelete: Emit,
         merge: MergeRequest,
     ) -> None:
         self._contexts, self._nothing = contexts, program.nothing
+        self._representative = representative
         self._enqueue, self._overdelete, self._merge = enqueue, overdelete, merge
         self._labels: dict[str, set[Predicate]] = {}
         self._changed: dict[str, None] = {}
@@ -83,6 +87,11 @@ class ContextIndex:
         predicate.on_insert.append(gain)
         predicate.on_delete.append(lose)
 
+    def rename(self) -> None:
+        """Look again at everybody: an individual came to stand for another, or ceased to."""
+        self._about.clear()
+        self._changed.update(dict.fromkeys(self._labels))
+
     def flush(self) -> None:
         """Add what the changed individuals' classes imply."""
         for x in tuple(self._changed):
@@ -104,7 +113,7 @@ class ContextIndex:
                     facts = tuple((one, x) for one in self._few(labels, head))
                     self._merge(x, str(other.value), None, facts)
                 continue
-            fact = _fact(head, x)
+            fact = self._fact(head, x)
             if len(fact) == 2 and fact[1] != x:
                 self._about.setdefault((fact[0], fact[1]), {})[x] = None
             self._emit(fact)
@@ -120,7 +129,7 @@ class ContextIndex:
         facts = (
             [(self._nothing, x)]
             if heads is None
-            else [_fact(head, x) for head in heads if isinstance(head, PredicateAtom)]
+            else [self._fact(head, x) for head in heads if isinstance(head, PredicateAtom)]
         )
         for fact in facts:
             if fact[0].holds(fact):
@@ -140,30 +149,30 @@ class ContextIndex:
         return lambda x, y: self._relation_supports(predicate, x, y)
 
     def _class_supports(self, predicate: Predicate, x: str) -> Iterator[Premises]:
-        head = None if predicate is self._nothing else PredicateAtom(predicate, (_X,))
-        yield from self._premises(x, head, predicate)
+        yield from self._premises(x, (predicate, x), predicate)
         for other in tuple(self._about.get((predicate, x), ())):
-            yield from self._premises(other, PredicateAtom(predicate, (Constant(x),)), None)
+            yield from self._premises(other, (predicate, x), None)
 
     def _relation_supports(self, predicate: Predicate, x: str, y: Any) -> Iterator[Premises]:
-        if predicate.kind == 'data':
-            head = PredicateAtom(predicate, (_X, Constant(y, True)))
-            yield from self._premises(x, head, None)
-            return
-        yield from self._premises(x, PredicateAtom(predicate, (_X, Constant(y))), None)
-        yield from self._premises(y, PredicateAtom(predicate, (Constant(x), _X)), None)
-        if x == y:
-            yield from self._premises(x, PredicateAtom(predicate, (_X, _X)), None)
+        yield from self._premises(x, (predicate, x, y), None)
+        if predicate.kind == 'object' and x != y:
+            yield from self._premises(y, (predicate, x, y), None)
 
-    def _premises(
-        self, x: str, head: HeadAtom | None, itself: Predicate | None
-    ) -> Iterator[Premises]:
+    def _premises(self, x: str, fact: Fact, itself: Predicate | None) -> Iterator[Premises]:
+        """Yield the classes by which what an individual is implies a fact, without `itself`."""
         held = self._labels.get(x)
         if held is None or self._requiring.isdisjoint(held):
             return
-        labels = frozenset(held) if itself is None else frozenset(held) - {itself}
-        if self._implies(labels, head):
-            yield tuple((one, x) for one in self._few(labels, head))
+        labels = frozenset(held) - {itself}
+        heads = self._contexts.heads(labels)
+        if fact[0] is self._nothing:
+            if heads is None:
+                yield tuple((one, x) for one in self._few(labels, None))
+            return
+        for head in heads or ():
+            if isinstance(head, PredicateAtom) and head.predicate is fact[0]:
+                if self._fact(head, x) == fact:
+                    yield tuple((one, x) for one in self._few(labels, head))
 
     def _implies(self, labels: frozenset[Predicate], head: HeadAtom | None) -> bool:
         heads = self._contexts.heads(labels)
@@ -196,6 +205,14 @@ class ContextIndex:
         few = self._few(labels, None)
         yield tuple((one, x if one in mine else y) for one in few)
 
+    def _fact(self, head: PredicateAtom, x: str) -> Fact:
+        """Return the fact that a head states of an individual, in representatives."""
+        names = self._representative
 
-def _fact(head: PredicateAtom, x: str) -> Fact:
-    return (head.predicate, *(t.value if isinstance(t, Constant) else x for t in head.terms))
+        def argument(term: Term) -> Any:
+            if not isinstance(term, Constant):
+                return x
+            value: Any = term.value
+            return value if term.is_value else names.get(value, value)
+
+        return (head.predicate, *map(argument, head.terms))

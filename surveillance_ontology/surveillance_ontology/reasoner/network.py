@@ -105,7 +105,10 @@ class Network:
         self._attach_evidence()
         self.contexts: ContextIndex | None = None
         if program.contexts is not None:
-            index = ContextIndex(program, program.contexts, enqueue, overdelete, merge)
+            index = ContextIndex(
+                program, program.contexts, representative, enqueue, overdelete, merge
+            )
+            self.naming.append(index.rename)
             self.contexts = index
             difference.evidence.append(index)
             for predicate in program.relevant:
