@@ -78,9 +78,7 @@ class University:
         professors = [person for person in staff if '/Lecturer' not in person]
         for number in range(len(staff) * draw.randint(8, 14)):
             yield from self._student(f'{home}/UndergraduateStudent{number}', home, professors)
-        graduates = [
-            f'{home}/GraduateStudent{n}' for n in range(len(staff) * draw.randint(3, 4))
-        ]
+        graduates = [f'{home}/GraduateStudent{n}' for n in range(len(staff) * draw.randint(3, 4))]
         for student in graduates:
             yield from self._graduate_student(student, home, professors)
         for person in professors:

@@ -4,6 +4,7 @@
 //   load PATH                      -> ok | inconsistent | error MESSAGE
 //   class C X                      -> true | false        (by refutation)
 //   object P X Y, data P X LEXICAL DATATYPE, same X Y, different X Y, subclass C D
+//   below C, members C             -> the named subclasses (individuals), separated by tabs
 //   all N                          -> for each of the N questions on the next lines a letter: t, f, or e for an error
 //   visit ROBOT FROM TO NOW_OLD NOW_NEW VISIT_OLD VISIT_NEW
 //                                  -> NANOSECONDS of replacing and checking consistency, NANOSECONDS of the queries
@@ -68,6 +69,21 @@ public class ResidentReasoner {
         }
         if (words[0].equals("visit")) {
             return visit(words);
+        }
+        if (words[0].equals("below") || words[0].equals("members")) {
+            OWLClass cls = factory.getOWLClass(IRI.create(words[1]));
+            StringBuilder names = new StringBuilder("-");
+            for (OWLEntity found : words[0].equals("below")
+                    ? reasoner.getSubClasses(cls, false).getFlattened()
+                    : reasoner.getInstances(cls, false).getFlattened()) {
+                names.append("\t").append(found.getIRI());
+            }
+            if (words[0].equals("below")) {
+                for (OWLClass equal : reasoner.getEquivalentClasses(cls).getEntities()) {
+                    names.append("\t").append(equal.getIRI());
+                }
+            }
+            return names.toString();
         }
         return String.valueOf(reasoner.isEntailed(axiom(words)));
     }

@@ -57,6 +57,7 @@ class CaseSearch:
         names: The IRIs of named individuals.
         values: The values of each individual.
         gaps: What was not decided.
+        depends: Whether the last contradiction rests on choices that are held.
     """
 
     def __init__(self, rules: CaseRules, most_steps: int) -> None:
@@ -85,6 +86,8 @@ class CaseSearch:
         self._numbers = count(1)
         self._trail: list[tuple[dict[Any, Any], Any, Any]] = []
         self._stack: list[_Choice] = []
+        self._held = 0
+        self.depends = False
         self._queue: list[tuple[int, ...]] = []
         self._recount: dict[int, None] = {}
         self._revalue: dict[int, None] = {}
@@ -113,10 +116,16 @@ class CaseSearch:
         return len(self._trail)
 
     def undo(self, mark: int) -> None:
-        """Go back to a state without choices."""
+        """Go back to a state."""
         self._undo(mark)
-        self._stack.clear()
+        while self._stack and self._stack[-1].mark >= mark:
+            self._stack.pop()
+        self._held = min(self._held, len(self._stack))
         self._forget()
+
+    def hold(self) -> None:
+        """Keep to the choices of the model that was found, until `undo` takes them back."""
+        self._held = len(self._stack)
 
     def _undo(self, mark: int) -> None:
         trail = self._trail
@@ -283,7 +292,8 @@ class CaseSearch:
         """State something; False where that is a contradiction at once."""
         try:
             state()
-        except _ClashError:
+        except _ClashError as clash:
+            self.depends = bool(clash.choices)
             return False
         return True
 
@@ -353,7 +363,7 @@ class CaseSearch:
 
     def _go_back(self, choices: Choices) -> bool:
         """Take the next alternative of the last choice that took part; False: there is none."""
-        while self._stack:
+        while len(self._stack) > self._held:
             self._forget()
             choice = self._stack[-1]
             bit = 1 << len(self._stack) - 1
@@ -377,6 +387,7 @@ class CaseSearch:
                 choices = clash.choices
                 continue
             return True
+        self.depends = bool(choices)
         return False
 
     def _open(

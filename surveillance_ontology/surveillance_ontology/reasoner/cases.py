@@ -8,6 +8,7 @@ found on the way rules out further candidates.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
+from functools import partial
 from itertools import combinations, permutations
 
 from surveillance_ontology.owl import axioms as ax
@@ -21,8 +22,8 @@ from surveillance_ontology.reasoner.clauses import StoppedError, UnsupportedErro
 from surveillance_ontology.reasoner.datatypes import literal_of, value_of
 
 _NEGATIVE = (ax.NegativeObjectPropertyAssertion, ax.NegativeDataPropertyAssertion)
-MOST_STEPS = 100_000
-"""Facts that may be added in all searches for one answer; some seconds."""
+MOST_STEPS = 1_000_000
+"""Facts that may be added in all searches for one answer; some ten seconds."""
 
 
 class CaseReasoner:
@@ -76,7 +77,7 @@ class CaseReasoner:
 
     def _state(self) -> None:
         search = self._search
-        for name in self._individuals:
+        for name in (*self._individuals, *self._rules.nominal_of):
             search.individual(name)
         if not self._individuals and not self._assertions:
             search.somebody()
@@ -109,9 +110,9 @@ class CaseReasoner:
             self._search.undo(self._base)
         return self._consistent
 
-    def _is_possible(self, state: Callable[[], None]) -> bool:
+    def _is_possible(self, state: Callable[[], None], search: CaseSearch | None = None) -> bool:
         """Tell whether what `state` says holds in some model, left in the tables."""
-        search = self._search
+        search = search or self._search
         try:
             if not search.attempt(state):
                 return False
@@ -250,57 +251,87 @@ class CaseReasoner:
         """
         if not self.consistent():
             return
-        rules = self._rules
-        search = self._search if self.names_individuals else CaseSearch(rules, 4 * self._left)
-        base = self._base if search is self._search else search.mark()
-        possible: dict[str, set[str]] = {}
-        known_models: dict[str, set[str]] = {}
+        named = self.names_individuals
+        search = self._search if named else CaseSearch(self._rules, 4 * self._left)
+        base = self._base if named else search.mark()
+        models = _ClassModels(self._rules, search)
 
-        def asked(concepts: Iterable[int]) -> bool:
-            def state() -> None:
-                x = search.somebody()
-                self._somebody = x
-                for concept in concepts:
-                    search.concept(x, concept, 0)
+        def asked(questions: Iterable[tuple[str, ...]]) -> Iterator[tuple[str, ...]]:
+            """Yield the classes, alone or without another, that can have no members.
 
-            try:
-                if not (search.attempt(state) and search.solve()):
-                    return False
-            except StoppedError:
-                self.stopped = True
-                return True
-            self.gaps.update(search.gaps)
-            for y in search.alive():
-                names = {rules.names[concept] for concept in search.labels[y]} - {''}
-                for name in names:
-                    shared = known_models.get(name)
-                    known_models[name] = names if shared is None else shared & names
-            return True
-
-        for cls in classes:
-            if known(cls, NOTHING) or self.stopped:
-                continue
-            if not asked([rules.concept(cls)]):
-                yield cls, NOTHING
-            elif not self.stopped:
-                found, merged = search.find(self._somebody)
-                labels = {} if found is None else search.labels[found]
-                certain = {
-                    rules.names[one] for one, choices in labels.items() if not choices | merged
-                }
-                possible[cls] = {rules.names[one] for one in labels} - certain - {'', cls}
-                for sup in certain - {'', cls}:
-                    if not known(cls, sup):
-                        yield cls, sup
-            search.undo(base)
-        for cls, above in possible.items():
-            for sup in sorted(above):
-                if sup not in known_models[cls] or known(cls, sup) or self.stopped:
-                    continue
-                no = rules.positive(ex.ObjectComplementOf(sup))
-                if not asked([rules.concept(cls), no]):
-                    yield cls, sup
+            What contradicts one model of the individuals is asked for again without it.
+            """
+            again: list[tuple[str, ...]] = []
+            for model in (True, False):
+                if model and self._is_possible(lambda: None, search):
+                    search.hold()
+                start = search.mark()
+                for question in questions if model else again:
+                    if self.stopped:
+                        return
+                    if not models.may_be(*question):
+                        continue
+                    if self._is_possible(partial(models.state, *question), search):
+                        models.look(*question)
+                    elif search.depends:
+                        again.append(question)
+                    else:
+                        yield question
+                    search.undo(start)
                 search.undo(base)
+
+        wanted = [(cls,) for cls in classes if not known(cls, NOTHING)]
+        for cls, *_ in asked(wanted):
+            yield cls, NOTHING
+        for cls, sup in models.certain:
+            if not known(cls, sup):
+                yield cls, sup
+        for cls, *rest in asked([pair for pair in models.possible() if not known(*pair)]):
+            yield cls, rest[0]
+
+
+class _ClassModels:
+    """What models of classes, one after the other, say of which class may be below which."""
+
+    def __init__(self, rules: CaseRules, search: CaseSearch) -> None:
+        self._rules, self._search, self._somebody = rules, search, 0
+        self.certain: list[tuple[str, str]] = []
+        self._common: dict[str, set[str]] = {}
+        self._above: dict[str, set[str]] = {}
+
+    def state(self, cls: str, without: str = '') -> None:
+        """State that somebody is in a class and not in another one."""
+        self._somebody = self._search.somebody()
+        self._search.concept(self._somebody, self._rules.concept(cls), 0)
+        if without:
+            outside = self._rules.positive(ex.ObjectComplementOf(without))
+            self._search.concept(self._somebody, outside, 0)
+
+    def look(self, cls: str, without: str = '') -> None:
+        """Learn from the model that was found."""
+        rules, search = self._rules, self._search
+        for y in search.alive():
+            names = {rules.names[concept] for concept in search.labels[y]} - {''}
+            for name in names:
+                shared = self._common.get(name)
+                self._common[name] = names if shared is None else shared & names
+        if without:
+            return
+        found, merged = search.find(self._somebody)
+        labels = {} if found is None else search.labels[found]
+        above = {rules.names[one]: choices | merged for one, choices in labels.items()}
+        self.certain += [
+            (cls, sup) for sup, choices in above.items() if not choices and sup not in ('', cls)
+        ]
+        self._above[cls] = {sup for sup, choices in above.items() if choices} - {'', cls}
+
+    def may_be(self, cls: str, sup: str = '') -> bool:
+        """Tell whether every member of the class was a member of the other one so far."""
+        return not sup or sup in self._common[cls]
+
+    def possible(self) -> list[tuple[str, str]]:
+        """Return the pairs of classes, one above the other in the class's model by choice."""
+        return [(cls, sup) for cls, above in self._above.items() for sup in sorted(above)]
 
 
 def _without(axiom: Axiom) -> ClassExpression:

@@ -170,9 +170,9 @@ class ContextIndex:
                 yield tuple((one, x) for one in self._few(labels, None))
             return
         for head in heads or ():
-            if isinstance(head, PredicateAtom) and head.predicate is fact[0]:
-                if self._fact(head, x) == fact:
-                    yield tuple((one, x) for one in self._few(labels, head))
+            named = isinstance(head, PredicateAtom) and head.predicate is fact[0]
+            if named and self._fact(head, x) == fact:  # type: ignore[arg-type]
+                yield tuple((one, x) for one in self._few(labels, head))
 
     def _implies(self, labels: frozenset[Predicate], head: HeadAtom | None) -> bool:
         heads = self._contexts.heads(labels)

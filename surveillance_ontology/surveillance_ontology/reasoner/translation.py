@@ -315,6 +315,17 @@ class Translation:
             for clause in self.program.clauses
         ):
             self.contradict((self._differs(_X, _X),), _X)
+        if self.program.uses_thing:
+            self._state_named()
+
+    def _state_named(self) -> None:
+        """State that the individuals which axioms name exist."""
+        program = self.program
+        atoms = (atom for clause in program.clauses for atom in (*clause.body, clause.head))
+        terms = dict.fromkeys(term for atom in atoms for term in atom.terms)
+        for term in terms:
+            if isinstance(term, Constant) and not term.is_value:
+                program.clauses.append(Clause((), PredicateAtom(program.thing, (term,))))
 
     def report(self, reason: str) -> None:
         """Note a part of the axiom at hand that is not used."""

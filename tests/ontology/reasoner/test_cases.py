@@ -180,6 +180,42 @@ def test_justifications_are_minimal() -> None:
     assert len(kb.justification(SubClassOf(A, D))) in (2, 3)
 
 
+def test_a_union_or_enumeration_on_the_left_takes_no_choice() -> None:
+    people = [f'x:n{n}' for n in range(300)]
+    kinds = ex.ObjectOneOf((i, j, k))
+    axioms = [ax.EquivalentClasses((D, ex.ObjectUnionOf((A, B)))), ax.EquivalentClasses((C, kinds))]
+    others = [ClassAssertion(THING, name) for name in people]
+    reasoner = CaseReasoner([*axioms, *others, ClassAssertion(A, 'x:n7')], most_steps=2_000)
+    assert reasoner.consistent()
+    assert not reasoner.stopped
+    found = set(reasoner.facts(lambda _: False))
+    assert {ClassAssertion(D, 'x:n7'), ClassAssertion(C, i)} <= found
+    assert ClassAssertion(C, 'x:n7') not in found
+
+
+def test_class_questions_do_not_search_the_individuals_again() -> None:
+    # Each of 60 individuals is a choice; 40 classes are asked for on one model of them.
+    choices = [ClassAssertion(ex.ObjectUnionOf((A, B)), f'x:n{n}') for n in range(60)]
+    classes = [f'x:K{n}' for n in range(40)]
+    axioms = [SubClassOf(cls, ex.ObjectHasValue(P, i)) for cls in classes]
+    axioms.append(SubClassOf(ex.ObjectSomeValuesFrom(P, C), D))
+    reasoner = CaseReasoner([*choices, *axioms, ClassAssertion(C, i)], most_steps=2_000)
+    found = set(reasoner.hierarchy(classes, lambda *_: False))
+    assert not reasoner.stopped
+    assert found == {(cls, D) for cls in classes}
+    # What is below something only in every case of the individuals is found all the same.
+    axioms += [SubClassOf(A, C), SubClassOf(B, C), ClassAssertion(B_OR_C, i)]
+    cases = CaseReasoner([*choices, *axioms])
+    assert set(cases.hierarchy(classes, lambda *_: False)) == {(cls, D) for cls in classes}
+
+
+def test_individuals_that_only_classes_name_exist() -> None:
+    assert not reasoned(SubClassOf(ex.ObjectOneOf((i,)), NOTHING), ClassAssertion(A, j)).consistent
+    assert not reasoned(SubClassOf(THING, ex.ObjectComplementOf(ex.ObjectOneOf((i,))))).consistent
+    kb = reasoned(SubClassOf(A, ex.ObjectHasValue(P, i)), SubClassOf(ex.ObjectOneOf((i,)), B_OR_C))
+    assert kb.consistent
+
+
 @pytest.mark.parametrize('seed', range(40))
 def test_changes_lead_to_what_a_fresh_start_finds(seed: int) -> None:
     drawn = WideOntology(seed)

@@ -25,6 +25,7 @@ from surveillance_ontology.owl.axioms import (
     ObjectPropertyDomain,
     ReflexiveObjectProperty,
     Rule,
+    SameIndividual,
     SubClassOf,
     SubObjectPropertyOf,
     SubPropertyChainOf,
@@ -274,3 +275,27 @@ def test_long_rules(length: int) -> None:
 def test_what_takes_cases_is_not_lost(axioms: list[Axiom]) -> None:
     kb = reasoned(*axioms, AsymmetricObjectProperty(R))
     assert kb.unsupported == ()
+
+
+def test_values_that_classes_require_go_by_the_name_of_who_is_the_same() -> None:
+    # The guide's wine ontology does so: its sugars and those of its food are the same.
+    kb = reasoned(
+        EquivalentClasses((A, ObjectIntersectionOf((B, ObjectHasValue(P, k))))),
+        SubClassOf(A, some(Q, ObjectHasValue(P, j))),
+        SubClassOf(B, some(Q, some(Q, C))),
+        FunctionalObjectProperty(P),
+        DifferentIndividuals(frozenset((k, j))),
+        DifferentIndividuals(frozenset((m, j))),
+        ClassAssertion(B, i),
+        ObjectPropertyAssertion(P, i, m),
+    )
+    same = SameIndividual(frozenset((k, m)))
+    for _ in range(2):
+        kb.add(same)
+        assert kb.reason()
+        assert kb.types(i) == {A, B}
+        assert kb.object_values(P, i) == {k, m}
+        kb.remove(same)
+        assert kb.reason()
+        assert kb.types(i) == {B}
+        assert kb.object_values(P, i) == {m}
