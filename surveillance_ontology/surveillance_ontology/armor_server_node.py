@@ -37,7 +37,7 @@ MOST_WAITING = 5000
 """Requests that are taken and wait; further ones wait in the middleware."""
 WORKERS = 4
 """Threads for directives that may take long, and as many for `LONG_QUERIES`."""
-LONG_QUERIES = ('SPARQL', 'AT')
+LONG_QUERIES = ('SPARQL', 'AT', 'EXPLAIN')
 
 
 class _Backlog:

@@ -12,10 +12,12 @@ a derived fact never becomes an assertion. Nothing here is thread-safe; a caller
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 from surveillance_ontology.memory import uncollected
 from surveillance_ontology.owl.assertions import Assertions, is_assertion
@@ -153,6 +155,7 @@ def justify(
     likely: Iterable[Axiom],
     schema: Iterable[Axiom],
     assumed: tuple[Axiom, ...] = (),
+    until: float = math.inf,
 ) -> tuple[Axiom, ...]:
     """Return a smallest set of axioms from which a goal follows (Junker, "QuickXplain", AAAI 2004).
 
@@ -162,6 +165,7 @@ def justify(
         likely: Axioms that a proof uses; with the schema they are tried first.
         schema: The axioms that are not about individuals.
         assumed: Axioms that are there in any case.
+        until: Steady time after which axioms that are not needed may be left in.
     """
     fixed = list(assumed)
 
@@ -178,7 +182,7 @@ def justify(
             fixed = list(assumed)
             if not enough(candidates):
                 candidates = [*declared, *candidates]
-            return tuple(_fewest(candidates, enough))
+            return tuple(_fewest(candidates, enough, until))
     return ()
 
 
@@ -194,13 +198,15 @@ def follows(axioms: Iterable[Axiom], goal: Axiom | None) -> bool:
     return not consistent if goal is None else consistent and kb.holds(goal)
 
 
-def _fewest(candidates: list[Axiom], follows: Callable[[Iterable[Axiom]], bool]) -> list[Axiom]:
-    """Return the candidates without those that are not needed."""
+def _fewest(
+    candidates: list[Axiom], follows: Callable[[Iterable[Axiom]], bool], until: float
+) -> list[Axiom]:
+    """Return the candidates without those that are not needed, as far as the time allows."""
 
     def narrow(known: list[Axiom], changed: bool, rest: list[Axiom]) -> list[Axiom]:
         if changed and follows(known):
             return []
-        if len(rest) == 1:
+        if len(rest) == 1 or time.monotonic() > until:
             return rest
         middle = len(rest) // 2
         first, second = rest[:middle], rest[middle:]
@@ -249,11 +255,13 @@ class KnowledgeBase:
         iri: The ontology's IRI.
         classified: How often the classes were put in order; tells whether `subclasses` may have
             changed.
+        patience: Seconds after which `explain` looks no further for axioms that it can do without.
     """
 
     def __init__(self, iri: str, axioms: Iterable[Axiom] = ()) -> None:
         self.iri = iri
         self.classified = 0
+        self.patience = math.inf
         self._told = Assertions()
         self._classification: Classification | None = None
         self._engine: Engine | None = None
@@ -608,7 +616,7 @@ class KnowledgeBase:
         if not isinstance(fact, SubClassOf):
             found = Reasons(engine, self._schema_axioms).of_fact(fact)
         if found is None:
-            return self._listed(axiom_text(fact), self.justification(fact))
+            return self._listed(axiom_text(fact), *self._justified(fact))
         return self._complete(found, fact)
 
     def explain_inconsistency(self) -> Explanation | None:
@@ -619,12 +627,13 @@ class KnowledgeBase:
             return None
         found = Reasons(self._engine, self._schema_axioms).of_inconsistency()
         if found is None:
-            return self._listed('the ontology is inconsistent', self.justification(None))
+            return self._listed('the ontology is inconsistent', *self._justified(None))
         return self._complete(found, None)
 
     def _complete(self, found: Explanation, goal: Axiom | None) -> Explanation:
         """Return the explanation resting on no more axioms than it needs, and on all of them."""
-        needed = justify(self._told.axioms, goal, found.sources(), self._told.schema)
+        until = time.monotonic() + self.patience
+        needed = justify(self._told.axioms, goal, found.sources(), self._told.schema, until=until)
         again: Explanation | None = found
         if not set(found.sources()) <= set(needed):
             alone = KnowledgeBase(self.iri, needed)
@@ -633,7 +642,7 @@ class KnowledgeBase:
             reasons = Reasons(alone._engine, alone._schema_axioms)
             again = reasons.of_inconsistency() if goal is None else reasons.of_fact(goal)
         if again is None or again.because == BY_CASES:
-            return self._listed(found.fact_text, needed)
+            return self._listed(found.fact_text, needed, time.monotonic() <= until)
         sources = again.sources()
         return replace(again, background=tuple(a for a in needed if a not in sources))
 
@@ -645,20 +654,28 @@ class KnowledgeBase:
             fact: As for `explain`; None asks for a contradiction.
 
         Returns:
-            The axioms; none where the fact does not hold.
+            The axioms; none where the fact does not hold. Once `patience` has passed, there may be
+            more than it needs.
         """
+        return self._justified(fact)[0]
+
+    def _justified(self, fact: Axiom | None) -> tuple[tuple[Axiom, ...], bool]:
+        """Return the axioms to which a fact is owed, and whether they are the fewest."""
         if fact in self._told.axioms:
-            return (fact,)
+            return (fact,), True
         holds = not self.consistent if fact is None else self.holds(fact)
         if not holds or self._engine is None:
-            return ()
+            return (), True
+        until = time.monotonic() + self.patience
         reasons = Reasons(self._engine, lambda *_: ())
         proof = None
         if fact is None:
             proof = reasons.of_inconsistency()
         elif not isinstance(fact, SubClassOf):
             proof = reasons.of_fact(fact)
-        return justify(self._told.axioms, fact, proof.sources() if proof else (), self._told.schema)
+        likely = proof.sources() if proof else ()
+        found = justify(self._told.axioms, fact, likely, self._told.schema, until=until)
+        return found, time.monotonic() <= until
 
     def _schema_axioms(self, assumed: tuple[Axiom, ...], goal: Axiom | None) -> tuple[Axiom, ...]:
         """Return the axioms about classes and properties by which assumptions imply something."""
@@ -666,9 +683,10 @@ class KnowledgeBase:
         found = justify([*schema, *assumed], goal, (), schema, assumed)
         return tuple(axiom for axiom in found if axiom not in assumed)
 
-    def _listed(self, text: str, axioms: tuple[Axiom, ...]) -> Explanation:
+    def _listed(self, text: str, axioms: tuple[Axiom, ...], fewest: bool) -> Explanation:
+        because = 'these axioms together' + ('' if fewest else ', perhaps not all of them')
         parts = tuple(Explanation(axiom_text(a), 'asserted', axioms=(a,)) for a in axioms)
-        return Explanation(text, 'axiom', 'these axioms together', parts, axioms=axioms)
+        return Explanation(text, 'axiom', because, parts, axioms=axioms)
 
     # --- changes ---
 
@@ -816,6 +834,23 @@ class KnowledgeBase:
         self._classify()
         self._rebuild(self._engine)
         return self._consistent
+
+    def give_up(self, part: int = 500) -> Iterator[None]:
+        """Let go of everything, some entries with each step; afterwards it can be used no more.
+
+        The memory of a large ontology, given back at once, would stop all threads for long.
+        """
+        owners: list[Any] = [self._told]
+        if self._engine is not None:
+            owners += [self._engine, *self._engine.program.predicates()]
+        for owner in owners:
+            names = getattr(owner, '__slots__', None) or vars(owner)
+            for held in [getattr(owner, name) for name in names]:
+                while isinstance(held, dict | set) and held:
+                    take = held.popitem if isinstance(held, dict) else held.pop
+                    for _ in range(min(part, len(held))):
+                        take()
+                    yield
 
     # --- whoever listens ---
 

@@ -8,11 +8,14 @@ from __future__ import annotations
 
 import ctypes
 import gc
-from collections.abc import Iterator
+import time
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 
 LARGE = 10_000
 """Axioms from which on an ontology is kept out of the collector's way."""
+PAUSE = 0.0002
+"""Seconds for other threads between two parts of an ontology that is given up."""
 
 
 @contextmanager
@@ -34,10 +37,19 @@ def settle(axioms: int) -> None:
         gc.freeze()
 
 
-def release() -> None:
-    """Give the memory of what was dropped back to the system."""
-    gc.unfreeze()
-    gc.collect()  # Axioms and rules refer to each other in cycles.
-    gc.freeze()
+def release(parts: Iterable[None], others: bool) -> None:
+    """Give the memory of a large ontology back to the system; other threads go on meanwhile.
+
+    Args:
+        parts: Lets go of a part of the ontology with each step.
+        others: There are other large ontologies, which a collection would look through: what is
+            left, a few objects that refer to each other in cycles, waits until they are dropped.
+    """
+    for _ in parts:
+        time.sleep(PAUSE)
+    if not others:
+        gc.unfreeze()
+        gc.collect()
+        gc.freeze()
     with suppress(OSError, AttributeError):  # Not glibc: it decides itself.
         ctypes.CDLL('libc.so.6').malloc_trim(0)

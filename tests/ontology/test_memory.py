@@ -32,7 +32,9 @@ def test_what_settled_is_looked_at_again_when_something_was_dropped() -> None:
     del ring
     gc.collect()
     assert gone() is not None, 'the collector does not look at it'
-    memory.release()
+    memory.release([], others=True)
+    assert gone() is not None, 'a collection would look through the others'
+    memory.release([], others=False)
     assert gone() is None
     gc.unfreeze()
 

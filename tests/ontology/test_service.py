@@ -8,7 +8,8 @@ from pathlib import Path
 
 from surveillance_ontology.armor.access import DATA, Settings
 from surveillance_ontology.armor.protocol import DirectiveRequest
-from surveillance_ontology.armor.service import ArmorService
+from surveillance_ontology.armor.reference import SLOW
+from surveillance_ontology.armor.service import LARGE, ArmorService
 from surveillance_ontology.owl.vocabulary import OWL, RDF, XSD
 
 from .seven_rooms import FIXTURES, IRI, ONTOLOGY, Ask, asker, iri, names
@@ -121,6 +122,8 @@ def test_what_may_take_long_is_not_done_at_once(service: ArmorService, ask: Ask)
         request('LOAD FILE', ONTOLOGY, IRI, 'false', '', 'false', reference='other'),
         request('ADD CLASS CLASS', 'A', 'B'),
         request('DISJOINT IND', *(f'X{number}' for number in range(2000))),
+        request('QUERY EXPLAIN', 'ROOM(R1)'),
+        request('QUERY EXPLAIN INCONSISTENCY'),
     ):
         assert service.execute_at_once(slow) is None
     assert ask('GET ALL REFS').queried_objects == ['map'], 'nothing was done'
@@ -128,6 +131,43 @@ def test_what_may_take_long_is_not_done_at_once(service: ArmorService, ask: Ask)
     assert service.execute_at_once(request('REASON')) is not None
     ask('ADD CLASS CLASS', 'A', 'B')
     assert service.execute_at_once(request('REASON')) is None, 'classes changed'
+    assert service.execute_at_once(request('QUERY FACT', 'p(?, a)')) is not None
+    ask('DISJOINT IND', *(f'X{number}' for number in range(2000)))
+    ask('APPLY')
+    for number in range(LARGE):
+        ask('ADD IND', f'X{number}')
+    ask('APPLY')
+    assert service.execute_at_once(request('QUERY FACT', 'p(?, a)')) is None, 'many facts'
+
+
+def test_a_reference_whose_reasoning_takes_long_is_reasoned_over_by_a_worker(
+    service: ArmorService, ask: Ask
+) -> None:
+    ref = service.references.find('map')
+    ask('ADD IND CLASS', 'R1', 'ROOM')
+    assert service.execute_at_once(request('REASON')) is not None
+    ref.took = 2 * SLOW
+    assert service.execute_at_once(request('ADD IND CLASS', 'R2', 'ROOM')) is None
+    ask('ADD IND CLASS', 'R2', 'ROOM')
+    assert service.execute_at_once(request('REASON')) is not None, 'it took less this time'
+
+
+def test_an_ontology_that_was_dropped_meanwhile_is_asked_no_more(
+    service: ArmorService, ask: Ask
+) -> None:
+    ref = service.references.find('map')
+    answers = []
+    with ref.lock:
+        asking = threading.Thread(
+            target=lambda: answers.append(ask('QUERY EXPLAIN', 'ROOM(R1)').error_description)
+        )
+        asking.start()
+        ask('DROP')
+    asking.join()
+    assert answers[0] in (
+        "'map' was dropped meanwhile",
+        "unknown reference 'map'; loaded: none",
+    )
 
 
 def test_the_memory_of_a_large_ontology_is_given_back(

@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 import threading
+import time
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -22,6 +23,10 @@ from surveillance_ontology.reasoner.java_reasoning import JavaKnowledgeBase
 
 LONG_BACKLOG = 500
 """Changes since the last reasoning from which on the next counts as slow."""
+SLOW = 0.01
+"""Seconds of processor time of the last reasoning from which on the next counts as slow."""
+PATIENCE = 5.0
+"""Seconds for making an explanation short; nobody else can use the ontology meanwhile."""
 NOBODY = 'none'
 """How ARMOR says that no client is mounted; a client of this name counts as none."""
 
@@ -111,7 +116,9 @@ class Origin:
 def knowledge_base(base: str, axioms: Iterable[Axiom], reasoner: str) -> KnowledgeBase:
     """Make a knowledge base with the reasoner of a name; the native one for unknown names."""
     kind = JAVA.get(reasoner.upper())
-    return JavaKnowledgeBase(base, axioms, kind) if kind else KnowledgeBase(base, axioms)
+    kb = JavaKnowledgeBase(base, axioms, kind) if kind else KnowledgeBase(base, axioms)
+    kb.patience = PATIENCE
+    return kb
 
 
 @dataclass(slots=True)
@@ -130,6 +137,7 @@ class Reference:
         queue: Changes that wait.
         backlog: Changes since the last reasoning, queued ones included; a measure of its cost.
         heavy: Classes or properties changed since the last reasoning; the next takes longer.
+        took: Seconds of processor time of the last reasoning that had something to do.
         revision: Counts what may have changed an answer, so that copies know when they are old.
         serial: Tells this reference from any other of the same name.
         dropped: The name does not stand for it any more.
@@ -145,11 +153,24 @@ class Reference:
     queue: list[Change] = field(default_factory=list)
     backlog: int = 0
     heavy: bool = False
+    took: float = 0.0
     revision: int = 0
     dropped: bool = False
     history: History = field(default_factory=History)
     serial: int = field(default_factory=itertools.count().__next__)
     lock: threading.RLock = field(default_factory=threading.RLock)
+
+    @contextlib.contextmanager
+    def held(self) -> Iterator[KnowledgeBase]:
+        """Hold the lock.
+
+        Raises:
+            DirectiveError: 205, the name does not stand for it any more.
+        """
+        with self.lock:
+            if self.dropped:
+                raise DirectiveError(f'{shown(self.name)} was dropped meanwhile')
+            yield self.kb
 
     def submit(self, changes: list[Change]) -> None:
         """Take changes in, at once or into the queue, as the reference is set up."""
@@ -201,8 +222,7 @@ class Reference:
             apply_all(self.kb, queued)
         if self.kb.stale:
             self.revision += 1
-        self.backlog, self.heavy = 0, False
-        return self.kb.reason()
+        return self._derive()
 
     def restore(self, other: Reference) -> None:
         """Take over the state of another reference of the same name."""
@@ -215,7 +235,8 @@ class Reference:
     @property
     def is_slow(self) -> bool:
         """Whether the next reasoning may take long."""
-        return self.heavy or self.backlog > LONG_BACKLOG or bool(self.origin.reasoner)
+        much = self.heavy or self.backlog > LONG_BACKLOG
+        return much or self.took > SLOW or bool(self.origin.reasoner)
 
     def is_free_for(self, client: str) -> bool:
         """Tell whether a client may change the reference or mount on it."""
@@ -225,8 +246,15 @@ class Reference:
         apply_all(self.kb, changes)
         self.revision += 1
         if not self.buffered_reasoner:
-            self.kb.reason()
-            self.backlog, self.heavy = 0, False
+            self._derive()
+
+    def _derive(self) -> bool:
+        self.backlog, self.heavy = 0, False
+        stale, begin = self.kb.stale, time.thread_time()
+        consistent = self.kb.reason()
+        if stale:
+            self.took = time.thread_time() - begin
+        return consistent
 
 
 class Registry:
@@ -242,6 +270,11 @@ class Registry:
     def names(self) -> list[str]:
         """Return all names, sorted."""
         return sorted(self._references)
+
+    def hold_more_than(self, axioms: int) -> bool:
+        """Tell whether one of the references has more axioms."""
+        with self._lock:
+            return any(len(ref.kb) > axioms for ref in self._references.values())
 
     def get(self, name: str) -> Reference | None:
         """Find a reference, None when there is none of the name."""

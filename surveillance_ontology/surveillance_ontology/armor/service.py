@@ -32,6 +32,9 @@ from surveillance_ontology.armor.store import JournalError, Store
 from surveillance_ontology.reasoner.java_reasoning import JavaReasonerError
 
 LONG_ARGUMENTS = 1000
+"""Arguments from which on a directive is not quick."""
+LARGE = 1000
+"""Axioms from which on a query that gathers from all of them is not quick."""
 
 
 class ArmorService:
@@ -124,7 +127,8 @@ class ArmorService:
         if not ref.lock.acquire(blocking=False):
             return None
         try:
-            if directive.kind.may_reason and ref.is_slow:
+            slow = directive.kind.may_reason and ref.is_slow
+            if slow or (directive.gathers and len(ref.kb) > LARGE):
                 return None
             return self.execute(request)
         finally:

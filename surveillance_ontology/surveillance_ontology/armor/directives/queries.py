@@ -94,7 +94,12 @@ def _types(ref: Reference, ind: str) -> DirectiveResponse:
     return response
 
 
-@query('QUERY IND CLASS', CLS, summary='All individuals of a class, asserted and derived.')
+@query(
+    'QUERY IND CLASS',
+    CLS,
+    gathers=True,
+    summary='All individuals of a class, asserted and derived.',
+)
 def _instances(ref: Reference, cls: str) -> DirectiveResponse:
     return _answer(_entities(ref.kb.instances(cls)), ref, ('class', cls))
 
@@ -165,11 +170,13 @@ def _object_properties(ref: Reference, ind: str) -> DirectiveResponse:
     'QUERY EXPLAIN',
     text('fact'),
     native=False,
+    slow=True,
     summary='Why a fact holds, written as `URGENT(R3)`, `connectedTo(R1, C1)` or '
     '`owl:sameAs(a, b)`: first an English sentence, then the derivation as a tree.',
 )
-def _explain(ref: Reference, fact: str) -> DirectiveResponse:
-    explanation = ref.kb.explain(_full_fact(ref, fact))
+def _explain(_: Session, ref: Reference, fact: str) -> DirectiveResponse:
+    with ref.held() as kb:
+        explanation = kb.explain(_full_fact(ref, fact))
     if explanation is None:
         return DirectiveResponse(
             success=False, error_description=f'{fact} is neither asserted nor derived in {ref.name}'
@@ -180,10 +187,12 @@ def _explain(ref: Reference, fact: str) -> DirectiveResponse:
 @query(
     'QUERY EXPLAIN INCONSISTENCY',
     native=False,
+    slow=True,
     summary='Why the ontology contradicts itself, in the form of QUERY EXPLAIN; else nothing.',
 )
-def _explain_inconsistency(ref: Reference) -> DirectiveResponse:
-    explanation = ref.kb.explain_inconsistency()
+def _explain_inconsistency(_: Session, ref: Reference) -> DirectiveResponse:
+    with ref.held() as kb:
+        explanation = kb.explain_inconsistency()
     if explanation is None:
         return DirectiveResponse(error_description=f'{ref.name} is consistent')
     return DirectiveResponse(queried_objects=[explanation.sentence(), explanation.tree()])
@@ -192,6 +201,7 @@ def _explain_inconsistency(ref: Reference) -> DirectiveResponse:
 @query(
     'QUERY UNSUPPORTED',
     native=False,
+    gathers=True,
     summary='What the ontology holds that the reasoner does not use, one sentence each.',
 )
 def _unsupported(ref: Reference) -> DirectiveResponse:
@@ -203,6 +213,7 @@ def _unsupported(ref: Reference) -> DirectiveResponse:
     text('pattern'),
     flag('asserted', 'false'),
     native=False,
+    gathers=True,
     summary='Facts that match a pattern, `URGENT(?)`, `connectedTo(R1, ?)`, `hasDoor(?, ?)`: '
     'asserted and derived ones, or with the second argument the asserted ones only.',
 )
@@ -231,8 +242,8 @@ def _at(
 ) -> DirectiveResponse:
     try:
         seconds = float(time)
-        with ref.lock:
-            axioms = ref.history.at(seconds, ref.kb.axioms())
+        with ref.held() as kb:
+            axioms = ref.history.at(seconds, kb.axioms())
     except ValueError as error:
         raise DirectiveError(f'QUERY AT: argument time {error}') from None
     past = Reference(ref.name, KnowledgeBase(ref.kb.iri, axioms), ref.origin)

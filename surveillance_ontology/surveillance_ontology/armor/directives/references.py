@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import threading
+import time
 from collections.abc import Iterator
 from typing import Any
 
@@ -41,6 +42,8 @@ RELEASE_AFTER = 0.2
 WRITTEN = {'turtle': 'ntriples', 'owlxml': 'rdfxml', 'functional': 'rdfxml'}
 """What SAVE writes for formats that are only read: N-Triples is Turtle as well."""
 WEB_TIMEOUT = 20.0
+FIRST = 10
+"""How many times as long as the next one the first reasoning is taken to need."""
 MAX_NAMED = 5
 """How many unsupported statements a description names."""
 
@@ -183,16 +186,19 @@ def _drop(session: Session, request: DirectiveRequest) -> DirectiveResponse:
             session.tell(ref.name, None)
             if len(ref.kb) > memory.LARGE:
                 # Not yet: this directive and those that wait for the lock still refer to it.
-                release = threading.Timer(RELEASE_AFTER, _release, args=(session,))
+                release = threading.Timer(RELEASE_AFTER, _release, args=(session, ref))
                 release.daemon = True
                 release.start()
     return DirectiveResponse()
 
 
-def _release(session: Session) -> None:
+def _release(session: Session, ref: Reference) -> None:
     """Give back the memory of a large ontology, also of the processes that know its graph."""
     session.sparql.forget()
-    memory.release()
+    with ref.lock:  # The last of those who found it before it was dropped.
+        parts = ref.kb.give_up()
+        ref.kb, ref.history = KnowledgeBase(ref.kb.iri), History()
+    memory.release(parts, session.references.hold_more_than(memory.LARGE))
 
 
 @utility(
@@ -401,7 +407,9 @@ def _read_document(
         raise DirectiveError(f'LOAD: {error}') from None
     if document.iri and document.iri.rstrip('#') != base:
         notes.append(f'the document is of {document.iri}, names are completed with {base}')
+    begin = time.thread_time()
     kb = _reasoned(base, document.axioms, reasoner, notes)
+    took = (time.thread_time() - begin) / FIRST
     if not kb.consistent:
         notes.append('the ontology is inconsistent')
     unsupported = [*document.unsupported, *kb.unsupported]
@@ -411,7 +419,7 @@ def _read_document(
         notes.append(f'{len(unsupported)} statements not supported by the reasoner: {named}{more}')
     used = reasoner if isinstance(kb, JavaKnowledgeBase) else ''
     form = WRITTEN.get(document.format, document.format)
-    return Reference(name, kb, Origin(path, form, document.prefixes, used)), notes
+    return Reference(name, kb, Origin(path, form, document.prefixes, used), took=took), notes
 
 
 def _reasoned(base: str, axioms: list[Axiom], reasoner: str, notes: list[str]) -> KnowledgeBase:

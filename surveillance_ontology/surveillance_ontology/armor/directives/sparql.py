@@ -89,12 +89,12 @@ def _select(session: Session, ref: Reference, parts: tuple[str, ...]) -> list[li
     derived = session.settings.sparql_derived
 
     def update(known: Version | None) -> GraphUpdate | None:
-        with ref.lock:
+        with ref.held():
             if known == session.graphs.version(ref, derived):
                 return None
             return session.graphs.update(ref, derived, known)
 
-    with ref.lock:
+    with ref.held():
         version = session.graphs.version(ref, derived)
     try:
         return session.sparql.select(

@@ -106,6 +106,7 @@ class Directive:
         rest: The last argument may be repeated, at least this many times; 0: not repeated.
         most: How many arguments it takes at most; 0: as many as the service allows.
         slow: It may take long and must not run where other directives wait.
+        gathers: It takes the longer the larger the ontology is.
         schema: It changes classes or properties, after which reasoning takes longer.
         native: It stands in ARMOR 2.2 too.
         type_error_succeeds: An unsupported type is answered with success, as ARMOR does.
@@ -123,6 +124,7 @@ class Directive:
     rest: int = 0
     most: int = 0
     slow: bool = False
+    gathers: bool = False
     schema: bool = False
     native: bool = True
     type_error_succeeds: bool = True
