@@ -31,6 +31,7 @@ class Steersman:
         self.seen: list[Scan] = []
         self.pose = self.odometry = self.place = self.missing = None
         self.lost, self.jumps, self.obstacles_changed = False, 0, False
+        self.ambiguous = False
 
     def see(self, scan: Scan, _now: float) -> Velocity:
         self.seen.append(scan)
@@ -72,6 +73,32 @@ def test_without_scans_or_odometry_the_robot_is_told_to_stand(
     graph.until(lambda: drives(*both))
     graph.until(lambda: not drives((scans, scan())), timeout=5.0)
     assert 'nothing on the topic' in capfd.readouterr().err
+
+
+@pytest.mark.parametrize('doubt', ['ambiguous', 'lost'])
+def test_a_robot_that_does_not_know_where_it_is_tells_no_place(
+    graph: Any, steersman: Steersman, doubt: str
+) -> None:
+    navigator: Any = steersman
+    told: list[str | None] = []
+    base = RobotBase(graph.node, navigator, 5.0, lambda place, _stamp: told.append(place))
+    scans = graph.node.create_publisher(LaserScan, 'scan', SENSOR_QOS)
+    navigator.see = lambda _scan, _now: setattr(navigator, 'place', 'R1')
+
+    def last(place: str | None) -> bool:
+        scans.publish(scan())
+        return told[-1:] == [place]
+
+    graph.until(lambda: last('R1'))
+    # It finds out with the next scan: the simulated navigator changes its mind there.
+    navigator.see = lambda _scan, _now: setattr(navigator, doubt, True)
+    graph.until(lambda: last(None))
+    assert base.place is None
+    assert not base.is_sure
+    navigator.place = 'R2'
+    navigator.see = lambda _scan, _now: setattr(navigator, doubt, False)
+    graph.until(lambda: last('R2'))
+    assert told == ['R1', None, 'R2']
 
 
 def test_messages_that_are_not_sound_end_nothing(

@@ -73,6 +73,8 @@ class RobotBase:
         self._lock = threading.RLock()
         self._stepped = threading.Condition(self._lock)
         self._steps = 0
+        self._awaited: Callable[[], bool] = lambda: False
+        self._on_step: Callable[[Pose], None] = lambda _pose: None
         self._pose_sent = float('-inf')
         self._was_lost = False
         self._jumps = 0
@@ -92,9 +94,14 @@ class RobotBase:
         node.create_subscription(PoseWithCovarianceStamped, 'initialpose', self._on_initial_pose, 1)
 
     @property
+    def is_sure(self) -> bool:
+        """Whether the robot knows where it is: not lost, and nowhere else as likely."""
+        return not (self._navigator.lost or self._navigator.ambiguous)
+
+    @property
     def place(self) -> str | None:
         """The place the robot is in; None while that is not known."""
-        return None if self._navigator.lost else self._navigator.place
+        return self._navigator.place if self.is_sure else None
 
     @property
     def pose(self) -> Pose | None:
@@ -122,7 +129,7 @@ class RobotBase:
         Args:
             drive: The drive.
             interrupt: Ends it early: the robot brakes.
-            on_step: Told the pose now and then.
+            on_step: Told the pose with each scan, in the executor's thread; must not block.
             another_path: Finds a path from a pose to the drive's goal; raises `NoPathError`.
 
         Returns:
@@ -131,23 +138,22 @@ class RobotBase:
         Raises:
             MotionFailedError: The sensors gave nothing for too long.
         """
-        with self._carrying_out(drive, interrupt):
+        with self._carrying_out(drive, interrupt, on_step):
             while not drive.state.ended and not interrupt.is_set():
-                pose = self._await_step(interrupt)
-                if pose is None:
+                self._await(lambda: drive.state.ended or drive.state is State.ASKING, interrupt)
+                pose = self.pose
+                if drive.state is not State.ASKING or interrupt.is_set() or pose is None:
                     continue
-                on_step(pose)
-                if drive.state is State.ASKING:
-                    self._node.get_logger().info(f'{drive.reason}: looking for another path')
-                    try:
-                        path = another_path(pose)
-                    except NoPathError as error:
-                        with self._lock:
-                            drive.no_path(str(error))
-                    else:
-                        with self._lock:
-                            drive.new_path(path)
-        return self._navigator.pose or (float('nan'),) * 3
+                self._node.get_logger().info(f'{drive.reason}: looking for another path')
+                try:
+                    path = another_path(pose)
+                except NoPathError as error:
+                    with self._lock:
+                        drive.no_path(str(error))
+                else:
+                    with self._lock:
+                        drive.new_path(path)
+        return self.pose or (float('nan'),) * 3
 
     def spin(self, spin: Spin, interrupt: Interrupt) -> None:
         """Turn once on the spot; it blocks.
@@ -156,14 +162,18 @@ class RobotBase:
             MotionFailedError: The sensors gave nothing for too long.
         """
         with self._carrying_out(spin, interrupt):
-            while not spin.done and not interrupt.is_set():
-                self._await_step(interrupt)
+            self._await(lambda: spin.done, interrupt)
 
     @contextmanager
-    def _carrying_out(self, task: Drive | Spin, interrupt: Interrupt) -> Iterator[None]:
+    def _carrying_out(
+        self,
+        task: Drive | Spin,
+        interrupt: Interrupt,
+        on_step: Callable[[Pose], None] = lambda _pose: None,
+    ) -> Iterator[None]:
         """Hands a task to the navigator; afterwards the robot stands."""
         with self._lock:
-            self._navigator.task = task
+            self._navigator.task, self._on_step = task, on_step
         unsubscribe = interrupt.subscribe(self._wake)
         try:
             yield
@@ -173,21 +183,24 @@ class RobotBase:
                 self._navigator.task = None
                 self._command(Velocity())
 
-    def _await_step(self, interrupt: Interrupt) -> Pose | None:
+    def _await(self, condition: Callable[[], bool], interrupt: Interrupt) -> None:
+        """Wait until a condition holds after a scan, or for the interrupt.
+
+        Raises:
+            MotionFailedError: The sensors gave nothing for too long.
+        """
         with self._stepped:
-            before = self._steps
-            self._stepped.wait_for(
-                lambda: self._steps != before or interrupt.is_set(), self._sensor_timeout
-            )
-            if interrupt.is_set():
-                return None
-            if self._steps == before:
-                topic = self._navigator.missing or 'scan'
-                raise MotionFailedError(
-                    f'nothing came on the topic {topic} for {self._sensor_timeout:g} s',
-                    None if self.pose is None else point_of(self.pose),
-                )
-            return self._navigator.pose
+            # The worker is woken when there is something to do, not with each scan.
+            self._awaited = condition
+            while not (condition() or interrupt.is_set()):
+                before = self._steps
+                woken = self._stepped.wait(self._sensor_timeout)
+                if not woken and self._steps == before:
+                    topic = self._navigator.missing or 'scan'
+                    raise MotionFailedError(
+                        f'nothing came on the topic {topic} for {self._sensor_timeout:g} s',
+                        None if self.pose is None else point_of(self.pose),
+                    )
 
     def _wake(self) -> None:
         with self._stepped:
@@ -230,11 +243,14 @@ class RobotBase:
             velocity = self._navigator.see(scan, measured)
             if velocity is not None and self._navigator.task is not None:
                 self._command(velocity)
+                if self._navigator.pose is not None:
+                    self._on_step(self._navigator.pose)
             self._publish_pose(measured, stamp)
             if self.place != before:
                 self._on_place(self.place, stamp)
             self._steps += 1
-            self._stepped.notify_all()
+            if self._navigator.task is not None and self._awaited():
+                self._stepped.notify_all()
         self._tell(stamp)
 
     @contextmanager

@@ -89,7 +89,7 @@ class NavigationMotion:
         if drive.state is State.FAILED:
             raise MotionFailedError(drive.reason, end)
         report(end)
-        self._recorder.tell(self._base.place_at(end))
+        self._recorder.tell(self._base.place_at(end) if self._base.is_sure else None)
         return end
 
     def place_reached(self, goal: Points, end: Points, _run: GoalRun) -> str:
@@ -103,6 +103,8 @@ class NavigationMotion:
         Raises:
             MotionFailedError: It is not in the goal's place.
         """
+        if not self._base.is_sure:
+            raise MotionFailedError('the robot does not know in which of several places it is', end)
         wanted, place = self._base.place_at(goal), self._base.place_at(end)
         if place is None or place != wanted:
             raise MotionFailedError(f'the robot stopped in {place}: expected {wanted}', end)
