@@ -2,17 +2,20 @@
 
     python benchmarks/navigation.py [--quick] [SECTION ...]
 
-The sections are planning, control, people, kidnaps, silence, stack and pace; all by default. Every
-figure of planning stands beside its peers' from the same run.
+The sections are planning, control, people, kidnaps, silence, stack, pace and times; all by default.
+Every figure of planning stands beside its peers' from the same run.
 """
 
 from __future__ import annotations
 
 import argparse
 import itertools
+import json
 import logging
 import math
 import os
+import random
+import re
 import signal
 import statistics
 import subprocess
@@ -31,6 +34,7 @@ from typing import Any
 import networkx
 import numpy as np
 import numpy.typing as npt
+import yaml
 from geometry_msgs.msg import Twist
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
@@ -38,6 +42,7 @@ from skimage.graph import MCP_Geometric
 from whole_stack import ROOT, Stack, ros_arguments
 
 from launcher import run
+from surveillance_behaviour.policy.leg_times import PERCENTILE_99, LegTimes
 from surveillance_controllers import geometry
 from surveillance_controllers.motion.driving import Drive, State
 from surveillance_controllers.motion.localisation import Scan
@@ -659,16 +664,84 @@ def _await(condition: Callable[[], Any], patience: float, pause: float = 0.05) -
         time.sleep(pause)
 
 
+@dataclass(frozen=True)
+class Leg:
+    """One drive of a mission, in simulated seconds; `stop` is until the next decision."""
+
+    start: str
+    goal: str
+    begun: float
+    seconds: float
+    metres: float
+    stop: float
+    promised: float
+
+
+def mission(
+    place: Path, seconds: float, speed: float = 0.0, robot: dict[str, Any] | None = None
+) -> list[Leg]:
+    """Patrol a place for simulated seconds; return the drives between which nothing else came."""
+    with tempfile.TemporaryDirectory() as folder:
+        record = Path(folder) / 'mission.jsonl'
+        patrol = Stack(
+            place,
+            {
+                'simulator': {'speed': speed},
+                'robot_behavior': {'record': str(record), **(robot or {})},
+            },
+        )
+        patrol.start()
+        try:
+            _await(lambda: patrol.robot.base.travelled > 0.1, 60.0)
+            end = patrol.robot.time + seconds
+            while patrol.robot.time < end:
+                time.sleep(0.05)
+        finally:
+            patrol.close()
+        return legs_of(record)
+
+
+def legs_of(record: Path) -> list[Leg]:
+    """Return the drives in a mission's record."""
+    events = [json.loads(line) for line in record.read_text().splitlines()]
+    events = [each for each in events if each['event'] != 'exploring']
+    legs, at = [], ''
+    for decision, visit, after in zip(events, events[1:], events[2:], strict=False):
+        if decision['event'] in ('start', 'visit'):
+            at = decision['place']
+        kinds = [each['event'] for each in (decision, visit, after)]
+        if kinds != ['decision', 'visit', 'decision'] or visit['place'] != decision['place']:
+            continue
+        promised = re.search(r'no place longer than ([0-9.]+) s', after['reason'])
+        legs.append(
+            Leg(
+                at,
+                visit['place'],
+                decision['time'],
+                visit['time'] - decision['time'],
+                visit['distance'],
+                after['time'] - visit['time'],
+                float(promised[1]) if promised else math.nan,
+            )
+        )
+    return legs
+
+
 def pace(*, quick: bool) -> None:
     """Measure the simulated seconds of the same legs and stops: at full speed beside real time."""
-    seconds = 35.0 if quick else 240.0
-    measured = [legs_and_stops(speed, seconds) for speed in (0.0, 1.0)]
+    place, seconds = ROOT / 'config' / 'seven_rooms.yaml', 35.0 if quick else 240.0
+    fast, real = (mission(place, seconds, speed) for speed in (0.0, 1.0))
     rows = []
-    for what, fast, real in (
-        ('leg', *(legs for legs, _ in measured)),
-        ('stop between two drives', *(stops for _, stops in measured)),
+    for what, measure in (
+        ('leg', lambda leg: leg.seconds),
+        ('stop', lambda leg: leg.stop),
+        ('from decision to decision', lambda leg: leg.seconds + leg.stop),
     ):
-        pairs = list(zip(fast, real, strict=False))
+        pairs = [
+            (measure(quick_one), measure(slow_one))
+            for quick_one, slow_one in zip(fast, real, strict=False)
+            if (quick_one.start, quick_one.goal) == (slow_one.start, slow_one.goal)
+        ]
         ratios = [quick_one / slow_one for quick_one, slow_one in pairs]
         rows.append(
             (
@@ -681,42 +754,80 @@ def pace(*, quick: bool) -> None:
             )
         )
     table(
-        'The same mission as fast as it goes and in real time, with no exploring: simulated '
-        'seconds, medians.',
+        'The same mission as fast as it goes and in real time: simulated seconds, medians.',
         ('what', 'pairs', 'fast, s', 'real time, s', 'ratio', 'from to'),
         rows,
     )
 
 
-def legs_and_stops(speed: float, seconds: float) -> tuple[list[float], list[float]]:
-    """Return the simulated seconds of each leg, and between two drives."""
-    parameters: dict[str, dict[str, Any]] = {
-        'simulator': {'speed': speed},
-        'robot_behavior': {'exploration_seconds': 0.0},
-    }
+def times(*, quick: bool) -> None:
+    """Time of legs and the longest wait: as the mission predicts them, beside what was driven."""
+    seconds = 120.0 if quick else 700.0
+    rows = []
     with tempfile.TemporaryDirectory() as folder:
-        record = Path(folder) / 'mission.jsonl'
-        parameters['robot_behavior']['record'] = str(record)
-        patrol = Stack(ROOT / 'config' / 'seven_rooms.yaml', parameters)
-        drives: list[tuple[float, float]] = []
-        patrol.start()
-        try:
-            _await(lambda: patrol.robot.base.travelled > 0.1, 60.0)
-            moving, began = True, patrol.robot.time
-            end = began + seconds
-            while patrol.robot.time < end:
-                time.sleep(0.0005)
-                base, now = patrol.robot.base, patrol.robot.time
-                if moving and not base.is_moving:
-                    drives.append((began, now))
-                    moving = False
-                elif not moving and base.is_moving:
-                    moving, began = True, now
-        finally:
-            patrol.close()
-    legs = [end - start for start, end in drives]
-    stops = [second[0] - first[1] for first, second in itertools.pairwise(drives)]
-    return legs, stops
+        for name, place in places_to_patrol(Path(folder))[: 1 if quick else None]:
+            positions = read_world(place).plan.place.positions
+            learned = LegTimes()
+            wrong, kept = [], 0
+            legs = mission(place, seconds)
+            for leg in legs:
+                straight = math.dist(positions[leg.start][:2], positions[leg.goal][:2])
+                expected = learned.expected(leg.start, leg.goal, straight)
+                late = 1.0 + PERCENTILE_99 * learned.spread
+                wrong.append(abs(expected / leg.seconds - 1.0))
+                kept += leg.seconds <= late * expected
+                learned.observe(leg.start, leg.goal, leg.seconds, straight, leg.metres)
+            promised, longest = longest_wait(legs)
+            rows.append(
+                (
+                    name,
+                    f'{len(legs)}',
+                    f'{median(wrong):.1%}',
+                    f'{np.percentile(wrong, 90):.1%}',
+                    f'{kept / len(legs):.1%}',
+                    f'{promised:.0f}',
+                    f'{longest:.0f}',
+                    f'{longest / promised:.2f}',
+                )
+            )
+    table(
+        f'{seconds:.0f} simulated seconds of patrol: how wrong the expected time of each leg is '
+        'before it is driven,\nhow many keep to the time that 99 of 100 should keep to, and the '
+        'longest wait from visit to visit in the second half.',
+        ('place', 'legs', 'wrong by', '90 %', 'within p99', 'wait: promised', 'driven', 'ratio'),
+        rows,
+    )
+
+
+def places_to_patrol(folder: Path) -> list[tuple[str, Path]]:
+    """Return eight places, those that are generated as files in a folder."""
+    places = [(name, ROOT / 'config' / f'{name}.yaml') for name in ('seven_rooms', 'patrol_world')]
+    for name, parameters in (
+        ('grid 2x2', place_generation.grid(2, 2)),
+        ('grid 3x2', place_generation.grid(3, 2)),
+        ('ring of 6', place_generation.ring(6)),
+        ('ring of 8', place_generation.ring(8)),
+        ('tree 3x2', place_generation.tree(3, 2, random.Random(1))),
+        ('tree 3x3', place_generation.tree(3, 3, random.Random(2))),
+    ):
+        file = folder / f'{name.replace(" ", "_")}.yaml'
+        file.write_text(yaml.safe_dump({'/**': {'ros__parameters': parameters}}))
+        places.append((name, file))
+    return places
+
+
+def longest_wait(legs: Sequence[Leg]) -> tuple[float, float]:
+    """Return the longest wait that the mission promises when half is over, and the driven one."""
+    half = (legs[0].begun + legs[-1].begun) / 2
+    seen: dict[str, float] = {}
+    waits = [0.0]
+    for leg in legs:
+        arrived = leg.begun + leg.seconds
+        if leg.goal in seen and arrived > half:
+            waits.append(arrived - seen[leg.goal])
+        seen[leg.goal] = arrived + leg.stop
+    promises = [leg.promised for leg in legs if leg.begun > half and not math.isnan(leg.promised)]
+    return (median(promises) if promises else math.nan), max(waits)
 
 
 SECTIONS: dict[str, Callable[..., None]] = {
@@ -727,6 +838,7 @@ SECTIONS: dict[str, Callable[..., None]] = {
     'silence': silence,
     'stack': stack,
     'pace': pace,
+    'times': times,
 }
 
 
