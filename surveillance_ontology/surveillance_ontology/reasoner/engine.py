@@ -39,6 +39,8 @@ from surveillance_ontology.reasoner.proofs import ProofSearch
 Conflict = tuple[str, str]
 Classes = Mapping[str, Iterable[str]]
 _MOST_VALUES = 20_000
+LEAST_VALUES = 2_000
+"""So many values of literals are remembered before those that nobody asserts are forgotten."""
 BY_CASES = 'every case leads to it'
 """The origin of facts that reasoning by cases found."""
 
@@ -74,6 +76,7 @@ class Engine:
         self.equality = Equality()
         self.spelling: dict[Value, Literal] = {}
         self._values: dict[Literal, Value] = {}
+        self._most_values = LEAST_VALUES
         self.difference = Difference(program)
         self.asserted: dict[Fact, int] = {}
         self._queue: list[Fact] = []
@@ -115,12 +118,16 @@ class Engine:
         values = self._values
         value = values.get(literal)
         if value is None:
-            if len(values) > 200_000:
-                values.clear()
-                self.spelling.clear()
             value = values[literal] = value_of(literal)
             self.spelling.setdefault(value, literal)
         return value
+
+    def _forget_values(self) -> None:
+        """Keep the values that are asserted: each moment of a clock is another one."""
+        used = {fact[-1] for fact in self.asserted}
+        self._values = {text: value for text, value in self._values.items() if value in used}
+        self.spelling = {value: text for value, text in self.spelling.items() if value in used}
+        self._most_values = max(LEAST_VALUES, 2 * len(self._values))
 
     def fact_of(self, axiom: Axiom) -> Fact | None:
         """Return the fact an assertion states, in representatives; None for assertions of another
@@ -496,6 +503,8 @@ class Engine:
                 for fire in fact[0].on_insert:
                     fire(*fact[1:])
         self._propagate()
+        if len(self._values) > self._most_values:
+            self._forget_values()
 
     def adopt(self, change: ProgramChange) -> None:
         """Run another program on the facts that are there; nobody may be the same as another."""

@@ -4,6 +4,7 @@ changes.
 
 from __future__ import annotations
 
+import gc
 import random
 
 import pytest
@@ -18,9 +19,12 @@ from surveillance_ontology.owl.axioms import (
     DataPropertyAssertion,
     Declaration,
     EquivalentClasses,
+    SubDataPropertyOf,
     SymmetricObjectProperty,
     TransitiveObjectProperty,
 )
+from surveillance_ontology.owl.expressions import Literal
+from surveillance_ontology.reasoner import engine
 from surveillance_ontology.reasoner.datatypes import value_of
 from tests.ontology.reasoner.patrol_map import (
     DOOR_FACTS,
@@ -49,6 +53,26 @@ def by_value(axiom: Axiom) -> object:
     if isinstance(axiom, DataPropertyAssertion):
         return axiom.prop, axiom.subject, value_of(axiom.literal)
     return axiom
+
+
+def test_a_value_that_changes_for_ever_is_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(engine, 'LEAST_VALUES', 50)
+    xsd = 'http://www.w3.org/2001/XMLSchema#'
+    written = Literal('007', xsd + 'int')
+    kb = KnowledgeBase(IRI)
+    kb.add(SubDataPropertyOf(n('p'), n('q')))
+    kb.add(DataPropertyAssertion(n('p'), n('x'), written))
+    before = [DataPropertyAssertion(n('p'), n('y'), Literal('0', xsd + 'long'))]
+    for moment in range(1, 1000):
+        after = [DataPropertyAssertion(n('p'), n('y'), Literal(str(moment), xsd + 'long'))]
+        kb.change(after, before)
+        assert kb.reason()
+        before = after
+    # One that is asserted is written as before, also where it is derived.
+    assert DataPropertyAssertion(n('q'), n('x'), written) in set(kb.facts())
+    gc.collect()
+    kept = [each for each in gc.get_objects() if type(each) is Literal]
+    assert len([each for each in kept if each.datatype == xsd + 'long']) < 200
 
 
 def derived(kb: KnowledgeBase) -> set[object]:
