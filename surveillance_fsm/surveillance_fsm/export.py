@@ -115,15 +115,14 @@ def _entry(structure: Structure, label: str) -> tuple[str, str]:
     return (_entry(inner, first)[0] if first else path), f'cluster_{path}'
 
 
-def to_ascii(container: Container, active: Iterable[str] | None = None) -> str:
-    """Draw as an indented list for a terminal or a log.
-
-    Args:
-        container: The machine.
-        active: Paths to mark with ``>``; None marks what runs now.
-    """
+def to_ascii(container: Container) -> str:
+    """Draw as an indented list for a terminal or a log; ``>`` marks what runs now."""
     structure = structure_of(container)
-    marked = set(_active(structure) if active is None else active)
+    marked = {
+        f'{inner.path}/{label}'
+        for inner in structure.walk()
+        for label in inner.container.get_active_states()
+    }
     lines = [f'{structure.path} ({structure.kind}) ends with {", ".join(structure.outcomes)}']
     _ascii(structure, marked, lines, '')
     return '\n'.join(lines) + '\n'
@@ -147,14 +146,6 @@ def _ascii(structure: Structure, marked: set[str], lines: list[str], indent: str
         lines.append(f'{indent}{branch}{mark} {label}{kind}{flag}{f"  {leads}" if leads else ""}')
         if inner is not None:
             _ascii(inner, marked, lines, indent + ('     ' if last else '|    '))
-
-
-def _active(structure: Structure) -> list[str]:
-    return [
-        f'{inner.path}/{label}'
-        for inner in structure.walk()
-        for label in inner.container.get_active_states()
-    ]
 
 
 def _bundles(edges: Iterable[Edge]) -> list[tuple[str, str, bool, list[str]]]:

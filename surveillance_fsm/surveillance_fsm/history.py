@@ -127,17 +127,14 @@ class TransitionFeed:
     Args:
         machine: The root.
         consume: Takes each `Transition`, in order, on the feed's thread.
-        show_userdata: Whether transitions carry userdata.
     """
 
     def __init__(
         self,
         machine: Container,
         consume: Callable[[Transition], object],
-        show_userdata: bool = True,
     ) -> None:
         self._consume = consume
-        self._show_userdata = show_userdata
         self._queue: deque[RawTransition] = deque()
         self._lost: deque[None] = deque()
         self._visits: dict[tuple[str, str], int] = {}
@@ -226,7 +223,7 @@ class TransitionFeed:
             noted.kind,
             noted.time - since,
             visits,
-            presentable(noted.userdata) if self._show_userdata else {},
+            presentable(noted.userdata),
         )
 
 

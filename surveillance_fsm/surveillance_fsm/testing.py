@@ -98,16 +98,13 @@ class FakeClock:
 Scripted = str | Callable[[Any], str]
 
 
-def script(
-    machine: Container, outcomes: Mapping[str, Iterable[Scripted]], repeat_last: bool = False
-) -> None:
+def script(machine: Container, outcomes: Mapping[str, Iterable[Scripted]]) -> None:
     """Have states return given outcomes in place of doing their work.
 
     Args:
         machine: The root.
         outcomes: From paths of states to what each execution returns in turn; a function is given
-            the userdata, may write to it, and returns the outcome.
-        repeat_last: Return the last outcome for ever; otherwise running out of outcomes is an
+            the userdata, may write to it, and returns the outcome. Running out of outcomes is an
             error of the test.
 
     Raises:
@@ -126,15 +123,13 @@ def script(
                     f"State '{path}' has no outcome '{outcome}' to be scripted: its outcomes are "
                     f'{sorted(state.get_registered_outcomes())}'
                 )
-        _play(machine, path, state, turns, repeat_last)
+        _play(path, state, turns)
 
 
-def _play(
-    machine: Container, path: str, state: State, turns: deque[Scripted], repeat_last: bool
-) -> None:
+def _play(path: str, state: State, turns: deque[Scripted]) -> None:
     def execute(ud: Any) -> str:
         assert turns, f"State '{path}' is executed more often than it has scripted outcomes"
-        turn = turns[0] if repeat_last and len(turns) == 1 else turns.popleft()
+        turn = turns.popleft()
         return turn if isinstance(turn, str) else turn(ud)
 
     state.execute = execute  # type: ignore[method-assign]

@@ -106,9 +106,7 @@ class Canvas:
         corners = (*self._fine((x - radius, y - radius)), *self._fine((x + radius, y + radius)))
         self._draw.ellipse(corners, fill=colour)
 
-    def pill(
-        self, centre: Point, text: str, size: float, colour: str, text_colour: str = 'white'
-    ) -> None:
+    def pill(self, centre: Point, text: str, size: float, colour: str) -> None:
         """Write text on a rounded sign; its centre and size are in points."""
         width = self.text_width(text, size) + size * 1.1
         high = size * 1.75
@@ -121,7 +119,7 @@ class Canvas:
             radius=high / 2 * _FINE,
             fill=colour,
         )
-        self.text(centre, text, size, text_colour, anchor='mm')
+        self.text(centre, text, size, 'white', anchor='mm')
 
     def text(self, at: Point, text: str, size: float, colour: str, anchor: str = 'la') -> None:
         """Write text at a point in points; `anchor` as Pillow has it."""

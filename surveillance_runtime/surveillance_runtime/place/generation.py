@@ -24,6 +24,7 @@ ROOM = 4.0
 """Side of a room in a grid, ring or tree, metres."""
 
 DOOR_WIDTH = 1.2
+"""Width of each door, metres."""
 
 
 def place_from_rectangles(
@@ -31,7 +32,6 @@ def place_from_rectangles(
     connections: Iterable[tuple[str, str]],
     *,
     start: str,
-    door_width: float = DOOR_WIDTH,
 ) -> dict[str, Any]:
     """Return the parameters of a place whose rooms are rectangles.
 
@@ -40,7 +40,6 @@ def place_from_rectangles(
         connections: Pairs of neighbours with a door in the middle of the edge they share; the doors
             are named D1, D2, ... in this order.
         start: The place where the robot starts and charges.
-        door_width: Width of each door, metres.
 
     Raises:
         ValueError: Two connected places do not share an edge long enough for a door.
@@ -49,7 +48,7 @@ def place_from_rectangles(
     rooms: dict[str, list[str]] = {name: [] for name in rectangles}
     for number, (first, second) in enumerate(connections, start=1):
         door = f'D{number}'
-        doors[door] = _door_between(first, second, rectangles, door_width)
+        doors[door] = _door_between(first, second, rectangles)
         rooms[first].append(door)
         rooms[second].append(door)
     centres = {
@@ -186,19 +185,18 @@ def _neighbours(columns: int, rows: int) -> list[tuple[str, str]]:
     return pairs
 
 
-def _door_between(
-    first: str, second: str, rectangles: Mapping[str, Rectangle], width: float
-) -> list[float]:
+def _door_between(first: str, second: str, rectangles: Mapping[str, Rectangle]) -> list[float]:
     west_1, south_1, east_1, north_1 = rectangles[first]
     west_2, south_2, east_2, north_2 = rectangles[second]
     south, north = max(south_1, south_2), min(north_1, north_2)
     west, east = max(west_1, west_2), min(east_1, east_2)
-    if west == east and north - south > width:
-        return [west, (south + north) / 2, math.pi / 2, width]
-    if south == north and east - west > width:
-        return [(west + east) / 2, south, 0.0, width]
+    if west == east and north - south > DOOR_WIDTH:
+        return [west, (south + north) / 2, math.pi / 2, DOOR_WIDTH]
+    if south == north and east - west > DOOR_WIDTH:
+        return [(west + east) / 2, south, 0.0, DOOR_WIDTH]
     raise ValueError(
-        f'no door between {first} and {second}: expected an edge shared for more than {width} m'
+        f'no door between {first} and {second}: expected an edge shared for more than '
+        f'{DOOR_WIDTH} m'
     )
 
 

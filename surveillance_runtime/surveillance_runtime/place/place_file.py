@@ -34,14 +34,11 @@ class PlaceFile:
     plan: FloorPlan | None
 
 
-def read_place_file(
-    path: str | Path, robot_radius: float = ROBOT_RADIUS, *, walls: bool = False
-) -> PlaceFile:
-    """Read a place's file and check all that it says.
+def read_place_file(path: str | Path, *, walls: bool = False) -> PlaceFile:
+    """Read a place's file and check all that it says, also that the robot fits through the doors.
 
     Args:
         path: A parameter file whose section `/**` describes a place.
-        robot_radius: Of the robot that has to fit through the doors, metres.
         walls: Whether walls and doors must be given, as a simulated place needs them.
 
     Raises:
@@ -67,7 +64,7 @@ def read_place_file(
         if walls or any(key in file.values for key in GEOMETRY_KEYS):
             plan = FloorPlan.from_parameters(file.values)
             Regions(plan)
-            check_passable(plan, robot_radius)
+            check_passable(plan, ROBOT_RADIUS)
     except PlaceError as error:
         raise file.error(error.where, error.problem) from None
     return PlaceFile(file, place, plan)

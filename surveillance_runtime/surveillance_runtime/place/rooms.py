@@ -297,9 +297,9 @@ def _first_duplicate(names: Sequence[str]) -> str | None:
     return None
 
 
-def _shown(value: Any, limit: int = 60) -> str:
+def _shown(value: Any) -> str:
     text = repr(value)
-    return text if len(text) <= limit else text[: limit - 3] + '...'
+    return text if len(text) <= 60 else text[:57] + '...'
 
 
 def _known(what: str, names: Iterable[str], limit: int = 12) -> str:
