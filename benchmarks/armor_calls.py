@@ -3,8 +3,10 @@
     python benchmarks/armor_calls.py [--quick]
 
 Through ROS every call is measured beside a bare std_srvs/Trigger call to another process, in random
-order in one loop, so that a busy machine slows all of them alike. The caller, the armor server, the
-map builder (which subscribes to changes) and the Trigger server are processes of their own.
+order in one loop, so that a busy machine slows all of them alike. A whole visit (what changes,
+REASON, and what a decision asks, as one list) is measured at 7 and 10,000 places. The caller, the
+armor server, the map builder (which subscribes to changes) and the Trigger server are processes of
+their own.
 
 Under load: 50 clients of one process send 20 requests each at once, and answers are counted; one
 client asks while another process sends 1,000 malformed requests a second, or while a large ontology
@@ -28,9 +30,12 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
 IRI = 'http://bnc/exp-rob-lab/2022-23'
 ONTOLOGY = ROOT / 'surveillance_ontology' / 'surveillance_ontology' / 'data' / 'surveillance.owl'
 PLACE = ROOT / 'config' / 'seven_rooms.yaml'
+PLACES = (7, 10_000)
+"""Sizes of the maps of which a whole visit is measured."""
 TRIGGER = """
 from std_srvs.srv import Trigger
 from surveillance_runtime.node import PatrolNode
@@ -165,12 +170,49 @@ def _service_rows(label: str, store: Any, rounds: int) -> list[Row]:
     return [(f'{name}, {label}', milliseconds, '') for name, milliseconds in taken.items()]
 
 
+class MappedVisit:
+    """A visit on a generated map (`benchmarks/ontology.py`), as one list of directives."""
+
+    def __init__(self, client: Any, places: int, folder: Path) -> None:
+        from benchmarks.ontology import Patrol, schema
+        from surveillance_ontology import write_ontology
+
+        self._client, self._patrol = client, Patrol(places)
+        file = folder / f'{places}.nt'
+        write_ontology([*schema(), *self._patrol.assertions()], IRI, file, 'ntriples')
+        client.utils.load_ref_from_file(str(file), IRI, False, 'PELLET', True)
+
+    def __call__(self) -> None:
+        """Go to a neighbour, and ask what a decision asks."""
+        ask, patrol = self._client.request, self._patrol
+        _, come, _ = patrol.step()
+        is_in, now, visited = come
+        seen, time_now = visited.literal.lexical, now.literal.lexical
+        answer = self._client.batch(
+            [
+                ask('SET OBJECTPROP IND', 'isIn', 'Robot1', is_in.object),
+                ask('SET DATAPROP IND', 'now', 'Robot1', 'LONG', time_now),
+                ask('SET DATAPROP IND', 'visitedAt', visited.subject, 'LONG', seen),
+                ask('REASON'),
+                ask('QUERY OBJECTPROP IND', 'canReach', 'Robot1'),
+                ask('QUERY IND CLASS', 'URGENT'),
+                ask('QUERY IND CLASS', 'CORRIDOR'),
+                ask('QUERY OBJECTPROP IND', 'isIn', 'Robot1'),
+            ]
+        )
+        assert answer.success, answer
+        assert len(answer.responses[4].queried_objects) == len(patrol.beyond[patrol.place])
+
+
 @contextmanager
-def servers() -> Any:
-    """Provide the processes that answer."""
+def servers(folder: Path) -> Any:
+    """Provide the processes that answer; the armor server reads ontologies in a folder."""
     module = 'surveillance_ontology.'
     arguments = [
-        ['-m', module + 'armor_server_node', '--ros-args', '-p', 'store:=none'],
+        [
+            *('-m', module + 'armor_server_node', '--ros-args', '-p', 'store:=none'),
+            *('-p', f'ontologies_folder:={folder}'),
+        ],
         ['-m', module + 'ontology_map_builder_node', '--ros-args', '--params-file', str(PLACE)],
         ['-c', TRIGGER],
     ]
@@ -200,7 +242,7 @@ def through_ros(rounds: int) -> list[Row]:
     from surveillance_runtime.testing import claim_domain
 
     os.environ['ROS_DOMAIN_ID'] = str(claim_domain())
-    with servers():
+    with tempfile.TemporaryDirectory() as folder, servers(Path(folder)):
         rclpy.init()
         node = PatrolNode('benchmark')
         spinner = ExecutorThread()
@@ -211,10 +253,18 @@ def through_ros(rounds: int) -> list[Row]:
             client = ArmorClient(node, 'benchmark', names.call(ReferenceName.Request(), 30.0).name)
             bare = ServiceCaller(node, Trigger, 'bare')
             bare.call(Trigger.Request(), 30.0)
+            maps = [
+                ArmorClient(node, 'benchmark', f'{places} places', timeout=120.0)
+                for places in PLACES
+            ]
             batch = [client.request('QUERY IND CLASS', 'ROOM')] * 100
             calls: dict[str, Callable[[], Any]] = {
                 'bare Trigger': lambda: bare.call(Trigger.Request(), 5.0),
                 **single_calls(client),
+                **{
+                    f'one visit, {places} places': MappedVisit(mapped, places, Path(folder))
+                    for places, mapped in zip(PLACES, maps, strict=True)
+                },
             }
             taken = medians(calls, rounds)
             taken |= medians({'batch of 100 queries': lambda: client.batch(batch)}, 20)

@@ -169,6 +169,20 @@ def test_a_justification_is_enough_and_no_axiom_of_it_is_spare() -> None:
             assert not holds_in([axiom for axiom in axioms if axiom != spare], fact)
 
 
+def test_an_explanation_that_took_too_long_to_shorten_says_so() -> None:
+    kb = seven_rooms()
+    fact = SubClassOf(n('CORRIDOR'), n('LOCATION'))
+    short = kb.explain(fact)
+    kb.patience = -1.0
+    long = kb.explain(fact)
+    assert short is not None
+    assert long is not None
+    assert short.because == 'these axioms together'
+    assert long.because == 'these axioms together, perhaps not all of them'
+    assert set(long.sources()) > set(short.sources())
+    assert holds_in(long.sources(), fact)
+
+
 def test_a_contradiction_has_a_justification() -> None:
     kb = seven_rooms(link('isIn', 'Robot1', 'C1'))
     axioms = kb.justification(None)
