@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import shutil
 import sys
+import time
 from collections.abc import Sequence
 from functools import partial
 from typing import Any, TextIO
@@ -49,6 +50,7 @@ class ConsoleNode(PatrolNode):
             minimum=0.1,
             maximum=3600.0,
         )
+        self._timeout = timeout
         self._actions = MissionActions(self, timeout)
         self._feed = MissionFeed(self, FEED_PERIOD)
         for name in CONTROLLED:
@@ -81,9 +83,11 @@ class ConsoleNode(PatrolNode):
                 _tell(each.text, each.who)
 
     def _why(self) -> str:
-        snapshot = self._feed.snapshot
-        if snapshot.decision is None:
-            return 'no decision yet'
+        deadline = time.monotonic() + self._timeout
+        while (snapshot := self._feed.snapshot).decision is None:
+            # The feed of a console that was just opened has not heard of it yet.
+            if time.monotonic() > deadline or self.stopping.wait(FEED_PERIOD):
+                return 'no decision yet'
         return f'{decision_line(snapshot)}\n{snapshot.decision.reason}'
 
 

@@ -18,12 +18,12 @@ from PIL import Image
 
 from surveillance_behaviour.policy.policies import POLICIES
 from surveillance_operator.regions import OCCUPIED, regions
-from surveillance_operator.snapshot import Grid, Health, Snapshot
+from surveillance_operator.snapshot import NO_POINTS, Grid, Health, Snapshot
 
 Parts = dict[str, Any]
 
 MOST_TRAIL = 600
-"""Points of the trail in a whole frame."""
+"""Points of the trail that viewers are shown, the newest."""
 
 
 def _points(points: NDArray[np.float64] | None) -> list[list[float]]:
@@ -74,7 +74,7 @@ def _status(snapshot: Snapshot) -> Any:
         'state': status.state,
         'since': status.since,
         'place': status.place,
-        'heading_to': status.heading_to,
+        'whereabouts': status.whereabouts,
         'help': status.waiting_for_help,
         'text': status.text,
         'avoided': list(status.avoided),
@@ -267,7 +267,5 @@ class Framer:
 
     def whole(self) -> Parts:
         """Return all parts, and the trail, which patches leave to whoever follows the pose."""
-        trail = self._last.trail if self._last is not None else None
-        if trail is not None and len(trail) > MOST_TRAIL:
-            trail = trail[:: -(-len(trail) // MOST_TRAIL)]
-        return {**self.parts, 'trail': _points(trail)}
+        trail = NO_POINTS if self._last is None else self._last.trail
+        return {**self.parts, 'trail': _points(trail[-MOST_TRAIL:])}

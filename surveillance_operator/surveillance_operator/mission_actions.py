@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import re
+import time
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
@@ -16,7 +17,7 @@ from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
 from std_srvs.srv import Trigger
 
-from surveillance_fsm.ros import CallError, ServiceCaller
+from surveillance_fsm.ros import CallError, ServiceCaller, UnavailableError
 from surveillance_interfaces.srv import (
     AddRoom,
     ConsoleCommand,
@@ -40,6 +41,8 @@ from surveillance_ontology.patrol_ontology import facts_of
 from surveillance_operator.topics import BEHAVIOUR, CONTROLLERS
 from surveillance_runtime.node import PatrolNode
 
+_DISCOVERY = 2.0
+"""Seconds in which a node that has just started finds the services that there are."""
 _NAME = re.compile(r'[A-Za-z]\w{0,63}\Z', re.ASCII)
 
 
@@ -55,6 +58,10 @@ class NoAnswerError(ActionError, LookupError):
     """The node that should do it is not there, or does not answer."""
 
 
+class NoServerError(NoAnswerError):
+    """This kind of mission does not have the service."""
+
+
 class MissionActions:
     """Calls the services of a mission.
 
@@ -68,6 +75,7 @@ class MissionActions:
         self._timeout = timeout
         self._callers: dict[str, ServiceCaller] = {}
         self._armor: ArmorClient | None = None
+        self._found_by = time.monotonic() + min(_DISCOVERY, timeout)
         for kind, name in (
             (SetDoor, 'simulation/set_door'),
             (SetDoor, 'ontology_map/set_door'),
@@ -88,9 +96,11 @@ class MissionActions:
 
     def set_door(self, door: str, is_open: bool) -> str:
         """Open or close a door: a simulated one, or else as the map has it."""
-        simulated = self._callers['simulation/set_door'].is_ready()
-        service = 'simulation/set_door' if simulated else 'ontology_map/set_door'
-        return self._told(service, SetDoor.Request(door=_name(door), open=is_open))
+        request = SetDoor.Request(door=_name(door), open=is_open)
+        try:
+            return self._told('simulation/set_door', request)
+        except NoServerError:
+            return self._told('ontology_map/set_door', request)
 
     def place_obstacle(self, name: str, x: float, y: float, radius: float) -> str:
         """Put a cylinder in the simulated robot's way, metres."""
@@ -222,11 +232,12 @@ class MissionActions:
 
     def _call(self, service: str, request: Any) -> Any:
         caller = self._callers[service]
+        # Nobody waits for a service that this kind of mission does not have.
+        discovery = max(min(0.5, self._timeout), self._found_by - time.monotonic())
         try:
-            # Nobody waits for a service that this kind of mission does not have.
-            return caller.call(
-                request, self._timeout, self._node.stopping, discovery=min(0.5, self._timeout)
-            )
+            return caller.call(request, self._timeout, self._node.stopping, discovery=discovery)
+        except UnavailableError as error:
+            raise NoServerError(str(error)) from None
         except CallError as error:
             raise NoAnswerError(str(error)) from None
 

@@ -55,6 +55,8 @@ PLANNER = 'planner_controller'
 POSE_TYPE = 'geometry_msgs/msg/PoseWithCovarianceStamped'
 OBSERVERS = ('mission_', 'console')
 """How the names of nodes begin that only look on."""
+TERMINALS = ('mission_view', 'console')
+"""The nodes of a person's terminal: that they are gone is no fault."""
 
 
 class MissionFeed:
@@ -217,13 +219,16 @@ class MissionFeed:
     def _note_silent(self) -> None:
         """Mark the nodes whose own reports have ceased."""
         now = time.monotonic()
-        silent = {
-            name: replace(each, level=3, message=f'silent, last: {each.message}')
-            for name, each in self._snapshot.health.items()
-            if each.level != 3 and now - each.heard > STALE_AFTER
-        }
-        if silent:
-            self.update(lambda old: replace(old, health={**old.health, **silent}), begins=False)
+        health = dict(self._snapshot.health)
+        for name, each in self._snapshot.health.items():
+            if each.level == 3 or now - each.heard <= STALE_AFTER:
+                continue
+            if is_terminal(name):
+                del health[name]
+            else:
+                health[name] = replace(each, level=3, message=f'silent, last: {each.message}')
+        if health != self._snapshot.health:
+            self.update(lambda old: replace(old, health=health), begins=False)
 
     def _now(self) -> float:
         if self._clock_time is not None:
@@ -389,6 +394,11 @@ class _OtherRobots:
                 with contextlib.suppress(ValueError):
                     came[robot] = conversions.pose_from(taken[0].pose.pose)
         return came
+
+
+def is_terminal(name: str) -> bool:
+    """Tell whether a part of this name, which reports on `/diagnostics`, is a person's terminal."""
+    return name.rpartition('/')[2].partition(':')[0] in TERMINALS
 
 
 def _mismatch(reason: str) -> str:

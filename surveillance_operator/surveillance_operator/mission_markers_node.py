@@ -18,7 +18,7 @@ from std_msgs.msg import ColorRGBA, String
 from visualization_msgs.msg import Marker, MarkerArray
 
 from surveillance_operator.conversions import MOST_NAMES, URGENT_MARK
-from surveillance_operator.mission_feed import MissionFeed
+from surveillance_operator.mission_feed import MissionFeed, is_terminal
 from surveillance_operator.robot_description import urdf
 from surveillance_operator.snapshot import Snapshot
 from surveillance_runtime.diagnostics import STALE_AFTER, TOPIC
@@ -28,6 +28,8 @@ from surveillance_runtime.qos import STATE_QOS
 
 PERIOD = 1.0
 """Seconds between two messages."""
+PATH_PERIOD = 5.0
+"""Seconds between two of the way driven, which is long."""
 FRESH, LATE = (0.81, 0.89, 0.97), (0.88, 0.48, 0.12)
 """Colours of a place that was just visited, and of one over its threshold."""
 
@@ -55,10 +57,13 @@ class MissionMarkers(PatrolNode):
         self.spawn(self._work, 'markers')
 
     def _work(self) -> None:
+        drawn, due = None, 0.0
         while not self.stopping.wait(PERIOD):
             snapshot = self._feed.see()
             self._markers.publish(markers_of(snapshot, self.get_clock().now().to_msg()))
-            self._driven.publish(path_of(snapshot, self.get_clock().now().to_msg()))
+            if snapshot.trail is not drawn and time.monotonic() >= due:
+                drawn, due = snapshot.trail, time.monotonic() + PATH_PERIOD
+                self._driven.publish(path_of(snapshot, self.get_clock().now().to_msg()))
             if silent := self._silent(snapshot):
                 message = DiagnosticArray(status=silent)
                 message.header.stamp = self.get_clock().now().to_msg()
@@ -82,7 +87,7 @@ class MissionMarkers(PatrolNode):
                 hardware_id=hardware,
             )
             for name, (at, hardware) in sorted(self._reports.items())
-            if at < late
+            if at < late and not is_terminal(name)
         ]
 
 

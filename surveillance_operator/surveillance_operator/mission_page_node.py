@@ -96,6 +96,7 @@ class MissionPage(PatrolNode):
             'add_room': lambda g: actions.add_room(g['name'], g['x'], g['y'], list(g['doors'])),
             'remove_room': lambda g: actions.remove_room(g['name']),
             'go': lambda g: actions.go_to(str(g['place'])),
+            'arm': lambda g: actions.move_arm(str(g['pose'])),
             'machine': lambda g: actions.machine(str(g['word'])),
             'threshold': lambda g: actions.set_threshold(g['seconds']),
             'policy': lambda g: actions.set_policy(str(g['policy'])),

@@ -7,7 +7,7 @@ import sys
 import time
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
-from itertools import pairwise
+from itertools import groupby, pairwise
 from pathlib import Path
 
 from surveillance_behaviour.mission import mission_log
@@ -174,13 +174,10 @@ def _page(folder: Path, events: Sequence[Event], drawn: str, bound: float | None
         if not found:
             body.append(f'<h2>{title} (0)</h2>')
             continue
-        rows = [
-            [_clock(event.time - start), *(_cell(event.fields[key]) for key in columns)]
-            for event in found[:MOST_LINES]
-        ]
-        table = _table(['at', *columns], rows)
-        if len(found) > MOST_LINES:
-            table += f'<p>and {len(found) - MOST_LINES} more: see {RECORD}.</p>'
+        rows = _rows(found, columns, start)
+        table = _table(['at', *columns], rows[:MOST_LINES])
+        if len(rows) > MOST_LINES:
+            table += f'<p>and {len(rows) - MOST_LINES} more: see {RECORD}.</p>'
         opened = ' open' if is_open else ''
         head = f'<summary>{title} ({len(found)})</summary>'
         body.append(f'<details{opened}>{head}{table}</details>')
@@ -257,6 +254,16 @@ def _strip(times: Iterable[float], threshold: float | None, start: float, end: f
         '<svg viewBox="0 0 600 30" preserveAspectRatio="none" aria-hidden="true">'
         f'<polygon class="strip" points="{" ".join(points)}"/>{limit}</svg>'
     )
+
+
+def _rows(found: Sequence[Event], columns: Sequence[str], start: float) -> list[list[str]]:
+    """Return a row for each event; equal ones that follow each other share one."""
+    rows = []
+    for cells, group in groupby(found, lambda event: [_cell(event.fields[k]) for k in columns]):
+        first, *more = (_clock(event.time - start) for event in group)
+        again = f' ({len(more) + 1} times until {more[-1]})' if more else ''
+        rows.append([first, *cells[:-1], cells[-1] + again])
+    return rows
 
 
 def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

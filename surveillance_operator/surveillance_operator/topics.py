@@ -41,7 +41,7 @@ from surveillance_runtime.conversions import seconds_of
 from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.robot_arm import ARM
 
-TRAIL_STEP, TRAIL_POINTS = 0.05, 3000
+TRAIL_STEP, TRAIL_POINTS = 0.1, 1000
 """Least distance of two points of the trail, metres, and how many are kept."""
 KEPT_TRANSITIONS = 60
 SAME_MOMENT = 0.03
@@ -54,7 +54,7 @@ STILL = 0.01
 POSE_TOPIC = 'amcl_pose'
 DETECTIONS_TOPIC = 'aruco_detector/detections'
 BEHAVIOUR = 'robot_behavior'
-CONTROLLERS = ('battery_controller', 'planner_controller', 'motion_controller', 'arm_controller')
+CONTROLLERS = ('battery_controller', 'planner_controller', 'motion_controller')
 
 _QUEUE = QoSProfile(
     depth=200, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
@@ -102,7 +102,7 @@ def moved(pose: Pose, old: Snapshot) -> Fields:
     """Return the fields that a new pose changes: the pose, and the trail."""
     trail = old.trail
     if not len(trail) or math.dist(trail[-1], pose[:2]) >= TRAIL_STEP:
-        trail = np.vstack([trail[-TRAIL_POINTS:], pose[:2]])
+        trail = np.vstack([trail[1 - TRAIL_POINTS :], pose[:2]])
     return {'pose': pose, 'trail': trail}
 
 

@@ -55,6 +55,18 @@ def test_a_door_of_a_simulation_is_moved_and_else_told_to_the_map(
     assert (told[0].door, told[0].open, moved[0].open) == ('D1', False, True)
 
 
+def test_a_simulated_door_is_moved_by_whoever_has_just_started(
+    graph: Any, actions: MissionActions
+) -> None:
+    told = serve(graph, SetDoor, 'ontology_map/set_door', success=True, message='known')
+    graph.until(lambda: actions._callers['ontology_map/set_door'].is_ready())
+    with ThreadPoolExecutor(1) as pool:
+        answer = pool.submit(actions.set_door, 'D1', True)
+        serve(graph, SetDoor, 'simulation/set_door', success=True, message='moved')
+        assert answer.result(10.0) == 'moved'
+    assert told == []
+
+
 def test_a_refusal_is_said_in_the_words_of_the_node(graph: Any, actions: MissionActions) -> None:
     serve(graph, GoTo, 'go_to', success=False, message='no place is called R9')
     serve(graph, WhyNot, 'why_not', success=True, message='R3 can wait', premises=['URGENT(R3)'])

@@ -54,6 +54,7 @@ def test_the_map_shows_the_robot_moving(viewer: Viewer) -> None:
     viewer.until(lambda: 'L' in viewer.attribute('path.plan', 'd'))
     viewer.changes(lambda: viewer.attribute('path.driven', 'd'))
     assert viewer.count('.door') == 7
+    assert viewer.count('.door-name') == 7
     assert viewer.text('#connection') == 'live'
 
 
@@ -84,9 +85,9 @@ def test_the_machine_is_drawn_and_lit(viewer: Viewer) -> None:
 
 def test_the_strips_of_time_run(viewer: Viewer) -> None:
     assert viewer.count('[data-strip]') == 9
-    viewer.changes(lambda: viewer.text('[data-value=R1]'))
+    viewer.changes(lambda: viewer.text('[data-value=E]'))
     viewer.until(lambda: '%' in viewer.text('[data-value=battery]'))
-    viewer.until(lambda: 'L' in viewer.attribute('[data-strip=R1] .fill', 'd'))
+    assert 'L' in viewer.attribute('[data-strip=E] .fill', 'd')
 
 
 def test_every_node_is_seen_to_be_up(viewer: Viewer) -> None:

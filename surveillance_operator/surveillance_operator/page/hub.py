@@ -11,7 +11,7 @@ import json
 import threading
 from collections.abc import AsyncIterator
 
-from surveillance_operator.frames import PARTS, Framer, Parts
+from surveillance_operator.frames import MOST_TRAIL, PARTS, Framer, Parts
 from surveillance_operator.snapshot import Snapshot
 
 LEAST_PERIOD = 0.015
@@ -68,6 +68,7 @@ class Hub:
                 parts['trail'] = self._trail
             elif self._trail is not None and parts.get('pose'):
                 self._trail.append(parts['pose'][:2])
+                del self._trail[:-MOST_TRAIL]
             self._accept(parts)
         self._rouse()
 

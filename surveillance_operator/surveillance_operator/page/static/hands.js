@@ -1,23 +1,30 @@
-// What a person may do: each form says what came of it.
+// What a person may do: one line for each thing, and what came of it above them.
 import {$, h, act} from './dom.js';
 
+// An example of each controller's commands.
 const COMMANDS = {
   battery_controller: 'battery set 50',
-  planner_controller: 'plan set [[10,8,0]]',
+  planner_controller: 'plan set []',
   motion_controller: 'move 2 0',
-  arm_controller: 'status',
 };
+const POSES = ['left', 'home', 'right', 'back', 'stop'];
 
-const select = (name, ...options) => h('select', {name}, ...options.map((value) => h('option', {value}, value)));
-const labelled = (text, input) => h('label', {}, text, input);
-const number = (name, text, value = '') => labelled(text, h('input', {name, value, inputmode: 'decimal', required: true}));
-const word = (name, text, value, long = false) =>
-  labelled(text, h('input', {name, value, class: long ? 'long' : null, required: true, autocomplete: 'off'}));
+const select = (name, label, ...options) =>
+  h('select', {name, 'aria-label': label}, ...options.map((value) => h('option', {value}, value)));
+const input = (name, text, value, attributes = {}) =>
+  h('label', {}, text, h('input', {name, value, required: true, autocomplete: 'off', ...attributes}));
+const number = (name, text, value = '') => input(name, text, value, {inputmode: 'decimal', class: 'short'});
 
 function offer(list, names) {
   const chosen = list.value;
   list.replaceChildren(...names.map((name) => h('option', {value: name}, name)));
   if (names.includes(chosen)) list.value = chosen;
+}
+
+// A setting as the mission has it now, unless a person is changing it.
+function follow(field, value) {
+  if (value === undefined || value === null || field.dataset.known === String(value) || document.activeElement === field) return;
+  field.dataset.known = field.value = value;
 }
 
 export class Hands {
@@ -30,51 +37,46 @@ export class Hands {
         $('machine-answer').textContent = (await act('machine', {word: button.dataset.machine})).text;
       });
     }
-    this.place = select('place');
-    this.door = select('door');
-    this.room = select('name');
-    this.policy = select('policy');
-    this.controller = select('controller', ...Object.keys(COMMANDS));
-    this.x = number('x', 'x [m]');
-    this.y = number('y', 'y [m]');
-    this.threshold = number('seconds', 'Threshold [s]');
-    this.requests = h('pre', {id: 'requests'}, '');
-    this.current = {};
+    this.place = select('place', 'Place');
+    this.door = select('door', 'Door');
+    this.room = select('name', 'Room');
+    this.policy = select('policy', 'Policy');
+    this.controller = select('controller', 'Controller', ...Object.keys(COMMANDS));
+    this.command = h('input', {name: 'line', value: COMMANDS.battery_controller, class: 'long', required: true, autocomplete: 'off', 'aria-label': 'Command'});
+    this.seconds = h('input', {name: 'seconds', inputmode: 'decimal', required: true, class: 'short', 'aria-label': 'Threshold in seconds'});
+    this.requests = h('pre', {id: 'requests', role: 'status'}, '');
+    this.point = this.form('Point', [number('x', 'x [m]'), number('y', 'y [m]'), h('span', {class: 'note'}, 'or click the map')], []);
+    this.answer = this.form('Command', [this.requests, this.controller, this.command], [['Send', 'command', (g) => g]]);
+    this.arm = this.form('Arm', [select('pose', 'Pose', ...POSES)], [['Move', 'arm', (g) => g]]);
+    this.obstacle = this.form('Obstacle', [input('name', 'name', 'box', {class: 'short'}), number('radius', 'radius [m]', '0.3')],
+      [['Place', 'obstacle', (g) => ({name: g.name, ...this.at(), radius: +g.radius}), this.point],
+        ['Take away', 'remove_obstacle', (g) => ({name: g.name})]]);
     $('hands-body').append(
-      this.form('Robot', [labelled('Place', this.place)],
-        [['Go there', 'go', (g) => ({place: g.place})], ['Call it home', 'go', () => ({place: ''})]]),
-      this.form('Door', [labelled('Door', this.door)],
-        [['Open', 'door', (g) => ({door: g.door, open: true})], ['Close', 'door', (g) => ({door: g.door, open: false})]]),
-      this.form('Urgency', [this.threshold], [['Set', 'threshold', (g) => ({seconds: +g.seconds})]]),
-      this.form('Choice of places', [labelled('Policy', this.policy)], [['Set', 'policy', (g) => ({policy: g.policy})]]),
-      this.form('Obstacle: a click on the map fills in x and y',
-        [word('name', 'Name', 'box'), this.x, this.y, number('radius', 'radius [m]', '0.3')],
-        [['Place', 'obstacle', (g) => ({name: g.name, x: +g.x, y: +g.y, radius: +g.radius})],
-          ['Take away', 'remove_obstacle', (g) => ({name: g.name}), true]]),
-      this.form('New room: at x and y above', [word('name', 'Name', 'R9'), word('doors', 'Doors', 'D1')],
-        [['Add', 'add_room', (g) => ({name: g.name, ...this.point(), doors: g.doors.split(/[ ,]+/).filter(Boolean)})]]),
-      this.form('Room', [labelled('Room', this.room)], [['Remove', 'remove_room', (g) => ({name: g.name})]]),
-      this.form('Controllers: answers in mode MANUAL',
-        [labelled('Controller', this.controller), word('line', 'Command', COMMANDS.battery_controller, true)],
-        [['Send', 'command', (g) => g]], this.requests),
+      this.form('Robot', [this.place], [['Go there', 'go', (g) => ({place: g.place})], ['Call it home', 'go', () => ({place: ''})]]),
+      this.form('Door', [this.door], [['Open', 'door', (g) => ({door: g.door, open: true})], ['Close', 'door', (g) => ({door: g.door, open: false})]]),
+      this.form('Threshold', [this.seconds, h('span', {}, 's')], [['Set', 'threshold', (g) => ({seconds: +g.seconds})]]),
+      this.form('Policy', [this.policy], [['Set', 'policy', (g) => ({policy: g.policy})]]),
+      this.arm,
+      this.form('Room', [this.room], [['Remove', 'remove_room', (g) => ({name: g.name})]]),
+      this.point,
+      this.form('New room', [input('name', 'name', 'R9', {class: 'short'}), input('doors', 'doors', 'D1', {class: 'short'})],
+        [['Add', 'add_room', (g) => ({name: g.name, ...this.at(), doors: g.doors.split(/[ ,]+/).filter(Boolean)}), this.point]]),
+      this.obstacle,
+      this.answer,
     );
-    this.controller.addEventListener('change', () => {
-      this.controller.form.elements.line.value = COMMANDS[this.controller.value];
-    });
+    this.controller.addEventListener('change', () => { this.command.value = COMMANDS[this.controller.value]; });
   }
 
-  // Buttons: label, action, its fields from the form's, whether the form may be incomplete.
-  form(title, fields, buttons, more) {
-    const form = h('form', {onsubmit: (event) => event.preventDefault()});
-    const done = async (name, fieldsOf, incomplete) => {
-      if (!incomplete && !form.reportValidity()) return;
+  // Buttons: label, action, its fields from the form's, another form that it reads, too.
+  form(title, fields, buttons) {
+    const form = h('form', {'aria-label': title, onsubmit: (event) => event.preventDefault()});
+    const pressed = buttons.map(([label, name, fieldsOf, other]) => h('button', {type: 'button', 'data-act': name, onclick: async () => {
+      if (![form, other].every((each) => !each || each.reportValidity())) return;
       const found = await act(name, fieldsOf(Object.fromEntries(new FormData(form))));
       $('done').textContent = (found.ok ? '✓ ' : '✗ ') + found.text;
       $('done').className = found.ok ? 'ok' : 'warn';
-    };
-    const pressed = buttons.map(([label, name, fieldsOf, incomplete]) =>
-      h('button', {type: 'button', 'data-act': name, onclick: () => done(name, fieldsOf, incomplete)}, label));
-    form.append(h('fieldset', {}, h('legend', {}, title), more ?? null, h('div', {class: 'row'}, ...fields, ...pressed)));
+    }}, label));
+    form.append(h('b', {}, title), h('div', {class: 'row'}, ...fields, ...pressed));
     return form;
   }
 
@@ -82,22 +84,18 @@ export class Hands {
     if (this.may) this.place.value = place;
   }
 
-  point(at) {
-    if (!this.may) return {};
-    const [x, y] = [this.x, this.y].map((label) => label.querySelector('input'));
-    if (at) [x.value, y.value] = at;
-    return {x: +x.value, y: +y.value};
+  pick([x, y]) {
+    if (this.may) Object.assign(this.point.elements.x, {value: x}), Object.assign(this.point.elements.y, {value: y});
   }
 
-  // A setting as the mission has it now, unless a person is changing it.
-  follow(name, input, value) {
-    if (value === undefined || value === null || this.current[name] === value || document.activeElement === input) return;
-    this.current[name] = input.value = value;
+  at() {
+    return {x: +this.point.elements.x.value, y: +this.point.elements.y.value};
   }
 
+  // Offers what this mission has, and shows what its controllers wait for.
   show() {
     if (!this.may) return;
-    const {places, doors, mission, requests} = this.state;
+    const {places, doors, mission, requests, health} = this.state;
     const names = JSON.stringify([Object.keys(places ?? {}), Object.keys(doors ?? {}), mission?.policies]);
     if (names !== this.names) {
       this.names = names;
@@ -105,9 +103,22 @@ export class Hands {
       offer(this.room, Object.keys(places ?? {}));
       offer(this.door, Object.keys(doors ?? {}));
       offer(this.policy, mission?.policies ?? []);
+      for (const list of [this.place, this.room, this.door]) list.form.hidden = !list.options.length;
     }
-    this.follow('policy', this.policy, mission?.policy || null);
-    this.follow('threshold', this.threshold.querySelector('input'), mission?.threshold);
-    this.requests.textContent = Object.entries(requests ?? {}).map(([name, text]) => `${name}: ${text}`).join('\n');
+    follow(this.policy, mission?.policy || null);
+    follow(this.seconds, mission?.threshold);
+    if (mission?.mode === 'MANUAL' && this.answer.previousSibling) $('hands-body').prepend(this.answer);
+    this.arm.hidden = !health?.nodes?.arm_controller;
+    this.obstacle.hidden = !health?.nodes?.simulator;
+    const waiting = Object.entries(requests ?? {}).filter(([, text]) => text);
+    const text = waiting.map(([name, said]) => `${name}: ${said}`).join('\n');
+    if (text === this.requests.textContent) return;
+    this.requests.textContent = text;
+    const [asking] = waiting.filter(([name, said]) => said.includes('Answer with') && said !== this.before?.[name]).map(([name]) => name);
+    this.before = {...requests};
+    if (asking && document.activeElement !== this.command) {
+      this.controller.value = asking;
+      this.command.value = COMMANDS[asking];
+    }
   }
 }

@@ -15,9 +15,10 @@ function row(name, node, own) {
   const {text, bad} = words(node);
   const again = Math.max(node.restarts ?? 0, Number(own.restarts) || 0);
   const sign = node.up ? (bad ? '▲' : '●') : '✗';
+  // What is wrong has room below the name.
   return h('tr', {class: node.up ? 'up' : 'down'},
-    h('th', {scope: 'row'}, h('b', {class: bad ? 'warn' : 'ok'}, `${sign} `), name),
-    h('td', {class: bad ? 'warn' : null}, text),
+    h('th', {scope: 'row', colspan: bad ? 2 : null}, h('b', {class: bad ? 'warn' : 'ok'}, `${sign} `), name, bad ? h('div', {class: 'warn'}, text) : null),
+    bad ? null : h('td', {}, text),
     h('td', {class: 'n'}, own.memory_mb ?? '–'),
     h('td', {class: again ? 'n warn' : 'n'}, String(again)));
 }

@@ -1,5 +1,5 @@
 // Follows the mission's events and hands each part to those who show it.
-import {$, h, age} from './dom.js';
+import {$, h} from './dom.js';
 import {MapView} from './map.js';
 import {drawMachine, lightMachine} from './machine.js';
 import {drawStrips} from './time.js';
@@ -16,7 +16,7 @@ const replaying = root.dataset.kind === 'replay';
 
 const why = new Why(state);
 const hands = new Hands(state, may && !replaying);
-const map = new MapView($('map'), (place) => { why.choose(place); hands.choose(place); }, (point) => hands.point(point));
+const map = new MapView($('map'), (place) => { why.choose(place); hands.choose(place); }, (point) => hands.pick(point));
 const replay = replaying ? new Replay() : null;
 window.mission = {state, now, received: 0};
 
@@ -35,24 +35,30 @@ function header() {
   set('title', status ? `${status.machine}${mission?.mode ? ' · ' + mission.mode : ''}` : 'no mission yet');
   document.title = status ? `${status.place || '?'} · ${status.machine}` : 'Mission';
   const ended = mission && !mission.running && status ? ' · the mission has ended' : '';
-  const where = status ? (status.heading_to && status.heading_to !== status.place ? `in ${status.place || '?'} → ${status.heading_to}` : `in ${status.place || '?'}`) : `waiting on ${mission?.where ?? ''}`;
+  const where = status ? status.whereabouts : `waiting on ${mission?.where ?? ''}`;
   set('state', `${status?.state ? status.state + ' · ' : ''}${where}${status?.text ? ' · ' + status.text : ''}${ended}`);
   $('state').classList.toggle('warn', Boolean(status?.help));
   set('battery', battery ? `battery ${Math.round(battery.level)} %${battery.low ? ' (low)' : ''}` : 'battery –');
   $('battery').classList.toggle('warn', Boolean(battery?.low));
 }
 
+function list(id, lines) {
+  $(id).replaceChildren(...lines.map(([at, text]) => h('li', {}, h('time', {}, at), text)));
+  if (!lines.length) $(id).append(h('li', {}, 'none yet'));
+}
+
 function lists() {
   const {events, markers, transitions} = state;
-  $('events').replaceChildren(...(events ?? []).toReversed().map(([at, text]) => h('li', {}, h('time', {}, at), text)));
+  list('events', (events ?? []).toReversed().map(([at, text]) => [at, text]));
   $('markers').replaceChildren(...(markers?.seen ?? []).map(([id, known, confirmed, confidence]) =>
     h('li', {}, `marker ${id}${confirmed ? ', confirmed' : ''}${known ? '' : ', not on the list'}, confidence ${confidence}`)));
   $('markers').hidden = !markers?.seen?.length;
   set('scan', markers?.progress ? `scan: view ${markers.progress[0]} of ${markers.progress[1]}` : '');
-  $('transitions').replaceChildren(...(transitions ?? []).toReversed().slice(0, 12).map((each) =>
-    h('li', {}, h('time', {}, `${each[6].toFixed(1)} s`), `${each[3]} –${each[4]}→ ${each[5]}`)));
+  list('transitions', (transitions ?? []).toReversed().slice(0, 12).map((each) =>
+    [`${each[6].toFixed(1)} s`, `${each[3]} –${each[4]}→ ${each[5]}`]));
 }
 
+const MOST_TRAIL = 600;
 const MAP_PARTS = ['status', 'grid', 'places', 'regions', 'links', 'doors', 'plan', 'scan', 'obstacles', 'pose', 'trail', 'mission', 'markers', 'others'];
 const SHOW = {
   header: [['status', 'mission', 'battery'], header],
@@ -64,7 +70,7 @@ const SHOW = {
     lightMachine($('machine'), state.active?.paths ?? [], state.transitions ?? []);
     $('paused').hidden = !state.active?.paused;
   }],
-  hands: [['places', 'doors', 'mission', 'requests'], () => hands.show()],
+  hands: [['places', 'doors', 'mission', 'requests', 'health'], () => hands.show()],
   strips: [['history', 'places', 'mission'], () => drawStrips($('strips'), state, now())],
   map: [MAP_PARTS, (parts) => map.show(state, parts, now())],
 };
@@ -80,7 +86,8 @@ function receive(message) {
   if (message.whole) for (const name of Object.keys(state)) delete state[name];
   if (parts.pose && !parts.trail && state.trail) {
     const last = state.trail.at(-1);
-    if (!last || Math.hypot(last[0] - parts.pose[0], last[1] - parts.pose[1]) > 0.1) { state.trail.push(parts.pose.slice(0, 2)); state.trail.splice(0, state.trail.length - 3000); }
+    if (!last || Math.hypot(last[0] - parts.pose[0], last[1] - parts.pose[1]) > 0.1) state.trail.push(parts.pose.slice(0, 2));
+    state.trail.splice(0, state.trail.length - MOST_TRAIL);
   }
   Object.assign(state, parts);
   if (message.replay) replay?.show(message.replay);

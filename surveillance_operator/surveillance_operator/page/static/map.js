@@ -56,7 +56,7 @@ export class MapView {
     const points = Object.values(places ?? {}).map((place) => place.at).filter(Boolean);
     if (!box && points.length) {
       const xs = points.map((p) => p[0]), ys = points.map((p) => p[1]);
-      box = [Math.min(...xs) - 2, Math.min(...ys) - 2, Math.max(...xs) + 2, Math.max(...ys) + 2];
+      box = [Math.min(...xs) - 1, Math.min(...ys) - 1, Math.max(...xs) + 4, Math.max(...ys) + 1];
     }
     if (!box) return;
     const [left, bottom, right, top] = box;
@@ -77,8 +77,11 @@ export class MapView {
       const shut = door.open === false;
       const path = s('path', {class: shut ? 'door shut' : 'door', d: line([[x1, y1], [x2, y2]]), 'data-door': name},
         s('title', {}, `door ${name} ${shut ? 'closed' : 'open'}`));
-      return shut ? [path, s('text', {class: 'cross', x: (x1 + x2) / 2, y: -(y1 + y2) / 2 + .3}, '×')] : [path];
-    });
+      const [x, y] = [(x1 + x2) / 2, -(y1 + y2) / 2];
+      // Beside the door: at its right end, or right of it.
+      const [dx, dy] = Math.abs(x2 - x1) > Math.abs(y2 - y1) ? [Math.abs(x2 - x1) / 2 + .45, -.15] : [.6, .16];
+      return [path, shut ? s('text', {class: 'cross', x, y: y + .3}, '×') : null, s('text', {class: 'door-name', x: x + dx, y: y + dy}, name)];
+    }).filter(Boolean);
     this.layers.doors.replaceChildren(...drawn);
   }
 
@@ -123,15 +126,15 @@ export class MapView {
   }
 
   drawPlace(name, at, region) {
-    // A place without a region is a disc with its words below.
+    // A place without a region is a disc with its words on the right.
     const floor = region ? s('path', {class: 'floor', d: filled(region.boxes)})
       : s('circle', {class: 'floor', cx: at[0], cy: -at[1], r: .5});
-    const [x, y] = region?.label ?? [at[0], at[1] - 1.1];
+    const [x, y] = region?.label ?? [at[0] + .8, at[1] - .25];
     const readable = (this.width ?? 16) / 24;
     const fits = region ? 3.2 * region.room / Math.max(4, name.length) : readable;
     const size = Math.max(readable / 2, Math.min(readable, fits));
-    const label = s('text', {x, y: -y, 'font-size': size}, name);
-    const words = s('text', {class: 'age', x, y: -y + size * .95, 'font-size': size * .8}, '');
+    const words = s('tspan', {class: 'age', ...(region ? {x, dy: size * .95} : {dx: size * .4}), 'font-size': size * .8}, '');
+    const label = s('text', {class: region ? null : 'beside', x, y: -y, 'font-size': size}, name, words);
     const choose = () => this.onPlace(name);
     const onkeydown = (event) => {
       if (event.key !== 'Enter' && event.key !== ' ') return;
@@ -141,7 +144,7 @@ export class MapView {
     const outline = floor.cloneNode();
     outline.setAttribute('class', 'outline');
     const room = s('g', {class: 'room', tabindex: 0, role: 'button', 'data-place': name, onclick: choose, onkeydown},
-      outline, s('circle', {class: 'spot', cx: at[0], cy: -at[1], r: .12}), label, words);
+      outline, s('circle', {class: 'spot', cx: at[0], cy: -at[1], r: .12}), label);
     this.rooms.set(name, {room, floor, words});
     return {floor, room};
   }

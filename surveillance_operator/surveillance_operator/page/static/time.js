@@ -56,9 +56,15 @@ export function drawStrips(root, state, now) {
   element('strip', 'battery').replaceChildren(s('path', {class: 'charge', d: charge}));
   element('value', 'battery').textContent = state.battery ? `${Math.round(state.battery.level)} %` : '–';
   const marks = history.marks.filter((mark) => mark[0] > since);
-  element('strip', 'events').replaceChildren(...marks.map(([at, kind, text]) => {
-    const mark = h('span', {title: `${kind}: ${text}`}, SIGNS[kind] ?? '•');
-    mark.style.left = `${100 * x(at) / W}%`;
+  // Where marks would cover each other, one stands for all of its kind.
+  const shown = new Map();
+  for (const [at, kind, text] of marks) {
+    const slot = `${kind} ${Math.floor(x(at) / 16)}`;
+    shown.set(slot, {at, kind, texts: [...shown.get(slot)?.texts ?? [], text]});
+  }
+  element('strip', 'events').replaceChildren(...[...shown.values()].map(({at, kind, texts}) => {
+    const mark = h('span', {title: `${kind}: ${[...new Set(texts)].join('; ')}${texts.length > 1 ? ` (${texts.length} times)` : ''}`}, SIGNS[kind] ?? '•');
+    mark.style.left = `${Math.min(98, 100 * x(at) / W)}%`;
     return mark;
   }));
   element('value', 'events').textContent = String(marks.length);

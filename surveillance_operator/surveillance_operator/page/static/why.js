@@ -21,7 +21,7 @@ export class Why {
       $('reason').textContent = decision.reason;
       const rows = decision.scores.toSorted((a, b) => b[1] - a[1]).map(([name, score]) =>
         h('tr', {class: name === decision.place ? 'chosen' : null}, h('td', {}, name === decision.place ? `→ ${name}` : name), h('td', {class: 'n'}, String(score))));
-      $('scores').replaceChildren(h('caption', {class: 'hidden'}, 'Candidates'), h('thead', {}, h('tr', {}, h('th', {scope: 'col'}, 'Candidate'), h('th', {scope: 'col', class: 'n'}, `Score (${decision.policy})`))), h('tbody', {}, ...rows));
+      $('scores').replaceChildren(h('caption', {class: 'hidden'}, 'Candidates'), h('thead', {}, h('tr', {}, h('th', {scope: 'col'}, 'Candidate'), h('th', {scope: 'col', class: 'n'}, `Score (${decision.policy}), highest wins`))), h('tbody', {}, ...rows));
     }
     const names = Object.keys(places ?? {});
     if (names.join() !== this.names) {
