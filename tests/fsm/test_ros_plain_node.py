@@ -7,6 +7,7 @@ import sys
 import threading
 
 import pytest
+from rclpy.action import ActionClient, ActionServer
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import Int32
@@ -39,7 +40,10 @@ class Plain(Node):
     """Nothing but rclpy's node; `stop` is what the test's graph calls before it destroys it."""
 
     def stop(self):
-        pass
+        # rclpy keeps a node in the ROS graph while its actions' servers and clients live.
+        for each in [*self.waitables]:
+            if isinstance(each, (ActionClient, ActionServer)):
+                each.destroy()
 
 
 @pytest.fixture

@@ -2,38 +2,27 @@
 
 from __future__ import annotations
 
-import signal
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
-from tests.launcher.conftest import ROOT, Started
+from tests.launcher.conftest import Started
+from tests.operator.beside_a_mission.conftest import LAUNCH
 from tests.operator.terminal import Terminal
 
-LAUNCH = [str(ROOT / '.venv/bin/python'), str(ROOT / 'launch.py')]
 pytestmark = pytest.mark.timeout(240)
 
 Open = Callable[..., Terminal]
 
 
-@pytest.fixture(scope='module')
-def mission(ros_domain: int, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Started]:
-    runs = str(tmp_path_factory.mktemp('runs'))
-    words = ['--composed', '--domain', str(ros_domain), '--record', runs]
-    started = Started([*LAUNCH, *words, '--params', str(ROOT / 'config/fast.yaml')])
-    started.until('decision 1', timeout=90)
-    yield started
-    started.end(signal.SIGINT)
-
-
 @pytest.fixture
-def terminal(ros_domain: int, tmp_path: Path) -> Iterator[Open]:
+def terminal(mission_domain: int, tmp_path: Path) -> Iterator[Open]:
     opened: list[Terminal] = []
 
     def start(*words: str, columns: int = 80, rows: int = 40) -> Terminal:
         environ = {'XDG_STATE_HOME': str(tmp_path)}
-        command = [*LAUNCH, *words, '--domain', str(ros_domain)]
+        command = [*LAUNCH, *words, '--domain', str(mission_domain)]
         opened.append(Terminal(command, columns, rows, environ))
         return opened[-1]
 
@@ -103,5 +92,18 @@ def test_a_person_answers_the_requests_of_mode_manual(terminal: Open, tmp_path: 
     manual.until('battery low: 10 %')
     manual.type('status\r')
     manual.until('The battery is at 10 %')
+    manual.type('exit\r')
+    assert manual.ended() == 0
+
+
+def test_the_arm_is_moved_from_the_terminal_of_mode_manual(terminal: Open, tmp_path: Path) -> None:
+    words = ('--mode', 'MANUAL', '--behaviour', 'patrol', '--namespace', 'arm')
+    words += ('--only', 'console,simulator,arm_controller', '--record', str(tmp_path))
+    manual = terminal(*words, columns=120, rows=60)
+    manual.until(*(f'{name:<14} | ready' for name in ('arm_controller', 'simulator', 'console')))
+    manual.type('arm up\r')
+    manual.until("arm: 'up': expected left, home, right, back or stop")
+    manual.type('arm left\r')
+    manual.until('at pose left')
     manual.type('exit\r')
     assert manual.ended() == 0

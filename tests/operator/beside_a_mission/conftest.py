@@ -1,0 +1,34 @@
+"""One whole mission for all that is looked at from outside: pages in a browser, terminals."""
+
+from __future__ import annotations
+
+import signal
+import socket
+from collections.abc import Iterator
+
+import pytest
+
+from surveillance_runtime.testing import claim_domain
+from tests.launcher.conftest import ROOT, Started
+
+LAUNCH = [str(ROOT / '.venv/bin/python'), str(ROOT / 'launch.py')]
+
+
+@pytest.fixture(scope='package')
+def mission_domain() -> int:
+    """Provide a ROS domain that no test in this process uses."""
+    return claim_domain()
+
+
+@pytest.fixture(scope='package')
+def mission(mission_domain: int, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Started]:
+    """Provide a patrol that is ten times as fast as real time, with a page that may control it."""
+    with socket.socket() as free:
+        free.bind(('127.0.0.1', 0))
+        port = free.getsockname()[1]  # a page that is started again keeps its address
+    words = ['--composed', '--web-control', '--web-address', f'127.0.0.1:{port}']
+    words += ['--domain', str(mission_domain), '--record', str(tmp_path_factory.mktemp('runs'))]
+    started = Started([*LAUNCH, *words, '--params', str(ROOT / 'config/fast.yaml')])
+    started.until('decision 1', timeout=90)
+    yield started
+    started.end(signal.SIGINT)
