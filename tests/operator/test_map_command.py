@@ -21,10 +21,16 @@ CONFIG = Path(__file__).parents[2] / 'config'
 def record(tmp_path: Path) -> Path:
     path = tmp_path / 'run.jsonl'
     with MissionRecord(path) as mission:
-        mission.start(0.0, 'surveillance', 'E', ['R1', 'R2', 'R3', 'R4', 'E', 'C1', 'C2'])
-        mission.visit(10.0, 'C1', 5.4)
+        mission.write(
+            'start',
+            0.0,
+            machine='surveillance',
+            place='E',
+            places=['R1', 'R2', 'R3', 'R4', 'E', 'C1', 'C2'],
+        )
+        mission.write('visit', 10.0, place='C1', distance=5.4)
         mission.write('visit', 20.0, place='R1', distance=3.0, path=[[10, 8], [10, 6.5], [10, 5]])
-        mission.end(60.0)
+        mission.write('end', 60.0)
     return path
 
 

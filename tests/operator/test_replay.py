@@ -33,12 +33,20 @@ def run(tmp_path: Path) -> Path:
     record(folder / 'timeline.jsonl')
     (folder / 'place.yaml').write_bytes((ROOT / 'config/seven_rooms.yaml').read_bytes())
     with MissionRecord(folder / 'mission.jsonl') as mission:
-        mission.start(0.0, 'surveillance', 'E', ['R1', 'R2', 'R3', 'R4', 'E', 'C1', 'C2'])
-        mission.decision(1.0, 'C1', 'CORRIDOR', '<b>C1</b> waits longest')
-        mission.visit(11.0, 'C1', 5.4)
-        mission.failure(12.0, 'MOVE', 'no way')
-        mission.recharge(20.0, 'E', 5.0)
-        mission.end(60.0)
+        mission.write(
+            'start',
+            0.0,
+            machine='surveillance',
+            place='E',
+            places=['R1', 'R2', 'R3', 'R4', 'E', 'C1', 'C2'],
+        )
+        mission.write(
+            'decision', 1.0, place='C1', rule='CORRIDOR', reason='<b>C1</b> waits longest'
+        )
+        mission.write('visit', 11.0, place='C1', distance=5.4)
+        mission.write('failure', 12.0, what='MOVE', reason='no way')
+        mission.write('recharge', 20.0, place='E', seconds=5.0)
+        mission.write('end', 60.0)
     return folder
 
 
