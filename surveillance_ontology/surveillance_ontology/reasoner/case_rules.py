@@ -20,6 +20,7 @@ from surveillance_ontology.owl.axioms import Axiom
 from surveillance_ontology.owl.expressions import ClassExpression, PropertyExpression
 from surveillance_ontology.owl.vocabulary import NOTHING, OWL, THING, TOP_LITERAL, local_name
 from surveillance_ontology.reasoner.clauses import UnsupportedError
+from surveillance_ontology.reasoner.contexts import closure
 from surveillance_ontology.reasoner.datatypes import unfolded, value_of
 from surveillance_ontology.reasoner.property_chains import AnyRole, Chains
 from surveillance_ontology.reasoner.translation import directed, negated, normal
@@ -324,27 +325,31 @@ class CaseRules:
             self.of_values |= xs
 
     def universal(self, concept: int, prop: PropertyExpression, target: int) -> None:
-        """Add the rules by which whoever a member is related to has another concept."""
+        """Add the rules by which whoever a member (0: anybody) is related to has a concept."""
         role = directed(prop)
         if not self._chains.is_complex(role):
-            rule = EdgeRule(frozenset((concept,)), self.role(role), _NONE, ((_Y, target),))
-            self.edge_rule(rule)
+            self.edge_rule(EdgeRule(_only(concept), self.role(role), _NONE, ((_Y, target),)))
             return
         steps = self._chains.steps(role)
-        states = {0: concept, 1: self.concept(self.fresh())}
-        self.node_rule(frozenset((states[1],)), ((_X, target),))
+        states: dict[int, int] = {}
+        if not concept:
+            # Everybody is in the states that are reached without a step.
+            free = [(before, after) for before, step, after in steps if step is None]
+            at_once = closure(0, lambda here: [after for before, after in free if before == here])
+            states.update(dict.fromkeys(at_once, 0))
         for before, _, after in steps:
             for number in (before, after):
                 if number not in states:
                     states[number] = self.concept(self.fresh())
-        # State 0 may be entered again, so it is not the concept itself.
-        states[0] = self.concept(self.fresh())
-        self.node_rule(frozenset((concept,)), ((_X, states[0]),))
+        if concept:
+            # State 0 may be entered again, so it is not the concept itself.
+            self.node_rule(_only(concept), ((_X, states[0]),))
+        self.node_rule(_only(states[1]), ((_X, target),))
         for before, step, after in steps:
-            here, there = frozenset((states[before],)), states[after]
-            if step is None:
+            here, there = _only(states[before]), states[after]
+            if there and step is None:
                 self.node_rule(here, ((_X, there),))
-            else:
+            elif there and step is not None:
                 self.edge_rule(EdgeRule(here, self.role(step), _NONE, ((_Y, there),)))
 
     def complex_role(self, prop: PropertyExpression) -> bool:
@@ -630,7 +635,7 @@ class _Clause:
     def _related(self) -> None:
         rules = self._rules
         if self._is_chained():
-            ((prop, filler),), (concept,) = self._every, self._body
+            ((prop, filler),), concept = self._every, next(iter(self._body), 0)
             rules.universal(concept, prop, rules.positive(filler))
             return
         inline: tuple[PropertyExpression, ClassExpression] | None = None
@@ -662,9 +667,9 @@ class _Clause:
             self._finish_edge(body, heads, *inline)
 
     def _is_chained(self) -> bool:
-        """Tell whether one concept alone says what a property with chains leads to."""
-        alone = len(self._every) == len(self._body) == 1 and not (self._heads or self._never)
-        return alone and self._rules.complex_role(self._every[0][0])
+        """Tell whether one concept alone, or none, says what a property with chains leads to."""
+        few = len(self._every) == 1 and len(self._body) <= 1 and not (self._heads or self._never)
+        return few and self._rules.complex_role(self._every[0][0])
 
     def _recognise(self, prop: PropertyExpression, filler: ClassExpression, name: str) -> None:
         """Everybody related to a member of the filler gets the named concept."""
@@ -675,9 +680,6 @@ class _Clause:
             ys = frozenset((source,)) - {0}
             rules.edge_rule(EdgeRule(_NONE, rules.role(prop), ys, ((_X, target),)))
             return
-        if not source:
-            source = rules.concept(rules.fresh())
-            rules.always.append(((_X, source),))
         iri, inverted = directed(prop)
         rules.has_inverse = True
         rules.universal(source, iri if inverted else ex.ObjectInverseOf(iri), target)
@@ -716,6 +718,10 @@ class _Clause:
                     ends.append((_Y, rules.positive(one)))
             if (_Y, 0) not in ends:
                 rules.edge_rule(EdgeRule(body, role, frozenset(ys) - {0}, (*heads, *ends)))
+
+
+def _only(concept: int) -> frozenset[int]:
+    return frozenset((concept,)) if concept else _NONE
 
 
 def _flat(disjuncts: Iterable[ClassExpression]) -> Iterator[ClassExpression]:
