@@ -38,6 +38,7 @@ from surveillance_ontology.owl.axioms import (
 from surveillance_ontology.owl.entities import entities_of, renamed
 from surveillance_ontology.owl.expressions import ClassExpression, Literal
 from surveillance_ontology.owl.vocabulary import NOTHING, THING
+from surveillance_ontology.reasoner.absence import Absence, Absences
 from surveillance_ontology.reasoner.cases import entails
 from surveillance_ontology.reasoner.classification import Classification
 from surveillance_ontology.reasoner.clauses import Fact as StoredFact
@@ -629,6 +630,15 @@ class KnowledgeBase:
         if found is None:
             return self._listed('the ontology is inconsistent', *self._justified(None))
         return self._complete(found, None)
+
+    def explain_absence(self, fact: Axiom) -> Absence | None:
+        """Return what a class or property assertion that does not hold lacks; None where it holds,
+        or nothing was reasoned yet.
+        """
+        engine = self._usable
+        if engine is None or self.holds(fact):
+            return None
+        return Absences(engine).of_fact(fact)
 
     def _complete(self, found: Explanation, goal: Axiom | None) -> Explanation:
         """Return the explanation resting on no more axioms than it needs, and on all of them."""

@@ -121,6 +121,7 @@ def test_every_method_sends_what_armor_expects() -> None:
         'QUERY IND OBJECTPROP': (lambda: ask.objectprops_of_ind('a'), ('a',)),
         'QUERY SPARQL ROWS': (lambda: ask.sparql('SELECT', 5), ('SELECT', '5')),
         'QUERY FACT': (lambda: ask.facts('A(?)'), ('A(?)',)),
+        'QUERY EXPLAIN ABSENCE': (lambda: ask.explain_absence('A(a)'), ('A(a)',)),
         'QUERY EXPLAIN INCONSISTENCY': (lambda: ask.explain_inconsistency(), ()),
         'APPLY': (lambda: use.apply_buffered_changes(), ()),
         'REASON': (lambda: use.sync_buffered_reasoner(), ()),

@@ -43,6 +43,11 @@ def test_explanations(ask: Ask) -> None:
     assert 'asserted' in tree
     refused = ask('QUERY EXPLAIN', 'URGENT(R4)')
     assert (refused.success, refused.exit_code) == (False, 0)
+    sentence, *missing = ask('QUERY EXPLAIN ABSENCE', 'URGENT(R4)').queried_objects
+    assert sentence.startswith('R4 is URGENT would follow from the rule')
+    assert missing
+    assert all(text in sentence for text in missing)
+    assert ask('QUERY EXPLAIN ABSENCE', 'URGENT(R3)').queried_objects == []
     assert ask('QUERY EXPLAIN INCONSISTENCY').queried_objects == []
     ask('ADD DATAPROP IND', 'visitedAt', 'R3', 'LONG', '5')
     sentence, tree = ask('QUERY EXPLAIN INCONSISTENCY').queried_objects

@@ -577,6 +577,14 @@ class Query(ClientPart):
         return sentence, tree
 
     @operation
+    def explain_absence(self, fact: str) -> Steps[list[str]]:
+        """Yield what a fact such as ``URGENT(R3)`` lacks: a sentence, then each missing condition;
+        nothing where it holds.
+        """
+        parse_fact(fact)
+        return (yield from self._objects('QUERY EXPLAIN ABSENCE', fact))
+
+    @operation
     def explain_inconsistency(self) -> Steps[tuple[str, str] | None]:
         """Yield why the ontology contradicts itself; None when it does not."""
         objects = yield from self._objects('QUERY EXPLAIN INCONSISTENCY')

@@ -24,6 +24,8 @@ from surveillance_ontology.reasoner.datatypes import literal_of, value_of
 _NEGATIVE = (ax.NegativeObjectPropertyAssertion, ax.NegativeDataPropertyAssertion)
 MOST_STEPS = 1_000_000
 """Facts that may be added in all searches for one answer; some ten seconds."""
+_QUESTION_STEPS = 200_000
+"""The same for one axiom."""
 
 
 class CaseReasoner:
@@ -252,7 +254,7 @@ class CaseReasoner:
         if not self.consistent():
             return
         named = self.names_individuals
-        search = self._search if named else CaseSearch(self._rules, 4 * self._left)
+        search = self._search if named else CaseSearch(self._rules, self._left)
         base = self._base if named else search.mark()
         models = _ClassModels(self._rules, search)
 
@@ -361,7 +363,7 @@ def entails(axioms: Iterable[Axiom], goal: Axiom | None) -> bool | None:
     denials: list[Denial] = [()] if goal is None else list(_denials(goal))
     certain = True
     for denial in denials:
-        reasoner = CaseReasoner([*axioms, *denial])
+        reasoner = CaseReasoner([*axioms, *denial], _QUESTION_STEPS)
         if reasoner.consistent():
             if not reasoner.gaps and not reasoner.stopped:
                 return False

@@ -173,7 +173,7 @@ class Reasons:
         unique = tuple(dict.fromkeys(premises))
         if isinstance(origin, Rule):
             name = f'the rule {origin.label}' if origin.label else f'the rule {axiom_text(origin)}'
-            reason = self._calculation(origin, proof)
+            reason = self.calculation(origin, proof)
             return Explanation(text, 'rule', name, unique, reason, (origin,))
         if isinstance(origin, Axiom):
             return Explanation(text, 'axiom', axiom_text(origin), unique, axioms=(origin,))
@@ -188,15 +188,15 @@ class Reasons:
 
     def _justify(self, proof: Proof) -> tuple[Axiom, ...]:
         """Return the axioms by which a step without one of its own follows from its premises."""
-        assumed = [self._stated(premise.fact) for premise in proof.premises]
-        goal = self._stated(proof.fact)
+        assumed = [self.stated(premise.fact) for premise in proof.premises]
+        goal = self.stated(proof.fact)
         is_clash = proof.fact[0] is self._engine.program.nothing
         if (goal is None and not is_clash) or not all(assumed):
             return ()
         facts = tuple(axiom for axiom in assumed if axiom is not None)
         return self._justification(facts, None if is_clash else goal)
 
-    def _stated(self, fact: Fact) -> Axiom | None:
+    def stated(self, fact: Fact) -> Axiom | None:
         """Return a fact as an assertion, where it can be written as one."""
         predicate = fact[0]
         program = self._engine.program
@@ -304,7 +304,7 @@ class Reasons:
             return f'{subject} {name} {literal_text(self._view.literal(fact[2]))}'
         return f'{subject} {name} {local_name(fact[2])}'
 
-    def _calculation(self, rule: Rule, proof: Proof) -> str:
+    def calculation(self, rule: Rule, proof: Proof) -> str:
         """Return the rule's built-ins with the values they were applied to, '' for a rule
         without.
         """
@@ -319,8 +319,10 @@ class Reasons:
             for fact in facts:
                 if fact[0].expression == source.prop and source.second not in values:
                     values[source.second] = fact[2]
-                    shown = literal_text(self._view.literal(fact[2]))
-                    texts[source.second] = f'{local_name(source.prop)} {shown}'
+                    shown = f'{local_name(source.prop)} {literal_text(self._view.literal(fact[2]))}'
+                    # With several robots it matters whose value it is.
+                    several = fact[1] not in proof.fact[1:] and len(fact[0].succ) > 1
+                    texts[source.second] = f'{local_name(fact[1])} {shown}' if several else shown
         parts: list[str] = []
         pending = list(computed)
         while pending:

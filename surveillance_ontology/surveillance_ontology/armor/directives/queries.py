@@ -185,6 +185,20 @@ def _explain(_: Session, ref: Reference, fact: str) -> DirectiveResponse:
 
 
 @query(
+    'QUERY EXPLAIN ABSENCE',
+    text('fact'),
+    native=False,
+    summary='What a fact that does not hold lacks, of the rule or definition nearest to it: first '
+    'an English sentence, then each missing condition; nothing where it holds.',
+)
+def _explain_absence(ref: Reference, fact: str) -> DirectiveResponse:
+    absence = ref.kb.explain_absence(_full_fact(ref, fact))
+    if absence is None:
+        return DirectiveResponse(error_description=f'{fact} holds in {ref.name}')
+    return DirectiveResponse(queried_objects=[absence.sentence(), *absence.missing])
+
+
+@query(
     'QUERY EXPLAIN INCONSISTENCY',
     native=False,
     slow=True,
