@@ -147,16 +147,8 @@ def _to_charge(world: World, stations: Sequence[str], why: str) -> Decision:
             f'no charging place ({", ".join(stations)}) can be reached from {world.place}'
         )
     best = min(within, key=lambda station: (station in world.avoided, within[station]))
-    return Decision(
-        time=world.now,
-        from_place=world.place,
-        place=best,
-        target=best,
-        rule=RECHARGE,
-        policy='nearest',
-        reason=f'{why}: {best} is the nearest charging place, {within[best]:.1f} s away',
-        scores={station: -seconds for station, seconds in within.items()},
-    )
+    reason = f'{why}: {best} is the nearest charging place, {within[best]:.1f} s away'
+    return _straight_to(world, best, RECHARGE, 'nearest', reason, within)
 
 
 def stations_within_reach(world: World, stations: Sequence[str]) -> dict[str, float]:
@@ -175,16 +167,16 @@ def _as_requested(world: World) -> Decision:
     if place not in world.graph.index:
         raise NowhereToGoError(f'{place}, as requested, cannot be reached from {world.place}')
     seconds = world.graph.seconds(world.place, place)
-    return Decision(
-        time=world.now,
-        from_place=world.place,
-        place=place,
-        target=place,
-        rule=REQUEST,
-        policy='request',
-        reason=f'an operator has sent the robot to {place}, {seconds:.1f} s away',
-        scores={place: -seconds},
-    )
+    reason = f'an operator has sent the robot to {place}, {seconds:.1f} s away'
+    return _straight_to(world, place, REQUEST, 'request', reason, {place: seconds})
+
+
+def _straight_to(
+    world: World, place: str, rule: str, policy: str, reason: str, away: Mapping[str, float]
+) -> Decision:
+    """Go to a place whatever the rules say; ``away`` has the seconds to each candidate."""
+    scores = {candidate: -seconds for candidate, seconds in away.items()}
+    return Decision(world.now, world.place, place, place, rule, policy, reason, scores)
 
 
 def _best(world: World, rule: str, allowed: Sequence[str], scores: Scores, policy: str) -> Decision:

@@ -287,34 +287,18 @@ class Container(State):
         """Take the input keys over from the parent's userdata."""
         if parent_ud is None or not self._input_keys:
             return
-        data = self.fsm_data
-        if isinstance(parent_ud, Remapper):
-            missing = parent_ud.fsm_copy_to(data, self._input_keys)
-        else:
-            missing = []
-            for key in self._input_keys:
-                try:
-                    data[key] = parent_ud[key]
-                except KeyError:
-                    missing.append(key)
-        for key in missing:
+        if not isinstance(parent_ud, Remapper):
+            parent_ud = Remapper(parent_ud, self._input_keys)
+        for key in parent_ud.fsm_copy_to(self.fsm_data, self._input_keys):
             logwarn(f"'{self.fsm_path}' starts without its input key '{key}': nobody set it")
 
     def fsm_copy_output_keys(self, parent_ud: Any) -> None:
         """Hand the output keys over to the parent's userdata."""
         if parent_ud is None or not self._output_keys:
             return
-        data = self.fsm_data
-        if isinstance(parent_ud, Remapper):
-            missing = parent_ud.fsm_take_from(data, self._output_keys)
-        else:
-            missing = []
-            for key in self._output_keys:
-                if key in data:
-                    parent_ud[key] = data[key]
-                else:
-                    missing.append(key)
-        for key in missing:
+        if not isinstance(parent_ud, Remapper):
+            parent_ud = Remapper(parent_ud, (), self._output_keys)
+        for key in parent_ud.fsm_take_from(self.fsm_data, self._output_keys):
             logwarn(f"'{self.fsm_path}' ends without its output key '{key}': nobody set it")
 
     # Construction.
