@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 import sys
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
@@ -18,6 +19,8 @@ from surveillance_runtime.place.floor_plan import FloorPlan
 from surveillance_simulation.world.textures import marker_panel
 
 EXIT_BAD_INPUT = 2
+Spot = tuple[float, float]
+Way = list[Spot]
 _SUFFIXES = ('.png', '.jpg', '.jpeg', '.webp')
 
 
@@ -81,27 +84,55 @@ def run_of(events: Sequence[mission_log.Event], place: Place, source: str) -> Ru
             _count(sum(summary.visits.values()), 'visit'),
             f'{summary.distance:.0f} m driven',
             _count(summary.recharges, 'recharge'),
+            _count(sum(summary.failures.values()), 'failure'),
         )
     )
-    return Run(list(_driven(events, place)), summary.unvisited, summary.visits, line)
+    driven, planned, failures = _drives(events, place)
+    thresholds = [event.fields.get('urgency_threshold') for event in events]
+    numbers = [float(each) for each in thresholds if isinstance(each, int | float)]
+    charged = Counter(event.text('place') for event in events if event.name == 'recharge')
+    return Run(
+        driven=driven,
+        planned=planned,
+        failures=failures,
+        waits=summary.unvisited,
+        visits=summary.visits,
+        recharges=charged,
+        threshold=numbers[-1] if numbers else None,
+        summary=line,
+    )
 
 
-def _driven(events: Sequence[mission_log.Event], place: Place) -> list[list[tuple[float, float]]]:
-    """Return the ways driven; where the record does not have one, it is the straight line."""
-    ways = []
-    here: tuple[float, float] | None = None
+def _way(event: mission_log.Event, field: str) -> Way:
+    points = event.fields.get(field)
+    return [(float(x), float(y)) for x, y in points] if isinstance(points, list) else []
+
+
+def _drives(
+    events: Sequence[mission_log.Event], place: Place
+) -> tuple[list[Way], list[Way], list[Spot]]:
+    """Return the ways driven, those planned, and where something failed.
+
+    A way that the record does not have is the straight line.
+    """
+    driven: list[Way] = []
+    planned: list[Way] = []
+    failures: list[Spot] = []
+    here: Spot | None = None
     for event in events:
         if event.name == 'start':
             here = place.positions[event.text('place')][:2]
         elif event.name == 'visit':
             there = place.positions[event.text('place')][:2]
-            path = event.fields.get('path')
-            if isinstance(path, list) and len(path) > 1:
-                ways.append([(float(point[0]), float(point[1])) for point in path])
-            elif here is not None:
-                ways.append([here, there])
+            straight = [here, there] if here is not None and here != there else []
+            planned.append(_way(event, 'path') or straight)
+            driven.append(_way(event, 'driven'))
             here = there
-    return ways
+        elif event.name == 'failure':
+            way = _way(event, 'driven')
+            driven.append(way)
+            failures += way[-1:] or ([here] if here is not None else [])
+    return [way for way in driven if len(way) > 1], [way for way in planned if way], failures
 
 
 def _count(number: int, word: str) -> str:

@@ -337,6 +337,9 @@ class ScriptedMotion:
     def last_position(self) -> Point | None:
         return self.world.at
 
+    def driven(self) -> list[Point]:
+        return []
+
 
 @dataclass
 class ScriptedRoutine:

@@ -29,7 +29,13 @@ def record(tmp_path: Path) -> Path:
             places=['R1', 'R2', 'R3', 'R4', 'E', 'C1', 'C2'],
         )
         mission.write('visit', 10.0, place='C1', distance=5.4)
-        mission.write('visit', 20.0, place='R1', distance=3.0, path=[[10, 8], [10, 6.5], [10, 5]])
+        way = [[10, 8], [10, 6.5], [10, 5]]
+        mission.write(
+            'visit', 20.0, place='R1', distance=3.0, path=way, driven=[[10, 8], [10.1, 5]]
+        )
+        back = [[10, 5], [10, 6]]
+        mission.write('failure', 30.0, what='moving', reason='the door is closed', driven=back)
+        mission.write('failure', 40.0, what='reasoning', reason='nobody answers')
         mission.write('end', 60.0)
     return path
 
@@ -67,22 +73,24 @@ def test_a_run_is_drawn_with_its_waits(
     output = tmp_path / 'run.png'
     place = CONFIG / 'seven_rooms.yaml'
     assert map_command.main([str(place), '--record', str(record), '-o', str(output)]) == 0
-    line = f'{record}: 1 min 0 s of patrol · 2 visits · 8 m driven · 0 recharges'
+    line = f'{record}: 1 min 0 s of patrol · 2 visits · 8 m driven · 0 recharges · 2 failures'
     assert line in capsys.readouterr().out
     plain = draw_place(read_world(place).plan, 'x', 'y')
     with Image.open(output) as picture:
         assert picture.size[0] > plain.size[0]
 
 
-def test_driven_ways_come_from_the_record_or_are_straight(record: Path) -> None:
+def test_ways_and_failures_come_from_the_record(record: Path) -> None:
     from surveillance_behaviour.mission import mission_log
 
     place = read_world(CONFIG / 'seven_rooms.yaml').plan.place
     run = map_command.run_of(mission_log.read(record), place, 'run')
-    assert run.driven == [
+    assert run.planned == [
         [(5.0, 10.0), (10.0, 8.0)],
         [(10.0, 8.0), (10.0, 6.5), (10.0, 5.0)],
     ]
+    assert run.driven == [[(10.0, 8.0), (10.1, 5.0)], [(10.0, 5.0), (10.0, 6.0)]]
+    assert run.failures == [(10.0, 6.0), (10.0, 5.0)]
     assert run.waits['R2'] == 60.0
     assert run.visits['R1'] == 1
 

@@ -102,7 +102,13 @@ class Mission:
             return
         self._started = self.now()
         self._noted_places = decisions.places
-        self.note('start', machine=self.machine, place=self.place, places=sorted(decisions.places))
+        self.note(
+            'start',
+            machine=self.machine,
+            place=self.place,
+            places=sorted(decisions.places),
+            urgency_threshold=self.settings.choice.urgency_threshold,
+        )
         before, self._cut_off = self._cut_off, None
         if before is None or before.time > self.now():
             return
@@ -183,8 +189,14 @@ class Mission:
         self.place = place
         self.astray = False
         self.explored = 0.0
-        way = {'path': [[round(x, 2), round(y, 2)] for x, y, *_ in path]} if path else {}
-        self.note('visit', place=place, distance=distance, **way)
+        planned = {'path': _rounded(path)} if path else {}
+        self.note('visit', place=place, distance=distance, **planned, **self._driven())
+
+    def _driven(self) -> dict[str, list[list[float]]]:
+        """Return the way driven since the last visit or failure, as a field of a record."""
+        motion = self.ports.motion
+        points = [] if motion is None else motion.driven()
+        return {'driven': _rounded(points)} if points else {}
 
     def charged(self, seconds: float) -> None:
         """Note that the battery was charged."""
@@ -207,7 +219,7 @@ class Mission:
         self.failure = Failure(what, reason, goal, charging, is_over)
         self.pending = None
         self.ports.decisions.disturbed()
-        self.note('failure', what=what, reason=reason)
+        self.note('failure', what=what, reason=reason, **self._driven())
         self.say(f'{what} failed: {reason}', warning=True)
 
     # What is known.
@@ -245,3 +257,8 @@ class Mission:
             if str(error) != self._record_complaint:
                 self._record_complaint = str(error)
                 self.say(str(error), warning=True)
+
+
+def _rounded(points: Sequence[Point]) -> list[list[float]]:
+    """Return points as a record has them: x and y in whole centimetres."""
+    return [[round(x, 2), round(y, 2)] for x, y, *_ in points]

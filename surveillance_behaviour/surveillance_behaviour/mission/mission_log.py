@@ -11,7 +11,10 @@ and the event's own fields::
     {"event": "start", "time": 0.0, "machine": "surveillance", "place": "E", "places": ["C1", "E"]}
     {"event": "exploring", "time": 1.0, "place": "E", "seconds": 1.0}
     {"event": "decision", "time": 2.0, "place": "C1", "rule": "URGENT", "reason": "..."}
-    {"event": "visit", "time": 9.4, "place": "C1", "distance": 5.4, "path": [[5, 10], ...]}
+    {"event": "visit", "time": 9.4, "place": "C1", "distance": 5.4, "path": [[5, 10], ...],
+     "driven": [[5, 10], ...]}
+
+The ``path`` was planned; ``driven`` is where the robot was, where the motion controller tells it.
 
 A record of a month stays small to read: a file that has grown to :data:`SEGMENT_BYTES` is packed as
 ``FILE.0001.gz``, ``FILE.0002.gz``, ..., and the new one begins with a ``snapshot`` of all that was

@@ -159,6 +159,9 @@ class Motion(Protocol):
     def last_position(self) -> Point | None:
         """Return where the robot was when it was last heard of; None: never."""
 
+    def driven(self) -> list[Point]:
+        """Return where the robot was on its way, since this was asked last."""
+
 
 class Routine(Protocol):
     """The services and actions of the behaviour `patrol`."""

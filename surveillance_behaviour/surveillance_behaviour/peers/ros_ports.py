@@ -6,6 +6,7 @@ clock (a move, a charge) has none but that its server lives and gets on.
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Callable, Sequence
@@ -133,6 +134,10 @@ class RosPlaces:
         return conversions.point_from(answer.position)
 
 
+TRACE_STEP = 0.3
+"""Least distance between two points of the way driven that are kept, metres."""
+
+
 class RosMotion:
     """``compute_path`` and ``follow_path``."""
 
@@ -141,6 +146,7 @@ class RosMotion:
         self._planner = GoalCaller(node, ComputePath, 'compute_path')
         self._controller = GoalCaller(node, FollowPath, 'follow_path')
         self._position: Point | None = None
+        self._driven: list[Point] = []
 
     def plan(self, start: Point, goal: Point, interrupt: Interrupt) -> list[Point]:
         """Return a path from ``start`` to ``goal``."""
@@ -157,15 +163,26 @@ class RosMotion:
         limits = self._deadlines
 
         def moved(feedback: FollowPath.Feedback) -> None:
-            self._position = conversions.point_from(feedback.position)
+            self._moved(conversions.point_from(feedback.position))
 
         result = run(self._controller, request, limits.answer, limits.move, interrupt, moved)
-        self._position = conversions.point_from(result.position)
-        return self._position
+        end = conversions.point_from(result.position)
+        self._moved(end)
+        return end
+
+    def _moved(self, position: Point) -> None:
+        self._position = position
+        if not self._driven or math.dist(self._driven[-1][:2], position[:2]) >= TRACE_STEP:
+            self._driven.append(position)
 
     def last_position(self) -> Point | None:
         """Return where the robot was when it was last heard of."""
         return self._position
+
+    def driven(self) -> list[Point]:
+        """Return where the robot was on its way, since this was asked last."""
+        driven, self._driven = self._driven, []
+        return driven
 
 
 class RosReasoner:

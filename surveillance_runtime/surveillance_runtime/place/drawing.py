@@ -23,7 +23,7 @@ _PAPER, _INK, _SOFT = '#fbfaf7', '#2f3742', '#7d8794'
 _ROOM, _CORRIDOR, _HOME = '#f6ecd9', '#e3ebf3', '#dff0dc'
 _WALL, _LEAF, _CLOSED = '#3a4350', '#b08a57', '#c0392b'
 _GRAPH, _SIGN, _SIGN_HOME = '#7fa3c7', '#2c5d8f', '#2f8a4c'
-_DRIVEN, _CALM, _LATE = '#14717f', '#fdf9f0', '#f2b287'
+_DRIVEN, _PLANNED, _CALM, _LATE = '#14717f', '#8a7fb8', '#fdf9f0', '#f2b287'
 _LONGEST_SIDE = 1180.0
 _PANEL = 250
 
@@ -34,12 +34,20 @@ class Run:
 
     Attributes:
         driven: The ways driven, each (n, 2) points in metres.
+        planned: The ways planned, likewise.
+        failures: Where a drive failed, (n, 2) points in metres.
+        recharges: How often the robot charged in each place.
+        threshold: Wait after which a place is urgent, seconds; None: not known.
         waits: Longest time each place went unvisited, seconds.
         visits: How often each place was visited.
         summary: One line about the whole run.
     """
 
     driven: Sequence[Sequence[Sequence[float]]] = ()
+    planned: Sequence[Sequence[Sequence[float]]] = ()
+    failures: Sequence[Sequence[float]] = ()
+    recharges: Mapping[str, int] = field(default_factory=dict)
+    threshold: float | None = None
     waits: Mapping[str, float] = field(default_factory=dict)
     visits: Mapping[str, int] = field(default_factory=dict)
     summary: str = ''
@@ -82,8 +90,12 @@ def draw_place(
     for x, y, radius in obstacles:
         canvas.disc((x, y), radius * scale, _CLOSED)
     if run is not None:
+        canvas.traces(run.planned, _PLANNED, max(1.2, scale / 40), 0.5)
         canvas.traces(run.driven, _DRIVEN, max(1.5, scale / 26), 0.34)
+        picture.failures(run)
     picture.station()
+    if run is not None:
+        picture.recharges(run)
     picture.signs()
     picture.legend(run)
     if run is not None and run.waits:
@@ -210,10 +222,36 @@ class _Picture:
         # Below the sign of the place, which stands at the same point.
         self._bolt(*self._canvas.at((x, y - (radius + self._size * 1.5) / self._canvas.scale)))
 
+    def failures(self, run: Run) -> None:
+        for x, y in run.failures:
+            self._cross(*self._canvas.at((x, y)))
+
+    def _cross(self, x: float, y: float) -> None:
+        reach = max(5.0, min(9.0, self._canvas.scale * 0.12))
+        for side in (1.0, -1.0):
+            ends = [
+                self._point(x - reach, y - side * reach),
+                self._point(x + reach, y + side * reach),
+            ]
+            self._canvas.line(ends, _CLOSED, 3.0)
+
+    def _point(self, x: float, y: float) -> tuple[float, float]:
+        """Return the point in metres of a place on the canvas."""
+        west, north = self._canvas.at((0.0, 0.0))
+        return (x - west) / self._canvas.scale, (north - y) / self._canvas.scale
+
+    def recharges(self, run: Run) -> None:
+        """Write beside the station's sign how often the robot charged."""
+        count = sum(run.recharges.values())
+        if count:
+            radius = max(9.0, self._canvas.scale * 0.24)
+            x, y = self._canvas.at(self._plan.station[:2])
+            at = (x + radius + 6, y + radius + self._size * 1.5)
+            self._canvas.text(at, f'× {count}', self._size, _SIGN_HOME, anchor='lm')
+
     def _bolt(self, x: float, y: float) -> None:
         radius = max(8.0, min(14.0, self._canvas.scale * 0.24))
-        west, north = self._canvas.at((0.0, 0.0))
-        point = ((x - west) / self._canvas.scale, (north - y) / self._canvas.scale)
+        point = self._point(x, y)
         self._canvas.disc(point, radius, _SIGN_HOME)
         shape = [(0.15, 0.7), (-0.42, -0.1), (-0.05, -0.1), (-0.15, -0.7), (0.42, 0.1), (0.05, 0.1)]
         unit = radius / self._canvas.scale
@@ -245,9 +283,17 @@ class _Picture:
         if run is None:
             self._stroke(x, y, _GRAPH, dashed=True)
             x += self._word(x + 28, y, 'way between places') + 46
-        elif run.driven:
-            self._stroke(x, y, _DRIVEN, dashed=False)
-            x += self._word(x + 28, y, 'driven') + 46
+        else:
+            for ways, colour, text in (
+                (run.driven, _DRIVEN, 'driven'),
+                (run.planned, _PLANNED, 'planned'),
+            ):
+                if ways:
+                    self._stroke(x, y, colour, dashed=False)
+                    x += self._word(x + 28, y, text) + 46
+            if run.failures:
+                self._cross(x + 6, y)
+                x += self._word(x + 20, y, 'failure') + 40
         if self._plan.markers:
             canvas.box(x, y - 6, x + 12, y + 6, _INK)
             canvas.box(x + 3.5, y - 2.5, x + 8.5, y + 2.5, _PAPER)
@@ -270,8 +316,10 @@ class _Picture:
         ranked = sorted(run.waits, key=lambda name: -run.waits[name])
         step = min(30.0, (bottom - top - 24) / max(1, len(ranked)))
         size = min(14.0, max(7.0, step * 0.62))
-        longest = max(run.waits.values())
+        longest = max(*run.waits.values(), run.threshold or 0.0)
         room = _PANEL - 150
+        threshold = run.threshold or 0.0
+        urgent = left + 44 + (room * threshold / longest if longest else 0.0)
         for number, name in enumerate(ranked):
             y = top + 24 + (number + 0.5) * step
             share = run.waits[name] / longest if longest else 0.0
@@ -283,7 +331,14 @@ class _Picture:
                 y + step * 0.3,
                 blend(_CALM, _LATE, 0.25 + 0.75 * share),
             )
-            words = f'{run.waits[name]:.0f} s'
-            canvas.text((left + 50 + room * share, y), words, size, _SOFT, anchor='lm')
+            words, x = f'{run.waits[name]:.0f} s', left + 50 + room * share
+            if x - 6 < urgent < x + canvas.text_width(words, size):
+                x = urgent + 5
+            canvas.text((x, y), words, size, _SOFT, anchor='lm')
             visits = str(run.visits.get(name, 0))
             canvas.text((left + _PANEL - 16, y), visits, size, _SOFT, anchor='rm')
+        if threshold:
+            end = top + 24 + len(ranked) * step + 4
+            canvas.box(urgent - 0.8, top + 18, urgent + 0.8, end, _CLOSED)
+            words = f'urgent after {threshold:.0f} s'
+            canvas.text((left + 44, end + 6), words, 12, _CLOSED)
