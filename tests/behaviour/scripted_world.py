@@ -27,16 +27,8 @@ from surveillance_behaviour.policy.world import Decision
 from surveillance_behaviour.world_model import Experience
 from surveillance_fsm import Interrupt
 from surveillance_ontology.patrol_ontology import Snapshot
+from tests.seven_rooms import SEVEN_ROOMS
 
-SEVEN_ROOMS = {
-    'R1': ['D1'],
-    'R2': ['D2'],
-    'R3': ['D3'],
-    'R4': ['D4'],
-    'E': ['D6', 'D7'],
-    'C1': ['D1', 'D2', 'D5', 'D6'],
-    'C2': ['D3', 'D4', 'D5', 'D7'],
-}
 POSITIONS = {
     'R1': (10.0, 5.0, 0.0),
     'R2': (15.0, 5.0, 0.0),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from contextlib import contextmanager
 
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.task import Future
@@ -10,11 +11,14 @@ from std_srvs.srv import Trigger
 
 import surveillance_fsm as fsm
 from surveillance_fsm.ros import (
+    IntrospectionServer,
     ServiceState,
     SimpleActionState,
 )
 from surveillance_interfaces.action import FollowPath
 from surveillance_runtime.node import PatrolNode
+
+from .states import Answer, Waiter
 
 SHORT = 0.3
 LONG = 20.0
@@ -90,3 +94,24 @@ def service(node, **arguments):
 def action(node, **arguments):
     times = {'server_wait_timeout': LONG, 'preempt_timeout': LONG}
     return SimpleActionState(node, 'follow_path', FollowPath, **{**times, **arguments})
+
+
+@contextmanager
+def introspected(node):
+    """Serve a machine whose inner one waits; gives its root and the state that waits."""
+    waiter = Waiter(100.0)
+    inner = fsm.StateMachine(['done', 'preempted'])
+    root = fsm.StateMachine(['done', 'preempted'])
+    with root:
+        fsm.StateMachine.add('FIRST', Answer('done'), {'done': 'INNER'})
+        fsm.StateMachine.add('INNER', inner)
+        with inner:
+            fsm.StateMachine.add('WAIT', waiter, {'done': 'LAST'})
+            fsm.StateMachine.add('LAST', Answer('done'))
+    root.userdata.level = 7
+    root.userdata.secret = object()
+    server = IntrospectionServer(node, 'robot', root, '/PATROL')
+    server.start()
+    yield root, waiter
+    root.request_preempt()
+    server.stop()

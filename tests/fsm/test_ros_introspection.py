@@ -8,36 +8,22 @@ import pytest
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_srvs.srv import Trigger
 
-import surveillance_fsm as fsm
 from surveillance_fsm.history import Transition
-from surveillance_fsm.ros import IntrospectionServer, ServiceCaller
+from surveillance_fsm.ros import ServiceCaller
 from surveillance_fsm.ros.conversions import transition_from, transition_message
 from surveillance_interfaces.msg import FsmStatus, FsmStructure, FsmTransition
 from surveillance_interfaces.srv import ForceOutcome, SetInitialState
 
-from .states import Answer, Background, Waiter, began
+from .ros_servers import introspected
+from .states import Background, began
 
 LATCHED = QoSProfile(depth=200, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 @pytest.fixture
 def watched(graph):
-    waiter = Waiter(100.0)
-    inner = fsm.StateMachine(['done', 'preempted'])
-    root = fsm.StateMachine(['done', 'preempted'])
-    with root:
-        fsm.StateMachine.add('FIRST', Answer('done'), {'done': 'INNER'})
-        fsm.StateMachine.add('INNER', inner)
-        with inner:
-            fsm.StateMachine.add('WAIT', waiter, {'done': 'LAST'})
-            fsm.StateMachine.add('LAST', Answer('done'))
-    root.userdata.level = 7
-    root.userdata.secret = object()
-    server = IntrospectionServer(graph.node, 'robot', root, '/PATROL')
-    server.start()
-    yield root, waiter
-    root.request_preempt()
-    server.stop()
+    with introspected(graph.node) as seen:
+        yield seen
 
 
 def call(graph, kind, name, **fields):

@@ -21,7 +21,6 @@ from surveillance_fsm.ros import (
     GoalCaller,
     GoalServer,
     IntrospectionClient,
-    IntrospectionServer,
     MonitorState,
     RosState,
     ServiceState,
@@ -31,6 +30,7 @@ from surveillance_fsm.ros import (
 from surveillance_interfaces.action import FollowPath
 from surveillance_interfaces.msg import SmachContainerStatus, SmachContainerStructure
 
+from .ros_servers import introspected
 from .states import Answer, Background, Waiter, began
 
 LATCHED = QoSProfile(depth=200, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -196,22 +196,8 @@ def test_ros_time_that_jumps_back_does_not_delay_a_sleep(graph):
 
 @pytest.fixture
 def watched(graph, node):
-    waiter = Waiter(100.0)
-    inner = fsm.StateMachine(['done', 'preempted'])
-    root = fsm.StateMachine(['done', 'preempted'])
-    with root:
-        fsm.StateMachine.add('FIRST', Answer('done'), {'done': 'INNER'})
-        fsm.StateMachine.add('INNER', inner)
-        with inner:
-            fsm.StateMachine.add('WAIT', waiter, {'done': 'LAST'})
-            fsm.StateMachine.add('LAST', Answer('done'))
-    root.userdata.level = 7
-    root.userdata.secret = object()
-    server = IntrospectionServer(node, 'robot', root, '/PATROL')
-    server.start()
-    yield root, waiter
-    root.request_preempt()
-    server.stop()
+    with introspected(node) as seen:
+        yield seen
 
 
 def test_smachs_topics_tell_structure_and_status_of_each_container(graph, watched):

@@ -9,19 +9,11 @@ from surveillance_ontology.armor.access import DATA
 from surveillance_ontology.armor.client import ArmorClient
 from surveillance_ontology.armor.protocol import DirectiveRequest, DirectiveResponse
 from surveillance_ontology.armor.service import ArmorService
+from tests.seven_rooms import SEVEN_ROOMS
 
 IRI = 'http://bnc/exp-rob-lab/2022-23'
 FIXTURES = Path(__file__).parent / 'fixtures'
 ONTOLOGY = str(DATA / 'surveillance.owl')
-SEVEN_ROOMS = {
-    'R1': ['D1'],
-    'R2': ['D2'],
-    'R3': ['D3'],
-    'R4': ['D4'],
-    'E': ['D6', 'D7'],
-    'C1': ['D1', 'D2', 'D5', 'D6'],
-    'C2': ['D3', 'D4', 'D5', 'D7'],
-}
 Ask = Callable[..., DirectiveResponse]
 
 

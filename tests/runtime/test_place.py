@@ -10,21 +10,13 @@ from hypothesis import strategies as st
 
 from surveillance_runtime.place import Place, PlaceError, make_place, read_place
 from surveillance_runtime.yaml_file import YamlFileError
+from tests.seven_rooms import SEVEN_ROOMS
 
-ROOMS = {
-    'R1': ['D1'],
-    'R2': ['D2'],
-    'R3': ['D3'],
-    'R4': ['D4'],
-    'E': ['D6', 'D7'],
-    'C1': ['D1', 'D2', 'D5', 'D6'],
-    'C2': ['D3', 'D4', 'D5', 'D7'],
-}
-POSITIONS = {room: [float(index), 0.0] for index, room in enumerate(ROOMS)}
+POSITIONS = {room: [float(index), 0.0] for index, room in enumerate(SEVEN_ROOMS)}
 
 
 def seven() -> Place:
-    return make_place(ROOMS, POSITIONS, 'E', ['E'])
+    return make_place(SEVEN_ROOMS, POSITIONS, 'E', ['E'])
 
 
 def test_graph_queries() -> None:
@@ -33,13 +25,13 @@ def test_graph_queries() -> None:
     assert place.neighbours('C1') == {'R1': 'D1', 'R2': 'D2', 'C2': 'D5', 'E': 'D6'}
     assert place.route('R1', 'R3') == ['R1', 'C1', 'C2', 'R3']
     assert place.route('E', 'E') == ['E']
-    assert place.reachable('R1') == set(ROOMS)
+    assert place.reachable('R1') == set(SEVEN_ROOMS)
 
 
 def test_a_closed_door_is_no_way_until_it_is_open_again() -> None:
     closed = seven().with_door('D1', is_open=False)
     assert closed.route('R1', 'E') is None
-    assert closed.reachable('E') == set(ROOMS) - {'R1'}
+    assert closed.reachable('E') == set(SEVEN_ROOMS) - {'R1'}
     assert closed.route('R1', 'E', through_closed=True) == ['R1', 'C1', 'E']
     assert closed.with_door('D1', is_open=True) == seven()
 
@@ -77,19 +69,19 @@ def test_edits_that_cannot_be(edit: object, words: str) -> None:
 
 
 def changed(**parts: object) -> tuple[object, ...]:
-    given = {'rooms': ROOMS, 'positions': POSITIONS, 'start': 'E', 'stations': ['E'], **parts}
+    given = {'rooms': SEVEN_ROOMS, 'positions': POSITIONS, 'start': 'E', 'stations': ['E'], **parts}
     return tuple(given.values())
 
 
 @pytest.mark.parametrize(
     ('description', 'words'),
     [
-        (changed(rooms={**ROOMS, 'E': ['D6', 'D9']}), "door 'D9' is in only one place, E"),
-        (changed(rooms={**ROOMS, 'R1': ['D1', 'D5']}), 'is in 3 places'),
-        (changed(rooms={**ROOMS, 'R1': ['D1', 'D1']}), "map.R1: duplicate door 'D1'"),
-        (changed(rooms={**ROOMS, 'R1': []}), 'map.R1: expected a list of at least one door'),
-        (changed(rooms={**ROOMS, 'R1': ['E']}), "door 'E' has the name of a room"),
-        (changed(rooms={**ROOMS, 'R1': [1]}), 'quote it'),
+        (changed(rooms={**SEVEN_ROOMS, 'E': ['D6', 'D9']}), "door 'D9' is in only one place, E"),
+        (changed(rooms={**SEVEN_ROOMS, 'R1': ['D1', 'D5']}), 'is in 3 places'),
+        (changed(rooms={**SEVEN_ROOMS, 'R1': ['D1', 'D1']}), "map.R1: duplicate door 'D1'"),
+        (changed(rooms={**SEVEN_ROOMS, 'R1': []}), 'map.R1: expected a list of at least one door'),
+        (changed(rooms={**SEVEN_ROOMS, 'R1': ['E']}), "door 'E' has the name of a room"),
+        (changed(rooms={**SEVEN_ROOMS, 'R1': [1]}), 'quote it'),
         (changed(rooms={}), 'map: expected rooms'),
         (
             changed(positions={k: v for k, v in POSITIONS.items() if k != 'R3'}),
