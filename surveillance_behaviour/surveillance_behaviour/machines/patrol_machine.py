@@ -17,7 +17,7 @@ from surveillance_behaviour.decision import RECHARGE
 from surveillance_behaviour.machines.shared_states import (
     FAILED,
     PREEMPTED,
-    MissionState,
+    PeerState,
     Recover,
     WaitForHelp,
     add,
@@ -33,7 +33,7 @@ from surveillance_behaviour.peers.ports import Point, Routine
 BATTERY_LOW = 'battery_low'
 
 
-class Initial(MissionState):
+class Initial(PeerState):
     """Has the robot look around and build its ontology."""
 
     task = 'starting'
@@ -48,7 +48,7 @@ class Initial(MissionState):
         return 'start'
 
 
-class Reasoning(MissionState):
+class Reasoning(PeerState):
     """Asks for the next place, unless the battery has to be charged first."""
 
     task = 'reasoning'
@@ -68,7 +68,7 @@ class Reasoning(MissionState):
         return BATTERY_LOW
 
 
-class MoveStep(MissionState):
+class MoveStep(PeerState):
     """One of the two steps of a move; whether a low battery ends it depends on where it goes.
 
     Args:
@@ -125,7 +125,7 @@ def follow_path(mission: Mission, ud: Any, interrupt: fsm.Interrupt) -> None:
     mission.arrived(ud.target, distance, ud.via_points)
 
 
-class GoBack(MissionState):
+class GoBack(PeerState):
     """Goes back to the last place the robot is known to have been in."""
 
     task = 'going back'
@@ -163,7 +163,7 @@ def drive(
     return path_length(via_points)
 
 
-class Recharge(MissionState):
+class Recharge(PeerState):
     """Charges the battery if the robot is at the dock, else chooses the dock to go to."""
 
     task = 'recharging'

@@ -19,6 +19,40 @@ FAILED = 'failed'
 
 
 class MissionState(fsm.State):
+    """A state that knows the mission; a preempt that comes before its work ends it.
+
+    Args:
+        mission: The mission's memory and ports.
+        outcomes: Outcomes beside ``preempted``.
+        input_keys: Userdata read.
+        output_keys: Userdata written.
+    """
+
+    def __init__(
+        self,
+        mission: Mission,
+        outcomes: Iterable[str],
+        input_keys: Iterable[str] = (),
+        output_keys: Iterable[str] = (),
+    ) -> None:
+        super().__init__([*outcomes, PREEMPTED], input_keys, output_keys)
+        self.mission = mission
+
+    def execute(self, ud: Any) -> str | None:
+        """Work, unless a preempt came first."""
+        return self.preempted() if self.preempt_requested() else self.work(ud, self.interrupt)
+
+    def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
+        """Do the state's own work and return the outcome."""
+        raise NotImplementedError
+
+    def preempted(self) -> str:
+        """Serve the preempt and return the outcome for that."""
+        self.service_preempt()
+        return PREEMPTED
+
+
+class PeerState(MissionState):
     """A state that talks to peers: it ends with ``failed`` when one of them fails.
 
     Args:
@@ -40,29 +74,20 @@ class MissionState(fsm.State):
         input_keys: Iterable[str] = (),
         output_keys: Iterable[str] = (),
     ) -> None:
-        super().__init__([*outcomes, FAILED, PREEMPTED], input_keys, output_keys)
-        self.mission = mission
+        super().__init__(mission, [*outcomes, FAILED], input_keys, output_keys)
 
     def execute(self, ud: Any) -> str | None:
         """Work until done, failed or preempted."""
-        if self.preempt_requested():
-            return self._preempted()
         try:
-            return self.work(ud, self.interrupt)
+            return super().execute(ud)
         except InterruptedWaitError:
-            if self.preempt_requested():
-                return self._preempted()
-            return self.interrupted(ud)
+            return self.preempted() if self.preempt_requested() else self.interrupted(ud)
         except AwayError as error:
             self.mission.failed(self.task, str(error), is_over=error.is_back)
             return FAILED
         except (PeerError, NowhereToGoError) as error:
             self.mission.failed(self.task, str(error), self.goal(ud), charging=self.charging)
             return FAILED
-
-    def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
-        """Do the state's own work and return the outcome."""
-        raise NotImplementedError
 
     def interrupted(self, ud: Any) -> str:
         """Return the outcome when something else than a preempt ended the work."""
@@ -74,24 +99,16 @@ class MissionState(fsm.State):
         """
         return None
 
-    def _preempted(self) -> str:
-        self.service_preempt()
-        return PREEMPTED
 
-
-class Recover(fsm.State):
+class Recover(MissionState):
     """Looks at the last failure and chooses the next step."""
 
     def __init__(self, mission: Mission, *, steps: Iterable[Step] = tuple(Step)) -> None:
         self._steps = tuple(steps)
-        super().__init__([*self._steps, PREEMPTED])
-        self.mission = mission
+        super().__init__(mission, self._steps)
 
-    def execute(self, ud: Any) -> str:
+    def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
         """Return the step that the recovery takes; one that the machine lacks becomes waiting."""
-        if self.preempt_requested():
-            self.service_preempt()
-            return PREEMPTED
         mission = self.mission
         assert mission.failure is not None
         step = mission.recovery.next_step(
@@ -115,17 +132,16 @@ LOOK_PERIOD = 0.2
 """Seconds between two looks whether a peer that was away has come back."""
 
 
-class WaitForHelp(fsm.State):
+class WaitForHelp(MissionState):
     """Says what is wrong and waits; then everything is tried anew, with longer pauses each time.
 
     The return of a peer that was away ends the pause.
     """
 
     def __init__(self, mission: Mission) -> None:
-        super().__init__(['try_again', PREEMPTED])
-        self.mission = mission
+        super().__init__(mission, ['try_again'])
 
-    def execute(self, ud: Any) -> str:
+    def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
         """Wait for one pause, or until the peer that was away is back."""
         mission = self.mission
         failure = mission.failure
@@ -136,8 +152,7 @@ class WaitForHelp(fsm.State):
             f'trying again in {seconds:g} s)'
         )
         if not self._wait(seconds, failure.is_over if failure is not None else None):
-            self.service_preempt()
-            return PREEMPTED
+            return self.preempted()
         mission.ports.announcer.waiting_for_help('')
         return 'try_again'
 

@@ -14,6 +14,7 @@ from surveillance_behaviour.machines.shared_states import (
     FAILED,
     PREEMPTED,
     MissionState,
+    PeerState,
     Recover,
     WaitForHelp,
     add,
@@ -31,7 +32,7 @@ NOTE_SECONDS = 1.0
 """The shortest time between two notes of how far a place is explored, seconds."""
 
 
-class Initialization(MissionState):
+class Initialization(PeerState):
     """Waits until the ontology holds the map, and sets the robot's parameters."""
 
     task = 'initialization'
@@ -45,36 +46,30 @@ class Initialization(MissionState):
         return 'initialized'
 
 
-class ChooseRoomTask(fsm.State):
+class ChooseRoomTask(MissionState):
     """Charge if the battery asks for it and the robot is at a station, else explore."""
 
     def __init__(self, mission: Mission) -> None:
-        super().__init__(['recharge', 'explore', PREEMPTED])
-        self.mission = mission
+        super().__init__(mission, ['recharge', 'explore'])
 
-    def execute(self, ud: Any) -> str:
-        if self.preempt_requested():
-            self.service_preempt()
-            return PREEMPTED
+    def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
         must_charge = self.mission.at_station() and self.mission.ports.decisions.why_charge()
         return 'recharge' if must_charge else 'explore'
 
 
-class ExploreTask(fsm.State):
+class ExploreTask(MissionState):
     """Looks around for a while; a battery that gets low ends it."""
 
     def __init__(self, mission: Mission) -> None:
-        super().__init__(['explored', PREEMPTED])
-        self.mission = mission
+        super().__init__(mission, ['explored'])
 
-    def execute(self, ud: Any) -> str:
+    def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
         mission = self.mission
         why = mission.ports.decisions.why_charge
-        with mission.battery.interrupting(self.interrupt, lambda: bool(why())) as wake:
+        with mission.battery.interrupting(interrupt, lambda: bool(why())) as wake:
             whole = self._explore(wake)
         if self.preempt_requested():
-            self.service_preempt()
-            return PREEMPTED
+            return self.preempted()
         if not whole:
             mission.say(f'exploring {mission.place} ends early: {why()}')
         return 'explored'
@@ -95,7 +90,7 @@ class ExploreTask(fsm.State):
         return True
 
 
-class RechargeTask(MissionState):
+class RechargeTask(PeerState):
     """Waits at the station until the battery is charged enough."""
 
     task = 'recharging'
@@ -115,7 +110,7 @@ class RechargeTask(MissionState):
         return self.mission.place
 
 
-class ChooseNextRoom(MissionState):
+class ChooseNextRoom(PeerState):
     """Charging place if the battery asks for it, else rules and policy."""
 
     task = 'choosing the next room'
@@ -128,7 +123,7 @@ class ChooseNextRoom(MissionState):
         return 'chosen'
 
 
-class MoveToNextRoom(MissionState):
+class MoveToNextRoom(PeerState):
     """Moves to the next room."""
 
     task = 'moving'
@@ -145,7 +140,7 @@ class MoveToNextRoom(MissionState):
         return str(ud.next_room)
 
 
-class ReturnToLastPlace(MissionState):
+class ReturnToLastPlace(PeerState):
     """Goes back to the last place the robot is known to have been in."""
 
     task = 'going back'
@@ -250,17 +245,13 @@ def surveillance_machine(mission: Mission) -> fsm.StateMachine:
     return machine
 
 
-class ReDock(fsm.State):
+class ReDock(MissionState):
     """Drives to the station again when the battery does not rise there."""
 
     def __init__(self, mission: Mission) -> None:
-        super().__init__(['again', 'give_up', PREEMPTED], output_keys=['next_room'])
-        self.mission = mission
+        super().__init__(mission, ['again', 'give_up'], output_keys=['next_room'])
 
-    def execute(self, ud: Any) -> str:
-        if self.preempt_requested():
-            self.service_preempt()
-            return PREEMPTED
+    def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
         mission = self.mission
         assert mission.failure is not None
         if mission.recovery.next_step(mission.failure, mission.now()) != Step.ANOTHER_PATH:
