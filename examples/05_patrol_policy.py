@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from surveillance_behaviour.decision import Rules
 from surveillance_behaviour.policy.graph import graph_of_places
-from surveillance_behaviour.policy.rule_bound import rule_bound
 from surveillance_behaviour.policy.simulation import Patrol
 
 POSITIONS = {
@@ -35,9 +34,7 @@ def main() -> None:
     print(f'{len(graph.places)} places, shortest tour {tour:.1f} s: {" - ".join(graph.walk)}')
     for factor in (0.5, 1.0):
         threshold = factor * tour
-        bound = rule_bound(graph, threshold)
-        least = f'{bound:.1f} s' if bound else 'not known'
-        print(f'\nurgency threshold {threshold:.1f} s; the least that obeys the rules: {least}')
+        print(f'\nurgency threshold {threshold:.1f} s')
         for policy in ('tour', 'lookahead', 'oldest', 'seed'):
             patrol = Patrol(graph, Rules(), policy, threshold, station='E')
             first = patrol.step()

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from benchmarks.rule_bound import default_ranks, rule_bound
 from surveillance_behaviour.decision import Rules
 from surveillance_behaviour.policy.graph import PatrolGraph
 from surveillance_behaviour.policy.plan import Plan
@@ -21,7 +22,6 @@ from surveillance_behaviour.policy.rollout import (
     roll_out,
 )
 from surveillance_behaviour.policy.rounds import RoundSearch
-from surveillance_behaviour.policy.rule_bound import default_ranks, simple_bound
 from surveillance_behaviour.policy.simulation import Patrol
 
 from .test_plan import chain, grid
@@ -95,10 +95,12 @@ def test_a_plan_keeps_what_it_promises(factor: float) -> None:
 
 
 @settings(max_examples=25, deadline=None, derandomize=True)
-@given(graphs(), st.floats(0.05, 3.0))
-def test_nobody_goes_below_the_simple_bound(graph: PatrolGraph, factor: float) -> None:
+@given(graphs(), st.floats(0.05, 3.0), st.sampled_from(['tour', 'oldest', 'lookahead']))
+def test_nobody_goes_below_the_bound_that_knows_the_rules(
+    graph: PatrolGraph, factor: float, policy: str
+) -> None:
     threshold = factor * graph.tour.length
-    patrol = Patrol(graph, Rules(), 'oldest', threshold, graph.places[0])
+    patrol = Patrol(graph, Rules(), policy, threshold, graph.places[0])
     for _ in patrol.until(20.0 * max(graph.tour.length, threshold)):
         pass
-    assert patrol.run.settled >= simple_bound(graph, threshold) - 0.01
+    assert patrol.run.settled >= rule_bound(graph, threshold, states=3_000).low - 0.01

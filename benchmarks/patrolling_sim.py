@@ -1,4 +1,4 @@
-"""Reads patrolling graphs in the format of ``patrolling_sim``.
+"""Reads maps in the format of ``patrolling_sim``.
 
 Numbers separated by white space: the number of vertices; width and height of the map in pixels;
 its resolution in metres per pixel; the x and y of its origin in metres (older files have none);

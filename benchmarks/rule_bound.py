@@ -1,0 +1,202 @@
+"""The least longest wait from visit to visit that any robot can have that obeys the rules.
+
+The rules hold the robot to URGENT places while there are any within reach, and to corridors else.
+`simple_bound` holds on every map: nobody is faster than the shortest closed tour, and a place that
+may be entered only when it is URGENT waits for the threshold and the leg to it. It need not be
+reachable.
+
+`rule_bound` searches through all ways on, on maps of up to `TABLE_UP_TO` places: can a robot that
+obeys go on for ever with no wait above a limit? A depth-first search answers that. A state is a
+place, and how long ago each place was visited. A state is dead when the places that are due cannot
+all be reached in time, or when all that follow from it are dead; one that comes back to itself goes
+on for ever. What is due in time is known exactly: a table has the shortest way through each set of
+places. The search begins anywhere, with any past: until a place was visited it may be URGENT or
+not. The limit is raised as long as that is proven impossible.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surveillance_behaviour.policy.graph import PatrolGraph
+from surveillance_behaviour.policy.rollout import RuleMap
+
+TABLE_UP_TO = 20
+"""The largest map that is searched, in places: its table takes 84 MB and 4 s."""
+STATES = 100_000
+"""How many states the search may visit in all; about 50 microseconds each."""
+TICKS = 1000
+"""Ticks in a second; ages are whole ticks."""
+
+State = tuple[int, int, tuple[int, ...]]
+"""Place, the set of places visited since the search began, and the ticks since each was visited."""
+
+
+@dataclass(frozen=True)
+class RuleBound:
+    """What is known of the least longest wait from visit to visit.
+
+    Attributes:
+        low: No robot that obeys the rules can have less, seconds.
+        high: A robot can go on for ever with this, seconds; inf: no such walk was found.
+    """
+
+    low: float
+    high: float = math.inf
+
+    def within(self, precision: float) -> bool:
+        """Return whether the two differ by less than this part."""
+        return self.high <= self.low * (1.0 + precision)
+
+
+def default_ranks(graph: PatrolGraph) -> list[int]:
+    """Return the ranks of the default rules: places with several ways before those with one."""
+    return [1 if len(graph.legs[place]) > 1 else 2 for place in graph.places]
+
+
+def simple_bound(graph: PatrolGraph, threshold: float, ranks: Sequence[int] | None = None) -> float:
+    """Return a wait from visit to visit that no robot can go below, seconds; see `rule_bound`."""
+    rules = RuleMap(graph, threshold, ranks or default_ranks(graph), 0)
+    return max(graph.tour.bound, rules.least_period)
+
+
+def rule_bound(
+    graph: PatrolGraph,
+    threshold: float,
+    ranks: Sequence[int] | None = None,
+    precision: float = 0.01,
+    states: int = STATES,
+) -> RuleBound:
+    """Return bounds of the least longest wait from visit to visit.
+
+    Args:
+        graph: The map.
+        threshold: Seconds after which a place is URGENT, which comes before everything.
+        ranks: Priority of each place while it is not URGENT, less comes first; default: see
+            `default_ranks`.
+        precision: The bounds that are looked for differ by this part at most.
+        states: How many states may be visited in all.
+    """
+    low, high = simple_bound(graph, threshold, ranks), math.inf
+    if len(graph.places) > TABLE_UP_TO:
+        return RuleBound(low)
+    search = _Search(RuleMap(graph, threshold, ranks or default_ranks(graph), 0), states)
+    step = 0.9 * precision
+    while high > low * (1.0 + precision):
+        limit = min(low * (1.0 + step), (low + high) / 2.0)
+        endless = search.goes_on(limit)
+        if endless is None:
+            break
+        if endless:
+            high = limit
+        else:
+            low, step = limit, 2.0 * step
+    return RuleBound(low, high)
+
+
+class _Search:
+    """Asks whether a robot can go on for ever with no wait above a limit.
+
+    Args:
+        rules: The map.
+        states: How many states may be visited, over all questions.
+    """
+
+    def __init__(self, rules: RuleMap, states: int) -> None:
+        self._rules, self._left = rules, states
+        self._legs = [
+            [(other, round(TICKS * seconds)) for other, seconds in ways.items()]
+            for ways in rules.legs
+        ]
+        self._threshold = round(TICKS * rules.threshold)
+        self._cover = _shortest_covers(np.array(rules.away))
+
+    def goes_on(self, limit: float) -> bool | None:
+        """Return whether it can; None: the states did not suffice to find out."""
+        longest = round(TICKS * limit) + self._rules.count
+        everywhere = (1 << self._rules.count) - 1
+        # Whoever goes on for ever comes to the first place.
+        begin: State = (0, 1, (0,) * self._rules.count)
+        path = [(begin, self._moves(begin))]
+        on_path, dead = {begin}, set[State]()
+        while path:
+            state, todo = path[-1]
+            if not todo:
+                dead.add(state)
+                on_path.discard(state)
+                path.pop()
+                continue
+            place, ticks = todo.pop()
+            if state[2][place] + ticks > longest:
+                continue
+            following = _after(state, place, ticks)
+            if following in on_path and following[1] == everywhere:
+                return True
+            if following in dead or not self._in_time(following, longest):
+                continue
+            self._left -= 1
+            if self._left < 0:
+                return None
+            on_path.add(following)
+            path.append((following, self._moves(following)))
+        return False
+
+    def _moves(self, state: State) -> list[tuple[int, int]]:
+        """Return the legs that the rules may allow, the place that waited longest last."""
+        place, met, ages = state
+        ranks = self._rules.ranks
+        allowed, least = [], math.inf
+        for other, ticks in self._legs[place]:
+            urgent = ages[other] > self._threshold
+            known = urgent or met >> other & 1
+            worst = 0 if urgent else ranks[other]
+            allowed.append((worst if known else 0, other, ticks))
+            least = min(least, worst)
+        moves = [(other, ticks) for best, other, ticks in allowed if best <= least]
+        return sorted(moves, key=lambda move: ages[move[0]])
+
+    def _in_time(self, state: State, longest: int) -> bool:
+        """Whether the places that are due before any moment can be visited by then."""
+        place, _, ages = state
+        covers, due = self._cover[place], 0
+        for age, other in sorted(zip(ages, range(len(ages)), strict=True), reverse=True):
+            due |= 1 << other
+            if covers[due] > longest - age:
+                return False
+        return True
+
+
+def _after(state: State, place: int, ticks: int) -> State:
+    """Return the state after a leg to a place."""
+    _, met, ages = state
+    now = [age + ticks for age in ages]
+    now[place] = 0
+    return place, met | 1 << place, tuple(now)
+
+
+def _shortest_covers(seconds: NDArray[np.float64]) -> NDArray[np.int32]:
+    """Return the ticks of the shortest way from each place through each set, shape (n, 2 ** n).
+
+    Sets are bit masks. Held and Karp's dynamic programme over the size of the set; rounded down,
+    so that a bound stays one.
+    """
+    count = len(seconds)
+    ticks = np.maximum(np.floor(TICKS * seconds).astype(np.int32) - 1, 0)
+    sets = np.arange(1 << count)
+    sizes = np.array([(sets >> place) & 1 for place in range(count)]).sum(axis=0)
+    cover = np.full((count, 1 << count), np.iinfo(np.int32).max, np.int32)
+    cover[:, 0] = 0
+    for size in range(1, count + 1):
+        of_size = np.flatnonzero(sizes == size)
+        for first in range(count):
+            chosen = of_size[(of_size >> first) & 1 == 1]
+            rest = cover[first, chosen ^ (1 << first)]
+            for start in range(count):
+                way = rest + ticks[start, first]
+                cover[start, chosen] = np.minimum(cover[start, chosen], way)
+    return cover
