@@ -17,7 +17,7 @@ from __future__ import annotations
 import math
 import random
 import time
-from collections.abc import Generator, Iterator
+from collections.abc import Generator, Iterable, Iterator, Mapping
 from copy import copy
 from dataclasses import dataclass, replace
 
@@ -60,8 +60,8 @@ SKIPS = (0.0, 0.3, 0.6)
 """Targets visited more lately than this may be skipped, in lengths of the round."""
 SIMPLE_UP_TO = 200
 """The largest map, in places, on which `oldest` and `lookahead` are tried."""
-
-
+SIMPLE: Mapping[str, type[Oldest | Lookahead]] = {'oldest': Oldest, 'lookahead': Lookahead}
+"""The simple policies, as guides."""
 UNKNOWN = Outcome(1e12, 1e12)
 """What nothing is known of."""
 
@@ -73,10 +73,11 @@ class Course:
     Attributes:
         kind: ``round``, ``oldest`` or ``lookahead``.
         targets: The targets of a round.
-        position: Of the target that it heads for first.
+        position: Of the target that it heads for first; negative: in the beginning, from its end.
         skip: Targets visited more lately than this are skipped, seconds.
         patience: A target that may be entered only when it is URGENT is waited for so long, else
             skipped, seconds.
+        beginning: Targets before the round, for the places that wait since the patrol began.
     """
 
     kind: str
@@ -84,6 +85,15 @@ class Course:
     position: int = 0
     skip: float = 0.0
     patience: float = 0.0
+    beginning: tuple[int, ...] = ()
+
+    def target(self, position: int) -> int:
+        """Return the target at a position."""
+        return self.targets[position] if position >= 0 else self.beginning[position]
+
+    def after(self, position: int) -> int:
+        """Return the position that comes next."""
+        return position + 1 if position + 1 < len(self.targets) else 0
 
 
 class RoundGuide:
@@ -113,19 +123,18 @@ class RoundGuide:
     def _target(self, state: State) -> int:
         """Move on to the next target that is not to be skipped, and return it."""
         rules, course = self._rules, self._course
-        targets, place = course.targets, state.place
-        count, position = len(targets), self.position
-        for _ in range(count):
-            target = targets[position]
+        place, position = state.place, self.position
+        for _ in range(len(course.beginning) + len(course.targets)):
+            target = course.target(position)
             idle = state.now - state.seen[target]
             if target != place and idle >= course.skip and target not in state.avoided:
                 gate = rules.gates[target]
                 if gate < 0 or rules.threshold - idle - rules.away[place][gate] <= course.patience:
                     break
-            position = position + 1 if position + 1 < count else 0
+            position = course.after(position)
         self.position = position
-        target = targets[position]
-        return target if target != place else targets[(position + 1) % count]
+        target = course.target(position)
+        return target if target != place else course.target(course.after(position))
 
 
 @dataclass(frozen=True)
@@ -216,7 +225,7 @@ class Plan:
         if not isinstance(self._guide, RoundGuide):
             return None
         place = self._guide.next(self._state)
-        return place, self._course.targets[self._guide.position]
+        return place, self._course.target(self._guide.position)
 
     @property
     def kind(self) -> str:
@@ -259,7 +268,10 @@ class Plan:
     def _finished(self) -> bool:
         if self._work + self._search.work >= ALL_WORK:
             return True
-        return self._search.finished and self._outcome.settled <= GOOD_ENOUGH * self._bound
+        return self._search.finished and self._good_enough(self._outcome)
+
+    def _good_enough(self, outcome: Outcome) -> bool:
+        return outcome.first <= GOOD_ENOUGH * self._bound
 
     def _lead(self) -> int:
         """Return how many choices a trial takes."""
@@ -312,7 +324,7 @@ class Plan:
             outcome = self._outcome = yield from self._followed(present, state, math.inf)
         courses = self._portfolio(state, guide.position)
         best_round, least = present, outcome
-        while self._work < end and outcome.settled > GOOD_ENOUGH * self._bound:
+        while self._work < end and not self._good_enough(outcome):
             course = next(courses, None) or self._changed(best_round, least)
             if course is None:
                 self._work += MOVE_WORK
@@ -347,7 +359,7 @@ class Plan:
     def _guide_of(self, course: Course) -> Guide:
         if course.kind == 'round':
             return RoundGuide(self._rules, course)
-        return (Oldest if course.kind == 'oldest' else Lookahead)(self._rules)
+        return SIMPLE[course.kind](self._rules)
 
     def _portfolio(self, state: State, position: int) -> Iterator[Course]:
         """Yield the best round that was found since the last trial, in several ways, and the
@@ -361,20 +373,47 @@ class Plan:
         length = rules.length(targets)
         wait = max(0.0, rules.least_period - length)
         slack = wait + 2.0 * rules.mean_leg
-        oldest = min(range(rules.count), key=state.seen.__getitem__)
-        heads = [oldest]
-        if self._course.kind == 'round':
-            heads.append(self._course.targets[position])
-        phases = [k for k, target in enumerate(targets) if targets[k - 1] == state.place]
-        phases += [targets.index(head) for head in heads]
-        for phase in dict.fromkeys(phases):
+        heads = [self._course.target(position)] if self._course.kind == 'round' else []
+        phases = self._phases(targets, state, heads)
+        for phase in phases:
             yield Course('round', targets, phase, 0.0, slack)
-        if first and rules.count <= SIMPLE_UP_TO:
-            yield Course('oldest')
-            yield Course('lookahead')
+        simple = SIMPLE if first and rules.count <= SIMPLE_UP_TO else ()
+        for kind in simple:
+            yield Course(kind)
         for skip in SKIPS:
             for patience in (0.0, slack, math.inf):
                 yield Course('round', targets, phases[0], skip * length, patience)
+        for kind in simple:
+            walk, begun = self._begun(kind, state)
+            for phase in (*self._phases(targets, begun), *range(len(targets))):
+                turned = targets[phase:] + targets[:phase]
+                yield Course('round', turned, -len(walk), 0.0, slack, walk)
+        for phase in range(len(targets) if first else 0):
+            yield Course('round', targets, phase, 0.0, slack)
+            yield Course('round', targets[::-1], phase, 0.0, slack)
+
+    def _phases(
+        self, targets: tuple[int, ...], state: State, heads: Iterable[int] = ()
+    ) -> list[int]:
+        """Return where a round is well begun: where it leads on, and with the oldest place."""
+        oldest = min(range(self._rules.count), key=state.seen.__getitem__)
+        phases = [k for k in range(len(targets)) if targets[k - 1] == state.place]
+        phases += [targets.index(head) for head in (oldest, *heads)]
+        return list(dict.fromkeys(phases))
+
+    def _begun(self, kind: str, state: State) -> tuple[tuple[int, ...], State]:
+        """Return how a simple policy visits every place once, and the state that follows."""
+        guide, at, walk = SIMPLE[kind](self._rules), state.copy(), list[int]()
+        end = at.now + HORIZON * max(self._bound, self._rules.threshold)
+        while not all(at.met) and at.now < end:
+            place = guide.next(at)
+            if place == at.place:
+                break
+            at.enter(place, self._rules.legs[at.place][place])
+            at.met[place] = True
+            walk.append(place)
+        self._work += MOVE_WORK * len(walk)
+        return tuple(walk), at
 
     def _changed(self, course: Course, outcome: Outcome) -> Course | None:
         """Return the course of a round with one random change."""
@@ -387,13 +426,25 @@ class Plan:
             return replace(course, skip=skip)
         if choice < 0.2:
             return replace(course, patience=draw.random() ** 2 * self._bound)
+        if course.position < 0 and choice < 0.7:
+            return self._begun_otherwise(course)
         changes = RoundChanges(rules, Round(course.targets, 0.0), draw)
         limit = 1.1 * min(outcome.settled, 1.5 * self._bound)
         targets = changes.doubled(limit) if choice < 0.4 else changes.one(limit)
         if targets is None:
             return None
+        if course.position < 0:
+            return replace(course, targets=targets)
         head = course.targets[course.position]
         return replace(course, targets=targets, position=targets.index(head))
+
+    def _begun_otherwise(self, course: Course) -> Course:
+        """Return the course with a target of its beginning left out, or moved."""
+        draw, beginning = self._draw, list(course.beginning[course.position :])
+        moved = beginning.pop(draw.randrange(len(beginning)))
+        if draw.random() < 0.5:
+            beginning.insert(draw.randint(0, len(beginning)), moved)
+        return replace(course, beginning=tuple(beginning), position=-len(beginning))
 
 
 def plan_of(world: World) -> Plan:

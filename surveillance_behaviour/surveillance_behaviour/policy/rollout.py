@@ -29,6 +29,8 @@ NEAR = 8
 """How many nearest places of each place are known."""
 SLICE = 100
 """After so many moves that are followed ahead, whoever waits for them may do something else."""
+LASTING = 4
+"""Percents of the bound by which a wait from visit to visit may be longer for a shorter first."""
 HALF_OPEN = 1e-3
 """Seconds by which a wait must be longer than the threshold, so that rounding does not decide."""
 
@@ -216,8 +218,13 @@ class Outcome:
     steps: int = 0
 
     def grade(self, bound: float) -> tuple[int, int, float]:
-        """Return what to compare by, less is better: whole percents of the bound count."""
-        return round(100.0 * self.settled / bound), round(100.0 * self.first / bound), self.settled
+        """Return what to compare by, less is better, in whole percents of the bound.
+
+        Waits from visit to visit come again and again, so they count first, as far as they are
+        more than `LASTING` above the bound. Then the first waits do, which come once.
+        """
+        lasting = max(0, round(100.0 * self.settled / bound) - 100 - LASTING)
+        return lasting, round(100.0 * self.first / bound), self.settled
 
 
 def roll_out(
