@@ -271,3 +271,28 @@ def test_thin_margin_on_a_dark_wall_is_enough():
 def test_busy_textures_show_no_marker(backdrop):
     for seed in range(5):
         assert not DETECTOR.detect(seen([], backdrop=backdrop, seed=seed))
+
+
+def test_margin_may_be_cut_by_the_edge_of_the_image():
+    marker = cv2.aruco.generateImageMarker(DICTIONARY, 14, 56)
+    image = np.full((120, 160), 200, np.uint8)
+    image[40:96, 0:56] = marker
+    assert [each.marker_id for each in DETECTOR.detect(image)] == [14]
+
+
+def test_dark_thing_that_touches_the_border_hides_no_marker():
+    marker = cv2.aruco.generateImageMarker(DICTIONARY, 14, 42)
+    image = np.full((160, 160), 215, np.uint8)
+    image[60:102, 60:102] = marker
+    cv2.line(image, (101, 61), (108, 57), 10, 3)
+    assert [each.marker_id for each in DETECTOR.detect(image)] == [14]
+
+
+def test_text_is_no_marker_of_a_small_dictionary():
+    detector = MarkerDetector(DetectorSettings('DICT_4X4_50'))
+    for scale in (0.4, 0.5, 0.6, 0.8):
+        for font in (cv2.FONT_HERSHEY_SIMPLEX, cv2.FONT_HERSHEY_DUPLEX):
+            image = np.full((240, 640), 215, np.uint8)
+            for row, text in enumerate(('ABCDEFGHIJKLM', 'NOPQRSTUVWXYZ', '0123456789', 'BERISE')):
+                cv2.putText(image, text, (10, 50 + 50 * row), font, scale, 90, 2, cv2.LINE_AA)
+            assert not detector.detect(cv2.GaussianBlur(image, (0, 0), 0.8))

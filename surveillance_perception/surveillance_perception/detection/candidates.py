@@ -3,7 +3,8 @@
 A marker's black border is one dark blob on its white margin, so its outline is found by local
 thresholding and the convex hull of each dark blob is cut down to the smallest quadrilateral around
 it. Hulls survive what breaks polygon approximation on small and oblique markers: the corners are a
-few tenths of a pixel wrong, which `template_fit` repairs, but they are there.
+few tenths of a pixel wrong, which `template_fit` repairs, but they are there. `EdgeFit` moves the
+sides of those that are wrong by up to a cell.
 
 Of the hundreds of dark outlines in a textured image only a few pass `BorderCheck`, and every marker
 that can be read does. A candidate costs 73 samples there and some thousands in `template_fit`.
@@ -11,14 +12,19 @@ that can be read does. A candidate costs 73 samples there and some thousands in 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator, Sequence
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
-from surveillance_perception.detection.image_sampling import Array, Grey, ImagePyramid, levels_for
+from surveillance_perception.detection.image_sampling import (
+    Array,
+    Grey,
+    ImagePyramid,
+    homographies_of,
+    levels_for,
+)
 
 Quads = npt.NDArray[np.float64]
 
@@ -37,6 +43,10 @@ _CELL_PIXELS = 6.0
 # an outline runs through the middles of the outermost dark pixels, and blur makes dark smaller
 _INSET = 0.65
 _LEAST_SINE = 0.3
+_PLACES, _STEPS = 10, 13
+_REACH = 1.2
+_STRAIGHTNESS = 0.15
+_STEEPEST = 0.5
 
 
 def dark_masks(
@@ -94,7 +104,7 @@ def quads_around(
     min_area: float = 12.0,
     limit: int = 10**9,
 ) -> Quads:
-    """Quadrilaterals around the blobs of masks that do not touch the edge.
+    """Quadrilaterals around the blobs of masks.
 
     Args:
         masks: Images (height, width), blobs are not 0, and by how much each is smaller than the
@@ -115,21 +125,23 @@ def quads_around(
         quads = []
         length, breadth = min_length / scale, max(2.0, min_width / scale)
         contours, _ = cv2.findContours(mask, cv2.RETR_LIST, cv2.CHAIN_APPROX_SIMPLE)
-        height, width = mask.shape
         for contour in contours:
             if len(contour) < 4:
                 continue
             left, top, across, down = cv2.boundingRect(contour)
             if max(across, down) < length or min(across, down) < breadth:
                 continue
-            if left == 0 or top == 0 or left + across == width or top + down == height:
-                continue
             # outer outlines run the other way round than the outlines of holes
             area = -cv2.contourArea(contour, oriented=True)
             if area <= 0:
                 continue
             right, bottom = (left + across) * scale, (top + down) * scale
-            blob = tuple(each // _SAME_BOX for each in (left * scale, top * scale, right, bottom))
+            blob = (
+                left * scale // _SAME_BOX,
+                top * scale // _SAME_BOX,
+                right // _SAME_BOX,
+                bottom // _SAME_BOX,
+            )
             if blob in seen:
                 continue
             seen.add(blob)
@@ -138,7 +150,7 @@ def quads_around(
                 quads.append(quad)
         if quads:
             # a pixel's middle has whole coordinates, in a halved image as well
-            grown = _grown(_clockwise(np.array(quads)), _INSET)
+            grown = _grown(_clockwise(np.array(quads, dtype=float)), _INSET)
             found.append((grown + 0.5) * scale - 0.5)
     return np.concatenate(found) if found else np.zeros((0, 4, 2))
 
@@ -165,13 +177,13 @@ def distinct(quads: Quads, distance: float) -> npt.NDArray[np.int64]:
 
 def _quad_around(
     contour: npt.NDArray[np.int32], area: float, min_area: float
-) -> list[tuple[float, float]] | None:
+) -> npt.NDArray[np.float32] | None:
     hull = cv2.convexHull(contour)
     hull_area = cv2.contourArea(hull)
     if hull_area < min_area or area < _MIN_SOLIDITY * hull_area:
         return None
     quad = _smallest_quad(hull)
-    return quad if quad is not None and _area(quad) <= _MAX_GROWTH * hull_area else None
+    return quad if quad is not None and cv2.contourArea(quad) <= _MAX_GROWTH * hull_area else None
 
 
 def _clockwise(quads: Quads) -> Quads:
@@ -192,60 +204,16 @@ def _grown(quads: Quads, distance: float) -> Quads:
     return np.asarray(quads + distance * shift)
 
 
-def _area(corners: Sequence[tuple[float, float]]) -> float:
-    total = 0.0
-    for (x, y), (next_x, next_y) in zip(corners, [*corners[1:], corners[0]], strict=True):
-        total += x * next_y - next_x * y
-    return abs(total) / 2.0
-
-
-# OpenCV's approxPolyN does the same from 4.11 on; this has to run with 4.10 too
-def _smallest_quad(hull: npt.NDArray[np.int32]) -> list[tuple[float, float]] | None:
+def _smallest_quad(hull: npt.NDArray[np.int32]) -> npt.NDArray[np.float32] | None:
+    """Return the smallest quadrilateral (4, 2) around a hull; None where it is no such thing."""
     tolerance = max(0.7, 0.02 * cv2.arcLength(hull, True))
     reduced = cv2.approxPolyDP(hull, tolerance, True)
     if len(reduced) < 4:
         reduced = hull
     if not 4 <= len(reduced) <= _MAX_HULL_CORNERS:
         return None
-    corners: list[tuple[float, float]] = [(float(x), float(y)) for x, y in reduced[:, 0]]
-    cuts = [_without_edge(corners, index) for index in range(len(corners))]
-    while len(corners) > 4:
-        index = min(range(len(corners)), key=lambda each: cuts[each][0])
-        area, apex = cuts[index]
-        if area == math.inf:
-            return None
-        corners[index] = apex
-        after = (index + 1) % len(corners)
-        del corners[after], cuts[after]
-        if after < index:
-            index -= 1
-        for each in range(index - 2, index + 2):
-            cuts[each % len(corners)] = _without_edge(corners, each % len(corners))
-    return corners
-
-
-def _without_edge(
-    corners: list[tuple[float, float]], index: int
-) -> tuple[float, tuple[float, float]]:
-    """Return the added area and the new corner when the edge from `index` to the next one is
-    dropped.
-    """
-    count = len(corners)
-    before, start = corners[index - 1], corners[index]
-    end, after = corners[(index + 1) % count], corners[(index + 2) % count]
-    in_x, in_y = start[0] - before[0], start[1] - before[1]
-    out_x, out_y = end[0] - after[0], end[1] - after[1]
-    edge_x, edge_y = end[0] - start[0], end[1] - start[1]
-    determinant = in_x * out_y - in_y * out_x
-    if abs(determinant) < 1e-9:
-        return math.inf, start
-    along = (edge_x * out_y - edge_y * out_x) / determinant
-    apex = (start[0] + along * in_x, start[1] + along * in_y)
-    beyond = (apex[0] - end[0]) * out_x + (apex[1] - end[1]) * out_y
-    if along < 0 or beyond < -1e-9:
-        return math.inf, start
-    area = abs((apex[0] - start[0]) * edge_y - (apex[1] - start[1]) * edge_x) / 2.0
-    return area, apex
+    quad = cv2.approxPolyN(reduced.astype(np.float32), 4, None, -1.0, True).reshape(-1, 2)
+    return quad if len(quad) == 4 else None
 
 
 class BorderCheck:
@@ -303,3 +271,73 @@ def _border(along: npt.NDArray[np.float64], radius: float) -> Array:
     across = np.full_like(along, radius)
     sides = [(along, -across), (across, along), (along, across), (-across, along)]
     return np.concatenate([np.stack(side) for side in sides], axis=1)
+
+
+class EdgeFit:
+    """Moves the sides of quadrilaterals onto the outer edges of a border of `side` cells.
+
+    A hull is wrong by up to a cell where something dark touches the marker, or light ate a corner.
+    Across each side the steepest rise from dark to light is looked for at some places, and a line
+    laid through them; places far from the line count less (iteratively reweighted least squares).
+    """
+
+    def __init__(self, side: int) -> None:
+        self._side = side
+        self._along = np.linspace(-0.9, 0.9, _PLACES)
+        self._across = np.linspace(-_REACH, _REACH, _STEPS) * 2.0 / side
+        along, across = (
+            each.ravel() for each in np.meshgrid(self._along, self._across, indexing='ij')
+        )
+        out = 1.0 + across
+        sides = [(along, -out), (out, along), (along, out), (-out, along)]
+        points = np.concatenate([np.stack(side) for side in sides], axis=1)
+        self._grid = np.vstack([points, np.ones(points.shape[1])])
+
+    def fitted(self, pyramid: ImagePyramid, quads: Quads) -> Quads:
+        """Return quads (m, 4, 2) with their sides on the edges nearest to them."""
+        homographies = homographies_of(quads)
+        levels = levels_for(homographies, self._side, _CELL_PIXELS)
+        values = pyramid.sample(homographies, self._grid, levels).astype(float)
+        values = values.reshape(len(quads), 4, _PLACES, _STEPS)
+        rise = np.maximum(values[..., 2:] - values[..., :-2], 0.0)
+        steepest = rise.max(axis=3)
+        near = np.square(rise * (rise > 0.5 * steepest[..., None])) + 1e-9
+        # where each place's edge is, in marker units outwards
+        found = (near * self._across[1:-1]).sum(axis=3) / near.sum(axis=3)
+        weight = steepest / np.maximum(steepest.max(axis=2, keepdims=True), 1e-6) + 1e-3
+        spread = 2.0 / self._side * _STRAIGHTNESS
+        shift, slope = _line(self._along, found, weight)
+        for _ in range(2):
+            residual = found - shift[..., None] - slope[..., None] * self._along
+            shift, slope = _line(self._along, found, weight / (1.0 + np.square(residual / spread)))
+        return _corners_between(homographies, 1.0 + shift, np.clip(slope, -_STEEPEST, _STEEPEST))
+
+
+def _line(x: Array, y: Array, weight: Array) -> tuple[Array, Array]:
+    """Return a weighted straight line through y (..., n) over x (n,): value at 0, and slope."""
+    total = weight.sum(axis=-1)
+    middle = (weight * x).sum(axis=-1) / total
+    height = (weight * y).sum(axis=-1) / total
+    centred = x - middle[..., None]
+    variance = np.maximum((weight * centred * centred).sum(axis=-1), 1e-9)
+    slope = (weight * centred * (y - height[..., None])).sum(axis=-1) / variance
+    return height - slope * middle, slope
+
+
+def _corners_between(homographies: Array, out: Array, slope: Array) -> Quads:
+    """Corners (m, 4, 2) in pixels where sides meet, given as `out + slope * along` (m, 4)."""
+    top, right, bottom, left = range(4)
+    corners = np.empty((len(out), 4, 3))
+    for index, (level, upright) in enumerate(
+        [(top, left), (top, right), (bottom, right), (bottom, left)]
+    ):
+        # y = down (out + slope x), x = across (out + slope y)
+        down = -1.0 if level == top else 1.0
+        across = -1.0 if upright == left else 1.0
+        first, second = down * out[:, level], down * slope[:, level]
+        third, fourth = across * out[:, upright], across * slope[:, upright]
+        x = (third + fourth * first) / (1.0 - fourth * second)
+        corners[:, index] = np.stack([x, first + second * x, np.ones_like(x)], axis=1)
+    pixels = corners @ homographies.transpose(0, 2, 1)
+    depth = np.where(np.abs(pixels[..., 2:]) < 1e-6, 1e-6, pixels[..., 2:])
+    return np.asarray(pixels[..., :2] / depth)

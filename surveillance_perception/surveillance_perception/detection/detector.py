@@ -4,7 +4,7 @@ The way from an image to markers:
 
 1. `prepare` stretches a dark image and smooths a noisy one.
 2. `dark_masks` and `quads_around` propose quadrilaterals, `BorderCheck` keeps those with a white
-   margin, a black border and something inside.
+   margin, a black border and something inside; `EdgeFit` moves their sides onto the border.
 3. `TemplateFit` compares each with every code of the dictionary through the camera's blur, aligns
    the likely ones with the image, and tries stronger blur where the fit is poor.
 4. A reading is accepted by its correlation and by its lead over the second best code: a lower lead
@@ -22,6 +22,7 @@ import numpy.typing as npt
 
 from surveillance_perception.detection.candidates import (
     BorderCheck,
+    EdgeFit,
     Quads,
     dark_masks,
     distinct,
@@ -50,6 +51,8 @@ _WRONG_BORDER = 0.3
 _CONTRADICTED = 0.6
 _RIGHT_BORDER = 3
 _RIGHT_LEAD = 1.6
+_RIGHT_CORRELATION = 0.8
+_SURE_LEAD, _SURE_BORDER = 6.0, 6
 _FEW_SPARE_BITS = 12.0
 _STRICT = 1.8
 
@@ -134,6 +137,7 @@ class MarkerDetector:
         self._reader = MarkerReader(codes, self.settings.blur)
         self._even_reader = MarkerReader(codes, self.settings.blur, even=True)
         self._border = BorderCheck(self._reader.codes.side)
+        self._edges = EdgeFit(self._reader.codes.side)
 
     def detect(
         self, image: npt.NDArray[np.uint8], expected: Sequence[Array] = ()
@@ -202,8 +206,15 @@ class MarkerDetector:
         if not len(quads):
             return quads
         correlation = self._border.correlation(pyramid, homographies_of(quads), contrast)
-        order = np.argsort(-correlation)
-        quads = quads[order[correlation[order] > 0.0]]
+        passed = correlation > 0.0
+        quads, correlation = quads[passed], correlation[passed]
+        if not len(quads):
+            return quads
+        fitted = self._edges.fitted(pyramid, quads)
+        better = self._border.correlation(pyramid, homographies_of(fitted), contrast)
+        closer = better > correlation
+        quads[closer], correlation[closer] = fitted[closer], better[closer]
+        quads = quads[np.argsort(-correlation)]
         quads = quads[distinct(quads, _SAME_QUAD)]
         self.left_out = max(0, len(quads) - settings.max_candidates)
         return np.asarray(quads[: settings.max_candidates])
@@ -232,9 +243,18 @@ class MarkerDetector:
             & (readings.inner > settings.least_inner_correlation)
             & (np.where(agreed, joint_lead, readings.lead) > lead)
         )
-        right = (readings.wrong_border <= _RIGHT_BORDER) & (
-            ((readings.wrong == 0) & (readings.inner_lead > _RIGHT_LEAD * strict))
-            | ((readings.wrong <= min(1, codes.correction)) & (readings.inner_lead > lead * strict))
+        # letters look like codes of 16 cells: without a border that fits, the code must be clear
+        sure = readings.inner_lead > _SURE_LEAD * strict
+        right = (
+            (readings.wrong_border <= np.where(sure, _SURE_BORDER, _RIGHT_BORDER))
+            & (sure | (readings.correlation > _RIGHT_CORRELATION))
+            & (
+                ((readings.wrong == 0) & (readings.inner_lead > _RIGHT_LEAD * strict))
+                | (
+                    (readings.wrong <= min(1, codes.correction))
+                    & (readings.inner_lead > lead * strict)
+                )
+            )
         )
         clear = readings.lead > np.where(lead < settings.unknown_lead, _CLEAR_KNOWN, _CLEAR) * lead
         # votes of cells a pixel wide are weak, but nearly all of them are not wrong by chance
