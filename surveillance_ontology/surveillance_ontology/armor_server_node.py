@@ -78,7 +78,7 @@ class ArmorServer(PatrolNode):
     def __init__(self, *, keep: bool = False, **node_options: Any) -> None:
         super().__init__('armor_server', **node_options)
         self._service = described_service(self, keep=keep)
-        self._feed = ChangeFeed(self._service, self._soon)
+        self._feed = ChangeFeed(self._service.session, self._soon)
         self._subscribers = 0
         self._untold: list[NumberedChange] = []
         self._publisher = self.create_publisher(

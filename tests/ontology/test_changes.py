@@ -29,7 +29,7 @@ def test_changes_are_numbered_and_say_what_is_derived(
     service: ArmorService, client: ArmorClient
 ) -> None:
     announced: list[int] = []
-    feed = ChangeFeed(service, lambda: announced.append(1))
+    feed = ChangeFeed(service.session, lambda: announced.append(1))
     build_seven_rooms(client, False, True)
     loaded, *changes = feed.take()
     assert (loaded.reference_name, loaded.sequence) == ('map', 0)
@@ -54,7 +54,7 @@ def test_a_change_too_large_for_a_message_leaves_a_gap(
     service: ArmorService, client: ArmorClient
 ) -> None:
     client.utils.load_ref_from_file(ONTOLOGY, IRI, True)
-    feed = ChangeFeed(service, lambda: None)
+    feed = ChangeFeed(service.session, lambda: None)
     for number in range(LARGE + 1):
         client.manipulation.add_ind_to_class(f'X{number}', 'THING')
     client.utils.apply_buffered_changes()
@@ -166,7 +166,7 @@ def test_followed_facts_are_those_that_the_server_has(
     service = ArmorService(warn=lambda _: None)
     client = ArmorClient('test', 'map', InProcessTransport(service))
     build_seven_rooms(client, False, True)
-    feed = ChangeFeed(service, lambda: None)
+    feed = ChangeFeed(service.session, lambda: None)
     sets = [FactSet(pattern) for pattern in PATTERNS]
     for facts in sets:
         facts.follow(0, [])

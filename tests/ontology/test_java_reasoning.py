@@ -69,7 +69,7 @@ def test_hermit_derives_what_the_native_reasoner_does_not(tmp_path: Path) -> Non
         return ArmorService(limits, store=Store(tmp_path / 'store'))
 
     service = start()
-    feed = ChangeFeed(service, lambda: None)
+    feed = ChangeFeed(service.session, lambda: None)
     ask = asker(service)
     for name, reasoner in (('map', 'hermit'), ('native', 'native')):
         ask('LOAD FILE', 'u.owl', IRI, 'false', reasoner, 'true', reference=name)

@@ -12,7 +12,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from surveillance_ontology.armor.service import ArmorService
+from surveillance_ontology.armor.session import Session
 from surveillance_ontology.knowledge_base import Changes
 from surveillance_ontology.owl.axioms import Axiom
 
@@ -41,19 +41,19 @@ class NumberedChange(NamedTuple):
 
 
 class ChangeFeed:
-    """Collects the changes of a service.
+    """Collects the changes of a service's references.
 
     Args:
-        service: The service.
+        session: What the changes are made in.
         announce: Called, in any thread, when there is something to take and was nothing before.
     """
 
-    def __init__(self, service: ArmorService, announce: Callable[[], None]) -> None:
+    def __init__(self, session: Session, announce: Callable[[], None]) -> None:
         self._announce = announce
         self._lock = threading.Lock()
         self._waiting: deque[NumberedChange] = deque(maxlen=KEPT)
         self._sequences: dict[str, int] = {}
-        service.watch(self._on_changes)
+        session.watch(self._on_changes)
 
     def take(self) -> list[NumberedChange]:
         """Take what waits, oldest first."""

@@ -23,7 +23,16 @@ import re
 from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import suppress
 from functools import update_wrapper
-from typing import Any, Concatenate, Generic, ParamSpec, Protocol, TypeVar, overload
+from typing import (
+    TYPE_CHECKING,
+    Any,
+    Concatenate,
+    Generic,
+    ParamSpec,
+    Protocol,
+    TypeVar,
+    overload,
+)
 
 from surveillance_ontology.armor.facts import ShortFact, parse_fact
 from surveillance_ontology.armor.protocol import (
@@ -34,6 +43,9 @@ from surveillance_ontology.armor.protocol import (
 )
 from surveillance_ontology.armor.rendering import parse_rendered
 from surveillance_ontology.owl.vocabulary import local_name
+
+if TYPE_CHECKING:
+    from surveillance_ontology.armor.service import ArmorService
 
 P = ParamSpec('P')
 R = TypeVar('R')
@@ -171,19 +183,10 @@ def operation(steps: Callable[Concatenate[S, P], Steps[R]]) -> Operation[S, P, R
     return Operation(steps)
 
 
-class RequestMaker(HasTransport, Protocol):
-    """The client that parts belong to."""
-
-    reference_name: str
-
-    def request(self, words: str, *args: str) -> DirectiveRequest:
-        """Make a directive."""
-
-
 class ClientPart:
     """A group of operations of one client."""
 
-    def __init__(self, client: RequestMaker) -> None:
+    def __init__(self, client: ArmorClient) -> None:
         self.client = client
 
     @property
@@ -727,20 +730,10 @@ class ArmorClient:
         return answer
 
 
-class DirectiveExecutor(Protocol):
-    """A directive service of this process: `service.ArmorService`."""
-
-    def execute(self, request: DirectiveRequest) -> DirectiveResponse:
-        """Carry out one directive."""
-
-    def execute_list(self, requests: Batch) -> ListResponse:
-        """Carry out a batch."""
-
-
 class InProcessTransport:
     """Brings directives to a service in this process."""
 
-    def __init__(self, service: DirectiveExecutor) -> None:
+    def __init__(self, service: ArmorService) -> None:
         self._service = service
 
     def call(self, request: DirectiveRequest) -> DirectiveResponse:

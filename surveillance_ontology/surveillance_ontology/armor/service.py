@@ -27,7 +27,7 @@ from surveillance_ontology.armor.protocol import (
 )
 from surveillance_ontology.armor.reference import Change, Reference, Registry
 from surveillance_ontology.armor.rendering import one_line, shown
-from surveillance_ontology.armor.session import Session, Watcher
+from surveillance_ontology.armor.session import Session
 from surveillance_ontology.armor.store import JournalError, Store
 from surveillance_ontology.reasoner.java_reasoning import JavaReasonerError
 
@@ -59,20 +59,16 @@ class ArmorService:
         store: Store | None = None,
         clock: Callable[[], float] = time.time,
     ) -> None:
-        self.session = Session(settings or Settings(), screen, warn, store, clock)
+        self._settings = settings or Settings()
+        self.session = Session(self._settings, screen, warn, store, clock)
         self._store = store
         if store:
             with memory.uncollected():
-                for ref in store.recover(self.settings.history):
+                for ref in store.recover(self._settings.history):
                     self.session.register(ref)
                     memory.settle(len(ref.kb))
             for note in store.notes:
                 warn(note)
-
-    @property
-    def settings(self) -> Settings:
-        """What is allowed."""
-        return self.session.settings
 
     @property
     def references(self) -> Registry:
@@ -139,8 +135,8 @@ class ArmorService:
 
         A failure does not end the batch: each directive has its own answer.
         """
-        if len(requests) > self.settings.max_batch:
-            problem = f'{len(requests)} directives in a list, at most {self.settings.max_batch}'
+        if len(requests) > self._settings.max_batch:
+            problem = f'{len(requests)} directives in a list, at most {self._settings.max_batch}'
             return ListResponse(False, False, [_refusal(problem)])
         names = {request.reference_name for request in requests}
         with self.references.held(names):
@@ -168,7 +164,7 @@ class ArmorService:
     def _undo(self, names: Iterable[str]) -> None:
         """Bring references back to what the store has of them."""
         assert self._store is not None
-        durable = {ref.name: ref for ref in self._store.recover(self.settings.history)}
+        durable = {ref.name: ref for ref in self._store.recover(self._settings.history)}
         for name in names:
             kept, ref = durable.get(name), self.references.get(name)
             if kept is not None and ref is not None:
@@ -179,16 +175,6 @@ class ArmorService:
             elif ref is not None:
                 self.references.remove(ref)
             self.session.tell(name, None)
-
-    def watch(self, watcher: Watcher) -> Callable[[], None]:
-        """Tell a watcher of every change of asserted and derived facts.
-
-        It is called inside the directive that caused the change and must be quick.
-
-        Returns:
-            A function that ends the watching.
-        """
-        return self.session.watch(watcher)
 
     def _execute(self, request: DirectiveRequest) -> DirectiveResponse:
         if not request.reference_name:
@@ -236,16 +222,18 @@ class ArmorService:
         return remark
 
     def _values(self, directive: Directive, request: DirectiveRequest, ref: Reference) -> list[Any]:
-        return directive.read(request.args, ref.kb.iri, narrow_doubles=self.settings.narrow_doubles)
+        return directive.read(
+            request.args, ref.kb.iri, narrow_doubles=self._settings.narrow_doubles
+        )
 
     def _check_size(self, request: DirectiveRequest) -> None:
         args = request.args
-        if len(args) > self.settings.max_arguments:
-            raise DirectiveError(f'{len(args)} arguments, at most {self.settings.max_arguments}')
+        if len(args) > self._settings.max_arguments:
+            raise DirectiveError(f'{len(args)} arguments, at most {self._settings.max_arguments}')
         characters = sum(map(len, args))
-        if characters > self.settings.max_characters:
+        if characters > self._settings.max_characters:
             raise DirectiveError(
-                f'{characters} characters of arguments, at most {self.settings.max_characters}'
+                f'{characters} characters of arguments, at most {self._settings.max_characters}'
             )
 
 

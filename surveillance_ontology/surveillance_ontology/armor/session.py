@@ -70,10 +70,12 @@ class Session:
         """Write a line for the operator."""
         self._warn(one_line(text))
 
-    def watch(self, watcher: Watcher) -> Callable[[], None]:
-        """Tell a watcher of every change; return a function that ends the watching."""
+    def watch(self, watcher: Watcher) -> None:
+        """Tell a watcher of every change of asserted and derived facts.
+
+        It is called inside the directive that caused the change and must be quick.
+        """
         self._watchers.append(watcher)
-        return lambda: self._watchers.remove(watcher)
 
     def register(self, ref: Reference) -> None:
         """Make a reference known under its name."""

@@ -6,7 +6,6 @@ import contextlib
 import threading
 import time
 from collections.abc import Iterator
-from typing import Any
 
 from surveillance_ontology import memory
 from surveillance_ontology.armor.access import (
@@ -67,36 +66,6 @@ _LOAD_DIFFERS = (
 _WEB_DIFFERS = 'Refused unless the parameter allow_web is set.'
 
 
-@utility('LOAD FILE', text('path'), *_LOAD, summary=_LOAD_SUMMARY, differs=_LOAD_DIFFERS, slow=True)
-def _load_file(session: Session, request: DirectiveRequest, *values: Any) -> DirectiveResponse:
-    return _load(session, request, *values)
-
-
-@utility(
-    'LOAD FILE MOUNTED',
-    *(text('path'), *_LOAD),
-    summary='LOAD FILE, then MOUNT. When mounting is refused the ontology stays loaded.',
-    slow=True,
-)
-def _load_file_mounted(
-    session: Session, request: DirectiveRequest, *values: Any
-) -> DirectiveResponse:
-    response = _load(session, request, *values)
-    _mount(session, request)
-    return response
-
-
-@utility(
-    'LOAD WEB',
-    *(text('url'), *_LOAD),
-    summary='LOAD FILE with a document from the web.',
-    differs=_WEB_DIFFERS,
-    slow=True,
-)
-def _load_web(session: Session, request: DirectiveRequest, *values: Any) -> DirectiveResponse:
-    return _load(session, request, *values, web=True)
-
-
 @utility(
     'LOAD WEB MOUNTED',
     *(text('url'), *_LOAD),
@@ -104,14 +73,20 @@ def _load_web(session: Session, request: DirectiveRequest, *values: Any) -> Dire
     differs=_WEB_DIFFERS,
     slow=True,
 )
-def _load_web_mounted(
-    session: Session, request: DirectiveRequest, *values: Any
-) -> DirectiveResponse:
-    response = _load(session, request, *values, web=True)
-    _mount(session, request)
-    return response
-
-
+@utility(
+    'LOAD WEB',
+    *(text('url'), *_LOAD),
+    summary='LOAD FILE with a document from the web.',
+    differs=_WEB_DIFFERS,
+    slow=True,
+)
+@utility(
+    'LOAD FILE MOUNTED',
+    *(text('path'), *_LOAD),
+    summary='LOAD FILE, then MOUNT. When mounting is refused the ontology stays loaded.',
+    slow=True,
+)
+@utility('LOAD FILE', text('path'), *_LOAD, summary=_LOAD_SUMMARY, differs=_LOAD_DIFFERS, slow=True)
 def _load(
     session: Session,
     request: DirectiveRequest,
@@ -120,8 +95,21 @@ def _load(
     buffered: bool,
     reasoner: str,
     lazy: bool,
-    *,
-    web: bool = False,
+) -> DirectiveResponse:
+    response = _loaded(session, request, source, iri, buffered, reasoner, lazy)
+    if request.secondary:
+        _mount(session, request)
+    return response
+
+
+def _loaded(
+    session: Session,
+    request: DirectiveRequest,
+    source: str,
+    iri: str,
+    buffered: bool,
+    reasoner: str,
+    lazy: bool,
 ) -> DirectiveResponse:
     name = request.reference_name
     again = DirectiveResponse(error_description=f'{name} is loaded already')
@@ -130,6 +118,7 @@ def _load(
     with session.loading:
         if name not in session.references:
             with memory.uncollected():
+                web = request.primary.upper() == 'WEB'
                 ref, notes = _read_document(
                     name, source, iri, reasoner, session.paths, session.settings, web=web
                 )
@@ -202,6 +191,13 @@ def _release(session: Session, ref: Reference) -> None:
 
 
 @utility(
+    'SAVE INFERENCE',
+    text('path', ''),
+    summary='SAVE with the derived facts.',
+    differs='The live ontology stays as it is; ARMOR asserts every derived fact for good.',
+    slow=True,
+)
+@utility(
     'SAVE',
     text('path', ''),
     summary='Writes the asserted axioms in the format that was loaded, to a file below the '
@@ -213,30 +209,13 @@ def _release(session: Session, ref: Reference) -> None:
     'in .nt gets N-Triples, which hold names that RDF/XML cannot.',
     slow=True,
 )
-def _save(session: Session, request: DirectiveRequest, path: str) -> DirectiveResponse:
-    return _write(session, request, path, inferences=False)
-
-
-@utility(
-    'SAVE INFERENCE',
-    text('path', ''),
-    summary='SAVE with the derived facts.',
-    differs='The live ontology stays as it is; ARMOR asserts every derived fact for good.',
-    slow=True,
-)
-def _save_inference(session: Session, request: DirectiveRequest, path: str) -> DirectiveResponse:
-    return _write(session, request, path, inferences=True)
-
-
 @memory.uncollected()
-def _write(
-    session: Session, request: DirectiveRequest, path: str, *, inferences: bool
-) -> DirectiveResponse:
+def _save(session: Session, request: DirectiveRequest, path: str) -> DirectiveResponse:
     with session.references.locked(request.reference_name) as ref:
         session.check_free(ref, request.client_name)
         target = session.paths.to_write(path or _loaded_file(session, ref), ONTOLOGY_ENDINGS)
         axioms = list(ref.kb.axioms())
-        if inferences:
+        if request.primary:
             axioms = list(dict.fromkeys([*axioms, *ref.kb.facts()]))
         origin = ref.origin
     # Late, as what LOAD WEB needs: a server that starts again is to be back at once.
