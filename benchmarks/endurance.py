@@ -1,6 +1,7 @@
 """Eight simulated hours of patrol while doors close, things stand about and the robot is pushed.
 
-    python benchmarks/endurance.py [--hours 8] [--seed 1] [--map FILE] [--quick]
+    python benchmarks/endurance.py [--hours 8] [--seed 1] [--map FILE] [--people 5] [--range 3]
+        [--quick]
 
 Runs the whole stack in one process as fast as it goes, makes trouble through the simulator's
 services, and watches from outside: collisions, the battery, what the ontology says about where the
@@ -26,6 +27,7 @@ from geometry_msgs.msg import PoseStamped
 from sensor_msgs.msg import BatteryState
 from whole_stack import ROOT, Stack
 
+from surveillance_controllers.battery.model import BatteryParameters
 from surveillance_fsm.ros import ServiceCaller
 from surveillance_interfaces.msg import FactChanges
 from surveillance_interfaces.srv import (
@@ -37,9 +39,13 @@ from surveillance_interfaces.srv import (
     SlipOdometry,
 )
 from surveillance_ontology.armor_client import CHANGES_QOS, CHANGES_TOPIC
+from surveillance_operator.map_command import graph_over_doors
 from surveillance_runtime.conversions import seconds_of
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
+from surveillance_simulation.world.world import read_world
 
+USUAL_SPEED = 0.45
+"""Of a drive, m/s: acceleration, bends and doors included."""
 LONGEST_WRONG = 2.0
 """Simulated seconds that the ontology may be wrong about the robot's place."""
 
@@ -273,6 +279,17 @@ class Trouble:
         return 'drain by 10 percent'
 
 
+def capacity_for(place: Path, ranges: float) -> float:
+    """Return the energy of ways from the station to the farthest place and home, Wh."""
+    plan = read_world(place).plan
+    graph = graph_over_doors(plan)
+    home = plan.place.recharge_rooms[0]
+    metres = max(graph.seconds(home, other) for other in plan.place.rooms)
+    battery = BatteryParameters()
+    joules_per_metre = battery.joules_per_metre + battery.rest_power / USUAL_SPEED
+    return ranges * 2.0 * metres * joules_per_metre / 3600.0
+
+
 def run(
     place: Path,
     seconds: float,
@@ -280,13 +297,30 @@ def run(
     pause: tuple[float, float] = (40.0, 120.0),
     tell: Callable[[str], None] = lambda _: None,
     log_level: str = 'fatal',
+    people: int = 0,
+    ranges: float | None = None,
 ) -> tuple[Watch, Trouble]:
     """Patrol for simulated seconds with trouble every `pause` seconds; return what was seen.
 
     The seconds count from when the robot first drives.
+
+    Args:
+        place: The place's file.
+        seconds: How long.
+        seed: Of the trouble, the people and all noise.
+        pause: Least and greatest time between two troubles, seconds.
+        tell: Told each trouble.
+        log_level: Of all nodes.
+        people: How many walk about, who keep to their way (`pushy`).
+        ranges: The battery lasts for so many ways to the farthest place and home; None: as it is.
     """
     rng = random.Random(seed)
-    stack = Stack(place, {'simulator': {'random_seed': seed}}, log_level=log_level)
+    parameters: dict[str, dict[str, Any]] = {
+        'simulator': {'random_seed': seed, 'people.count': people, 'people.manner': 'pushy'}
+    }
+    if ranges is not None:
+        parameters['battery_controller'] = {'battery.capacity': capacity_for(place, ranges)}
+    stack = Stack(place, parameters, log_level=log_level)
     watch = Watch(stack)
     trouble = Trouble(stack, watch, rng)
     stack.start()
@@ -313,6 +347,10 @@ def main() -> int:
     parser.add_argument('--hours', type=float, default=8.0, help='simulated hours')
     parser.add_argument('--seed', type=int, default=1)
     parser.add_argument('--map', type=Path, default=ROOT / 'config' / 'seven_rooms.yaml')
+    parser.add_argument('--people', type=int, default=0, help='how many walk about')
+    parser.add_argument(
+        '--range', type=float, help='ways to the farthest place and home that a charge lasts for'
+    )
     parser.add_argument('--quick', action='store_true', help='ten simulated minutes')
     parser.add_argument('--verbose', action='store_true', help='print each trouble')
     options = parser.parse_args()
@@ -320,7 +358,14 @@ def main() -> int:
     logging.disable()
     begun = time.monotonic()
     tell = print if options.verbose else lambda _: None
-    watch, trouble = run(options.map, seconds, options.seed, tell=tell)
+    watch, trouble = run(
+        options.map,
+        seconds,
+        options.seed,
+        tell=tell,
+        people=options.people,
+        ranges=options.range,
+    )
     took = time.monotonic() - begun
     made = ', '.join(f'{kind} {count}' for kind, count in sorted(trouble.made.items()))
     print(f'{watch.now / 3600:.2f} simulated hours in {took:.0f} s, {watch.now / took:.1f} times')
