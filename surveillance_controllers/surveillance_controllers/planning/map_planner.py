@@ -4,8 +4,6 @@ of."""
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import PoseWithCovarianceStamped
@@ -87,7 +85,14 @@ class MapPlanner:
         return np.column_stack([path, heights])
 
     def _on_map(self, message: OccupancyGrid) -> None:
-        self._replace(lambda: GridPlanner(conversions.grid_from(message), self._parameters), 'map')
+        try:
+            planner = GridPlanner(conversions.grid_from(message), self._parameters)
+        except ValueError as error:
+            self._node.get_logger().error(f'map: {error}')
+            return
+        with self._lock:
+            self._planner = planner
+        self._has_map.set()
 
     def _on_obstacles(self, message: PointCloud2) -> None:
         try:
@@ -100,16 +105,6 @@ class MapPlanner:
             self._pose = conversions.pose_from(message.pose.pose)
         except ValueError as error:
             self._node.get_logger().error(f'amcl_pose: {error}')
-
-    def _replace(self, make: Callable[[], Any], topic: str) -> None:
-        try:
-            planner = make()
-        except ValueError as error:
-            self._node.get_logger().error(f'{topic}: {error}')
-            return
-        with self._lock:
-            self._planner = planner
-        self._has_map.set()
 
 
 class NavigationPlanning:

@@ -6,7 +6,7 @@ Places are the nodes of a graph; a door that leads into two places joins them, u
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from itertools import combinations, pairwise
 
 import networkx as nx
@@ -35,21 +35,29 @@ def route(
     Raises:
         NoPathError: No open doors lead there; the text names the closed doors that would.
     """
-    graph = nx.Graph()
-    graph.add_nodes_from([start, goal])
-    blocked = nx.Graph()
-    blocked.add_nodes_from([start, goal])
-    for door, rooms in sorted(rooms_of.items()):
-        for first, second in combinations(sorted(rooms), 2):
-            length = _distance(positions, first, second)
-            for edges in (blocked,) if door in closed else (graph, blocked):
-                if not edges.has_edge(first, second) or edges[first][second]['length'] > length:
-                    edges.add_edge(first, second, length=length, door=door)
-    try:
-        places = nx.shortest_path(graph, start, goal, weight='length')
-    except nx.NetworkXNoPath:
-        raise NoPathError(_why(blocked, closed, start, goal)) from None
-    return [graph[first][second]['door'] for first, second in pairwise(places)]
+
+    def doors_through(doors: Iterable[str]) -> list[str] | None:
+        graph = nx.Graph()
+        graph.add_nodes_from([start, goal])
+        for door in sorted(doors):
+            for first, second in combinations(sorted(rooms_of[door]), 2):
+                length = _distance(positions, first, second)
+                if length < graph.get_edge_data(first, second, {}).get('length', math.inf):
+                    graph.add_edge(first, second, length=length, door=door)
+        try:
+            places = nx.shortest_path(graph, start, goal, weight='length')
+        except nx.NetworkXNoPath:
+            return None
+        return [graph[first][second]['door'] for first, second in pairwise(places)]
+
+    doors = doors_through(door for door in rooms_of if door not in closed)
+    if doors is not None:
+        return doors
+    shut = [door for door in doors_through(rooms_of) or () if door in closed]
+    if not shut:
+        raise NoPathError(f'no route from {start} to {goal}: no doors lead there')
+    which = f'doors {", ".join(shut)} are' if len(shut) > 1 else f'door {shut[0]} is'
+    raise NoPathError(f'no route from {start} to {goal}: the {which} closed')
 
 
 def _distance(positions: Mapping[str, ArrayLike], first: str, second: str) -> float:
@@ -57,17 +65,3 @@ def _distance(positions: Mapping[str, ArrayLike], first: str, second: str) -> fl
         return 1.0
     a, b = np.asarray(positions[first], float), np.asarray(positions[second], float)
     return math.dist(a[:2], b[:2])
-
-
-def _why(graph: nx.Graph, closed: Collection[str], start: str, goal: str) -> str:
-    try:
-        places = nx.shortest_path(graph, start, goal, weight='length')
-    except nx.NetworkXNoPath:
-        return f'no route from {start} to {goal}: no doors lead there'
-    doors = [graph[a][b]['door'] for a, b in pairwise(places)]
-    shut = [door for door in doors if door in closed]
-    many = len(shut) > 1
-    return (
-        f'no route from {start} to {goal}: the door{"s" if many else ""} {", ".join(shut)} '
-        f'{"are" if many else "is"} closed'
-    )
