@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from .seven_rooms import Ask, iri, names
 
 
@@ -161,3 +163,29 @@ def test_what_is_not_there_to_be_taken_away_is_named(ask: Ask) -> None:
         assert (answer.success, answer.exit_code) == (True, 0), 'as ARMOR does'
         assert remark in answer.error_description
     assert ask('REMOVE DATAPROP IND', 'size', 'X', 'INT', '1').error_description == ''
+
+
+@pytest.mark.parametrize(
+    ('words', 'args', 'argument'),
+    [
+        ('ADD DATAPROP IND', ('rdfs:label', 'R1', 'STRING', 'x'), 'property'),
+        ('SET OBJECTPROP IND', ('owl:Thing', 'R1', 'R2'), 'property'),
+        ('ADD IND CLASS', ('R1', 'xsd:long'), 'class'),
+        ('DISJOINT IND', ('R1', '<http://www.w3.org/2002/07/owl#Nothing>'), 'individual'),
+        ('RENAME CLASS', ('ROOM', 'owl:Class'), 'new name'),
+    ],
+)
+def test_words_of_owl_itself_are_no_names(
+    ask: Ask, words: str, args: tuple[str, ...], argument: str
+) -> None:
+    answer = ask(words, *args)
+    assert (answer.success, answer.exit_code) == (False, 205)
+    assert f'argument {argument} ' in answer.error_description
+    assert 'is a word of OWL itself' in answer.error_description
+
+
+def test_the_classes_and_properties_that_owl_has_can_be_named(ask: Ask) -> None:
+    assert ask('ADD IND CLASS', 'R1', 'owl:Thing').success
+    assert ask('ADD CLASS CLASS', 'K', 'owl:Nothing').success
+    assert ask('ADD OBJECTPROP IND', 'owl:topObjectProperty', 'R1', 'R2').success
+    assert ask('REMOVE DATAPROP IND', 'rdfs:label', 'R1', 'STRING', 'x').success

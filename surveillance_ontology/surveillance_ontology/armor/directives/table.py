@@ -21,6 +21,7 @@ from surveillance_ontology.armor.rendering import (
     shown,
     unsupported_type,
 )
+from surveillance_ontology.owl.vocabulary import NOTHING, OWL, RDF, RDFS, THING, XSD
 from surveillance_runtime.suggestions import nearest
 
 MAX_CARDINALITY = 2**31 - 1
@@ -72,6 +73,14 @@ ENTITY_KINDS = {
     Read.CLASS: 'class',
     Read.OBJECT_PROPERTY: 'object_property',
     Read.DATA_PROPERTY: 'data_property',
+}
+
+
+_RESERVED = (OWL, RDF, RDFS, XSD)
+_BUILT_IN = {
+    Read.CLASS: (THING, NOTHING),
+    Read.OBJECT_PROPERTY: (OWL + 'topObjectProperty', OWL + 'bottomObjectProperty'),
+    Read.DATA_PROPERTY: (OWL + 'topDataProperty', OWL + 'bottomDataProperty'),
 }
 
 
@@ -177,7 +186,7 @@ class Directive:
             for index, (read, default) in enumerate(self._plan):
                 text = args[index] if index < count else default
                 if read == _ENTITY:
-                    values.append(parse_entity(text, base))
+                    values.append(self._entity(self.arguments[index].read, text, base))
                 elif read == Read.TYPE.value:
                     type_word = self._type(text, args)
                 elif read in _LITERALS:
@@ -189,11 +198,22 @@ class Directive:
                     values.append(_OTHERS[read](text))
             if self.rest:
                 for text in args[len(self._plan) :]:
-                    values.append(parse_entity(text, base) if read == _ENTITY else text)
+                    entity = read == _ENTITY
+                    kind = self.arguments[index].read
+                    values.append(self._entity(kind, text, base) if entity else text)
         except ValueError as error:
             name = self.arguments[index].name
             raise DirectiveError(f'{self.words}: argument {name} {error}') from None
         return values
+
+    def _entity(self, read: Read, text: str, base: str) -> str:
+        iri = parse_entity(text, base)
+        if not iri.startswith(_RESERVED) or iri in _BUILT_IN.get(read, ()):
+            return iri
+        # It may be asked about and retracted: a document may hold anything.
+        if self.kind is Kind.MANIPULATION and self.command != 'REMOVE':
+            raise ValueError(f'{shown(text)} is a word of OWL itself, expected another name')
+        return iri
 
     @cached_property
     def _plan(self) -> tuple[tuple[str, str], ...]:
