@@ -3,6 +3,8 @@ from __future__ import annotations
 import io
 import json
 import os
+import subprocess
+import sys
 import threading
 from dataclasses import replace
 from pathlib import Path
@@ -15,6 +17,7 @@ from launcher.log_merge import MergedLog
 from launcher.options import make_parser
 from launcher.run import (
     MARKERS,
+    NETWORK_ROS,
     PAGE,
     RECORDER,
     LaunchError,
@@ -180,9 +183,16 @@ def test_the_behaviour_is_last_in_one_process_so_that_it_stops_first():
 
 
 def test_discovery_is_the_machines_own_unless_asked_for(monkeypatch):
-    monkeypatch.delenv('ROS_AUTOMATIC_DISCOVERY_RANGE', raising=False)
-    assert node_environ(Run())['ROS_AUTOMATIC_DISCOVERY_RANGE'] == 'LOCALHOST'
+    for name in ('ROS_AUTOMATIC_DISCOVERY_RANGE', 'FASTRTPS_DEFAULT_PROFILES_FILE'):
+        monkeypatch.delenv(name, raising=False)
+    environ = node_environ(Run())
+    assert environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] == 'SYSTEM_DEFAULT'
+    profile = Path(environ['FASTRTPS_DEFAULT_PROFILES_FILE']).read_text()
+    assert '<interfaceWhiteList><address>127.0.0.1</address></interfaceWhiteList>' in profile
     assert node_environ(Run(network=True))['ROS_AUTOMATIC_DISCOVERY_RANGE'] == 'SUBNET'
+    with monkeypatch.context() as other:
+        other.setenv('RMW_IMPLEMENTATION', 'rmw_cyclonedds_cpp')
+        assert node_environ(Run())['ROS_AUTOMATIC_DISCOVERY_RANGE'] == 'LOCALHOST'
     monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'OFF')
     assert node_environ(Run())['ROS_AUTOMATIC_DISCOVERY_RANGE'] == 'OFF'
 
@@ -215,11 +225,29 @@ def test_an_alarm_gets_one_line_as_its_last_argument(tmp_path):
     assert out.read_text() == 'first|waiting for help: a door is closed|'
 
 
-def test_a_domain_and_quiet_transports_reach_the_nodes(tmp_path, monkeypatch):
-    monkeypatch.delenv('FASTDDS_BUILTIN_TRANSPORTS', raising=False)
+@pytest.mark.parametrize('network', [False, True])
+def test_no_node_uses_shared_memory(monkeypatch, network):
+    """What a killed process leaves there hides its successor: it answers nobody."""
+    for name in NETWORK_ROS:
+        monkeypatch.delenv(name, raising=False)
+    threads = (
+        'import glob, rclpy; rclpy.init(); node = rclpy.create_node("looked_at");'
+        "print(*(open(each).read() for each in glob.glob('/proc/self/task/*/comm')))"
+    )
+    shown = subprocess.run(
+        [sys.executable, '-c', threads],
+        env=node_environ(Run(network=network)),
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout
+    assert 'dds.udp' in shown
+    assert 'dds.shm' not in shown
+
+
+def test_a_domain_reaches_the_nodes(tmp_path):
     environ = node_environ(Run(domain=7), tmp_path)
     assert environ['ROS_DOMAIN_ID'] == '7'
-    assert environ['FASTDDS_BUILTIN_TRANSPORTS'] == 'UDPv4'
     assert node_environ(Run()).get('ROS_DOMAIN_ID') == os.environ.get('ROS_DOMAIN_ID')
 
 
