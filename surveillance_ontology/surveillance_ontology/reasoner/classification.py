@@ -92,15 +92,13 @@ class Classification:
         if not program.partial:
             return
         contexts = Contexts(program)
-        parts = {existential.label for existential in program.existentials}
-        parts |= {condition.label for condition in program.at_most if condition.label is not None}
         for label, weaker, sentence in program.partial:
             for clause in program.clauses:
                 atoms = [atom for atom in clause.body if isinstance(atom, PredicateAtom)]
                 if not any(atom.predicate is label for atom in atoms):
                     continue
                 head = clause.head
-                if not isinstance(head, PredicateAtom) or head.predicate in parts:
+                if not isinstance(head, PredicateAtom) or _is_part(head.predicate, label):
                     continue
                 if len(atoms) == len(clause.body) and all(
                     atom.predicate.kind == 'class' and atom.terms == (_X,) for atom in atoms
@@ -338,6 +336,15 @@ class Classification:
 
     def _excludes(self, token: Token) -> bool:
         return self._contexts.context((token,)).clash
+
+
+def _is_part(part: Predicate, label: Predicate) -> bool:
+    """Tell whether a class is what membership in a number or `only` consists of."""
+    one, other = part.expression, label.expression
+    return hasattr(one, 'prop') and all(
+        getattr(one, name, None) == getattr(other, name, None)
+        for name in ('prop', 'filler', 'range')
+    )
 
 
 _TOGETHER = 'together with what must exist, which are the same would need reasoning by cases'

@@ -11,8 +11,9 @@ from surveillance_ontology.owl.assertions import is_assertion
 from surveillance_ontology.owl.axioms import Axiom, ClassAssertion, Rule
 from surveillance_ontology.reasoner.cases import CaseReasoner, entails
 from surveillance_ontology.reasoner.classification import Classification
-from surveillance_ontology.reasoner.clauses import Constant, Program
+from surveillance_ontology.reasoner.clauses import BodyAtom, Constant, Program, SameAtom
 from surveillance_ontology.reasoner.engine import Engine, FactView
+from surveillance_ontology.reasoner.translation import is_positive
 
 _MOST_ASSERTIONS = 20_000
 
@@ -84,20 +85,24 @@ class Completion:
         """Tell whether the clauses may leave something out without saying so.
 
         They do not where nothing unnamed must exist, nor where each class that requires somebody
-        says all by itself and rules, which take no part in cases, do the rest.
+        says all by itself and nothing is counted or excluded, or rules, which take no part in
+        cases, do the rest.
         """
         if program.unsupported or program.contexts is not None:
             return True
+        clauses = [clause for clause in program.clauses if not clause.named_only]
+        if any(isinstance(c.head, SameAtom) and _names(c.head) for c in clauses):
+            return True  # What a class of one individual is below depends on the individual.
         if not program.existentials:
             return False
-        names_somebody = any(
-            isinstance(term, Constant) and not term.is_value
-            for clause in program.clauses
-            if not clause.named_only
-            for atom in (*clause.body, clause.head)
-            for term in atom.terms
-        )
-        return names_somebody or not self._has_rules
+        if any(_names(atom) for clause in clauses for atom in (*clause.body, clause.head)):
+            return True
+        if self._has_rules:
+            return False
+        values = any(existential.prop.kind == 'data' for existential in program.existentials)
+        # The states of chains stand among the labels as tuples.
+        classes = (label for label in program.labels if not isinstance(label, tuple))
+        return values or bool(program.at_most) or not all(map(is_positive, classes))
 
     def _is_wanted(self) -> bool:
         if self._wanted or self._has_rules:
@@ -120,3 +125,8 @@ class Completion:
             found.append('the ontology: reasoning by cases took too many steps')
         found += self._program.unsupported[len(self._native) :]
         self.unsupported = tuple(dict.fromkeys(found))
+
+
+def _names(atom: BodyAtom) -> bool:
+    """Tell whether an atom is about a certain individual."""
+    return any(isinstance(term, Constant) and not term.is_value for term in atom.terms)

@@ -234,3 +234,20 @@ def test_changes_lead_to_what_a_fresh_start_finds(seed: int) -> None:
         assert {a for a in kb.facts() if isinstance(a, ax.ObjectPropertyAssertion)} == {
             a for a in fresh.facts() if isinstance(a, ax.ObjectPropertyAssertion)
         }
+
+
+def test_a_number_on_the_left_is_not_lost_where_the_right_side_counts_too() -> None:
+    # `d` has an empty range, so everybody has exactly none of it.
+    nothing = ex.DataIntersectionOf((XSD + 'integer', XSD + 'string'))
+    none = ex.DataExactCardinality(0, T, ex.DataOneOf((whole(1), whole(2))))
+    some = ex.ObjectSomeValuesFrom(P, ex.DataHasValue(T, whole(1)))
+    assert not reasoned(SubClassOf(none, some), ax.DataPropertyRange(T, nothing)).consistent
+
+
+def test_a_class_of_one_individual_is_empty_where_that_individual_is_no_member() -> None:
+    apart = ax.DisjointClasses((A, C))
+    kb = reasoned(apart, SubClassOf(A, ex.ObjectOneOf((i,))), ClassAssertion(C, i))
+    assert kb.holds(SubClassOf(A, NOTHING))
+    kb.remove(ClassAssertion(C, i))
+    kb.reason()
+    assert not kb.holds(SubClassOf(A, NOTHING))
