@@ -90,8 +90,8 @@ def draw_place(
     for x, y, radius in obstacles:
         canvas.disc((x, y), radius * scale, _CLOSED)
     if run is not None:
-        canvas.traces(run.planned, _PLANNED, max(1.2, scale / 40), 0.5)
-        canvas.traces(run.driven, _DRIVEN, max(1.5, scale / 26), 0.34)
+        canvas.traces(run.planned, _PLANNED, max(1.2, scale / 40), 0.7)
+        canvas.traces(run.driven, _DRIVEN, max(1.5, scale / 26), 0.5)
         picture.failures(run)
     picture.station()
     if run is not None:
@@ -332,7 +332,7 @@ class _Picture:
                 blend(_CALM, _LATE, 0.25 + 0.75 * share),
             )
             words, x = f'{run.waits[name]:.0f} s', left + 50 + room * share
-            if x - 6 < urgent < x + canvas.text_width(words, size):
+            if x - 6 < urgent < x + canvas.text_width(words, size) + 6:
                 x = urgent + 5
             canvas.text((x, y), words, size, _SOFT, anchor='lm')
             visits = str(run.visits.get(name, 0))
