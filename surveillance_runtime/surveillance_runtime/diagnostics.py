@@ -1,8 +1,8 @@
-"""The health of nodes on `/diagnostics`: each node's own status, once a second of real time.
+"""What a process tells of itself: heartbeats to the launcher, its nodes' health on `/diagnostics`.
 
-A node notes in its `Health` what is wrong with it and figures that matter. `DiagnosticsThread`
-publishes the health of all nodes of a process. It does not need the executor, so an executor that
-hangs is reported too. Who listens takes a node that has been silent for `STALE_AFTER` as stale.
+`DiagnosticsThread` publishes the health of all nodes of a process once a second of real time. It
+does not need the executor, so an executor that hangs is reported too. Who listens takes a node that
+has been silent for `STALE_AFTER` as stale.
 """
 
 from __future__ import annotations
@@ -12,87 +12,71 @@ import os
 import threading
 import time
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.clock import Clock, ClockType
 
-if TYPE_CHECKING:
-    from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.health import ERROR, OK, RECENT, WARN, Finding
+from surveillance_runtime.node import PatrolNode
 
 TOPIC = '/diagnostics'
 PERIOD = 1.0
 """Seconds of real time between two messages of a node."""
 STALE_AFTER = 5.0
 """Seconds without a message after which a node's last status says nothing any more."""
-RECENT = 10.0
-"""For how long a lost message or a restart is a warning, seconds."""
 LATE = 0.5
 """Seconds by which an executor is late that are worth a warning."""
 HANGS = 3.0
 """Seconds by which an executor is late that are an error."""
 RESTARTS = 'LAUNCH_RESTARTS'
 """The environment variable with how often the launcher has started the process again."""
-OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
+HEARTBEAT = 'LAUNCH_HEARTBEAT'
+"""The environment variable with the descriptor to which the launcher wants heartbeats."""
+BEAT_PERIOD = 0.25
+"""Seconds of real time between two heartbeats."""
 
-Finding = tuple[bytes, str]
-"""A level and what it is about, in words."""
 
+class Heartbeat:
+    """Notes that the executor goes round, and tells the launcher where it asked to be told.
 
-class Health:
-    """What is wrong with a node at present, and its figures; safe from any thread.
-
-    Attributes:
-        lost: How many messages were lost to exceptions of callbacks.
+    Args:
+        nodes: The nodes of the process; a timer of the first one beats.
     """
 
-    def __init__(self) -> None:
-        self.lost = 0
-        self._lost_at = -RECENT
-        self._lost_by = ''
-        self._findings: dict[str, Finding] = {}
-        self._figures: dict[str, str] = {}
-        self._lock = threading.Lock()
+    def __init__(self, nodes: Sequence[PatrolNode]) -> None:
+        given = os.environ.pop(HEARTBEAT, None)
+        self._pipe = int(given) if given is not None else None
+        if self._pipe is not None:
+            os.set_blocking(self._pipe, False)
+        self._last = time.monotonic()
+        self._late = 0.0
+        nodes[0].create_timer(
+            BEAT_PERIOD,
+            self._beat,
+            callback_group=ReentrantCallbackGroup(),
+            clock=Clock(clock_type=ClockType.STEADY_TIME),
+        )
 
-    def warn(self, subject: str, text: str) -> None:
-        """Note a warning on a subject, in place of what was noted on it before."""
-        self._note(subject, (WARN, text))
+    def _beat(self) -> None:
+        now = time.monotonic()
+        self._late = max(self._late, now - self._last - BEAT_PERIOD)
+        self._last = now
+        self._write(b'.')
 
-    def error(self, subject: str, text: str) -> None:
-        """Note that the node cannot do its work until somebody helps."""
-        self._note(subject, (ERROR, text))
+    def take_lateness(self) -> float:
+        """Return by how much a beat came late at most since this was asked last, seconds."""
+        late, self._late = self._late, 0.0
+        return max(0.0, late, time.monotonic() - self._last - BEAT_PERIOD)
 
-    def clear(self, subject: str) -> None:
-        """Take back what was noted on a subject."""
-        with self._lock:
-            self._findings.pop(subject, None)
+    def say_finished(self) -> None:
+        """Say that the process ends on purpose, and is not to be started again."""
+        self._write(b'F')
 
-    def figure(self, name: str, value: object) -> None:
-        """Note a figure that is shown with the status."""
-        with self._lock:
-            self._figures[name] = str(value)
-
-    def lose_message(self, why: str) -> None:
-        """Count a message that was lost to an exception; it is a warning for a while."""
-        with self._lock:
-            self.lost += 1
-            self._lost_at, self._lost_by = time.monotonic(), why
-
-    def findings(self) -> list[Finding]:
-        """Return what is wrong now."""
-        with self._lock:
-            found = list(self._findings.values())
-            if time.monotonic() - self._lost_at < RECENT:
-                found.append((WARN, f'a message was lost: {self._lost_by}'))
-        return found
-
-    def figures(self) -> dict[str, str]:
-        """Return the figures that were noted."""
-        with self._lock:
-            return {**self._figures, 'lost_messages': str(self.lost)}
-
-    def _note(self, subject: str, finding: Finding) -> None:
-        with self._lock:
-            self._findings[subject] = finding
+    def _write(self, word: bytes) -> None:
+        if self._pipe is not None:
+            with contextlib.suppress(OSError):  # the launcher is gone, or has not read for long
+                os.write(self._pipe, word)
 
 
 class DiagnosticsThread:

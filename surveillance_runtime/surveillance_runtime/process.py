@@ -12,22 +12,19 @@ import os
 import signal
 import sys
 import threading
-import time
 import traceback
 import warnings
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import rclpy
-from rclpy.callback_groups import ReentrantCallbackGroup
-from rclpy.clock import Clock, ClockType
 from rclpy.executors import ExternalShutdownException, ShutdownException
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from threadpoolctl import threadpool_limits
 
 from surveillance_runtime.configuration import RosArguments, argument_layer, split_arguments
-from surveillance_runtime.diagnostics import DiagnosticsThread
+from surveillance_runtime.diagnostics import DiagnosticsThread, Heartbeat
 from surveillance_runtime.executor import PatrolExecutor
 from surveillance_runtime.node import (
     JOIN_SECONDS,
@@ -39,10 +36,6 @@ from surveillance_runtime.node import (
 from surveillance_runtime.parameters import ParameterError
 
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM)
-HEARTBEAT = 'LAUNCH_HEARTBEAT'
-"""The environment variable with the descriptor to which the launcher wants heartbeats."""
-BEAT_PERIOD = 0.25
-"""Seconds of real time between two heartbeats."""
 EXIT_CANNOT_START = 2
 """The exit code of a node whose configuration does not let it start."""
 
@@ -159,48 +152,6 @@ def check_taken(arguments: RosArguments, nodes: Sequence[PatrolNode]) -> None:
         if not takes and not entry.name.startswith('qos_overrides.'):
             names = ' or '.join(node.get_name() for node in nodes)
             raise ParameterError(f'{entry.origin}: not a parameter of {names} as configured')
-
-
-class Heartbeat:
-    """Notes that the executor goes round, and tells the launcher where it asked to be told.
-
-    Args:
-        nodes: The nodes of the process; a timer of the first one beats.
-    """
-
-    def __init__(self, nodes: Sequence[PatrolNode]) -> None:
-        given = os.environ.pop(HEARTBEAT, None)
-        self._pipe = int(given) if given is not None else None
-        if self._pipe is not None:
-            os.set_blocking(self._pipe, False)
-        self._last = time.monotonic()
-        self._late = 0.0
-        nodes[0].create_timer(
-            BEAT_PERIOD,
-            self._beat,
-            callback_group=ReentrantCallbackGroup(),
-            clock=Clock(clock_type=ClockType.STEADY_TIME),
-        )
-
-    def _beat(self) -> None:
-        now = time.monotonic()
-        self._late = max(self._late, now - self._last - BEAT_PERIOD)
-        self._last = now
-        self._write(b'.')
-
-    def take_lateness(self) -> float:
-        """Return by how much a beat came late at most since this was asked last, seconds."""
-        late, self._late = self._late, 0.0
-        return max(0.0, late, time.monotonic() - self._last - BEAT_PERIOD)
-
-    def say_finished(self) -> None:
-        """Say that the process ends on purpose, and is not to be started again."""
-        self._write(b'F')
-
-    def _write(self, word: bytes) -> None:
-        if self._pipe is not None:
-            with contextlib.suppress(OSError):  # the launcher is gone, or has not read for long
-                os.write(self._pipe, word)
 
 
 class _Ending:

@@ -8,14 +8,12 @@ from __future__ import annotations
 import queue
 import threading
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rclpy.task import Future
 
 from surveillance_fsm.ros.waiting import reported, wake_executor
-
-if TYPE_CHECKING:
-    from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.node import PatrolNode
 
 
 class AwaitedWork:
