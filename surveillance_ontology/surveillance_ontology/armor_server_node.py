@@ -19,6 +19,7 @@ from rclpy.event_handler import PublisherEventCallbacks
 from surveillance_interfaces.msg import ArmorDirectiveRes, FactChanges
 from surveillance_interfaces.srv import ArmorDirective, ArmorDirectiveList
 from surveillance_ontology.armor.change_feed import ChangeFeed, NumberedChange
+from surveillance_ontology.armor.protocol import DirectiveRequest
 from surveillance_ontology.armor_client import CHANGES_TOPIC
 from surveillance_ontology.conversions import changes_to_ros, fill_response, request_from_ros
 from surveillance_ontology.ontology_parameters import described_service
@@ -36,8 +37,9 @@ SLICE = 0.005
 MOST_WAITING = 5000
 """Requests that are taken and wait; further ones wait in the middleware."""
 WORKERS = 4
-"""Threads for directives that may take long, and as many for `LONG_QUERIES`."""
+"""Threads for directives that may take long, as many for `LONG_QUERIES`, as many for documents."""
 LONG_QUERIES = ('SPARQL', 'AT', 'EXPLAIN')
+DOCUMENTS = ('LOAD', 'SAVE')
 
 
 class _Backlog:
@@ -93,6 +95,7 @@ class ArmorServer(PatrolNode):
         self._pause.cancel()
         self._work = AwaitedWork(self, WORKERS)
         self._queries = AwaitedWork(self, WORKERS)
+        self._documents = AwaitedWork(self, WORKERS)
         group = ReentrantCallbackGroup()
         self._backlog = _Backlog()
         self._single = self.create_service(
@@ -109,6 +112,7 @@ class ArmorServer(PatrolNode):
         """End the workers and queries that run."""
         self._work.stop()
         self._queries.stop()
+        self._documents.stop()
         self._service.close()
 
     async def _on_directive(self, request: Any, response: Any) -> Any:
@@ -156,11 +160,16 @@ class ArmorServer(PatrolNode):
         directive = request_from_ros(request.armor_request)
         answer = self._service.execute_at_once(directive)
         if answer is None:
-            # Queries that take all their time must not keep other slow directives waiting.
-            work = self._queries if directive.primary.upper() in LONG_QUERIES else self._work
+            work = self._workers(directive)
             answer = await work.run(lambda: self._service.execute(directive))
         fill_response(response.armor_response, answer)
         return response
+
+    def _workers(self, directive: DirectiveRequest) -> AwaitedWork:
+        """Return whose turn it is: what takes long must not keep changes and REASON waiting."""
+        if directive.command.upper() in DOCUMENTS:
+            return self._documents
+        return self._queries if directive.primary.upper() in LONG_QUERIES else self._work
 
     async def _on_list(self, request: Any, response: Any) -> Any:
         directives = [request_from_ros(msg) for msg in request.armor_requests]

@@ -121,6 +121,26 @@ def test_a_client_beside_a_burst_of_another_is_answered_in_its_turn(graph: Any) 
     assert order.index('good') < 300
 
 
+def test_loads_that_wait_for_one_another_keep_nobody_waiting(graph: Any) -> None:
+    server = graph.add(ArmorServer)
+    armor = ArmorClient(graph.node, 'test', 'map')
+    armor.utils.load_ref_from_file(ONTOLOGY, IRI)
+    loaded: list[str] = []
+
+    async def load(name: str) -> None:
+        client = ArmorClient(graph.node, 'test', name, timeout=20.0)
+        await client.utils.load_ref_from_file.call_async(ONTOLOGY, IRI)
+        loaded.append(name)
+
+    with server._service.session.loading:
+        for number in range(5):
+            graph.node.executor.create_task(load, f'other{number}')
+        graph.until(lambda: server._documents._queue.qsize() == 1)
+        assert armor.manipulation.add_class('NEW')
+        assert not loaded
+    graph.until(lambda: len(loaded) == 5)
+
+
 def test_a_long_query_keeps_nobody_waiting(graph: Any) -> None:
     graph.add(ArmorServer, {'sparql_timeout': 3.0})
     armor = ArmorClient(graph.node, 'test', 'map')
