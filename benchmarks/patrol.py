@@ -9,6 +9,7 @@ spends 2 s in each place it enters; all places count as just visited at the star
            Held-Karp lower bound (marked >=)
 - mean:    the time a place went unvisited, averaged over places and time
 - late:    longest - threshold
+- times are those of the processor
 
     python benchmarks/patrol.py                       all maps; takes long
     python benchmarks/patrol.py --quick               small maps, below a minute
@@ -174,9 +175,9 @@ def table(rows: Sequence[Sequence[str]]) -> str:
 
 def compare(place: Map, hours: float) -> dict[str, PatrolRun]:
     """Return all policies on one map, printed."""
-    began = time.perf_counter()
+    began = time.thread_time()
     tour = place.graph.tour
-    planning = time.perf_counter() - began
+    planning = time.thread_time() - began
     sign = '' if tour.exact else '>= '
     print(
         f'\n{place.name}: {len(place.graph.places)} places, bound {sign}{tour.bound:.1f} s, '
@@ -185,9 +186,9 @@ def compare(place: Map, hours: float) -> dict[str, PatrolRun]:
     rows = [['policy', 'rules', 'longest s', 'ratio', 'mean s', 'late s', 'moves', 'ms/choice']]
     runs = {}
     for policy in (*RULED, *FREE):
-        began = time.perf_counter()
+        began = time.thread_time()
         run = runs[policy] = patrol(place, policy, hours)
-        spent = time.perf_counter() - began
+        spent = time.thread_time() - began
         rows.append(
             [
                 policy + (' (default)' if policy == DEFAULT_POLICY else ''),
@@ -429,6 +430,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument(
         '--random', type=int, metavar='N', help='random maps, too (default 8, or 3)'
     )
+    parser.add_argument(
+        '--sizes', nargs='+', type=int, default=SIZES, metavar='N', help='places of random maps'
+    )
     parser.add_argument('--table', nargs='+', choices=TABLES, default=TABLES, help='default: all')
     parser.add_argument('--plot', type=Path, metavar='FILE.png', help='draw the ratios')
     options = parser.parse_args(arguments)
@@ -462,8 +466,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             strandings(place, hours)
     if 'rules' in options.table:
         many = options.random if options.random is not None else 3 if options.quick else 8
-        uneven = 4
-        graphs = [random_graph(SIZES[n % len(SIZES)], n, n % uneven == 3) for n in range(many)]
+        sizes, uneven = options.sizes, 4
+        graphs = [random_graph(sizes[n % len(sizes)], n, n % uneven == 3) for n in range(many)]
         within = [*(chosen if options.graph else small[:2] if options.quick else small), *graphs]
         if options.quick:
             within_rules(within, (0.1, 1.0), 8.0, 3_000)

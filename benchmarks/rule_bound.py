@@ -19,6 +19,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,7 +115,7 @@ class _Search:
             for ways in rules.legs
         ]
         self._threshold = round(TICKS * rules.threshold)
-        self._cover = _shortest_covers(np.array(rules.away))
+        self._cover = _shortest_covers(rules.graph)
 
     def goes_on(self, limit: float) -> bool | None:
         """Return whether it can; None: the states did not suffice to find out."""
@@ -179,14 +180,15 @@ def _after(state: State, place: int, ticks: int) -> State:
     return place, met | 1 << place, tuple(now)
 
 
-def _shortest_covers(seconds: NDArray[np.float64]) -> NDArray[np.int32]:
+@lru_cache(maxsize=1)
+def _shortest_covers(graph: PatrolGraph) -> NDArray[np.int32]:
     """Return the ticks of the shortest way from each place through each set, shape (n, 2 ** n).
 
     Sets are bit masks. Held and Karp's dynamic programme over the size of the set; rounded down,
     so that a bound stays one.
     """
-    count = len(seconds)
-    ticks = np.maximum(np.floor(TICKS * seconds).astype(np.int32) - 1, 0)
+    count = len(graph.places)
+    ticks = np.maximum(np.floor(TICKS * graph.distances).astype(np.int32) - 1, 0)
     sets = np.arange(1 << count)
     sizes = np.array([(sets >> place) & 1 for place in range(count)]).sum(axis=0)
     cover = np.full((count, 1 << count), np.iinfo(np.int32).max, np.int32)

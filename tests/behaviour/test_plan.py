@@ -66,6 +66,18 @@ def test_the_plan_is_no_worse_than_simple_policies(name: str, factor: float) -> 
     assert settled_on(name, 'tour', factor) <= 1.01 * best
 
 
+@pytest.mark.parametrize('name', ['seven rooms', 'chain'])
+def test_the_first_waits_are_no_worse_than_those_of_simple_policies(name: str) -> None:
+    graph = MAPS[name]
+    longest = {}
+    for policy in ('tour', 'oldest', 'lookahead'):
+        patrol = Patrol(graph, Rules(), policy, 0.75 * graph.tour.length, graph.places[0])
+        for _ in patrol.until(5.0 * graph.tour.length):
+            pass
+        longest[policy] = patrol.run.longest
+    assert longest['tour'] <= 1.01 * min(longest.values())
+
+
 @pytest.mark.parametrize(
     ('name', 'factor', 'least'),
     [

@@ -56,6 +56,8 @@ TRIED = 8
 """How many courses a trial between two choices has the time for."""
 GOOD_ENOUGH = 1.004
 """A longest wait of so many bounds is not improved any further."""
+ACCEPTED = 1.04
+"""A wait from visit to visit of so many bounds is accepted for shorter first waits."""
 SKIPS = (0.0, 0.3, 0.6)
 """Targets visited more lately than this may be skipped, in lengths of the round."""
 SIMPLE_UP_TO = 200
@@ -176,6 +178,7 @@ class Plan:
         self._course = Course('none')
         self._guide: Guide = Oldest(rules)
         self._outcome = UNKNOWN
+        self._simple = math.inf  # The longest wait from visit to visit of the simple policies.
         self._state = self._state_of(world)
         order = before.targets if before else world.graph.tour.order
         self._search = RoundSearch(rules, order)
@@ -273,6 +276,10 @@ class Plan:
     def _good_enough(self, outcome: Outcome) -> bool:
         return outcome.first <= GOOD_ENOUGH * self._bound
 
+    def _better(self, one: Outcome, other: Outcome) -> bool:
+        accepted = min(ACCEPTED * self._bound, self._simple)
+        return one.grade(self._bound, accepted) < other.grade(self._bound, accepted)
+
     def _lead(self) -> int:
         """Return how many choices a trial takes."""
         trial = TRIED * MOVE_WORK * self._outcome.steps
@@ -330,12 +337,11 @@ class Plan:
                 self._work += MOVE_WORK
                 continue
             found = yield from self._followed(course, state, 1.01 * least.settled)
-            grade = found.grade(self._bound)
-            if course.kind == 'round' and (
-                best_round.kind != 'round' or grade < least.grade(self._bound)
-            ):
+            if course.kind in SIMPLE:
+                self._simple = min(self._simple, found.settled)
+            elif best_round.kind != 'round' or self._better(found, least):
                 best_round, least = course, found
-            if grade < outcome.grade(self._bound):
+            if self._better(found, outcome):
                 best, outcome = course, found
                 self._switch = Switch(moves, state.place, best, outcome)
         if best.kind == 'round' and self._search.best.targets == self._offered != best.targets:

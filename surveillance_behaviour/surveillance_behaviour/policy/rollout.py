@@ -29,8 +29,6 @@ NEAR = 8
 """How many nearest places of each place are known."""
 SLICE = 100
 """After so many moves that are followed ahead, whoever waits for them may do something else."""
-LASTING = 4
-"""Percents of the bound by which a wait from visit to visit may be longer for a shorter first."""
 HALF_OPEN = 1e-3
 """Seconds by which a wait must be longer than the threshold, so that rounding does not decide."""
 
@@ -88,6 +86,12 @@ class RuleMap:
         held = [(gate, place) for place, gate in enumerate(self.gates) if gate >= 0]
         legs = [self.legs[gate][place] for gate, place in held]
         return self.threshold + max(legs) + HALF_OPEN if legs else 0.0
+
+    @cached_property
+    def least_round(self) -> float:
+        """Seconds that no lawful round is known to fall below."""
+        tour = self.graph.tour
+        return max(self.least_period, tour.length if tour.find_bound is None else 0.0)
 
     @cached_property
     def near(self) -> list[list[int]]:
@@ -217,13 +221,13 @@ class Outcome:
     first: float
     steps: int = 0
 
-    def grade(self, bound: float) -> tuple[int, int, float]:
+    def grade(self, bound: float, accepted: float) -> tuple[int, int, float]:
         """Return what to compare by, less is better, in whole percents of the bound.
 
         Waits from visit to visit come again and again, so they count first, as far as they are
-        more than `LASTING` above the bound. Then the first waits do, which come once.
+        longer than what is accepted. Then the first waits do, which come once.
         """
-        lasting = max(0, round(100.0 * self.settled / bound) - 100 - LASTING)
+        lasting = max(0, round(100.0 * (self.settled - accepted) / bound))
         return lasting, round(100.0 * self.first / bound), self.settled
 
 

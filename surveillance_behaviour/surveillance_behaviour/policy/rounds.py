@@ -142,7 +142,7 @@ class RoundSearch:
         best = self.best
         if self.work > ALL_WORK or len(best.targets) < 4:
             return True
-        return not best.breaches and best.length <= self._rules.least_period
+        return not best.breaches and best.length <= self._rules.least_round + 1e-6
 
     def improve(self, work: float) -> bool:
         """Search on; whether the best round became better."""
