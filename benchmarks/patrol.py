@@ -15,7 +15,7 @@ spends 2 s in each place it enters; all places count as just visited at the star
     python benchmarks/patrol.py --quick               small maps, below a minute
     python benchmarks/patrol.py --graph FOLDER ...    maps of patrolling_sim
     python benchmarks/patrol.py --random 100 --table rules    100 random maps within the rules
-    python benchmarks/patrol.py --plot docs/patrol.png
+    python benchmarks/patrol.py --plot docs/images/patrol.png
 """
 
 from __future__ import annotations
@@ -375,7 +375,7 @@ COLOURS = {
 }
 
 
-def plot(path: Path, results: dict[str, tuple[float, dict[str, PatrolRun]]]) -> None:
+def plot(path: Path, hours: float, results: dict[str, tuple[float, dict[str, PatrolRun]]]) -> None:
     """Draw the ratios to the bound on a logarithmic scale, a group of bars for each map."""
     import cv2
     import numpy as np
@@ -393,7 +393,8 @@ def plot(path: Path, results: dict[str, tuple[float, dict[str, PatrolRun]]]) -> 
         font = cv2.FONT_HERSHEY_SIMPLEX
         cv2.putText(image, text, (x, y), font, scale, (40, 40, 40), 1, cv2.LINE_AA)
 
-    write('longest time unvisited / bound (24 h; 1 = the shortest closed tour)', left, 24, 0.5)
+    title = f'longest time unvisited / bound ({hours:g} h; 1 = the shortest closed tour)'
+    write(title, left, 24, 0.5)
     for mark in (1.0, 1.1, 1.5, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0):
         if mark <= 10**decades:
             cv2.line(image, (left, row(mark)), (image.shape[1] - 20, row(mark)), (225, 225, 225), 1)
@@ -478,7 +479,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if 'configured' in options.table and not options.graph:
         configured(small, min(hours, 6.0))
     if options.plot:
-        plot(options.plot, results)
+        plot(options.plot, hours, results)
     return 0
 
 
