@@ -50,7 +50,7 @@ URGENT_MARK = ' URGENT'
 """Follows the name of a place on `place_markers`."""
 STANDING = 0.01
 """A joint that is slower stands still, rad/s."""
-MOST_BEAMS = 180
+MOST_BEAMS = 120
 """Of a scan with more beams every n-th is shown."""
 
 

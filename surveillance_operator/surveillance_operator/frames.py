@@ -22,6 +22,8 @@ from surveillance_operator.snapshot import NO_POINTS, Grid, Health, Snapshot
 
 Parts = dict[str, Any]
 
+FIGURES = frozenset({'memory_mb', 'restarts'})
+
 MOST_TRAIL = 600
 """Points of the trail that viewers are shown, the newest."""
 
@@ -157,12 +159,12 @@ def _report(health: Health) -> Any:
 
 
 def _figures(snapshot: Snapshot) -> Any:
-    """Return the figures that nodes report of themselves, which change each second."""
+    """Return what viewers are shown of the figures that nodes report of themselves."""
     start = f'{snapshot.namespace}/' if snapshot.namespace else ''
     return {
-        name.removeprefix(start): dict(each.values)
+        name.removeprefix(start): {key: value for key, value in each.values if key in FIGURES}
         for name, each in sorted(snapshot.health.items())
-        if each.values
+        if ':' not in name
     }
 
 

@@ -11,7 +11,7 @@ import contextlib
 import math
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -27,7 +27,7 @@ from surveillance_ontology.armor.facts import ShortFact
 from surveillance_ontology.armor_client import ArmorClient, FactSubscription
 from surveillance_ontology.patrol_ontology import CONNECTIONS, PLACES, URGENT_PLACES, VISITS
 from surveillance_operator import conversions
-from surveillance_operator.polled_subscription import PolledSubscription
+from surveillance_operator.polled_subscription import PolledSubscription, await_message
 from surveillance_operator.snapshot import Change, Pose, Snapshot, follow
 from surveillance_operator.topics import (
     BEHAVIOUR,
@@ -46,9 +46,13 @@ from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 
 LOOK_PERIOD = 0.5
 """Seconds of steady time between two looks at which nodes there are."""
+WHOLE_LOOK_PERIOD = 5.0
+"""And between two at the publishers of each topic, while no node comes or goes."""
 TIMEOUT = 2.0
 """Deadline of each question, seconds of steady time; then it is asked again."""
 
+WAKE_PERIOD = 0.1
+"""Longest wait for a message, seconds."""
 BUILDER = 'ontology_map_builder'
 PLANNER = 'planner_controller'
 """The node that knows the doors' lines and the execution mode, as its parameters."""
@@ -64,9 +68,10 @@ class MissionFeed:
 
     Args:
         node: The node that watches.
-        period: Seconds of steady time between two looks at the topics, or what tells them.
+        period: Least seconds of steady time between two looks at the topics, or what tells them.
         on_change: Called on the feed's thread with each new snapshot and what changed.
-        streams: Follow the lidar, too.
+        streams: Follow the lidar, too, and look as soon as something comes, where the period is
+            short.
     """
 
     def __init__(
@@ -94,9 +99,16 @@ class MissionFeed:
             for topic in TOPICS
             if streams or not topic.stream
         ]
+        # The lidar comes with the pose, and health now and then.
+        self._prompt = [
+            subscription
+            for topic, subscription in self._topics
+            if streams and not topic.beside and not topic.period
+        ]
         self._facts = _Facts(node, self.update)
         self._others = _OtherRobots(node) if streams else None
-        self._next_look = 0.0
+        self._next_look = self._next_whole_look = self._changed_at = 0.0
+        self._processes: Mapping[str, set[str]] = {}
         self._next_reading: dict[str, float] = {}
         node.spawn(self._run, 'mission feed')
 
@@ -144,7 +156,10 @@ class MissionFeed:
             if time.monotonic() >= self._next_look:
                 self._next_look = time.monotonic() + LOOK_PERIOD
                 self._look()
-            stopping.wait(self._period())
+            period = self._period()
+            stopping.wait(period)
+            if self._prompt and period < WAKE_PERIOD:
+                await_message(self._node.context, self._prompt, WAKE_PERIOD)
 
     def _take(self) -> None:
         """Take all messages that came into one new snapshot."""
@@ -185,11 +200,28 @@ class MissionFeed:
         return True
 
     def _look(self) -> None:
-        node, old = self._node, self._snapshot
+        node, now = self._node, time.monotonic()
         processes: dict[str, set[str]] = {}
         for log in node.get_publishers_info_by_topic('/rosout'):  # which every node has
             if log.node_namespace == node.get_namespace():
                 processes.setdefault(log.node_name, set()).add(str(log.endpoint_gid))
+        if processes != self._processes:
+            self._processes, self._changed_at = processes, now
+        # A node's topics are found some time after the node.
+        if now < self._changed_at + WHOLE_LOOK_PERIOD or now >= self._next_whole_look:
+            self._next_whole_look = now + WHOLE_LOOK_PERIOD
+            self._look_at_topics(processes)
+        if not node.count_publishers('/clock'):
+            self._clock_time = None
+        self._note_silent()
+        self._facts.ask()
+        if self._others is not None:
+            for robot in self._others.find():
+                self.update(partial(_without_robot, robot=robot), begins=False)
+
+    def _look_at_topics(self, processes: Mapping[str, set[str]]) -> None:
+        """Note which nodes there are, and whose topics cannot be heard."""
+        node, old = self._node, self._snapshot
         names = set(self._facts.servers())
         silent = dict(old.silent)
         for topic, subscription in self._topics:
@@ -208,13 +240,6 @@ class MissionFeed:
                 lambda old: replace(old, nodes=nodes, ended=ended, silent=silent),
                 begins=bool(nodes),
             )
-        if not node.count_publishers('/clock'):
-            self._clock_time = None
-        self._note_silent()
-        self._facts.ask()
-        if self._others is not None:
-            for robot in self._others.find():
-                self.update(partial(_without_robot, robot=robot), begins=False)
 
     def _note_silent(self) -> None:
         """Mark the nodes whose own reports have ceased."""

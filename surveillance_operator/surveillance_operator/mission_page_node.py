@@ -17,8 +17,8 @@ from surveillance_operator.snapshot import Change, Snapshot
 from surveillance_runtime.node import PatrolNode, StartError
 from surveillance_runtime.process import run_node
 
-POLL_PERIOD = 0.02
-"""Seconds between two looks at the topics while somebody looks at the page."""
+POLL_PERIOD = 0.015
+"""Least seconds between two looks at the topics while somebody looks at the page."""
 IDLE_PERIOD = 0.5
 """And while nobody does."""
 

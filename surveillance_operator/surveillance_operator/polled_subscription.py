@@ -7,10 +7,14 @@ own; and what a queue of bounded depth drops meanwhile is never waited for.
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Iterable
 from typing import Any
 
 from rclpy.callback_groups import CallbackGroup
+from rclpy.context import Context
 from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
@@ -65,6 +69,24 @@ class PolledSubscription:
     def destroy(self) -> None:
         """Leave the topic."""
         self._node.destroy_subscription(self._subscription)
+
+
+def await_message(
+    context: Context, subscriptions: Iterable[PolledSubscription], timeout: float
+) -> None:
+    """Wait until one of the subscriptions has a message, at most that many seconds."""
+    handles = [each._subscription.handle for each in subscriptions]
+    with contextlib.ExitStack() as held:
+        held.enter_context(context.handle)
+        for handle in handles:
+            held.enter_context(handle)
+        # Of subscriptions, guard conditions, timers, clients, services, events.
+        waiting = _rclpy.WaitSet(len(handles), 0, 0, 0, 0, 0, context.handle)
+        held.enter_context(waiting)
+        waiting.clear_entities()
+        for handle in handles:
+            waiting.add_subscription(handle)
+        waiting.wait(int(timeout * 1e9))
 
 
 def _never(_message: Any) -> None:

@@ -78,7 +78,8 @@ def test_a_node_that_reports_no_more_is_stale(graph: Any, monkeypatch: pytest.Mo
     markers = graph.add(MissionMarkers)
     listeners = len([heard, markers, 'its feed'])
     graph.until(lambda: node_speaks.get_subscription_count() == listeners)
-    node_speaks.publish(DiagnosticArray(status=[status]))
+    terminal = DiagnosticStatus(name='robot7/console', message='up')  # its end is no fault
+    node_speaks.publish(DiagnosticArray(status=[terminal, status]))
     stale = graph.until(
         lambda: [
             status
@@ -89,6 +90,7 @@ def test_a_node_that_reports_no_more_is_stale(graph: Any, monkeypatch: pytest.Mo
     )
     assert (stale[0].name, stale[0].hardware_id) == ('planner', 'robot7')
     assert stale[0].message == 'does not report'
+    assert {each.name for each in stale} == {'planner'}
     node_speaks.publish(DiagnosticArray(status=[status]))
     graph.until(lambda: heard[-1].status[0].level == DiagnosticStatus.OK)
     assert described[0].data.startswith('<?xml')

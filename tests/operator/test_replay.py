@@ -126,6 +126,16 @@ def test_the_report_is_one_file_that_tells_everything(run: Path) -> None:
     assert picture.stat().st_size > 10_000
 
 
+def test_what_failed_again_and_again_is_one_row_of_the_report(run: Path) -> None:
+    with MissionRecord(run / 'mission.jsonl') as mission:
+        for second in range(100, 200):
+            mission.write('failure', float(second), what='MOVE', reason='shut')
+    text = write_report(run).read_text()
+    assert text.count('shut') == 1
+    assert 'shut (100 times until 0:03:19)' in text
+    assert 'Failures (101)' in text
+
+
 def test_the_commands_find_runs_and_say_what_is_wrong(
     run: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -93,11 +93,13 @@ class Contents:
     Attributes:
         topics: Their types by name.
         start, end: Of its messages, seconds since 1970.
+        starts: Of each file's messages, nanoseconds since 1970.
     """
 
     topics: dict[str, str]
     start: float
     end: float
+    starts: dict[Path, int]
 
     @classmethod
     def of(cls, recording: Path) -> Contents:
@@ -107,7 +109,8 @@ class Contents:
             RecordingError: A file cannot be read, or has no summary.
         """
         topics: dict[str, str] = {}
-        times: list[int] = []
+        starts: dict[Path, int] = {}
+        end = 0
         for path in files_of(recording):
             try:
                 with open(path, 'rb') as file:
@@ -120,13 +123,11 @@ class Contents:
                 schema = summary.schemas.get(channel.schema_id)
                 topics[channel.topic] = schema.name if schema is not None else ''
             if summary.statistics.message_count:
-                times += [
-                    summary.statistics.message_start_time,
-                    summary.statistics.message_end_time,
-                ]
-        if not times:
+                starts[path] = summary.statistics.message_start_time
+                end = max(end, summary.statistics.message_end_time)
+        if not starts:
             raise RecordingError(f'{recording}: holds no messages')
-        return cls(topics, min(times) / 1e9, max(times) / 1e9)
+        return cls(topics, min(starts.values()) / 1e9, end / 1e9, starts)
 
 
 class LastMessages:
@@ -158,7 +159,8 @@ class LastMessages:
                 for each in known['files']
             }
         except (KeyError, TypeError, ValueError):
-            self.topics, self._starts = Contents.of(recording).topics, {}
+            contents = Contents.of(recording)
+            self.topics, self._starts = contents.topics, contents.starts
 
     def before(
         self, topics: Sequence[str], at: float, within: float, most: int = 10
