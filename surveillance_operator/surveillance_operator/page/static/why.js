@@ -49,7 +49,7 @@ export class Why {
     const body = h('div');
     const box = h('details', {'data-fact': fact}, h('summary', {}, fact, h('small', {}, ' derived: open for its proof')), body);
     box.addEventListener('toggle', async () => {
-      if (!box.open || body.childElementCount) return;
+      if (!box.open || body.querySelector('.proof')) return;
       const found = await ask('explain', {fact});
       body.replaceChildren(found.ok ? tree(found.lines) : h('p', {class: 'warn'}, found.text));
     });
