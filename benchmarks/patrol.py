@@ -373,6 +373,8 @@ COLOURS = {
     'HPCC': (120, 200, 200),
     'cycle': (120, 120, 120),
 }
+LEAST_WIDTH = 860
+"""Pixels that the legend of a picture needs."""
 
 
 def plot(path: Path, hours: float, results: dict[str, tuple[float, dict[str, PatrolRun]]]) -> None:
@@ -382,7 +384,8 @@ def plot(path: Path, hours: float, results: dict[str, tuple[float, dict[str, Pat
 
     left, top, height, bar, gap = 70, 50, 320, 12, 26
     group = bar * len(COLOURS) + gap
-    image = np.full((top + height + 90, left + group * len(results) + 20, 3), 255, np.uint8)
+    width = max(left + group * len(results) + 20, LEAST_WIDTH)
+    image = np.full((top + height + 90, width, 3), 255, np.uint8)
     greatest = max(run.longest / bound for bound, runs in results.values() for run in runs.values())
     decades = math.log10(max(greatest * 1.2, 10.0))
 

@@ -97,8 +97,15 @@ class RoundSearch:
             targets: Of the round.
             limit: Of the cost; a round that costs more may be judged in part only.
         """
+        walk, ends, times = self._walked(targets)
+        length = max(times[-1] if times else 0.0, self._rules.least_period)
+        most = (limit - length) / max(self._penalty, 1e-9)
+        breaches = self._breaches(walk, ends, times, length, most)
+        return Round(targets, length, tuple(breaches))
+
+    def _walked(self, targets: tuple[int, ...]) -> tuple[list[int], list[int], list[float]]:
+        """Return the places that a round enters, where in them each target is, and when."""
         rules = self._rules
-        legs, ranks, urgent = rules.legs, rules.ranks, rules.urgent
         walk: list[int] = []
         ends: list[int] = []
         place = targets[-1]
@@ -110,15 +117,22 @@ class RoundSearch:
         self.work += STEP_WORK * len(walk)
         times, now = [], 0.0
         for other in walk:
-            now += legs[place][other]
+            now += rules.legs[place][other]
             times.append(now)
             place = other
-        length = max(now, rules.least_period)
+        return walk, ends, times
+
+    def _breaches(
+        self, walk: list[int], ends: list[int], times: list[float], length: float, most: float
+    ) -> list[Breach]:
+        """Return the steps of a walk that the rules forbid; more than ``most``: not all of them."""
+        if not walk:
+            return []
+        rules = self._rules
+        legs, ranks, urgent = rules.legs, rules.ranks, rules.urgent
         # When each place was visited last, for the first step: in the round before.
-        seen = dict(zip(walk, times, strict=True))
-        seen = {other: last - length for other, last in seen.items()}
-        breaches, now = [], 0.0
-        most = (limit - length) / max(self._penalty, 1e-9)
+        seen = {other: then - length for other, then in zip(walk, times, strict=True)}
+        breaches, now, place = list[Breach](), 0.0, walk[-1]
         seen[place] = 0.0
         for step, (other, then) in enumerate(zip(walk, times, strict=True)):
             limit = now - rules.threshold
@@ -134,7 +148,7 @@ class RoundSearch:
                     break
             seen[other] = now = then
             place = other
-        return Round(targets, length, tuple(breaches))
+        return breaches
 
     @property
     def finished(self) -> bool:
