@@ -288,11 +288,25 @@ def test_dark_thing_that_touches_the_border_hides_no_marker():
     assert [each.marker_id for each in DETECTOR.detect(image)] == [14]
 
 
-def test_text_is_no_marker_of_a_small_dictionary():
-    detector = MarkerDetector(DetectorSettings('DICT_4X4_50'))
+@pytest.mark.parametrize('dictionary', ['DICT_4X4_50', 'DICT_4X4_250'])
+def test_text_is_no_marker_of_a_dictionary_with_few_spare_bits(dictionary):
+    detector = MarkerDetector(DetectorSettings(dictionary))
     for scale in (0.4, 0.5, 0.6, 0.8):
         for font in (cv2.FONT_HERSHEY_SIMPLEX, cv2.FONT_HERSHEY_DUPLEX):
             image = np.full((240, 640), 215, np.uint8)
             for row, text in enumerate(('ABCDEFGHIJKLM', 'NOPQRSTUVWXYZ', '0123456789', 'BERISE')):
                 cv2.putText(image, text, (10, 50 + 50 * row), font, scale, 90, 2, cv2.LINE_AA)
             assert not detector.detect(cv2.GaussianBlur(image, (0, 0), 0.8))
+
+
+def test_drawn_outline_on_bright_paper_is_no_marker_in_a_reflection():
+    detector = MarkerDetector(DetectorSettings('DICT_5X5_1000'))
+    generator = np.random.default_rng(2)
+    for _ in range(60):
+        image = np.full((90, 110), 255, np.uint8)
+        corners = np.array([[30, 30], [75, 30], [75, 60], [30, 60]]) + generator.integers(
+            -4, 5, (4, 2)
+        )
+        cv2.polylines(image, [corners], True, 20, 3, cv2.LINE_AA)
+        compressed = cv2.imencode('.jpg', image, [cv2.IMWRITE_JPEG_QUALITY, 60])[1]
+        assert not detector.detect(cv2.imdecode(compressed, cv2.IMREAD_GRAYSCALE))

@@ -33,6 +33,7 @@ _PLAIN_WRONG = 1
 _PLAIN_BORDER = 0.25
 _GLARING = 250.0
 _LIT = 140.0
+_GLARED_SHARE = 0.4
 _GLARED_CELLS = 4
 _GLARED_BORDER = 3
 _GLARE_LEAD = 2
@@ -249,8 +250,10 @@ class MarkerReader:
             return found
         cells = self._cells(patches, ratios=False)
         levels = self._fit.cells(patches)
-        bright = levels[:, 1:-1, 1:-1] >= _GLARING
-        for index in np.flatnonzero(bright.any(axis=(1, 2))):
+        share = (levels[:, 1:-1, 1:-1] >= _GLARING).mean(axis=(1, 2))
+        # on paper as bright as that everywhere no reflection shows
+        bright = (share > 0.0) & (share < _GLARED_SHARE)
+        for index in np.flatnonzero(bright):
             count = len(rivals[index])
             wrong, border = self._wrong(cells[index : index + 1].repeat(count, 0), rivals[index])
             total = wrong.sum(axis=(1, 2))

@@ -54,7 +54,7 @@ _RIGHT_LEAD = 1.6
 _RIGHT_CORRELATION = 0.8
 _SURE_LEAD, _SURE_BORDER = 6.0, 6
 _FEW_SPARE_BITS = 12.0
-_STRICT = 1.8
+_STRICT_BITS = 4.0
 
 
 @dataclass(frozen=True)
@@ -234,7 +234,9 @@ class MarkerDetector:
         )
         # how much a code says beyond telling the dictionary's markers apart
         spare = codes.bits**2 - np.log2(len(codes.ids))
-        strict = _STRICT if spare < _FEW_SPARE_BITS else 1.0
+        strict = 1.0 + max(0.0, _FEW_SPARE_BITS - spare) / _STRICT_BITS
+        # print looks like some code where a dictionary uses a large part of all there are
+        lead = lead * max(1.0, strict - 1.0)
         # where nearly all votes are the code's, its own cells may speak for a short lead
         agreed = (readings.wrong <= _AGREED * codes.bits**2) & (spare >= _FEW_SPARE_BITS)
         joint_lead = np.sqrt(readings.lead * np.maximum(readings.inner_lead, readings.lead))
@@ -256,7 +258,10 @@ class MarkerDetector:
                 )
             )
         )
-        clear = readings.lead > np.where(lead < settings.unknown_lead, _CLEAR_KNOWN, _CLEAR) * lead
+        clear = (
+            readings.lead
+            > np.where(known & (settings.known_ids is not None), _CLEAR_KNOWN, _CLEAR) * lead
+        )
         # votes of cells a pixel wide are weak, but nearly all of them are not wrong by chance
         clear &= readings.wrong_border <= _CONTRADICTED * 4 * (codes.side - 1)
         accepted = (correlated & (plausible | clear)) | (plausible & right) | glared
