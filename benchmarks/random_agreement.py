@@ -94,7 +94,7 @@ class Comparison:
 
     def __init__(self, kind: str, seconds: float) -> None:
         self._kind, self._seconds = kind, seconds
-        self._java: JavaReasoner | None = None
+        self._java: dict[str, JavaReasoner] = {}
         self.counts: Counter[str] = Counter()
         self.time = 0.0
 
@@ -161,27 +161,33 @@ class Comparison:
                         yield f'{seed}: silent: {axiom}'
 
     def _answers(self, path: Path, asked: list[tuple[str, ...]]) -> tuple[bool, str]:
-        if self._java is None:
-            self._java = JavaReasoner(self._kind, timeout=self._seconds)
-        if self._java.ask('load', str(path)) != 'ok':
+        reasoner = self._reasoner(self._kind)
+        if reasoner.ask('load', str(path)) != 'ok':
             return False, ''
-        return True, self._java.ask_all(asked)
+        return True, reasoner.ask_all(asked)
 
     def _judged(self, path: Path, words: tuple[str, ...] | None) -> bool | None:
         """Ask the other Java reasoner about a fact, or with None about consistency."""
         (other,) = (kind for kind in KINDS if kind != self._kind)
         try:
-            with JavaReasoner(other, timeout=self._seconds) as judge:
-                consistent = judge.ask('load', str(path)) == 'ok'
-                return consistent if words is None else judge.ask(*words) == 'true'
-        except JavaReasonerError:
+            judge = self._reasoner(other)
+            consistent = judge.ask('load', str(path)) == 'ok'
+            return consistent if words is None else judge.ask(*words) == 'true'
+        except JavaReasonerError as error:
+            if 'no answer' in str(error):
+                self.close()
             return None
 
+    def _reasoner(self, kind: str) -> JavaReasoner:
+        if kind not in self._java:
+            self._java[kind] = JavaReasoner(kind, timeout=self._seconds)
+        return self._java[kind]
+
     def close(self) -> None:
-        """End the JVM; the next comparison starts another one."""
-        if self._java is not None:
-            self._java.close()
-            self._java = None
+        """End the JVMs; the next comparison starts others."""
+        for reasoner in self._java.values():
+            reasoner.close()
+        self._java.clear()
 
 
 def main() -> None:

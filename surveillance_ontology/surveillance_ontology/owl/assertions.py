@@ -132,6 +132,8 @@ def _mentioned(axiom: Axiom) -> Iterable[str]:
         return (axiom.prop, axiom.subject)  # type: ignore[attr-defined]
     if kind is ObjectPropertyAssertion:
         return (axiom.prop, axiom.subject, axiom.object)  # type: ignore[attr-defined]
+    if kind is ClassAssertion and isinstance(axiom.cls, str):  # type: ignore[attr-defined]
+        return (axiom.cls, axiom.individual)  # type: ignore[attr-defined]
     if kind is DifferentIndividuals or kind is SameIndividual:
         return axiom.individuals  # type: ignore[attr-defined, no-any-return]
     return {iri for _, iri in entities_of(axiom)}
