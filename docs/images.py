@@ -32,7 +32,7 @@ from whole_stack import Stack  # noqa: E402
 from surveillance_fsm.ros import ServiceCaller  # noqa: E402
 from surveillance_interfaces.srv import PlaceObstacle, SetDoor, SetMarker  # noqa: E402
 from surveillance_operator import map_command  # noqa: E402
-from surveillance_operator.watch.view import MissionView  # noqa: E402
+from surveillance_operator.watch.view import KEY_NOTE, MissionView  # noqa: E402
 from surveillance_runtime import node_table  # noqa: E402
 from surveillance_runtime.qos import SENSOR_QOS  # noqa: E402
 from surveillance_runtime.robot_arm import ARM  # noqa: E402
@@ -89,7 +89,9 @@ def watch() -> None:
         while stack.robot.time < WATCH_SECONDS:
             threading.Event().wait(0.2)
         view: Any = stack.nodes['mission_view']
-        screenshot(MissionView(view.see()), 110, 34).save(IMAGES / 'watch.png', optimize=True)
+        screenshot(MissionView(view.see(), note=KEY_NOTE), 110, 34).save(
+            IMAGES / 'watch.png', optimize=True
+        )
     finally:
         stack.close()
 

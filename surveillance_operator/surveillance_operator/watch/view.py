@@ -42,6 +42,7 @@ SETTLING = 2.0
 """How long a single picture waits for what is latched, once a mission was seen, seconds."""
 PLAIN_SIZE = 100, 40
 """Columns and rows of a single picture where there is no terminal."""
+KEY_NOTE = 'q quit · p hold · d decision · n nodes · e events'
 KEYS = {
     'm': 'map',
     'd': 'decision',
@@ -397,14 +398,13 @@ class _Chosen:
 def show_moving(see: See, stopping: Interrupt, console: Console) -> None:
     """Draw on the terminal's other screen until `q` or told to stop; give the first one back."""
     chosen = _Chosen()
-    note = 'q quit · p hold · d decision · n nodes · e events'
     with (
         _keyboard() as read_keys,
         Live(console=console, screen=True, auto_refresh=False) as live,
     ):
         while not stopping.is_set() and not chosen.ended:
             seen = chosen.held or see()
-            shown = 'HELD: p goes on' if chosen.held else note
+            shown = 'HELD: p goes on' if chosen.held else KEY_NOTE
             live.update(MissionView(seen, page=chosen.page, note=shown), refresh=True)
             for key in read_keys(PERIOD, stopping):
                 chosen.press(key, seen)

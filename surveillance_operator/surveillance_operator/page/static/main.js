@@ -125,7 +125,7 @@ function camera() {
 document.body.classList.toggle('replay', replaying);
 $('replay').hidden = !replaying;
 for (const each of document.querySelectorAll('.hands')) each.hidden = !may || replaying;
-if (replaying) { $('asking').hidden = true; $('no-camera').textContent = 'no image of this moment'; }
+if (replaying) $('no-camera').textContent = 'no image of this moment';
 connect();
 setInterval(() => { map.tick(state, now()); drawStrips($('strips'), state, now()); }, 1000);
 setInterval(camera, 700);

@@ -27,6 +27,8 @@ export class Why {
     if (names.join() !== this.names) {
       const chosen = $('place').value;
       this.names = names.join();
+      // A recording answers no questions.
+      $('asking').hidden = !names.length || document.documentElement.dataset.kind === 'replay';
       $('place').replaceChildren(...names.map((name) => h('option', {value: name}, name)));
       if (names.includes(chosen)) $('place').value = chosen;
     }
