@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 import time
 
 import pytest
-import rclpy
 import yaml
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
-from rcl_interfaces.msg import ParameterDescriptor
-from rclpy.node import Node
 
 from surveillance_runtime.configuration import (
     Configuration,
@@ -273,32 +272,46 @@ def test_every_value_takes_effect_or_costs_one_line(tmp_path, pattern, name, cho
         assert effect in (chosen, layer.entries[0].value) or str(effect).casefold() in same
 
 
+READER = """
+import sys
+
+rclpy.init()
+for line in sys.stdin:
+    node = Node(
+        'reader',
+        cli_args=['--ros-args', '--params-file', line.strip()],
+        use_global_arguments=False,
+        start_parameter_services=False,
+        enable_rosout=False,
+    )
+    node.declare_parameter('given', descriptor=ParameterDescriptor(dynamic_typing=True))
+    value = node.get_parameter('given').value
+    node.destroy_node()
+    plain = isinstance(value, str | bool | int | float)
+    print(ascii(value if plain else list(value)), flush=True)
+"""
+
+
 @pytest.fixture(scope='module')
 def read_by_ros(tmp_path_factory, ros_domain):
-    """Return what a node gets for a value of a resolved file."""
+    """Return what a node gets for a value of a resolved file, as `repr` shows it.
+
+    In a process of its own: Fast DDS may wait for itself for ever where one process has two
+    participants, and endpoints of both come and go.
+    """
     path = tmp_path_factory.mktemp('resolved') / 'node.yaml'
-    context = rclpy.Context()
-    rclpy.init(context=context, domain_id=ros_domain)
+    with subprocess.Popen(
+        [sys.executable, '-c', READER], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as reader:
 
-    def read(value):
-        path.write_text(resolved_text('/reader', {'given': Setting(value, 'a test')}))
-        node = Node(
-            'reader',
-            context=context,
-            cli_args=['--ros-args', '--params-file', str(path)],
-            use_global_arguments=False,
-            start_parameter_services=False,
-            enable_rosout=False,
-        )
-        try:
-            node.declare_parameter('given', descriptor=ParameterDescriptor(dynamic_typing=True))
-            read = node.get_parameter('given').value
-        finally:
-            node.destroy_node()
-        return read if isinstance(value, str | bool | int | float) else list(read)
+        def read(value):
+            path.write_text(resolved_text('/reader', {'given': Setting(value, 'a test')}))
+            reader.stdin.write(f'{path}\n')
+            reader.stdin.flush()
+            return reader.stdout.readline().rstrip('\n')
 
-    yield read
-    rclpy.shutdown(context=context)
+        yield read
+        reader.stdin.close()
 
 
 @given(VALUES)
@@ -320,4 +333,4 @@ def test_a_node_reads_what_was_resolved(read_by_ros, chosen):
     elif chosen != []:  # which rcl gives no type
         numbers = isinstance(chosen, list) and float in map(type, chosen)
         expected = [float(each) for each in chosen] if numbers else chosen
-        assert repr(read_by_ros(chosen)) == repr(expected)
+        assert read_by_ros(chosen) == ascii(expected)
