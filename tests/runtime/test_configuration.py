@@ -274,6 +274,9 @@ def test_every_value_takes_effect_or_costs_one_line(tmp_path, pattern, name, cho
 
 READER = """
 import sys
+import rclpy
+from rcl_interfaces.msg import ParameterDescriptor
+from rclpy.node import Node
 
 rclpy.init()
 for line in sys.stdin:
