@@ -102,7 +102,7 @@ def test_the_arm_is_moved_from_the_terminal_of_mode_manual(terminal: Open, tmp_p
     manual = terminal(*words, columns=120, rows=60)
     manual.until(*(f'{name:<14} | ready' for name in ('arm_controller', 'simulator', 'console')))
     manual.type('arm up\r')
-    manual.until("arm: 'up': expected left, home, right, back or stop")
+    manual.until("arm: 'up': expected left, home, right, back")
     manual.type('arm left\r')
     manual.until('at pose left')
     manual.type('exit\r')
