@@ -43,6 +43,8 @@ from surveillance_runtime.node import PatrolNode
 
 _DISCOVERY = 2.0
 """Seconds in which a node that has just started finds the services that there are."""
+ARM_SECONDS = 60.0
+"""Deadline of a movement of the arm, whose answer comes when it has arrived."""
 _NAME = re.compile(r'[A-Za-z]\w{0,63}\Z', re.ASCII)
 
 
@@ -170,7 +172,7 @@ class MissionActions:
         number = getattr(MarkerRoutine.Request, pose.upper(), None) if pose.isalpha() else None
         if not isinstance(number, int):
             raise ActionError(f'{pose!r}: expected left, home, right, back or stop')
-        return self._told('move_arm', MarkerRoutine.Request(pos=number))
+        return self._told('move_arm', MarkerRoutine.Request(pos=number), ARM_SECONDS)
 
     def command(self, controller: str, line: str) -> str:
         """Give a controller one of its console's commands: the answers of mode MANUAL."""
@@ -224,18 +226,20 @@ class MissionActions:
             raise ActionError(result.reason or f'{name} was refused')
         return f'{name} is {shown}'
 
-    def _told(self, service: str, request: Any) -> str:
-        answer = self._call(service, request)
+    def _told(self, service: str, request: Any, timeout: float | None = None) -> str:
+        answer = self._call(service, request, timeout)
         if not answer.success:
             raise ActionError(answer.message or f'{service} refused')
         return str(answer.message) or 'done'
 
-    def _call(self, service: str, request: Any) -> Any:
+    def _call(self, service: str, request: Any, timeout: float | None = None) -> Any:
         caller = self._callers[service]
         # Nobody waits for a service that this kind of mission does not have.
         discovery = max(min(0.5, self._timeout), self._found_by - time.monotonic())
         try:
-            return caller.call(request, self._timeout, self._node.stopping, discovery=discovery)
+            return caller.call(
+                request, timeout or self._timeout, self._node.stopping, discovery=discovery
+            )
         except UnavailableError as error:
             raise NoServerError(str(error)) from None
         except CallError as error:

@@ -7,9 +7,10 @@ from typing import Any
 
 import pytest
 from rcl_interfaces.srv import SetParameters
+from rclpy.task import Future
 from std_srvs.srv import Trigger
 
-from surveillance_interfaces.srv import GoTo, PlaceObstacle, SetDoor, WhyNot
+from surveillance_interfaces.srv import GoTo, MarkerRoutine, PlaceObstacle, SetDoor, WhyNot
 from surveillance_ontology.armor_server_node import ArmorServer
 from surveillance_ontology.ontology_map_builder_node import OntologyMapBuilder
 from surveillance_operator.mission_actions import ActionError, MissionActions, NoAnswerError
@@ -65,6 +66,19 @@ def test_a_simulated_door_is_moved_by_whoever_has_just_started(
         serve(graph, SetDoor, 'simulation/set_door', success=True, message='moved')
         assert answer.result(10.0) == 'moved'
     assert told == []
+
+
+def test_a_movement_of_the_arm_is_waited_for(graph: Any) -> None:
+    arrived = Future()
+
+    async def move(_request: Any, response: Any) -> Any:
+        response.success, response.message = await arrived, 'at pose left'
+        return response
+
+    graph.node.create_service(MarkerRoutine, 'move_arm', move)
+    graph.node.create_timer(0.5, lambda: arrived.set_result(True))
+    hurried = MissionActions(graph.add(PatrolNode, name='hurried'), timeout=0.2)
+    assert hurried.move_arm('left') == 'at pose left'
 
 
 def test_a_refusal_is_said_in_the_words_of_the_node(graph: Any, actions: MissionActions) -> None:
