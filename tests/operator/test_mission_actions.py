@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import threading
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import pytest
 from rcl_interfaces.srv import SetParameters
-from rclpy.task import Future
 from std_srvs.srv import Trigger
 
 from surveillance_interfaces.srv import GoTo, MarkerRoutine, PlaceObstacle, SetDoor, WhyNot
@@ -15,6 +15,7 @@ from surveillance_ontology.armor_server_node import ArmorServer
 from surveillance_ontology.ontology_map_builder_node import OntologyMapBuilder
 from surveillance_operator.mission_actions import ActionError, MissionActions, NoAnswerError
 from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.waiting import AwaitedEvent
 
 PLACE = {
     'map.A': ['D'],
@@ -69,16 +70,23 @@ def test_a_simulated_door_is_moved_by_whoever_has_just_started(
 
 
 def test_a_movement_of_the_arm_is_waited_for(graph: Any) -> None:
-    arrived = Future()
+    moves, moved = AwaitedEvent(graph.node), threading.Event()
 
     async def move(_request: Any, response: Any) -> Any:
-        response.success, response.message = await arrived, 'at pose left'
+        await moves.wait_for(moved.is_set)
+        response.success, response.message = True, 'at pose left'
         return response
 
+    def arrive() -> None:
+        moved.set()
+        moves.happen()
+
     graph.node.create_service(MarkerRoutine, 'move_arm', move)
-    graph.node.create_timer(0.5, lambda: arrived.set_result(True))
+    timer = threading.Timer(0.5, arrive)
+    timer.start()
     hurried = MissionActions(graph.add(PatrolNode, name='hurried'), timeout=0.2)
     assert hurried.move_arm('left') == 'at pose left'
+    timer.join()
 
 
 def test_a_refusal_is_said_in_the_words_of_the_node(graph: Any, actions: MissionActions) -> None:
