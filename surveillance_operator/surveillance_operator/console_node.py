@@ -26,6 +26,7 @@ from surveillance_operator.console_commands import (
 from surveillance_operator.mission_actions import MissionActions
 from surveillance_operator.mission_feed import MissionFeed
 from surveillance_operator.snapshot import Snapshot, decision_line
+from surveillance_runtime.logging import print_lines
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
@@ -104,7 +105,7 @@ def status_line(snapshot: Snapshot) -> str:
 def _tell(text: str, controller: str = '') -> None:
     head = f'[{controller}] ' if controller else ''
     said = '\n'.join(head + line for line in text.splitlines())
-    print(wrapped(said, _columns()), file=sys.stdout, flush=True)
+    print_lines(wrapped(said, _columns()))
 
 
 def _columns() -> int:

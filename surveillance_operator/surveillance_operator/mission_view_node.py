@@ -15,7 +15,7 @@ from rich.console import Console
 from surveillance_operator.mission_feed import MissionFeed
 from surveillance_operator.snapshot import Change, Snapshot
 from surveillance_operator.watch.view import show_moving, show_once
-from surveillance_runtime.logging import clean
+from surveillance_runtime.logging import clean, print_lines
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
 
@@ -70,7 +70,7 @@ class MissionViewNode(PatrolNode):
 
     def _print(self, line: str) -> None:
         try:
-            print(clean(line), flush=True)  # a name may have come from any peer
+            print_lines(clean(line))  # a name may have come from any peer
         except BrokenPipeError:
             self.finish()
 

@@ -10,6 +10,7 @@ whoever asks for debug lines gets all of them.
 from __future__ import annotations
 
 import os
+import sys
 import threading
 import time
 from collections.abc import Callable
@@ -38,6 +39,15 @@ def clean(text: str) -> str:
     if text.isprintable():
         return text
     return ''.join(each if each.isprintable() else _escaped(each) for each in text)
+
+
+def print_lines(text: str) -> None:
+    """Print a text and its line end on standard output, in one write.
+
+    `print` writes the two apart: a line that another thread prints gets between them.
+    """
+    sys.stdout.write(text + '\n')
+    sys.stdout.flush()
 
 
 def without_controls(text: str) -> str:

@@ -9,7 +9,6 @@ console elsewhere can serve all controllers; what the operator is told also goes
 
 from __future__ import annotations
 
-import sys
 import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -28,6 +27,7 @@ from surveillance_controllers.manual.commands import (
 )
 from surveillance_controllers.manual.prompt import Console
 from surveillance_interfaces.srv import ConsoleCommand
+from surveillance_runtime.logging import print_lines
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import STATE_QOS
 
@@ -146,7 +146,7 @@ class CommandConsole:
         name = self._node.get_name()
         self._console = Console(name, self._on_line, self._grammar.completions, source=source)
         if self._console.on_terminal:
-            _tell('You can type these commands:\n' + self._grammar.help())
+            print_lines('You can type these commands:\n' + self._grammar.help())
         self._node.stopping.subscribe(self._console.stop)
         self._node.spawn(self._read, name=f'{name} console')
 
@@ -158,7 +158,7 @@ class CommandConsole:
     def announce(self, text: str) -> None:
         """Tell the operator something, wherever the operator is."""
         if self._console is not None:
-            _tell(text)
+            print_lines(text)
         self._announcements.publish(String(data=text))
 
     def _read(self) -> None:
@@ -175,7 +175,7 @@ class CommandConsole:
     def _on_line(self, line: str) -> None:
         _, answer = self._answer(line)
         if answer:
-            _tell(answer)
+            print_lines(answer)
 
     def _on_request(self, request: Any, response: Any) -> Any:
         response.accepted, response.answer = self._answer(request.line)
@@ -196,7 +196,3 @@ class CommandConsole:
             return True, self._carry_out(command)
         except CommandError as error:
             return False, str(error)
-
-
-def _tell(text: str) -> None:
-    print(text, file=sys.stdout, flush=True)
