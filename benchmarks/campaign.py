@@ -254,6 +254,18 @@ def visits(folder: Path) -> list[tuple[float, str]]:
     ]
 
 
+def _last_visits(folder: Path) -> dict[str, float]:
+    """Return when each place was visited last, on the clock as it is at the record's end."""
+    last: dict[str, float] = {}
+    before = 0.0
+    for event in (event for path in records(folder) for event in _events(path)):
+        back = max(0.0, before - event['time'])
+        last, before = {place: at - back for place, at in last.items()}, event['time']
+        if event.get('event') == 'visit':
+            last[event['place']] = before
+    return last
+
+
 def _events(path: Path) -> Iterator[dict[str, Any]]:
     for line in path.read_text('utf-8', 'replace').splitlines():
         try:
@@ -448,8 +460,7 @@ class Campaign:
         for at, place in written:
             if not self._was_there(place, at):
                 self.results.invented.append(f'{place} at {at:.0f} s stands in the record')
-        # As written: after the clock was set back, a later visit has an earlier time.
-        last = {place: at for at, place in written}
+        last = _last_visits(self._folder)
         for place, seconds in self.watcher.visited_at(
             'surveillance', list(self._positions)
         ).items():

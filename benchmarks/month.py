@@ -7,22 +7,24 @@
 The mission's record and the ontology's store get what a patrol of seven rooms writes at the pace of
 a real one (`benchmarks/campaign.py --network` counts 4.5 visits a minute): each visit with its
 decision, the notes of exploring, the leg's path, now and then a failure and a recharge. The table
-has the disk they take, the processor time to read both at the next start, and how much memory the
-process gained after its first day. Logs are bounded by themselves (`launcher.log_merge.LOG_BYTES`),
-recordings by `--keep`.
+has one row a day: the disk that record and store take, the processor time to read both at the next
+start, and the memory that the process holds. Logs are bounded by themselves
+(`launcher.log_merge.LOG_BYTES`), recordings by `--keep`.
 """
 
 from __future__ import annotations
 
 import argparse
 import gc
+import multiprocessing
 import random
+import shutil
 import sys
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
-from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
 if str(ROOT) not in sys.path:
@@ -57,7 +59,7 @@ class Month:
     """
 
     def __init__(self, folder: Path, seed: int) -> None:
-        self._folder = folder
+        self.folder = folder
         self._chance = random.Random(seed)
         self._place = read_place_file(ROOT / 'config' / 'seven_rooms.yaml').place
         self._service = ArmorService(Settings(), store=Store(folder / 'armor_store'))
@@ -102,8 +104,8 @@ class Month:
         self._service.close()
 
 
-def reads(folder: Path) -> tuple[float, float, Any]:
-    """Return processor seconds to read record and store at a start, and what was in the record."""
+def reads(folder: Path) -> tuple[float, float, str]:
+    """Return processor seconds to read record and store at a start, and where the record ends."""
     began = time.process_time()
     with mission_log.MissionRecord(folder / 'mission.jsonl'):
         events = mission_log.read(folder / 'mission.jsonl')
@@ -112,7 +114,7 @@ def reads(folder: Path) -> tuple[float, float, Any]:
     service = ArmorService(Settings(), store=Store(folder / 'armor_store'))
     end = time.process_time()
     service.close()
-    return middle - began, end - middle, cut_off
+    return middle - began, end - middle, cut_off.place if cut_off else 'nowhere'
 
 
 def _resident() -> float:
@@ -127,39 +129,47 @@ def _size(path: Path) -> float:
     return sum(each.stat().st_size for each in path.rglob('*') if each.is_file()) / 1e6
 
 
+def look(month: Month, day: float) -> str:
+    """Return a row of the table: what the mission leaves and holds now."""
+    folder = month.folder
+    with tempfile.TemporaryDirectory() as scratch:
+        copy = shutil.copytree(folder, Path(scratch) / 'copy')
+        # In a process of its own: what reading leaves in memory is not the mission's.
+        with ProcessPoolExecutor(1, multiprocessing.get_context('spawn')) as fresh:
+            record, store, place = fresh.submit(reads, copy).result()
+    in_store = _size(folder / 'armor_store')
+    return (
+        f'{day:5.1f} {_size(folder) - in_store:9.1f} {in_store:9.1f} {record:9.2f} {store:9.2f} '
+        f'{_resident():9.1f}  {place}'
+    )
+
+
 def main(words: Sequence[str] | None = None) -> int:
     """Run it, print the table, return the exit code."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
     parser.add_argument('--days', type=float, default=30.0)
+    parser.add_argument('--minutes', type=float, default=1e9, help='of this machine, at most')
     parser.add_argument('--seed', type=int, default=1)
     parser.add_argument('--quick', action='store_true', help='half a day')
     chosen = parser.parse_args(words)
     days = 0.5 if chosen.quick else chosen.days
+    end = time.monotonic() + 60.0 * chosen.minutes
+    print('  day record MB  store MB  read, s  build, s  held, MB  ends in', flush=True)
     with tempfile.TemporaryDirectory() as scratch:
-        folder = Path(scratch)
-        month = Month(folder, chosen.seed)
+        month = Month(Path(scratch), chosen.seed)
         month.begin()
-        settled, legs, began = 0.0, 0, time.monotonic()
+        looked = 0.0
         for now in month.legs(days * DAY):
-            legs += 1
-            if not settled and now > START + min(1.0, days / 2) * DAY:
-                settled = _resident()
-        grown = _resident() - settled
+            day = (now - START) / DAY
+            over = time.monotonic() >= end
+            if over or day >= min(days, looked + 1.0):
+                print(look(month, day), flush=True)
+                looked = day
+            if over:
+                break
         month.close()
-        seconds = time.monotonic() - began
-        record_seconds, store_seconds, cut_off = reads(folder)
-        store = _size(folder / 'armor_store')
-        rows = [
-            ('legs', f'{legs} in {days:g} days; {seconds:.0f} s of this machine'),
-            ('disk: record, store', f'{_size(folder) - store:.1f} MB, {store:.1f} MB'),
-            ('start: record, store (CPU)', f'{record_seconds:.2f} s, {store_seconds:.2f} s'),
-            ('memory after the first day', f'{grown:+.1f} MB'),
-            ('place that the record ends in', str(getattr(cut_off, 'place', None))),
-        ]
-    for title, figure in rows:
-        print(f'{title:32} {figure}')
     return 0
 
 

@@ -17,7 +17,12 @@ from pathlib import Path
 from typing import Any
 
 from surveillance_behaviour.decision import DecisionSettings
-from surveillance_behaviour.mission.mission_log import MissionLogError, account_of, read
+from surveillance_behaviour.mission.mission_log import (
+    MissionLogError,
+    account_of,
+    on_present_clock,
+    read,
+)
 from surveillance_behaviour.peers.ports import (
     Ontology,
     PeerError,
@@ -31,6 +36,9 @@ from surveillance_behaviour.policy.leg_times import LegTimes, graphs_of_places
 from surveillance_behaviour.policy.world import PolicyMemory, World
 from surveillance_fsm import Interrupt
 from surveillance_ontology.patrol_ontology import Snapshot
+
+SIMULTANEOUS = 1.0
+"""Seconds by which what several threads take for the present may differ."""
 
 
 @dataclass
@@ -50,6 +58,7 @@ class Experience:
         draw: How fast the battery falls.
         sent_to_charge: Why the robot was sent to charge and has not been charged since.
         requested: Where an operator wants the robot, and it has not been since; empty: nowhere.
+        now: The last time that was told, seconds on the clock of the visits.
     """
 
     path: Path | None = None
@@ -58,25 +67,26 @@ class Experience:
     draw: DrawEstimate = field(default_factory=DrawEstimate)
     sent_to_charge: str = ''
     requested: str = ''
+    now: float = 0.0
     problem: str = ''
 
     @classmethod
     def of_record(cls, record: str) -> Experience:
         """Return what was learned on the mission of a record; new for an empty name.
 
-        The visits in the record itself count where they are later. A file that cannot be read
-        counts as none; `problem` says what is wrong with it.
+        The visits in the record itself count: they are on the clock of its end. A file that cannot
+        be read counts as none; `problem` says what is wrong with it.
         """
         experience = cls(Path(record + '.experience.json') if record else None)
         experience.problem = experience._read()
         if record and Path(record).is_file():
             try:
-                visits = account_of(read(record)).visits
+                account = account_of(read(record))
             except MissionLogError as error:
                 experience.problem = str(error)
                 return experience
-            for place, at in visits.items():
-                experience.visits[place] = max(at, experience.visits.get(place, at))
+            experience.visits.update(account.visits)
+            experience.now = account.now or 0.0
         return experience
 
     def _read(self) -> str:
@@ -113,7 +123,15 @@ class Experience:
 
     def saw(self, place: str, now: float) -> None:
         """Note that the robot was in ``place``."""
+        self.tell_time(now)
         self.visits[place] = now
+
+    def tell_time(self, now: float) -> None:
+        """Take the visits with a clock that was set back, forget those of another simulation."""
+        latest = max((self.now, *self.visits.values()))
+        if now < latest - SIMULTANEOUS:
+            self.visits = on_present_clock(self.visits, latest, now)
+        self.now = now
 
 
 class WorldModel:
@@ -182,7 +200,8 @@ class WorldModel:
         Raises:
             PeerError: The ontology or the positions cannot be had, or do not fit together.
         """
-        self._begin(now)
+        self.experience.tell_time(now)
+        self._since = now if self._since is None else min(self._since, now)
         threshold, classes = self.settings.urgency_threshold, self.settings.rules.classes
         if threshold != self._told_threshold:
             self._ontology.set_urgency_threshold(threshold, interrupt)
@@ -209,7 +228,7 @@ class WorldModel:
             visited_at=visited_at,
             graph=graph,
             late_graph=late_graph,
-            since=self._since or 0.0,
+            since=self._since,
             threshold=threshold,
             target=self.target,
             avoided=avoided,
@@ -218,13 +237,6 @@ class WorldModel:
             memory=self._memory,
         )
         return self.world
-
-    def _begin(self, now: float) -> None:
-        if self._since is None or now < self._since:
-            # What lies ahead was on another clock.
-            own = self.experience.visits
-            self.experience.visits = {place: at for place, at in own.items() if at <= now}
-            self._since = now
 
     def _map_of(self, found: Snapshot, interrupt: Interrupt) -> tuple[PatrolGraph, PatrolGraph]:
         positions = {}

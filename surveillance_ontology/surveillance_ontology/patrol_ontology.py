@@ -339,8 +339,8 @@ class PatrolOntology:
             not_before: The answer must know where the robot was at this time, nanoseconds of ROS
                 time; it is waited for.
             visits: When the robot visited places, seconds; the ontology is told what it does not
-                know of that. Somebody else's later visit stays, and a place that was taken away
-                does not come back.
+                know of that. Somebody else's later visit stays, unless it lies ahead: then the
+                clock was set back. A place that was taken away does not come back.
             patience: How long to wait for an ontology that is consistent and knows where the
                 robot is, seconds of steady time.
             interrupt: Ends the wait early.
@@ -375,7 +375,12 @@ class PatrolOntology:
             owed = [
                 place
                 for place in asked
-                if place in self._places and int(visits.get(place, NEVER)) > found.visited[place]
+                if place in self._places
+                and place in visits
+                and (
+                    int(visits[place]) > found.visited[place]
+                    or found.visited[place] > int(now) >= int(visits[place])
+                )
             ]
             if asked == self._places and not owed:
                 return self._snapshot_of(found, classes)

@@ -9,6 +9,7 @@ import pytest
 
 from surveillance_behaviour.decider import Decider
 from surveillance_behaviour.decision import REQUEST, DecisionSettings
+from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_behaviour.world_model import Experience
 from surveillance_fsm import Interrupt
 
@@ -52,6 +53,22 @@ def test_the_ontology_knows_until_when_the_robot_was_in_a_place() -> None:
     told.begin(1.0, NOBODY)
     told.decide(20.0, NOBODY)
     assert world.visited_at['E'] == 20.0
+
+
+@pytest.mark.parametrize('after', [-3600.0, -5.0])
+def test_a_clock_that_is_set_back_while_nobody_decides_empties_no_visit(
+    tmp_path: Path, after: float
+) -> None:
+    world, path, date = World(), tmp_path / 'mission.jsonl', 1.7e9
+    with MissionRecord(path) as record:
+        record.write('start', date, machine='surveillance', place='E', places=['C1', 'E'])
+        record.write('visit', date + 10.0, place='C1', distance=0.0)
+        record.write('visit', date + 30.0, place='E', distance=0.0)
+    world.visited_at |= {'C1': date + 10.0, 'E': date + 30.0}
+    told = decider(world, path)
+    now = date + 30.0 + after
+    told.begin(now, NOBODY)
+    assert told.experience.visits == {'C1': now - 20.0, 'E': now}
 
 
 def test_a_request_is_taken_while_somebody_looks(tmp_path: Path) -> None:

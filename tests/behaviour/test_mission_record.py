@@ -173,6 +173,20 @@ def test_what_another_simulation_wrote_says_nothing(path: Path) -> None:
     assert cut_off(read(path)) == CutOff(1.0, 'C1')
 
 
+def test_a_clock_that_is_set_back_changes_no_visit_and_no_wait(path: Path) -> None:
+    date = 1.7e9
+    with MissionRecord(path) as record:
+        record.write('start', date, **START[1])
+        record.write('visit', date + 10.0, place='C1', distance=0.0)
+        record.write('visit', date + 30.0, place='E', distance=0.0)
+        record.write('decision', date - 3570.0, **DECISION[1])
+    account = account_of(read(path))
+    assert account.visits == {'C1': date - 3590.0, 'E': date - 3570.0}
+    assert cut_off(read(path)) == CutOff(date - 3570.0, 'E', math.inf, left=True)
+    assert summarize(read(path)).seconds == 30.0
+    assert summarize(read(path)).unvisited == {'C1': 20.0, 'E': 30.0}
+
+
 def test_a_long_record_is_read_from_its_last_file_and_sums_up_all(path: Path) -> None:
     whole = path.with_name('whole.jsonl')
     with MissionRecord(path, segment_bytes=3000) as record, MissionRecord(whole) as other:

@@ -163,6 +163,14 @@ def test_a_later_visit_of_somebody_else_stays(
     assert found.visited_at == {'E': 120.0, 'C1': 106.0, 'R1': 118.0}, 'between two snapshots'
 
 
+def test_visits_that_lie_ahead_of_a_clock_that_was_set_back_are_told_anew(
+    ontology: PatrolOntology,
+) -> None:
+    ontology.snapshot(110.0, RULES, visits={'E': 105.0, 'C1': 109.0})
+    found = ontology.snapshot(60.0, RULES, visits={'E': 55.0, 'C1': 59.0})
+    assert found.visited_at == {'E': 55.0, 'C1': 59.0}
+
+
 def test_a_room_that_was_taken_away_does_not_come_back_by_a_visit(
     ontology: PatrolOntology,
 ) -> None:

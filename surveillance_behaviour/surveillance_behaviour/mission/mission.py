@@ -7,7 +7,12 @@ from dataclasses import dataclass, field
 
 from surveillance_behaviour.charging import BatteryMonitor
 from surveillance_behaviour.decision import DecisionSettings
-from surveillance_behaviour.mission.mission_log import CutOff, MissionLogError, MissionRecord
+from surveillance_behaviour.mission.mission_log import (
+    CutOff,
+    MissionLogError,
+    MissionRecord,
+    is_other_simulation,
+)
 from surveillance_behaviour.mission.recovery import Failure, Recovery, RecoveryLimits
 from surveillance_behaviour.peers.ports import PeerError, Point, Ports
 from surveillance_behaviour.policy.battery_reserve import Battery
@@ -110,7 +115,7 @@ class Mission:
             urgency_threshold=self.settings.choice.urgency_threshold,
         )
         before, self._cut_off = self._cut_off, None
-        if before is None or before.time > self.now():
+        if before is None or is_other_simulation(before.time, self.now()):
             return
         self.astray = before.left
         if before.charging and not self.charged_enough():

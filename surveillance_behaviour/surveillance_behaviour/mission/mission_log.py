@@ -59,6 +59,8 @@ EVENTS: Mapping[str, tuple[str, ...]] = {
 """The events of a record with the fields each must have, beside ``event`` and ``time``."""
 
 
+A_DATE = 1e9
+"""From here on, in seconds, a time is a date of a machine's clock; a simulation counts from 0."""
 SEGMENT_BYTES = 4_000_000
 """Size from which on a record's file is packed away and a new one begun."""
 
@@ -334,15 +336,15 @@ class Account:
             self._restore(event.fields['account'])
             self.now = event.time
             return
-        summary = self.summary
-        if self.now is None or event.time < self.now:
-            # Another clock: another simulation.
+        summary, before = self.summary, event.time if self.now is None else self.now
+        if is_other_simulation(before, event.time):
             _close_gaps(summary, self.last_seen, self.now)
             self.last_seen = dict.fromkeys(summary.visits, event.time)
             self.left_at = None
-            self.visits = {}
         else:
-            summary.seconds += event.time - self.now
+            summary.seconds += max(0.0, event.time - before)
+            self.last_seen = on_present_clock(self.last_seen, before, event.time)
+        self.visits = on_present_clock(self.visits, before, event.time)
         self.now = event.time
         _count(summary, event, self.last_seen)
         if event.name == 'visit':
@@ -377,6 +379,22 @@ class Account:
             raise MissionLogError(f'a snapshot of the mission record is damaged: {error}') from None
 
 
+def is_other_simulation(before: float, now: float) -> bool:
+    """Tell whether a clock went back because another simulation counts it, not as it was set."""
+    return now < min(before, A_DATE)
+
+
+def on_present_clock(times: Mapping[str, float], before: float, now: float) -> dict[str, float]:
+    """Return times by a clock that has gone from one time to another.
+
+    A machine's clock that was set back takes them with it. Of what was on the clock of another
+    simulation, nothing is known.
+    """
+    if is_other_simulation(before, now):
+        return {name: at for name, at in times.items() if at <= now}
+    return {name: at - max(0.0, before - now) for name, at in times.items()}
+
+
 def account_of(events: Iterable[Event]) -> Account:
     """Count a record."""
     account = Account()
@@ -389,8 +407,9 @@ def summarize(events: Iterable[Event]) -> Summary:
     """Sum up a record.
 
     The time a place went unvisited runs from start to first visit, from visit to visit, and from
-    the last visit to the end. When the clock jumps back (another simulation writes to the
-    same file), the events from there on count as a mission of their own and their times add up.
+    the last visit to the end. When another simulation writes to the same file, the events from
+    there on count as a mission of their own and their times add up. A machine's clock that is set
+    back adds nothing, and no wait ends.
     """
     account = account_of(events)
     _close_gaps(account.summary, account.last_seen, account.now)
