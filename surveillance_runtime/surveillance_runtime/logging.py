@@ -21,10 +21,10 @@ from rclpy.logging import LoggingSeverity
 
 LONGEST = 1000
 """Characters of a line; what is longer loses its middle."""
-LINES_PER_SECOND, LINES_AT_ONCE = 8.0, 100.0
+LINES_PER_SECOND, LINES_AT_ONCE = 7.0, 40.0
 """Lines of a node for each second in the long run, and after a pause."""
 WARNINGS_PER_SECOND, WARNINGS_AT_ONCE = 2.0, 20.0
-"""The same for its warnings and errors."""
+"""The same for its warnings and errors: 600 lines of both kinds in any minute."""
 
 # rclpy tells the throttles of different callers apart by the first frame outside of these files.
 rcutils._internal_callers.append(os.path.realpath(__file__))
