@@ -35,8 +35,9 @@ import subprocess
 import sys
 import threading
 import time
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -63,6 +64,12 @@ from surveillance_runtime.testing import claim_domain  # noqa: E402
 
 PLACES = {'surveillance': 'seven_rooms.yaml', 'patrol': 'patrol_world.yaml'}
 STARTED = re.compile(r'started (\w+) \(process (\d+)\)')
+STEPS = {
+    'noticed': re.compile(r'\| (?:WARN: )?(\w+) died'),
+    'started': STARTED,
+    'ready': re.compile(r'(\w+) +\| ready$'),
+}
+"""The lines of the launcher that show how far the return of a node is."""
 NEAR = 1.6
 """How far from a place's point the robot may be and count as having visited it, metres."""
 CLOSE_IN_TIME = 4.0
@@ -82,6 +89,7 @@ class Launcher:
 
     Attributes:
         processes: The process id of each node that was started last.
+        steps: When each of `STEPS` was seen last, by node, steady seconds.
     """
 
     def __init__(
@@ -89,6 +97,7 @@ class Launcher:
     ) -> None:
         environ = {**os.environ, **more, 'ROS_DOMAIN_ID': str(domain)}
         self.processes: dict[str, int] = {}
+        self.steps: defaultdict[str, dict[str, float]] = defaultdict(dict)
         self.folder: Path | None = None
         self._log = log.open('a')
         self.process = subprocess.Popen(
@@ -109,6 +118,9 @@ class Launcher:
         for line in self.process.stdout:
             self._log.write(line)
             self._log.flush()
+            for step, pattern in STEPS.items():
+                if seen := pattern.search(line):
+                    self.steps[seen.group(1)][step] = time.monotonic()
             if found := STARTED.search(line):
                 self.processes[found.group(1)] = int(found.group(2))
             elif self.folder is None and (found := re.search(r'files in (\S+)', line)):
@@ -212,6 +224,24 @@ class Watcher:
         return future.result()
 
 
+@dataclass(frozen=True)
+class Outage:
+    """How long a node that was hit was away.
+
+    Attributes:
+        name: The node.
+        steps: Seconds since the step before, for each of `STEPS` and for its first answer.
+    """
+
+    name: str
+    steps: dict[str, float]
+
+    @property
+    def seconds(self) -> float:
+        """The whole of it."""
+        return sum(self.steps.values())
+
+
 @dataclass
 class Usage:
     """What a process held when it was looked at first, a minute after its start, and last."""
@@ -228,7 +258,7 @@ class Results:
     """What the campaign saw."""
 
     hits: Counter[str] = field(default_factory=Counter)
-    outages: list[tuple[str, float]] = field(default_factory=list)
+    outages: list[Outage] = field(default_factory=list)
     away: list[str] = field(default_factory=list)
     lost: list[str] = field(default_factory=list)
     invented: list[str] = field(default_factory=list)
@@ -365,16 +395,30 @@ class Campaign:
                 continue
             self.results.hits[signal.Signals(kind).name] += 1
         before = {name: self.launcher.processes[name] for name in names}
-        for name in names:
+
+        def await_return(name: str) -> None:
             late = began + PATIENCE
             while self.launcher.processes[name] == before[name] and time.monotonic() < late:
                 time.sleep(0.02)
             if self.watcher.answers(name, late - time.monotonic()):
-                self.results.outages.append((name, time.monotonic() - began))
+                self.results.outages.append(self._outage(name, began, time.monotonic()))
             else:
                 self.results.away.append(
                     f'{name} after {signal.Signals(kind).name}: {self._second_opinion(name)}'
                 )
+
+        with ThreadPoolExecutor() as pool:
+            list(pool.map(await_return, names))
+
+    def _outage(self, name: str, began: float, answered: float) -> Outage:
+        seen = self.launcher.steps[name]
+        # A step whose line was not read yet took no time of its own.
+        moments, last = {}, began
+        for step in (*STEPS, 'answers'):
+            last = min(answered, max(last, seen.get(step, last)))
+            moments[step] = answered if step == 'answers' else last
+        before = [began, *moments.values()]
+        return Outage(name, {step: at - before[i] for i, (step, at) in enumerate(moments.items())})
 
     def _second_opinion(self, name: str) -> str:
         """Return whether a node that seems to be away is: somebody new asks it, too."""
@@ -573,13 +617,14 @@ def main(words: Sequence[str] | None = None) -> int:
     finally:
         campaign.close()
     results = campaign.results
-    outages = [seconds for _, seconds in results.outages]
+    outages = [outage.seconds for outage in results.outages]
     longest = max(results.resumes, default=math.nan)
     median, late = _quantile(outages, 0.5), _quantile(outages, 0.99)
     rows = [
         ('hits', ', '.join(f'{kind} {count}' for kind, count in sorted(results.hits.items()))),
         ('nodes that stayed away', _named(results.away)),
         ('outage, median and p99', f'{median:.1f} s, {late:.1f} s'),
+        *_steps(results.outages),
         ('start again after everything was killed, longest', f'{longest:.1f} s'),
         ('visits seen in the record', str(len(campaign._seen))),
         ('lost', _named(results.lost)),
@@ -621,6 +666,17 @@ def show(rows: Sequence[tuple[str, str]]) -> None:
 
 def _times(what: Sequence[tuple[str, float]]) -> str:
     return ', '.join(f'{kind} {seconds:.1f} s' for kind, seconds in what) or 'not tried'
+
+
+def _steps(outages: Sequence[Outage]) -> Iterator[tuple[str, str]]:
+    """Yield a row for each node: the median seconds of each step of its return."""
+    for name in sorted({outage.name for outage in outages}):
+        own = [outage for outage in outages if outage.name == name]
+        medians = {
+            step: _quantile([outage.steps[step] for outage in own], 0.5) for step in own[0].steps
+        }
+        steps = ', '.join(f'{step} {seconds:.1f}' for step, seconds in medians.items())
+        yield f'  {name} ({len(own)})', f'{steps} s'
 
 
 def _named(what: Sequence[str]) -> str:
