@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import base64
 import io
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import fields
 from typing import Any
@@ -18,7 +19,7 @@ from PIL import Image
 
 from surveillance_behaviour.policy.policies import POLICIES
 from surveillance_operator.regions import OCCUPIED, regions
-from surveillance_operator.snapshot import NO_POINTS, Grid, Health, Snapshot
+from surveillance_operator.snapshot import NO_POINTS, TRAIL_STEP, Grid, Health, Snapshot
 
 Parts = dict[str, Any]
 
@@ -26,6 +27,14 @@ FIGURES = frozenset({'memory_mb', 'restarts'})
 
 MOST_TRAIL = 600
 """Points of the trail that viewers are shown, the newest."""
+
+
+def lengthen(trail: list[list[float]], pose: list[float]) -> None:
+    """Add where a pose is to a trail, unless it is where the trail ends."""
+    # Poses are rounded: a step of just this length counts.
+    if not trail or math.dist(trail[-1], pose[:2]) > 0.99 * TRAIL_STEP:
+        trail.append(pose[:2])
+        del trail[:-MOST_TRAIL]
 
 
 def _points(points: NDArray[np.float64] | None) -> list[list[float]]:
@@ -254,9 +263,11 @@ class Framer:
         self.parts: Parts = {}
 
     def patch(self, snapshot: Snapshot) -> Parts:
-        """Return the parts that differ from the last snapshot's."""
+        """Return the parts that differ from the last snapshot's, and a trail that begins anew."""
         last, changed = self._last, {}
         self._last = snapshot
+        if last is not None and len(snapshot.trail) < len(last.trail):
+            changed['trail'] = _points(snapshot.trail)
         for name, (sources, compute) in self._parts.items():
             if last is not None and all(
                 getattr(last, source) is getattr(snapshot, source) for source in sources

@@ -137,14 +137,18 @@ class MissionFeed:
             if self._over and begins:
                 self._over = False
                 self._facts.forget()
+                if not self._node.count_publishers('/clock'):
+                    self._clock_time = None
                 # What follows the ontology tells what goes, too.
                 kept = {
                     name: getattr(old, name)
-                    for name in ('events', 'visited_at', 'urgent', 'links', 'history', 'restarts')
+                    for name in ('events', 'visited_at', 'urgent', 'links', 'restarts')
                 }
                 old = replace(self._empty, **kept)
                 new = change(old)
-            new, told = follow(old, replace(new, now=self._now()), time.strftime('%H:%M:%S'))
+            # Nothing passes after a mission's end.
+            now = old.now if self._over else self._now()
+            new, told = follow(old, replace(new, now=now), time.strftime('%H:%M:%S'))
             self._over = self._over or bool(old.nodes and not new.nodes)
             self._snapshot = new
         self._on_change(new, told)
@@ -211,8 +215,6 @@ class MissionFeed:
         if now < self._changed_at + WHOLE_LOOK_PERIOD or now >= self._next_whole_look:
             self._next_whole_look = now + WHOLE_LOOK_PERIOD
             self._look_at_topics(processes)
-        if not node.count_publishers('/clock'):
-            self._clock_time = None
         self._note_silent()
         self._facts.ask()
         if self._others is not None:

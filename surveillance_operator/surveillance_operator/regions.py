@@ -62,11 +62,17 @@ def regions(
             points[name] = (row + 0.5, column + 0.5)
             owners.setdefault(int(parts[row, column]), []).append(name)
     found = {}
+    boxes = ndimage.find_objects(parts)
     for part, names in owners.items():
-        mask = parts == part
-        nearest = _nearest(mask, [points[name] for name in names])
+        # Only the part's own box is looked at: a map may have hundreds.
+        rows, columns = boxes[part - 1]
+        mask = parts[rows, columns] == part
+        inside = [(points[n][0] - rows.start, points[n][1] - columns.start) for n in names]
+        x, y = grid.origin
+        corner = x + side * columns.start, y + side * rows.start
+        nearest = _nearest(mask, inside)
         for number, name in enumerate(names):
-            found[name] = _region(mask & (nearest == number), points[name], grid.origin, side)
+            found[name] = _region(mask & (nearest == number), inside[number], corner, side)
     return found
 
 

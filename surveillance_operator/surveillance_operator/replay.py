@@ -159,9 +159,8 @@ class Player:
                 return
             now, parts = self._line.line(number)
             changed.update(parts)
-        whole = 'trail' in changed
         self._number = number
-        self._tell(changed, now, whole=whole)
+        self._tell(changed, now)
 
     def _tell(self, parts: dict[str, Any], now: float | None, *, whole: bool = False) -> None:
         replay = {

@@ -18,6 +18,8 @@ from numpy.typing import NDArray
 from surveillance_behaviour.policy.world import Decision
 
 NO_POINTS: NDArray[np.float64] = np.empty((0, 2))
+TRAIL_STEP = 0.1
+"""Least distance of two points of a trail, metres."""
 BATTERY_STEP = 10
 """Percent between two lines about the battery."""
 KEPT_EVENTS = 50

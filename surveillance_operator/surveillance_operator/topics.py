@@ -36,13 +36,13 @@ from surveillance_ontology.armor.facts import ShortFact, parse_fact
 from surveillance_ontology.armor_client import value_in
 from surveillance_ontology.patrol_ontology import CONNECTIONS, URGENT_PLACES, VISITS
 from surveillance_operator import conversions
-from surveillance_operator.snapshot import NO_POINTS, Pose, Snapshot
+from surveillance_operator.snapshot import NO_POINTS, TRAIL_STEP, Pose, Snapshot
 from surveillance_runtime.conversions import seconds_of
 from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.robot_arm import ARM
 
-TRAIL_STEP, TRAIL_POINTS = 0.1, 1000
-"""Least distance of two points of the trail, metres, and how many are kept."""
+TRAIL_POINTS = 1000
+"""How many points of the trail are kept."""
 KEPT_TRANSITIONS = 60
 SAME_MOMENT = 0.03
 """Most seconds between the stamps of a pose and a scan that belong together."""

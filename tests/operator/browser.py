@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import shutil
 from collections.abc import Callable
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -75,3 +76,13 @@ class Viewer:
         self.size(width, height, dark=dark)
         image = self.driver.execute_cdp_cmd('Page.captureScreenshot', {'format': 'png'})
         file.write_bytes(base64.b64decode(image['data']))
+
+    def axe(self) -> list[str]:
+        """Return what the accessibility checker finds, which a Python package brings along."""
+        if not self.js('return "axe" in window'):
+            self.js((files('axe_core_python') / 'axe.min.js').read_text(encoding='utf-8'))
+        found: list[str] = self.driver.execute_async_script(
+            'const done = arguments[0]; axe.run().then((r) => done(r.violations.map((v) => '
+            'v.id + ": " + v.nodes.slice(0, 3).map((n) => n.target + " " + n.failureSummary))))'
+        )
+        return found

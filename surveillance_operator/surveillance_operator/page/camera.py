@@ -15,7 +15,8 @@ from surveillance_runtime.node import PatrolNode
 ANNOTATED, RAW = 'aruco_detector/annotated', 'camera/rgb/image_raw'
 """The image with the markers drawn in, which a detector publishes while it looks; the plain one."""
 PATIENCE = 4.0
-"""The plain image is heard when none with markers came for this time, seconds."""
+"""The plain image is heard when none with markers came for this time, seconds; and an image that
+is older than this is not shown as if it were new."""
 IDLE_SECONDS = 5.0
 """After this time without a question nobody listens to the camera any more."""
 
@@ -31,11 +32,11 @@ class Camera:
         self._node = node
         self._lock = threading.Lock()
         self._subscriptions: dict[str, PolledSubscription] = {}
-        self._asked = self._annotated_at = 0.0
+        self._asked = self._annotated_at = self._came_at = 0.0
         self._jpeg: bytes | None = None
 
     def jpeg(self) -> bytes | None:
-        """Return the newest image; None where nothing came yet."""
+        """Return the newest image; None where nothing came for a while."""
         with self._lock:
             now = time.monotonic()
             if not self._subscriptions:
@@ -48,8 +49,8 @@ class Camera:
             elif now - self._annotated_at > PATIENCE:
                 newest = self._newest(RAW)
             if newest is not None:
-                self._jpeg = jpeg_from(newest)
-            return self._jpeg
+                self._jpeg, self._came_at = jpeg_from(newest), now
+            return self._jpeg if now - self._came_at <= PATIENCE else None
 
     def rest(self) -> None:
         """Leave the topics when nobody has asked for a while; call it now and then."""

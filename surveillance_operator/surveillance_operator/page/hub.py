@@ -11,7 +11,7 @@ import json
 import threading
 from collections.abc import AsyncIterator
 
-from surveillance_operator.frames import MOST_TRAIL, PARTS, Framer, Parts
+from surveillance_operator.frames import PARTS, Framer, Parts, lengthen
 from surveillance_operator.snapshot import Snapshot
 
 LEAST_PERIOD = 0.015
@@ -30,7 +30,7 @@ class Hub:
         self._waiting: set[asyncio.Event] = set()
         self._texts: dict[str, tuple[int, str]] = {}
         self._version = 0
-        self._trail: list[list[float]] | None = None
+        self._trail: list[list[float]] = []
         self._snapshot: Snapshot | None = None
         self._now = 0.0
         self.closed = False
@@ -59,17 +59,7 @@ class Hub:
         """
         with self._lock:
             self._now = self._now if now is None else now
-            if whole:
-                parts = {**dict.fromkeys(PARTS), **parts}
-            parts = dict(parts)
-            trail = parts.pop('trail', None)
-            if whole:
-                self._trail = trail or []
-                parts['trail'] = self._trail
-            elif self._trail is not None and parts.get('pose'):
-                self._trail.append(parts['pose'][:2])
-                del self._trail[:-MOST_TRAIL]
-            self._accept(parts)
+            self._accept({**dict.fromkeys(PARTS), 'trail': [], **parts} if whole else parts)
         self._rouse()
 
     def close(self) -> None:
@@ -84,7 +74,8 @@ class Hub:
         with self._lock:
             self._waiting.add(changed)
             if self._snapshot is not None:
-                self._accept(self._framer.patch(self._snapshot))
+                patch = self._framer.patch(self._snapshot)
+                self._accept({**patch, 'trail': self._framer.whole()['trail']})
         try:
             seen = -1
             yield 'retry: 1000\n\n'
@@ -95,7 +86,7 @@ class Hub:
                     parts = {name: text for name, (at, text) in self._texts.items() if at > seen}
                     seen, now = self._version, self._now
                     if first:
-                        parts['trail'] = json.dumps(self._whole_trail())
+                        parts['trail'] = json.dumps(self._trail)
                 body = ','.join(f'"{name}":{text}' for name, text in parts.items())
                 yield f'data: {{"now":{now:.2f},"whole":{int(first)},"p":{{{body}}}}}\n\n'
                 await asyncio.sleep(LEAST_PERIOD)
@@ -107,12 +98,12 @@ class Hub:
             with self._lock:
                 self._waiting.discard(changed)
 
-    def _whole_trail(self) -> object:
-        if self._trail is not None:
-            return self._trail
-        return self._framer.whole().get('trail', [])
-
     def _accept(self, parts: Parts) -> None:
+        # Viewers lengthen the trail themselves, unless they are given one.
+        if 'trail' in parts:
+            self._trail = list(parts['trail'])
+        elif parts.get('pose'):
+            lengthen(self._trail, parts['pose'])
         if parts:
             self._version += 1
             for name, value in parts.items():

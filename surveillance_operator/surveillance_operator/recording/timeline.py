@@ -15,7 +15,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-from surveillance_operator.frames import Framer, Parts
+from surveillance_operator.frames import Framer, Parts, lengthen
 from surveillance_operator.recording.bag import RecordingError
 from surveillance_operator.snapshot import Snapshot
 
@@ -160,7 +160,7 @@ class Timeline:
             now, changed = self.line(each)
             trail = changed.pop('trail', trail)
             if changed.get('pose') and each > first:
-                trail.append(changed['pose'][:2])
+                lengthen(trail, changed['pose'])
             parts.update(changed)
         return number, now, {**parts, 'trail': trail}
 

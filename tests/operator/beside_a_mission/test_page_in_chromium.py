@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import signal
 from collections.abc import Iterator
-from importlib.resources import files
 
 import pytest
 
@@ -170,16 +169,10 @@ def test_without_the_token_nobody_can_act(viewer: Viewer) -> None:
 
 @pytest.mark.parametrize('size', [PHONE, DESK], ids=['phone', 'desk'])
 @pytest.mark.parametrize('dark', [False, True], ids=['light', 'dark'])
-def test_axe_finds_nothing(
-    viewer: Viewer, size: tuple[int, int], dark: bool, axe_script: str
-) -> None:
+def test_axe_finds_nothing(viewer: Viewer, size: tuple[int, int], dark: bool) -> None:
     viewer.size(*size, dark=dark)
     assert viewer.js('return document.documentElement.scrollWidth') <= size[0]
-    viewer.js(axe_script)
-    found = viewer.driver.execute_async_script(
-        'const done = arguments[0]; axe.run().then((r) => done(r.violations.map((v) => '
-        'v.id + ": " + v.nodes.slice(0, 3).map((n) => n.target + " " + n.failureSummary))))'
-    )
+    found = viewer.axe()
     viewer.size(*DESK)
     assert found == []
 
@@ -198,10 +191,3 @@ def test_the_browser_has_nothing_to_complain_about(viewer: Viewer) -> None:
     gone = ('CONNECTION_REFUSED', 'CONNECTION_RESET', 'INCOMPLETE_CHUNKED_ENCODING')
     expected = ('status of 4', *(f'ERR_{each}' for each in (*gone, 'EMPTY_RESPONSE')))
     assert [s for s in severe if not any(each in s['message'] for each in expected)] == []
-
-
-@pytest.fixture(scope='module')
-def axe_script() -> str:
-    """Provide the accessibility checker, which a Python package brings along."""
-    script = files('axe_core_python') / 'axe.min.js'
-    return script.read_text(encoding='utf-8')

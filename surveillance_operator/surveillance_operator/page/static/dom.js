@@ -23,6 +23,22 @@ export function age(seconds) {
   return `${Math.floor(minutes / 60)}:${String(minutes % 60).padStart(2, '0')}:${rest}`;
 }
 
+// Names in the order in which a person counts: R2 before R10.
+export const names = (things) => Object.keys(things ?? {}).sort((a, b) => a.localeCompare(b, 'en', {numeric: true}));
+
+// A name that a drawing has room for.
+export const short = (name, most) => (name.length > most ? `${name.slice(0, most - 1)}…` : name);
+
+// How long a place waits: since its last visit, or since the mission is heard of; in words, and as a share of the threshold.
+export function wait({places, history, mission}, name, now) {
+  const {visited, urgent} = places[name];
+  const begun = Math.min(now, ...[history?.visits[0], history?.battery[0]].filter(Boolean).map(([at]) => at));
+  const seconds = Math.max(0, now - (visited ?? begun));
+  const threshold = mission?.threshold;
+  const late = urgent || Boolean(threshold) && seconds > threshold;
+  return {seconds, late, share: late ? 1 : threshold ? seconds / threshold : 0, text: (visited === null ? 'never' : age(seconds)) + (late ? ' !' : '')};
+}
+
 export async function ask(name, fields) {
   return answerOf(fetch(`/ask/${name}?` + new URLSearchParams(fields)));
 }

@@ -1,5 +1,5 @@
 // What a person may do: one line for each thing, and what came of it above them.
-import {$, h, act} from './dom.js';
+import {$, h, act, names} from './dom.js';
 
 // An example of each controller's commands.
 const COMMANDS = {
@@ -96,12 +96,12 @@ export class Hands {
   show() {
     if (!this.may) return;
     const {places, doors, mission, requests, health} = this.state;
-    const names = JSON.stringify([Object.keys(places ?? {}), Object.keys(doors ?? {}), mission?.policies]);
-    if (names !== this.names) {
-      this.names = names;
-      offer(this.place, Object.keys(places ?? {}));
-      offer(this.room, Object.keys(places ?? {}));
-      offer(this.door, Object.keys(doors ?? {}));
+    const offered = JSON.stringify([names(places), names(doors), mission?.policies]);
+    if (offered !== this.offered) {
+      this.offered = offered;
+      offer(this.place, names(places));
+      offer(this.room, names(places));
+      offer(this.door, names(doors));
       offer(this.policy, mission?.policies ?? []);
       for (const list of [this.place, this.room, this.door]) list.form.hidden = !list.options.length;
     }

@@ -1,5 +1,5 @@
 // The state machine as nested boxes, its transitions as arcs beside them.
-import {s} from './dom.js';
+import {s, short} from './dom.js';
 
 const ROW = 26, GAP = 6, PAD = 10, INDENT = 14, WIDTH = 190;
 
@@ -27,10 +27,10 @@ function layout(container, all, depth) {
     if (inner) {
       const drawn = layout(inner, all, depth + 1);
       height = drawn.height;
-      part.append(s('rect', {class: 'box', width: drawn.width, height, rx: 5}), s('text', {x: 8, y: 17}, label), drawn.group);
+      part.append(s('rect', {class: 'box', width: drawn.width, height, rx: 5}), s('text', {x: 8, y: 17}, short(label, 24)), drawn.group);
       width = Math.max(width, drawn.width);
     } else {
-      part.append(s('rect', {width, height, rx: 5}), s('text', {x: 8, y: 17}, label));
+      part.append(s('rect', {width, height, rx: 5}), s('text', {x: 8, y: 17}, short(label, 24)), s('title', {}, label));
     }
     rows.set(label, [y, height]);
     y += height + GAP;
@@ -48,7 +48,7 @@ function layout(container, all, depth) {
     group.append(s('path', {d: `M${right} ${a}C${right + reach} ${a} ${right + reach} ${b} ${right + 1} ${b}l5 -3m-5 3l5 3`, 'data-edge': `${container.path}|${from}|${outcome}`}, s('title', {}, `${from} –${outcome}→ ${to}`)));
   }
   const ends = container.outcomes.join(', ');
-  group.append(s('text', {class: 'label', x: PAD, y: y + 9}, `ends: ${ends}`));
+  group.append(s('text', {class: 'label', x: PAD, y: y + 9}, short(`ends: ${ends}`, 60)));
   return {group, width: right + 66, height: y + 18};
 }
 
@@ -58,7 +58,7 @@ export function drawMachine(svg, containers) {
   if (!root) return;
   const drawn = layout(root, containers, 0);
   svg.setAttribute('viewBox', `0 0 ${drawn.width} ${drawn.height}`);
-  svg.setAttribute('height', drawn.height);
+  svg.setAttribute('width', drawn.width);
   svg.append(s('text', {x: PAD, y: 17}, root.path), drawn.group);
 }
 

@@ -10,7 +10,7 @@ import {Replay} from './replay.js';
 
 const root = document.documentElement;
 const state = {};
-const clock = {now: 0, at: 0, rate: 1};
+const clock = {now: 0, at: 0, rate: 1, measured: 1};
 const may = root.dataset.control === '1';
 const replaying = root.dataset.kind === 'replay';
 
@@ -32,12 +32,12 @@ function set(id, text) {
 
 function header() {
   const {status, mission, battery} = state;
-  set('title', status ? `${status.machine}${mission?.mode ? ' · ' + mission.mode : ''}` : 'no mission yet');
+  const ended = mission && !mission.running && status;
+  set('title', status ? `${status.machine}${mission?.mode ? ' · ' + mission.mode : ''}` : mission?.running ? 'a mission begins' : 'no mission yet');
   document.title = status ? `${status.place || '?'} · ${status.machine}` : 'Mission';
-  const ended = mission && !mission.running && status ? ' · the mission has ended' : '';
-  const where = status ? status.whereabouts : `waiting on ${mission?.where ?? ''}`;
-  set('state', `${status?.state ? status.state + ' · ' : ''}${where}${status?.text ? ' · ' + status.text : ''}${ended}`);
-  $('state').classList.toggle('warn', Boolean(status?.help));
+  const words = status ? [ended && 'the mission has ended', status.state, status.whereabouts, status.text] : [`waiting on ${mission?.where ?? ''}`];
+  set('state', words.filter(Boolean).join(' · '));
+  $('state').classList.toggle('warn', Boolean(status?.help || ended));
   set('battery', battery ? `battery ${Math.round(battery.level)} %${battery.low ? ' (low)' : ''}` : 'battery –');
   $('battery').classList.toggle('warn', Boolean(battery?.low));
 }
@@ -58,9 +58,19 @@ function lists() {
     [`${each[6].toFixed(1)} s`, `${each[3]} –${each[4]}→ ${each[5]}`]));
 }
 
+// What is empty is said in words until there is something to show.
+function present() {
+  const {grid, places, machine, mission, health} = state;
+  const has = (part) => Object.keys(part ?? {}).length > 0;
+  const there = {map: grid || has(places), machine: has(machine), mission: mission?.running, nodes: has(health?.nodes) || has(health?.others)};
+  for (const each of document.querySelectorAll('[data-with]')) each.toggleAttribute('hidden', !there[each.dataset.with]);
+  for (const each of document.querySelectorAll('[data-without]')) each.toggleAttribute('hidden', Boolean(there[each.dataset.without]));
+}
+
 const MOST_TRAIL = 600;
 const MAP_PARTS = ['status', 'grid', 'places', 'regions', 'links', 'doors', 'plan', 'scan', 'obstacles', 'pose', 'trail', 'mission', 'markers', 'others'];
 const SHOW = {
+  present: [['grid', 'places', 'machine', 'mission', 'health'], present],
   header: [['status', 'mission', 'battery'], header],
   why: [['decision', 'places'], () => why.show()],
   lists: [['events', 'markers', 'transitions'], lists],
@@ -80,17 +90,21 @@ function receive(message) {
   const at = performance.now();
   if (clock.at && !message.whole) {
     const passed = (at - clock.at) / 1000;
-    if (passed > 0.5) clock.rate = Math.min(1000, Math.max(0, (message.now - clock.now) / passed));
+    if (passed > 0.5) {
+      // One leap of the clock, to the next mission for example, is no pace.
+      const measured = Math.max(0, (message.now - clock.now) / passed);
+      clock.rate = Math.min(measured, clock.measured);
+      clock.measured = measured;
+    }
   }
   if (!clock.at || at - clock.at > 500 || message.whole) { clock.now = message.now; clock.at = at; }
   if (message.whole) for (const name of Object.keys(state)) delete state[name];
   if (parts.pose && !parts.trail && state.trail) {
     const last = state.trail.at(-1);
-    if (!last || Math.hypot(last[0] - parts.pose[0], last[1] - parts.pose[1]) > 0.1) state.trail.push(parts.pose.slice(0, 2));
+    if (!last || Math.hypot(last[0] - parts.pose[0], last[1] - parts.pose[1]) > 0.099) state.trail.push(parts.pose.slice(0, 2));
     state.trail.splice(0, state.trail.length - MOST_TRAIL);
   }
   Object.assign(state, parts);
-  if (message.replay) replay?.show(message.replay);
   if (parts.replay) replay?.show(parts.replay);
   for (const [needs, draw] of Object.values(SHOW)) if (needs.some((name) => name in parts)) draw(parts);
   window.mission.received += 1;
@@ -118,14 +132,14 @@ function camera() {
   const next = new Image();
   const shown = (there) => { image.hidden = !there; $('no-camera').hidden = there; };
   next.onload = () => { image.src = next.src; shown(true); };
-  next.onerror = () => { if (replaying) shown(false); };
+  next.onerror = () => shown(false);
   next.src = `/camera.jpg?${Date.now()}`;
 }
 
 document.body.classList.toggle('replay', replaying);
 $('replay').hidden = !replaying;
 for (const each of document.querySelectorAll('.hands')) each.hidden = !may || replaying;
-if (replaying) $('no-camera').textContent = 'no image of this moment';
+present();
 connect();
 setInterval(() => { map.tick(state, now()); drawStrips($('strips'), state, now()); }, 1000);
 setInterval(camera, 700);

@@ -1,5 +1,5 @@
 // The map: what the robot knows of the place, and what it does there. Metres; y points up.
-import {s, age} from './dom.js';
+import {s, short, wait} from './dom.js';
 
 const LAYERS = ['regions', 'grid', 'links', 'driven', 'plan', 'doors', 'lidar', 'obstacles', 'markers', 'places', 'others', 'robot'];
 const ROBOT = 'M.55 0L-.35 .38L-.15 0L-.35 -.38Z';
@@ -80,7 +80,7 @@ export class MapView {
       const [x, y] = [(x1 + x2) / 2, -(y1 + y2) / 2];
       // Beside the door: at its right end, or right of it.
       const [dx, dy] = Math.abs(x2 - x1) > Math.abs(y2 - y1) ? [Math.abs(x2 - x1) / 2 + .45, -.15] : [.6, .16];
-      return [path, shut ? s('text', {class: 'cross', x, y: y + .3}, '×') : null, s('text', {class: 'door-name', x: x + dx, y: y + dy}, name)];
+      return [path, shut ? s('text', {class: 'cross', x, y: y + .3}, '×') : null, s('text', {class: 'door-name', x: x + dx, y: y + dy}, short(name, 8))];
     }).filter(Boolean);
     this.layers.doors.replaceChildren(...drawn);
   }
@@ -100,7 +100,7 @@ export class MapView {
     this.layers.others.replaceChildren(...Object.entries(others ?? {}).map(([name, pose]) => {
       const robot = s('g', {class: 'robot other', 'data-robot': name}, s('title', {}, name), s('path', {d: ROBOT}));
       placeAt(robot, pose);
-      return s('g', {}, robot, s('text', {class: 'tag', x: pose[0], y: -pose[1] - .6}, name));
+      return s('g', {}, robot, s('text', {class: 'tag', x: pose[0], y: -pose[1] - .6}, short(name, 16)));
     }));
   }
 
@@ -130,11 +130,12 @@ export class MapView {
     const floor = region ? s('path', {class: 'floor', d: filled(region.boxes)})
       : s('circle', {class: 'floor', cx: at[0], cy: -at[1], r: .5});
     const [x, y] = region?.label ?? [at[0] + .8, at[1] - .25];
+    const shown = short(name, 16);
     const readable = (this.width ?? 16) / 24;
-    const fits = region ? 3.2 * region.room / Math.max(4, name.length) : readable;
+    const fits = region ? 3.2 * region.room / Math.max(4, shown.length) : readable;
     const size = Math.max(readable / 2, Math.min(readable, fits));
     const words = s('tspan', {class: 'age', ...(region ? {x, dy: size * .95} : {dx: size * .4}), 'font-size': size * .8}, '');
-    const label = s('text', {class: region ? null : 'beside', x, y: -y, 'font-size': size}, name, words);
+    const label = s('text', {class: region ? null : 'beside', x, y: -y, 'font-size': size}, ...(!region || region.room > .25 * size * shown.length ? [shown, words] : []));
     const choose = () => this.onPlace(name);
     const onkeydown = (event) => {
       if (event.key !== 'Enter' && event.key !== ' ') return;
@@ -144,24 +145,19 @@ export class MapView {
     const outline = floor.cloneNode();
     outline.setAttribute('class', 'outline');
     const room = s('g', {class: 'room', tabindex: 0, role: 'button', 'data-place': name, onclick: choose, onkeydown},
-      outline, s('circle', {class: 'spot', cx: at[0], cy: -at[1], r: .12}), label);
+      s('title', {}, name), outline, s('circle', {class: 'spot', cx: at[0], cy: -at[1], r: .12}), label);
     this.rooms.set(name, {room, floor, words});
     return {floor, room};
   }
 
   tick(state, now) {
-    const threshold = state.mission?.threshold || 120;
     for (const [name, {room, floor, words}] of this.rooms) {
-      const place = state.places?.[name];
-      if (!place) continue;
-      const waited = place.visited === null ? Infinity : now - place.visited;
-      const share = Math.round(100 * Math.min(1, Math.max(0, waited / threshold)));
-      floor.style.fill = `color-mix(in srgb, var(--late) ${share}%, var(--fresh))`;
-      const late = place.urgent || waited > threshold;
-      const text = (Number.isFinite(waited) ? age(waited) : 'never') + (late ? ' !' : '');
+      if (!state.places?.[name]) continue;
+      const {share, text} = wait(state, name, now);
+      floor.style.fill = `color-mix(in srgb, var(--late) ${Math.round(100 * share)}%, var(--fresh))`;
       if (words.textContent !== text) words.textContent = text;
-      const said = Number.isFinite(waited) ? `unvisited for ${age(waited)}` : 'never visited';
-      room.setAttribute('aria-label', `${name}: ${said}${place.urgent ? ', URGENT' : ''}`);
+      const said = text.startsWith('never') ? 'never visited' : `unvisited for ${text.replace(' !', '')}`;
+      room.setAttribute('aria-label', `${name}: ${said}${text.endsWith('!') ? ', too long' : ''}`);
     }
   }
 }

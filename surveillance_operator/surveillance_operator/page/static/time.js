@@ -1,13 +1,18 @@
 // A strip for each place's idleness, one for the battery, one for what happened, over the last hour.
-import {h, s, age} from './dom.js';
+import {h, s, age, names, wait} from './dom.js';
 
 const HOUR = 3600, W = 600, H = 30;
 const SIGNS = {recharge: '⚡', failure: '✗', recovery: '↻', help: '?'};
-let names = '';
+const drawn = new Map();
+let built = '';
 
 function build(root, places) {
   const strip = (name) => s('svg', {viewBox: `0 0 ${W} ${H}`, preserveAspectRatio: 'none', role: 'img', 'data-strip': name, 'aria-label': name});
-  const row = (name, drawn) => [h('span', {}, name), drawn, h('span', {'data-value': name, class: 'n'}, '')];
+  const row = (name, strip) => {
+    drawn.set(name, {strip, value: h('span', {'data-value': name, class: 'n'}, '')});
+    return [h('span', {}, name), strip, drawn.get(name).value];
+  };
+  drawn.clear();
   root.replaceChildren(
     ...places.flatMap((name) => row(name, strip(name))),
     ...row('battery', strip('battery')),
@@ -16,58 +21,63 @@ function build(root, places) {
     h('p', {class: 'note', id: 'strip-note'}, ''));
 }
 
+// A saw: it rises from each visit, or from where the strip begins, to the next one.
 function sawtooth(visits, since, now, x, y) {
-  let d = `M0 ${H}`, last = visits[0] ?? since;
+  const rise = (from, to) => `L${x(Math.max(from, since))} ${y(Math.max(0, since - from))}L${x(to)} ${y(to - from)}L${x(to)} ${H}`;
+  let d = `M0 ${H}`, last = since;
   for (const at of visits) {
-    if (at > since) d += `L${x(Math.max(last, since))} ${y(Math.max(0, since - last))}L${x(at)} ${y(at - last)}L${x(at)} ${H}`;
+    if (at > since) d += rise(last, at);
     last = at;
   }
-  return [`${d}L${x(Math.max(last, since))} ${y(Math.max(0, since - last))}L${W} ${y(now - last)}L${W} ${H}Z`, now - last];
+  return `${d}${rise(last, now)}Z`;
 }
 
 export function drawStrips(root, state, now) {
-  const history = state.history;
+  const {history, mission, battery} = state;
   if (!history) return;
-  const places = Object.keys(state.places ?? {});
-  const key = places.join(' ');
-  if (key !== names || !root.childElementCount) {
-    names = key;
+  const places = names(state.places);
+  const key = JSON.stringify(places);
+  if (key !== built) {
+    built = key;
     build(root, places);
   }
-  const element = (kind, name) => root.querySelector(`[data-${kind}="${CSS.escape(name)}"]`);
-  const first = Math.min(now - 60, ...history.visits.slice(0, 1).map((v) => v[0]), ...history.battery.slice(0, 1).map((b) => b[0]));
-  const since = Math.max(now - HOUR, first);
-  const threshold = state.mission?.threshold || 120;
+  const waits = places.map((place) => wait(state, place, now));
+  const since = Math.max(now - HOUR, Math.min(now - 60, ...waits.map(({seconds}) => now - seconds), ...[history.visits[0], history.battery[0]].filter(Boolean).map(([at]) => at)));
+  const threshold = mission?.threshold;
+  const top = 1.5 * (threshold || Math.max(60, ...waits.map(({seconds}) => seconds)));
   const x = (at) => Math.round(10 * W * Math.max(0, (at - since) / (now - since))) / 10;
-  const y = (idle) => Math.round(10 * (H - H * Math.min(1, Math.max(0, idle) / (threshold * 1.5)))) / 10;
-  for (const place of places) {
-    const visits = history.visits.filter((v) => v[1] === place).map((v) => v[0]);
+  const y = (idle) => Math.round(10 * (H - H * Math.min(1, Math.max(0, idle) / top))) / 10;
+  const visited = Object.groupBy(history.visits, ([, place]) => place);
+  places.forEach((place, number) => {
+    const visits = (visited[place] ?? []).map(([at]) => at);
     const known = state.places[place].visited;
-    if (known !== null && !visits.some((v) => Math.abs(v - known) < 1)) visits.push(known);
-    visits.sort((a, b) => a - b);
-    const [d, idle] = sawtooth(visits, since, now, x, y);
-    element('strip', place).replaceChildren(s('path', {class: 'fill', d}), s('path', {class: 'limit', d: `M0 ${y(threshold)}H${W}`}));
-    const value = element('value', place);
-    value.textContent = (visits.length ? age(idle) : 'never') + (idle > threshold ? ' !' : '');
-    value.classList.toggle('over', idle > threshold);
-  }
+    if (known !== null && !visits.some((at) => Math.abs(at - known) < 1)) visits.push(known);
+    const limit = threshold ? s('path', {class: 'limit', d: `M0 ${y(threshold)}H${W}`}) : '';
+    const {strip, value} = drawn.get(place);
+    strip.replaceChildren(s('path', {class: 'fill', d: sawtooth(visits.sort((a, b) => a - b), since, now, x, y)}), limit);
+    value.textContent = waits[number].text;
+    value.classList.toggle('over', waits[number].late);
+  });
   const level = (percent) => H - 2 - (H - 4) * percent / 100;
   const charge = history.battery.map(([at, percent], i) => `${i ? 'L' : 'M'}${x(at)} ${level(percent)}`).join('') + (history.battery.length ? `H${W}` : '');
-  element('strip', 'battery').replaceChildren(s('path', {class: 'charge', d: charge}));
-  element('value', 'battery').textContent = state.battery ? `${Math.round(state.battery.level)} %` : '–';
-  const marks = history.marks.filter((mark) => mark[0] > since);
-  // Where marks would cover each other, one stands for all of its kind.
-  const shown = new Map();
-  for (const [at, kind, text] of marks) {
-    const slot = `${kind} ${Math.floor(x(at) / 16)}`;
-    shown.set(slot, {at, kind, texts: [...shown.get(slot)?.texts ?? [], text]});
-  }
-  element('strip', 'events').replaceChildren(...[...shown.values()].map(({at, kind, texts}) => {
-    const mark = h('span', {title: `${kind}: ${[...new Set(texts)].join('; ')}${texts.length > 1 ? ` (${texts.length} times)` : ''}`}, SIGNS[kind] ?? '•');
-    mark.style.left = `${Math.min(98, 100 * x(at) / W)}%`;
+  drawn.get('battery').strip.replaceChildren(s('path', {class: 'charge', d: charge}));
+  drawn.get('battery').value.textContent = battery ? `${Math.round(battery.level)} %` : '–';
+  drawMarks(drawn.get('events').strip, history.marks.filter(([at]) => at > since), (at) => x(at) / W);
+  drawn.get('events').value.textContent = String(history.marks.filter(([at]) => at > since).length);
+  root.querySelector('#axis-start').textContent = `${age(now - since)} ago`;
+  const dashed = threshold ? `dashed: threshold ${age(threshold)} · ` : '';
+  root.querySelector('#strip-note').textContent = `${dashed}⚡ recharge · ✗ failure · ↻ recovery · ? help`;
+}
+
+// Marks that would cover each other are one, with a sign for each kind.
+function drawMarks(root, marks, share) {
+  const shown = Object.entries(Object.groupBy(marks, ([at]) => Math.floor(24 * Math.min(.999, share(at)))));
+  root.replaceChildren(...shown.map(([slot, several]) => {
+    const kinds = [...new Set(several.map(([, kind]) => kind))];
+    const told = [...new Set(several.map(([, kind, text]) => `${kind}: ${text}`))];
+    const mark = h('span', {title: told.join('; ') + (several.length > told.length ? ` (${several.length} events)` : '')}, kinds.map((kind) => SIGNS[kind] ?? '•').join(''));
+    mark.style.left = `${100 * slot / 23}%`;
+    mark.style.translate = `${-100 * slot / 23}%`;
     return mark;
   }));
-  element('value', 'events').textContent = String(marks.length);
-  root.querySelector('#axis-start').textContent = `${age(now - since)} ago`;
-  root.querySelector('#strip-note').textContent = `dashed: threshold ${age(threshold)} · ⚡ recharge · ✗ failure · ↻ recovery · ? help`;
 }

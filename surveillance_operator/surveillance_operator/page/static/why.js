@@ -1,5 +1,8 @@
 // Why the robot goes where it goes: the decision, what is known of a place, proofs, why not.
-import {$, h, ask} from './dom.js';
+import {$, h, ask, names} from './dom.js';
+
+const MOST_SCORES = 12;
+const clock = () => `${new Date().toTimeString().slice(0, 8)}`;
 
 export class Why {
   constructor(state) {
@@ -16,35 +19,39 @@ export class Why {
 
   show() {
     const {decision, places} = this.state;
-    if (decision) {
+    if (!decision) {
+      $('decision-line').textContent = 'no decision yet';
+      for (const id of ['reason', 'scores', 'answer', 'facts']) $(id).replaceChildren();
+    } else {
       $('decision-line').textContent = `decision ${decision.number}: ${decision.from} → ${decision.place} [${decision.rule}]`;
       $('reason').textContent = decision.reason;
-      const rows = decision.scores.toSorted((a, b) => b[1] - a[1]).map(([name, score]) =>
+      const ranked = decision.scores.toSorted((a, b) => b[1] - a[1]);
+      const rows = ranked.filter(([name], place) => place < MOST_SCORES || name === decision.place).map(([name, score]) =>
         h('tr', {class: name === decision.place ? 'chosen' : null}, h('td', {}, name === decision.place ? `→ ${name}` : name), h('td', {class: 'n'}, String(score))));
-      $('scores').replaceChildren(h('caption', {class: 'hidden'}, 'Candidates'), h('thead', {}, h('tr', {}, h('th', {scope: 'col'}, 'Candidate'), h('th', {scope: 'col', class: 'n'}, `Score (${decision.policy}), highest wins`))), h('tbody', {}, ...rows));
+      $('scores').replaceChildren(h('caption', {class: 'hidden'}, 'Candidates'), h('thead', {}, h('tr', {}, h('th', {scope: 'col'}, 'Candidate'), h('th', {scope: 'col', class: 'n'}, `Score (${decision.policy}), highest wins`))), h('tbody', {}, ...rows), ...(ranked.length > rows.length ? [h('tfoot', {}, h('tr', {}, h('td', {colspan: 2}, `and ${ranked.length - rows.length} more`)))] : []));
     }
-    const names = Object.keys(places ?? {});
-    if (names.join() !== this.names) {
+    const known = names(places);
+    if (JSON.stringify(known) !== this.names) {
       const chosen = $('place').value;
-      this.names = names.join();
+      this.names = JSON.stringify(known);
       // A recording answers no questions.
-      $('asking').hidden = !names.length || document.documentElement.dataset.kind === 'replay';
-      $('place').replaceChildren(...names.map((name) => h('option', {value: name}, name)));
-      if (names.includes(chosen)) $('place').value = chosen;
+      $('asking').hidden = !known.length || document.documentElement.dataset.kind === 'replay';
+      $('place').replaceChildren(...known.map((name) => h('option', {value: name}, name)));
+      if (known.includes(chosen)) $('place').value = chosen;
     }
   }
 
   async whyNot() {
     const place = $('place').value;
     const found = await ask('why_not', {place});
-    $('answer').replaceChildren(h('p', {class: found.ok ? 'strong' : 'warn'}, found.text), ...(found.premises?.length ? [h('ul', {class: 'proof'}, ...found.premises.map((text) => h('li', {}, text)))] : []));
+    $('answer').replaceChildren(h('p', {class: found.ok ? 'strong' : 'warn'}, h('time', {}, clock()), found.text), ...(found.premises?.length ? [h('ul', {class: 'proof'}, ...found.premises.map((text) => h('li', {}, text)))] : []));
   }
 
   async facts() {
     const place = $('place').value;
     const found = await ask('facts', {place});
     if (!found.ok) { $('facts').replaceChildren(h('p', {class: 'warn'}, found.text)); return; }
-    $('facts').replaceChildren(h('h3', {}, `What is known of ${place}`), ...found.facts.map(([fact, asserted]) => asserted ? h('p', {class: 'fact'}, fact, h('small', {}, ' asserted')) : this.derived(fact)));
+    $('facts').replaceChildren(h('h3', {}, h('time', {}, clock()), `What is known of ${place}`), ...found.facts.map(([fact, asserted]) => asserted ? h('p', {class: 'fact'}, fact, h('small', {}, ' asserted')) : this.derived(fact)));
   }
 
   derived(fact) {

@@ -1,0 +1,166 @@
+"""The page in a real Chromium, shown what a mission may be: none, ended, large, hostile."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from surveillance_behaviour.policy.world import Decision
+from surveillance_operator.page.hub import Hub
+from surveillance_operator.page.server import Page
+from surveillance_operator.snapshot import (
+    Container,
+    Grid,
+    Health,
+    History,
+    Snapshot,
+    Status,
+    Transition,
+)
+from tests.operator.browser import CHROMIUM, DESK, DRIVER, MISSING, PHONE, Viewer
+
+pytestmark = [
+    pytest.mark.skipif(not (CHROMIUM and DRIVER), reason=MISSING),
+    pytest.mark.timeout(180),
+]
+HOSTILE = (
+    '<img src=x onerror="window.broken=1">',
+    'مرحبا\u202e',
+    'a_name_of_a_hundred_letters_' * 4,
+    '"];x',
+)
+
+
+def mission(names: tuple[str, ...]) -> Snapshot:
+    """Return a mission whose places, nodes, states and reasons have these names."""
+    side = int(np.ceil(np.sqrt(len(names))))
+    cells = np.zeros((side * 20, side * 20), np.int8)
+    cells[::20] = cells[:, ::20] = 100
+    positions = {
+        name: (2.0 * (n % side) + 1.0, 2.0 * (n // side) + 1.0) for n, name in enumerate(names)
+    }
+    first, last = names[0], names[-1]
+    return Snapshot(
+        where=first,
+        now=5000.0,
+        mode='SIMULATED',
+        threshold=240.0,
+        policy='tour',
+        nodes=dict.fromkeys(names, frozenset('1')),
+        status=Status(5000.0, first, last, first, last, False, first, ()),
+        decision=Decision(
+            4990.0, first, last, last, 'URGENT', 'tour', first, dict.fromkeys(names, 1.0)
+        ),
+        number=3,
+        battery=50.0,
+        grid=Grid(cells, 0.1),
+        positions=positions,
+        doors={first: True, last: False},
+        door_lines={first: (1.0, 2.0, 1.5, 2.0), last: (2.0, 0.5, 2.0, 1.0)},
+        visited_at=dict.fromkeys(names[1:], 4900.0),
+        urgent=frozenset({first}),
+        pose=(1.0, 1.0, 0.5),
+        trail=np.array([(1.0, 0.5), (1.0, 1.0)]),
+        obstacles=np.array([(1.0, 1.2)]),
+        containers=(Container('m', 'StateMachine', names, names[:1], names, ()),),
+        active=(f'm/{first}',),
+        transitions=(Transition(1, 4999.0, 'm', first, last, last, 'x', 1.0),),
+        markers={11: (0.5, 0.5)},
+        health={name: Health(2, first, (('memory_mb', '5'),)) for name in names},
+        silent={first: last},
+        events=(('12:00:00', first),),
+        history=History(((4900.0, last),), ((4000.0, 60.0),), ((4950.0, 'failure', first),)),
+    )  # fmt: skip
+
+
+ROOMS = tuple(f'R{n}' for n in range(1, 501))
+STATES = {
+    'nothing': Snapshot(where='ROS domain 5'),
+    'begins': replace(Snapshot(), nodes={'armor_server': frozenset('1')}),
+    'hostile': mission(HOSTILE),
+    'large': mission(ROOMS),
+    'ended': replace(mission(('A', 'B')), nodes={}, ended=frozenset({'A', 'B'})),
+}
+
+
+@pytest.fixture(scope='module')
+def hub() -> Hub:
+    return Hub()
+
+
+@pytest.fixture(scope='module')
+def viewer(hub: Hub) -> Iterator[Viewer]:
+    page = Page(hub, questions={}, actions={'go': lambda _: 'going'}, port=0)
+    page.start()
+    viewer = Viewer(page.address)
+    yield viewer
+    viewer.close()
+    page.stop()
+
+
+def show(hub: Hub, viewer: Viewer, name: str) -> None:
+    """Show a state of a mission, and wait until the page has it."""
+    hub.show(replace(STATES[name], policy=name))
+    viewer.until(lambda: viewer.js('return mission.state.mission?.policy') == name, 60)
+
+
+def visible(viewer: Viewer, selector: str) -> bool:
+    script = 'return document.querySelector(arguments[0]).getClientRects().length > 0'
+    return bool(viewer.js(script, selector))
+
+
+@pytest.mark.parametrize('name', STATES)
+def test_every_state_is_readable_everywhere(name: str, hub: Hub, viewer: Viewer) -> None:
+    show(hub, viewer, name)
+    for size, dark in ((PHONE, True), (DESK, False)):
+        viewer.size(*size, dark=dark)
+        assert viewer.js('return document.documentElement.scrollWidth') <= size[0]
+        if name != 'large':  # whose hundreds of equal rooms the checker takes a minute for
+            assert viewer.axe() == []
+    assert viewer.driver.get_log('browser') == []
+
+
+def test_what_is_empty_says_so(hub: Hub, viewer: Viewer) -> None:
+    show(hub, viewer, 'nothing')
+    assert viewer.text('#title') == 'no mission yet'
+    for each in ('#map-section', '#machine-section', '#health-section', '#hands', '#time-section'):
+        assert visible(viewer, f'{each} [data-without]'), each
+    assert not visible(viewer, '[data-machine=pause]')
+    show(hub, viewer, 'hostile')
+    assert visible(viewer, '#map')
+    assert not visible(viewer, '#map-section [data-without]')
+
+
+def test_no_name_becomes_markup_and_each_is_read(hub: Hub, viewer: Viewer) -> None:
+    show(hub, viewer, 'hostile')
+    viewer.until(lambda: viewer.count('[data-place]') == len(HOSTILE))
+    assert viewer.js('return window.broken') is None
+    assert viewer.count('main img') == 1
+    shown = viewer.js(
+        'return [...document.querySelectorAll("[data-place]")].map(e => e.dataset.place)'
+    )
+    assert sorted(shown) == sorted(HOSTILE)
+
+
+def test_a_leap_of_the_clock_makes_nothing_wait_longer(hub: Hub, viewer: Viewer) -> None:
+    for name in ('nothing', 'large'):
+        show(hub, viewer, name)
+    waited = viewer.text('[data-value=R2]')
+    assert waited.startswith('1:4'), waited  # 100 s, and those since
+
+
+def test_an_ended_mission_is_not_taken_for_a_running_one(hub: Hub, viewer: Viewer) -> None:
+    show(hub, viewer, 'ended')
+    assert viewer.text('#state').startswith('the mission has ended')
+    assert not visible(viewer, '#hands-body')
+
+
+def test_the_next_mission_starts_on_a_clean_page(hub: Hub, viewer: Viewer) -> None:
+    show(hub, viewer, 'hostile')
+    show(hub, viewer, 'begins')
+    assert viewer.js('return mission.state.trail') == []
+    assert viewer.text('#decision-line') == 'no decision yet'
+    assert viewer.count('#scores td') == 0
