@@ -6,10 +6,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
 from rclpy.qos import QoSProfile
+from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Bool, UInt8
 
 from surveillance_interfaces.action import FollowPath
@@ -143,8 +145,10 @@ def test_the_next_mission_begins_with_an_empty_picture(graph: Any) -> None:
     view = graph.add(MissionViewNode, namespace='alone')
     status = say(graph, '/alone/mission_status', MissionStatus(state='FIRST'))
     battery = say(graph, '/alone/battery_level', UInt8(data=50))
+    clock = say(graph, '/clock', Clock(clock=Time(sec=100)))
     graph.until(lambda: view.snapshot.battery == 50 and view.snapshot.nodes)
-    for publisher in (status, battery):
+    graph.until(lambda: view.see().now == 100.0)
+    for publisher in (status, battery, clock):
         graph.node.destroy_publisher(publisher)
     graph.until(lambda: not view.snapshot.nodes)
     frozen = view.see()
@@ -159,8 +163,11 @@ def test_the_next_mission_begins_with_an_empty_picture(graph: Any) -> None:
 
     graph.until(reported)
     assert view.see().status == frozen.status
+    assert view.see().now == 100.0  # no wait grows by the time of day
 
     say(graph, '/alone/mission_status', MissionStatus(state='SECOND'))
     graph.until(lambda: view.snapshot.status and view.snapshot.status.state == 'SECOND')
     assert view.snapshot.battery is None
+    assert view.snapshot.history.battery == ()
+    assert view.see().now > 1e9
     assert any('waiting for the next mission' in text for _, text in view.snapshot.events)
