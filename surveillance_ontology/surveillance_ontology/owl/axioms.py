@@ -8,7 +8,10 @@ wherever a data range is. Anonymous individuals are strings that begin with `_:`
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
+from itertools import combinations
+from typing import TypeVar
 
 from surveillance_ontology.owl.expressions import (
     Atom,
@@ -19,6 +22,7 @@ from surveillance_ontology.owl.expressions import (
 )
 from surveillance_ontology.owl.vocabulary import RDFS
 
+T = TypeVar('T')
 KINDS = (
     'class',
     'object_property',
@@ -141,6 +145,16 @@ class DisjointClasses(Axiom):
 class DisjointUnion(Axiom):
     cls: str
     classes: tuple[ClassExpression, ...]
+
+
+def pairs_of(members: Iterable[T]) -> Iterator[tuple[T, T]]:
+    """Yield every two of what an axiom lists; what it lists twice counts once (OWL 2, section 2.1).
+
+    What it lists twice and nothing else is a pair, as in `A owl:disjointWith A`.
+    """
+    listed = tuple(members)
+    distinct = tuple(dict.fromkeys(listed))
+    return combinations(distinct if len(distinct) > 1 else listed, 2)
 
 
 @dataclass(frozen=True, slots=True)

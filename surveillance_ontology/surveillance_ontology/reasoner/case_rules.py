@@ -441,10 +441,9 @@ class CaseRules:
             self._property_axiom(axiom)
 
     def _all_disjoint(self, classes: tuple[ClassExpression, ...]) -> None:
-        concepts = [self.recognised(expression) for expression in classes]
-        for place, first in enumerate(concepts):
-            for second in concepts[place + 1 :]:
-                self.node_rule(frozenset((first, second)) - {0}, ())
+        for first, second in ax.pairs_of(map(normal, classes)):
+            both = frozenset((self.recognised(first), self.recognised(second)))
+            self.node_rule(both - {0}, ())
 
     def _property_axiom(self, axiom: Axiom) -> None:
         if isinstance(axiom, ax.ReflexiveObjectProperty):
@@ -457,9 +456,8 @@ class CaseRules:
         elif isinstance(axiom, ax.DisjointObjectProperties):
             if any(map(self.complex_role, axiom.props)):
                 raise UnsupportedError('a property with chains is disjoint from another')
-            for place, first in enumerate(axiom.props):
-                for second in axiom.props[place + 1 :]:
-                    self._exclude(self.role(first), self.role(second))
+            for first, second in ax.pairs_of(axiom.props):
+                self._exclude(self.role(first), self.role(second))
         elif isinstance(axiom, (ax.FunctionalObjectProperty, ax.InverseFunctionalObjectProperty)):
             if self.complex_role(axiom.prop):
                 raise UnsupportedError('a property with chains is functional')
@@ -478,10 +476,9 @@ class CaseRules:
         elif isinstance(axiom, ax.FunctionalDataProperty):
             self.functional_values.append(ValueCount(1, axiom.prop, EVERY))
         elif isinstance(axiom, ax.DisjointDataProperties):
-            for place, name in enumerate(axiom.props):
-                for other in axiom.props[place + 1 :]:
-                    self.disjoint_props.setdefault(name, set()).add(other)
-                    self.disjoint_props.setdefault(other, set()).add(name)
+            for name, other in ax.pairs_of(axiom.props):
+                self.disjoint_props.setdefault(name, set()).add(other)
+                self.disjoint_props.setdefault(other, set()).add(name)
 
     def _exclude(self, first: int, second: int) -> None:
         for one, other in ((first, second), (-first, -second)):

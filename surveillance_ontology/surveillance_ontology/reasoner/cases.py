@@ -385,7 +385,7 @@ def _denials(goal: Axiom) -> Iterator[Denial]:
         for sub, sup in permutations(goal.classes, 2):
             yield (_member(sub, ex.ObjectComplementOf(sup)),)
     elif isinstance(goal, ax.DisjointClasses):
-        yield from ((_member(*pair),) for pair in combinations(goal.classes, 2))
+        yield from ((_member(*pair),) for pair in ax.pairs_of(goal.classes))
     elif isinstance(goal, ax.DisjointUnion):
         whole, parts = goal.cls, ex.ObjectUnionOf(goal.classes)
         yield from _denials(ax.EquivalentClasses((whole, parts)))
@@ -431,7 +431,7 @@ def _property_denials(goal: Axiom) -> Iterator[Denial]:
         links = (_holds(prop, one, other) for prop, one, other in steps)
         yield (*links, _fails(goal.sup, places[0], places[-1]))
     elif isinstance(goal, ax.DisjointObjectProperties):
-        for one, other in combinations(goal.props, 2):
+        for one, other in ax.pairs_of(goal.props):
             yield _holds(one), _holds(other)
     elif isinstance(goal, ax.FunctionalObjectProperty):
         yield (_member(ex.ObjectMinCardinality(2, goal.prop)),)

@@ -776,10 +776,8 @@ class Translation:
             self.imply(body, sup, _X)
 
     def _all_disjoint(self, classes: tuple[ClassExpression, ...]) -> None:
-        labels = [self._recognise(normal(expression)) for expression in classes]
-        for position, first in enumerate(labels):
-            for second in labels[position + 1 :]:
-                self._disjoint(first, second)
+        for first, second in ax.pairs_of(map(normal, classes)):
+            self._disjoint(self._recognise(first), self._recognise(second))
 
     def _key(self, axiom: ax.HasKey) -> None:
         props = [self._direction(prop) for prop in axiom.object_props]
@@ -821,12 +819,11 @@ class Translation:
             program.asymmetric.append(program.object(name))
             self.contradict((prop(axiom.prop, _X, _Y), prop(axiom.prop, _Y, _X)), _X)
         elif isinstance(axiom, ax.DisjointObjectProperties):
-            for place, first in enumerate(axiom.props):
-                for second in axiom.props[place + 1 :]:
-                    one, two = prop(first, _X, _Y), prop(second, _X, _Y)
-                    pair = (one.predicate, one.terms[0] == _Y, two.predicate, two.terms[0] == _Y)
-                    program.disjoint_properties.append(pair)
-                    self.contradict((one, two), _X)
+            for first, second in ax.pairs_of(axiom.props):
+                one, two = prop(first, _X, _Y), prop(second, _X, _Y)
+                pair = (one.predicate, one.terms[0] == _Y, two.predicate, two.terms[0] == _Y)
+                program.disjoint_properties.append(pair)
+                self.contradict((one, two), _X)
         elif isinstance(axiom, (ax.FunctionalObjectProperty, ax.InverseFunctionalObjectProperty)):
             atom = prop(axiom.prop, _X, _Y)
             inverse = (atom.terms[0] == _Y) != isinstance(axiom, ax.InverseFunctionalObjectProperty)
@@ -843,12 +840,11 @@ class Translation:
                     if data_sub != data_sup:
                         self._imply_data(data_sub, data_sup)
         elif isinstance(axiom, ax.DisjointDataProperties):
-            for place, name in enumerate(axiom.props):
-                for other in axiom.props[place + 1 :]:
-                    one = PredicateAtom(program.data(name), (_X, _Y))
-                    two = PredicateAtom(program.data(other), (_X, _Y))
-                    program.disjoint_properties.append((one.predicate, False, two.predicate, False))
-                    self.contradict((one, two), _X)
+            for name, other in ax.pairs_of(axiom.props):
+                one = PredicateAtom(program.data(name), (_X, _Y))
+                two = PredicateAtom(program.data(other), (_X, _Y))
+                program.disjoint_properties.append((one.predicate, False, two.predicate, False))
+                self.contradict((one, two), _X)
         elif isinstance(axiom, ax.FunctionalDataProperty):
             program.at_most.append(AtMost(None, 1, program.data(axiom.prop), False, None, axiom))
         elif isinstance(axiom, ax.DataPropertyDomain):

@@ -15,13 +15,14 @@ from surveillance_ontology.owl.expressions import ClassExpression, DataRange, Li
 from surveillance_ontology.owl.vocabulary import NOTHING, OWL, THING, TOP_LITERAL, XSD
 
 BASE = 'http://example.org/wide#'
-CLASSES = [BASE + name for name in 'ABCDEF']
+CLASSES = [BASE + name for name in 'ABCDEFGH']
 SIMPLE = [BASE + name for name in ('p', 'q', 'r')]
 LONG = [BASE + name for name in ('t', 'u')]
 """Properties that may be transitive or implied by chains, later ones above earlier ones."""
 OBJECTS = [*SIMPLE, *LONG]
 DATAS = [BASE + name for name in ('d', 'e')]
 INDIVIDUALS = [BASE + name for name in 'ijkl']
+TOP, BOTTOM = OWL + 'topObjectProperty', OWL + 'bottomObjectProperty'
 _NUMBERS = ('integer', 'int', 'byte', 'nonNegativeInteger', 'positiveInteger', 'decimal')
 _FACETS = ('minInclusive', 'maxInclusive', 'minExclusive', 'maxExclusive')
 _DATATYPES = (
@@ -29,6 +30,7 @@ _DATATYPES = (
     *(XSD + name for name in ('anyURI', 'hexBinary', 'token', 'unsignedByte', 'negativeInteger')),
     *(OWL + 'real', OWL + 'rational', TOP_LITERAL),
 )
+_DATATYPE = BASE + 'defined'
 
 
 class WideOntology:
@@ -38,11 +40,17 @@ class WideOntology:
         seed: Equal seeds draw equal axioms.
         cases: How likely a class expression is drawn whose consequences may need reasoning by
             cases: a union, an enumeration or a complement, wherever it stands.
+        special: How likely a property in a class is owl:topObjectProperty or
+            owl:bottomObjectProperty.
+
+    Attributes:
+        defined: Whether data ranges may use a datatype that the ontology defines.
     """
 
-    def __init__(self, seed: int, cases: float = 0.2) -> None:
+    def __init__(self, seed: int, cases: float = 0.2, special: float = 0.0) -> None:
         self.random = random.Random(seed)
-        self._cases = cases
+        self._cases, self._special = cases, special
+        self.defined = False
 
     # --- values ---
 
@@ -67,7 +75,7 @@ class WideOntology:
         draw = self.random
         choice = draw.randrange(10) if depth else draw.randrange(6)
         if choice <= 1:
-            return draw.choice(_DATATYPES)
+            return _DATATYPE if self.defined and draw.random() < 0.3 else draw.choice(_DATATYPES)
         if choice <= 4:
             kind = draw.random()
             facet = XSD + draw.choice(_FACETS)
@@ -109,6 +117,8 @@ class WideOntology:
         return ex.ObjectInverseOf(name) if self.random.random() < 0.25 else name
 
     def prop(self) -> ex.PropertyExpression:
+        if self._special and self.random.random() < self._special:
+            return self.random.choice([TOP, TOP, BOTTOM])
         name = self.random.choice(OBJECTS)
         return ex.ObjectInverseOf(name) if self.random.random() < 0.25 else name
 
@@ -171,58 +181,96 @@ class WideOntology:
         if choice <= 6:
             return ax.SubClassOf(self.expression(), self.expression())
         if choice <= 8:
+            if draw.random() < 0.15:
+                return ax.EquivalentClasses((self.named(), self.named(), self.expression(2)))
             return ax.EquivalentClasses((self.named(), self.expression()))
         if choice <= 10:
-            return ax.DisjointClasses(tuple(draw.sample(CLASSES, 2)))
-        whole, *parts = draw.sample(CLASSES, 3)
-        return ax.DisjointUnion(whole, tuple(parts))
+            if draw.random() < 0.25:
+                return ax.DisjointClasses((self.expression(2), self.expression(2)))
+            return ax.DisjointClasses(tuple(draw.sample(CLASSES, draw.choice([2, 2, 3, 4]))))
+        whole, *parts = draw.sample(CLASSES, draw.choice([3, 3, 4]))
+        return ax.DisjointUnion(whole, (*parts, self.expression(1)) if self._cases else parts)
 
     def property_axiom(self) -> Axiom:
+        return self.random.choice(
+            [
+                *[self._inclusion] * 5,
+                *[self._characteristic] * 6,
+                *[self._domain_or_range] * 5,
+                *[self._data_axiom] * 3,
+                self._key,
+            ]
+        )()
+
+    def _inclusion(self) -> Axiom:
         draw = self.random
-        choice = draw.randrange(20)
-        prop = self.prop()
-        if choice <= 1:
+        choice = draw.randrange(10)
+        if choice <= 2:
             return ax.SubObjectPropertyOf(self.simple(), draw.choice(OBJECTS))
-        if choice == 2:
-            return ax.InverseObjectProperties(*draw.sample(SIMPLE, 2))
         if choice == 3:
-            return ax.SymmetricObjectProperty(draw.choice(OBJECTS))
+            return ax.InverseObjectProperties(*draw.sample(SIMPLE, 2))
         if choice == 4:
-            return ax.TransitiveObjectProperty(draw.choice(LONG))
-        if choice == 5:
-            first, second = draw.choice(SIMPLE), draw.choice(SIMPLE)
+            return ax.EquivalentObjectProperties((draw.choice(SIMPLE), self.simple()))
+        if choice <= 7:
+            # Regular: `t` may be made of simple properties and itself, `u` also of `t`.
             target = draw.choice(LONG)
-            chain = draw.choice([(first, second), (target, second), (first, target)])
+            lower = [*SIMPLE, *LONG[: LONG.index(target)]]
+            steps = [self._turned(draw.choice(lower)) for _ in range(draw.choice([1, 1, 2]))]
+            other = draw.choice([self._turned(draw.choice(lower)), target])
+            chain = (other, *steps) if draw.random() < 0.5 else (*steps, other)
             return ax.SubPropertyChainOf(chain, target)
-        if choice == 6:
-            return ax.FunctionalObjectProperty(self.simple())
-        if choice == 7:
-            return ax.InverseFunctionalObjectProperty(draw.choice(SIMPLE))
         if choice == 8:
-            return ax.ReflexiveObjectProperty(draw.choice(OBJECTS))
-        if choice == 9:
-            kinds = [ax.AsymmetricObjectProperty, ax.IrreflexiveObjectProperty]
-            return draw.choice(kinds)(draw.choice(SIMPLE))
-        if choice == 10:
-            return ax.DisjointObjectProperties(tuple(draw.sample(SIMPLE, 2)))
-        if choice <= 12:
-            return ax.ObjectPropertyDomain(prop, self.expression(2))
-        if choice <= 14:
-            return ax.ObjectPropertyRange(prop, self.expression(2))
-        if choice == 15:
-            return ax.FunctionalDataProperty(draw.choice(DATAS))
-        if choice == 16:
-            return ax.DataPropertyRange(draw.choice(DATAS), self.data_range())
-        if choice == 17:
-            pair = tuple(draw.sample(DATAS, 2))
-            if draw.random() < 0.4:
-                return ax.DisjointDataProperties(pair)
-            return ax.SubDataPropertyOf(*pair)
-        if choice == 18:
-            return ax.DataPropertyDomain(draw.choice(DATAS), self.expression(2))
-        if draw.random() < 0.6:
-            return ax.HasKey(self.named(), (), (draw.choice(DATAS),))
-        return ax.HasKey(self.named(), (self.simple(),), ())
+            return ax.DisjointObjectProperties((draw.choice(SIMPLE), self.simple()))
+        return ax.DisjointObjectProperties(tuple(SIMPLE))
+
+    def _turned(self, name: str) -> ex.PropertyExpression:
+        return ex.ObjectInverseOf(name) if self.random.random() < 0.25 else name
+
+    def _characteristic(self) -> Axiom:
+        draw = self.random
+        simple = [
+            *[ax.FunctionalObjectProperty] * 3,
+            *[ax.InverseFunctionalObjectProperty] * 2,
+            ax.AsymmetricObjectProperty,
+            ax.IrreflexiveObjectProperty,
+        ]
+        every = [
+            *[ax.SymmetricObjectProperty] * 2,
+            *[ax.ReflexiveObjectProperty] * 2,
+            *[ax.TransitiveObjectProperty] * 2,
+        ]
+        kind = draw.choice([*simple, *every])
+        if kind in simple:
+            return kind(self.simple())
+        name = draw.choice(LONG if kind is ax.TransitiveObjectProperty else OBJECTS)
+        return kind(self._turned(name))
+
+    def _domain_or_range(self) -> Axiom:
+        kind = self.random.choice([ax.ObjectPropertyDomain, ax.ObjectPropertyRange])
+        return kind(self._turned(self.random.choice(OBJECTS)), self.expression(3))
+
+    def _data_axiom(self) -> Axiom:
+        draw = self.random
+        choice = draw.randrange(8)
+        prop, pair = draw.choice(DATAS), tuple(draw.sample(DATAS, 2))
+        if choice <= 1:
+            return ax.FunctionalDataProperty(prop)
+        if choice <= 3:
+            return ax.DataPropertyRange(prop, self.data_range())
+        if choice == 4:
+            return ax.DataPropertyDomain(prop, self.expression(2))
+        if choice == 5:
+            return ax.DisjointDataProperties(pair)
+        if choice == 6:
+            return ax.EquivalentDataProperties(pair)
+        return ax.SubDataPropertyOf(*pair)
+
+    def _key(self) -> Axiom:
+        draw = self.random
+        cls = self.named() if draw.random() < 0.7 else self.expression(2)
+        objects = draw.choice([(), (), (self.simple(),), tuple(draw.sample(SIMPLE, 2))])
+        datas = tuple(draw.sample(DATAS, draw.choice([1, 1, 2] if not objects else [0, 1])))
+        return ax.HasKey(cls, objects, datas)
 
     def assertion(self) -> Axiom:
         draw = self.random
@@ -251,6 +299,12 @@ class WideOntology:
         declared += [ax.Declaration('object_property', name) for name in OBJECTS]
         declared += [ax.Declaration('data_property', name) for name in DATAS]
         declared += [ax.Declaration('individual', name) for name in INDIVIDUALS]
+        if self.random.random() < 0.2:
+            declared += [
+                ax.Declaration('datatype', _DATATYPE),
+                ax.DatatypeDefinition(_DATATYPE, self.data_range()),
+            ]
+            self.defined = True
         drawn = [
             self.class_axiom() if self.random.random() < 0.6 else self.property_axiom()
             for _ in range(schema)
