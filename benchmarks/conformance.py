@@ -7,8 +7,8 @@ FOLDER holds OWL 2 test cases of the W3C as JSON (a list of records with `name`,
 `read_ontology` reads; subfolders too. Each is read and reasoned over in a process of its own.
 One table tells what became of the cases, one what became of the ontologies. `named` are cases whose
 answer is missing and whose axioms are reported in `unsupported`; `silent` ones are missing without
-a word. With --java HermiT and Pellet (the copies that owlready2 brings) judge the consistency of
-the same documents.
+a word. With --java HermiT and Pellet (the copies that owlready2 brings) read the same ontologies,
+and the subclasses and types that only one side finds are counted.
 """
 
 from __future__ import annotations
@@ -39,7 +39,10 @@ from surveillance_ontology.owl.axioms import (  # noqa: E402
     Annotation,
     Axiom,
     Declaration,
+    Import,
 )
+from surveillance_ontology.owl.entities import entities_of  # noqa: E402
+from surveillance_ontology.owl.vocabulary import NOTHING, THING  # noqa: E402
 from surveillance_ontology.reasoner.cases import UnsupportedError  # noqa: E402
 
 BASE = 'http://example.org/'
@@ -176,19 +179,38 @@ def run_cases(places: list[tuple[Path, int]], limit: float) -> None:
     print()
 
 
+def differences(kb: KnowledgeBase, reasoner: JavaReasoner) -> int:
+    """Return how many subclasses and types are found here or there alone."""
+    entities = {entity for axiom in kb.axioms() for entity in entities_of(axiom)}
+    classes = {iri for kind, iri in entities if kind == 'class'} | {THING}
+    individuals = {iri for kind, iri in entities if kind == 'individual' and iri[0] != '_'}
+    above = {one: {one, THING, *kb.superclasses(one)} for one in classes}
+    above[NOTHING] = classes
+    count = 0
+    for cls in classes - {NOTHING}:
+        below = set(reasoner.ask('below', cls).split('\t')) & classes
+        ours = {one for one in classes if cls in above[one]}
+        members = set(reasoner.ask('members', cls).split('\t')) & individuals
+        count += len((below ^ ours) - {cls}) + len(members ^ (kb.instances(cls) & individuals))
+    return count
+
+
 def verdicts(path: Path, java: list[str], limit: float) -> dict[str, str]:
-    """Return what the Java reasoners say of an ontology's consistency."""
-    found = {}
+    """Return what the Java reasoners say of an ontology, and in how many answers they differ."""
+    found: dict[str, str] = {}
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder) / 'ontology.owl'
         try:
-            write_ontology(read_ontology(path, BASE).axioms, BASE, copy)
+            kb, consistent, _, _ = reasoned(path)
+            write_ontology((a for a in kb.axioms() if not isinstance(a, Import)), BASE, copy)
         except (ValueError, OSError) as error:
             return dict.fromkeys(java, str(error)[:40])
         for kind in java:
             with JavaReasoner(kind, timeout=limit) as reasoner:
                 try:
                     found[kind] = reasoner.ask('load', str(copy))
+                    if found[kind] == 'ok' and consistent:
+                        found[kind] = f'{differences(kb, reasoner)} differ'
                 except JavaReasonerError as error:
                     found[kind] = str(error)[:40]
     return found
@@ -202,9 +224,9 @@ def run_ontologies(paths: list[Path], limit: float, java: list[str]) -> None:
     for path in paths:
         (result,) = apart(path, -1, limit)
         line = f'{path.name:26} {result.axioms:7} {result.seconds:8.2f}s {result.outcome:14}'
-        said = verdicts(path, java, limit)
+        said = verdicts(path, java, limit) if java else {}
         line += f' {result.unsupported:6}' + ''.join(f'  {said[kind]}' for kind in java)
-        print(line + (f'  {result.detail[:90]}' if result.detail else ''))
+        print(line + (f'  {result.detail[:90]}' if result.detail else ''), flush=True)
 
 
 def main() -> None:

@@ -304,7 +304,8 @@ class _ClassModels:
     def state(self, cls: str, without: str = '') -> None:
         """State that somebody is in a class and not in another one."""
         self._somebody = self._search.somebody()
-        self._search.concept(self._somebody, self._rules.concept(cls), 0)
+        if cls != THING:
+            self._search.concept(self._somebody, self._rules.concept(cls), 0)
         if without:
             outside = self._rules.positive(ex.ObjectComplementOf(without))
             self._search.concept(self._somebody, outside, 0)
@@ -314,7 +315,7 @@ class _ClassModels:
         rules, search = self._rules, self._search
         for y in search.alive():
             names = {rules.names[concept] for concept in search.labels[y]} - {''}
-            for name in names:
+            for name in (THING, *names):
                 shared = self._common.get(name)
                 self._common[name] = names if shared is None else shared & names
         if without:

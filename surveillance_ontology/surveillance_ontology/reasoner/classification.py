@@ -26,7 +26,15 @@ from surveillance_ontology.reasoner.clauses import (
     PredicateAtom,
     RangeAtom,
 )
-from surveillance_ontology.reasoner.contexts import Contexts, Role, Token, Tokens, closure, turned
+from surveillance_ontology.reasoner.contexts import (
+    Context,
+    Contexts,
+    Role,
+    Token,
+    Tokens,
+    closure,
+    turned,
+)
 from surveillance_ontology.reasoner.property_chains import spell_out_chains
 from surveillance_ontology.reasoner.simplify import drop_implied_atoms, simplify
 from surveillance_ontology.reasoner.translation import Translation
@@ -115,7 +123,7 @@ class Classification:
     def superclasses(self, cls: str) -> set[str]:
         """Named classes strictly above; of a class that can have no members, every other class."""
         if cls in self._impossible:
-            return {name for name in self._above if name != cls}
+            return {name for name in self._above if name not in (cls, THING)}
         return set(self._above.get(cls, ())) - {cls}
 
     def subclasses(self, cls: str) -> set[str]:
@@ -147,12 +155,14 @@ class Classification:
         return sub in impossible or sup == THING or sup in above.get(sub, ())
 
     def classes(self) -> set[str]:
-        """Return every named class."""
+        """Return every named class, and owl:Thing, which may be below others."""
         return set(self._above)
 
     def _hierarchy(self) -> None:
         contexts = self._contexts
-        if contexts.context(()).clash:
+        everybody = contexts.context(())
+        self._above[THING] = _named(everybody)
+        if everybody.clash:
             # There is always some individual, so what nothing can be is a contradiction.
             nothing = PredicateAtom(self.program.nothing, (Constant(NOTHING),))
             self.program.clauses.append(Clause((), nothing))
@@ -163,11 +173,7 @@ class Classification:
                 self._add_clause((predicate,), PredicateAtom(self.program.nothing, (_X,)))
                 self._above[name] = frozenset()
             else:
-                self._above[name] = frozenset(
-                    token.expression
-                    for token in context.tokens
-                    if isinstance(token, Predicate) and isinstance(token.expression, str)
-                )
+                self._above[name] = _named(context)
                 names = frozenset(
                     token[1]
                     for token in context.tokens
@@ -336,6 +342,12 @@ class Classification:
 
     def _excludes(self, token: Token) -> bool:
         return self._contexts.context((token,)).clash
+
+
+def _named(context: Context) -> frozenset[str]:
+    """Return the named classes of a context."""
+    labels = (token for token in context.tokens if isinstance(token, Predicate))
+    return frozenset(one.expression for one in labels if isinstance(one.expression, str))
 
 
 def _is_part(part: Predicate, label: Predicate) -> bool:

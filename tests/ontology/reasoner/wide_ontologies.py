@@ -189,7 +189,8 @@ class WideOntology:
                 return ax.DisjointClasses((self.expression(2), self.expression(2)))
             return ax.DisjointClasses(tuple(draw.sample(CLASSES, draw.choice([2, 2, 3, 4]))))
         whole, *parts = draw.sample(CLASSES, draw.choice([3, 3, 4]))
-        return ax.DisjointUnion(whole, (*parts, self.expression(1)) if self._cases else parts)
+        parts += [self.expression(1)] if self._cases else []
+        return ax.DisjointUnion(whole, tuple(parts))
 
     def property_axiom(self) -> Axiom:
         return self.random.choice(
@@ -220,7 +221,8 @@ class WideOntology:
             chain = (other, *steps) if draw.random() < 0.5 else (*steps, other)
             return ax.SubPropertyChainOf(chain, target)
         if choice == 8:
-            return ax.DisjointObjectProperties((draw.choice(SIMPLE), self.simple()))
+            one, other = draw.sample(SIMPLE, 2)
+            return ax.DisjointObjectProperties((one, self._turned(other)))
         return ax.DisjointObjectProperties(tuple(SIMPLE))
 
     def _turned(self, name: str) -> ex.PropertyExpression:

@@ -160,7 +160,7 @@ def _disjoint_class(_: Reference, *classes: str) -> list[Change]:
     schema=True,
 )
 def _disjoint_class_class(ref: Reference, cls: str) -> list[Change]:
-    return _disjoint(tuple(ref.kb.subclasses(cls) - {NOTHING}))
+    return _disjoint(tuple(ref.kb.subclasses(cls) - {NOTHING, THING}))
 
 
 def _disjoint(classes: tuple[str, ...]) -> list[Change]:

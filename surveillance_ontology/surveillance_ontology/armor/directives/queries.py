@@ -129,7 +129,8 @@ def _classes(ref: Reference, ind: str, bottom: bool) -> DirectiveResponse:
     types = ref.kb.types(ind)
     if not bottom:
         return _answer(_entities(types), ref, ('individual', ind))
-    lowest = sorted(local_name(cls) for cls in types if not ref.kb.subclasses(cls) - {NOTHING})
+    ends = {NOTHING, THING}
+    lowest = sorted(local_name(cls) for cls in types if not ref.kb.subclasses(cls) - ends)
     return _answer(lowest[:1], ref, ('individual', ind))
 
 
