@@ -102,7 +102,7 @@ class Graph:
         self._nodes.remove(node)
         done = threading.Event()
         self._spinner.executor.create_task(lambda: (node.destroy_node(), done.set()))
-        assert done.wait(10), 'executor does not spin'
+        assert done.wait(60.0), 'executor does not spin'
 
     def until(self, predicate: Callable[[], Any], timeout: float = 40.0) -> Any:
         """Wait until the predicate holds; it is looked at whenever `touch` is called and often.

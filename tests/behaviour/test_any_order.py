@@ -86,7 +86,7 @@ class AnyOrder(RuleBasedStateMachine):
         self.world.clock.on_limit = self.halt
         self.thread = threading.Thread(target=self.run, daemon=True)
         self.thread.start()
-        assert self.halted.acquire(timeout=20.0)
+        assert self.halted.acquire(timeout=60.0)
 
     def run(self) -> None:
         try:
@@ -115,7 +115,7 @@ class AnyOrder(RuleBasedStateMachine):
     def advance(self, seconds: float) -> None:
         self.world.clock.limit = self.world.clock.time + seconds
         self.go.release()
-        assert self.halted.acquire(timeout=20.0), 'the machine hangs'
+        assert self.halted.acquire(timeout=60.0), 'the machine hangs'
 
     @rule(
         call=st.sampled_from(CALLS),
@@ -188,7 +188,7 @@ class AnyOrder(RuleBasedStateMachine):
         self.fsm.request_preempt()
         self.world.clock.limit = float('inf')
         self.go.release()
-        self.thread.join(20.0)
+        self.thread.join(60.0)
         assert self.ended
         self.record.close()
         self.folder.cleanup()

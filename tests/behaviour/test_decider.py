@@ -79,16 +79,16 @@ def test_a_request_is_taken_while_somebody_looks(tmp_path: Path) -> None:
 
     def snapshot(*args: object) -> object:
         asked.set()
-        assert answered.wait(20.0)
+        assert answered.wait(60.0)
         return right(*args)  # type: ignore[arg-type]
 
     world.snapshot = snapshot  # type: ignore[method-assign, assignment]
     looking = threading.Thread(target=told.look, args=(2.0, NOBODY))
     looking.start()
-    assert asked.wait(20.0)
+    assert asked.wait(60.0)
     requesting = threading.Thread(target=told.request, args=('R4',))
     requesting.start()
-    requesting.join(20.0)
+    requesting.join(60.0)
     taken = not requesting.is_alive()
     answered.set()
     looking.join()

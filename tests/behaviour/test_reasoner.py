@@ -20,7 +20,7 @@ def test_requests_that_come_while_a_choice_is_made_share_the_next_one(
     def look(*_: Any) -> None:
         done = threading.Event()
         looks.append(done)
-        assert done.wait(10.0)
+        assert done.wait(60.0)
         raise PeerError('armor', 'away')
 
     monkeypatch.setattr(reasoner._decider, 'decide', look)
@@ -53,7 +53,7 @@ def test_a_choice_that_begins_at_once_is_given_once(graph: Any, monkeypatch: Any
 
     def run_and_wait(work: Any) -> Any:
         future = put(lambda: (begun.set(), work())[1])
-        assert begun.wait(10.0)
+        assert begun.wait(60.0)
         # The worker goes on while the request that asked is still on its way.
         graph_pause.wait(0.05)
         return future

@@ -56,7 +56,7 @@ def in_background() -> Iterator[Callable[[Callable[[], Any]], Callable[[], Any]]
 
         def start(work: Callable[[], Any]) -> Callable[[], Any]:
             future = pool.submit(work)
-            return lambda: future.result(10)
+            return lambda: future.result(60.0)
 
         yield start
 

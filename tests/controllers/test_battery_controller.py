@@ -75,7 +75,7 @@ def test_exit_ends_the_node_without_a_failure(graph: Any, operator: Any) -> None
         BatteryController, {'execution_mode': 'MANUAL'}, console_source=operator.source
     )
     operator.type('exit')
-    assert node.ended.wait(5)
+    assert node.ended.wait(60.0)
     assert node.failure is None
 
 

@@ -21,7 +21,7 @@ PATH = [Point(x=0.0, y=0.0), Point(x=4.0, y=0.0), Point(x=4.0, y=3.0)]
 
 def follow(graph: Any, path: list[Point], **options: Any) -> Any:
     caller = GoalCaller(graph.node, FollowPath, 'follow_path')
-    return caller.run(FollowPath.Goal(path=path), accept_timeout=5.0, **options)
+    return caller.run(FollowPath.Goal(path=path), accept_timeout=60.0, **options)
 
 
 def test_manual_moves_take_the_given_time_and_error(
@@ -78,7 +78,7 @@ def test_a_path_that_cannot_be_followed_is_aborted_with_the_reason(
     graph.add(MotionController, {'execution_mode': 'RANDOM'})
     assert follow(graph, path).status == 'aborted'
     caller = GoalCaller(graph.node, Control, 'motion/controller')
-    assert caller.run(Control.Goal(point_set=path), accept_timeout=5.0).status == 'aborted'
+    assert caller.run(Control.Goal(point_set=path), accept_timeout=60.0).status == 'aborted'
     reason = 'a point is not finite' if path else 'no points, expected at least one'
     logged = capfd.readouterr().err
     assert f'follow_path: follow_path: {reason}' not in logged

@@ -61,23 +61,23 @@ class World:
     def compute(self, goal: tuple[float, float]) -> Any:
         x, y = self.position
         request = ComputePath.Goal(start=Point(x=x, y=y), goal=Point(x=goal[0], y=goal[1]))
-        return self._compute.run(request, accept_timeout=10.0, result_timeout=20.0)
+        return self._compute.run(request, accept_timeout=60.0, result_timeout=60.0)
 
     def follow(self, path: list[Point], **options: Any) -> Any:
-        return self._follow.run(FollowPath.Goal(path=path), accept_timeout=10.0, **options)
+        return self._follow.run(FollowPath.Goal(path=path), accept_timeout=60.0, **options)
 
     def plan(self, target: str) -> Any:
         seen: list[int] = []
         end = self._plan.run(
             Plan.Goal(target=target),
-            accept_timeout=10.0,
-            result_timeout=20.0,
+            accept_timeout=60.0,
+            result_timeout=60.0,
             on_feedback=lambda feedback: seen.append(len(feedback.via_points)),
         )
         return end, seen
 
     def control(self, points: list[Point]) -> Any:
-        return self._control.run(Control.Goal(point_set=points), accept_timeout=10.0)
+        return self._control.run(Control.Goal(point_set=points), accept_timeout=60.0)
 
     def ask_until(self, holds: Callable[[], bool]) -> None:
         """Ask again and again, which `graph.until` cannot: it must not wait for answers."""
@@ -217,6 +217,6 @@ def test_without_a_robot_the_reason_is_what_does_not_come(
         kind, name, goal = ComputePath, 'compute_path', ComputePath.Goal(goal=points[1])
     else:
         kind, name, goal = FollowPath, 'follow_path', FollowPath.Goal(path=points)
-    end = GoalCaller(graph.node, kind, name).run(goal, accept_timeout=10.0)
+    end = GoalCaller(graph.node, kind, name).run(goal, accept_timeout=60.0)
     assert end.status == 'aborted'
     assert text in capfd.readouterr().err

@@ -26,7 +26,7 @@ def coordinates(points: list[Point]) -> list[tuple[float, float, float]]:
 def compute(graph: Any, **options: Any) -> Any:
     caller = GoalCaller(graph.node, ComputePath, 'compute_path')
     goal = ComputePath.Goal(start=START, goal=GOAL)
-    return caller.run(goal, accept_timeout=5.0, **options)
+    return caller.run(goal, accept_timeout=60.0, **options)
 
 
 def test_manual_requests_wait_for_the_operator(
@@ -109,4 +109,4 @@ def test_a_start_that_is_no_number_is_aborted(graph: Any) -> None:
     graph.add(PlannerController, {'execution_mode': 'RANDOM'})
     caller = GoalCaller(graph.node, ComputePath, 'compute_path')
     goal = ComputePath.Goal(start=Point(x=float('nan')), goal=GOAL)
-    assert caller.run(goal, accept_timeout=5.0).status == 'aborted'
+    assert caller.run(goal, accept_timeout=60.0).status == 'aborted'

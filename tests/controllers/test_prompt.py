@@ -84,9 +84,9 @@ def test_a_terminal_console_can_be_stopped_while_it_waits() -> None:
         thread = threading.Thread(target=lambda: endings.append(console.run()))
         thread.start()
         keyboard.send_text('x\r')
-        assert first.wait(5)
+        assert first.wait(60.0)
         console.stop()
-        thread.join(5)
+        thread.join(60.0)
         assert endings == ['stopped']
         console.stop()
 
@@ -113,7 +113,7 @@ def test_one_console_addresses_every_controller(graph: Any, operator: Any, capfd
     operator.type('move 1 0')
     operator.type('jump')
     operator.type('exit')
-    assert node.ended.wait(5)
+    assert node.ended.wait(60.0)
     assert node.failure is None
     shown = capfd.readouterr().out
     assert '[battery_controller] The battery is at 42 %.' in shown
@@ -133,13 +133,13 @@ def test_a_request_is_announced_once_with_its_controller_before_each_line(
     ends: list[str] = []
     goal = ComputePath.Goal(goal=Point(x=1.0))
     thread = threading.Thread(
-        target=lambda: ends.append(caller.run(goal, accept_timeout=5.0).status)
+        target=lambda: ends.append(caller.run(goal, accept_timeout=60.0).status)
     )
     thread.start()
     told = graph.listen(String, 'planner_controller/announcement', STATE_QOS)
     graph.until(lambda: told)
     operator.type('plan set [[1, 2, 0]]')
-    thread.join(10)
+    thread.join(60.0)
     assert ends == ['succeeded']
     shown = [line for line in capfd.readouterr().out.splitlines() if 'Answer with' in line]
     assert len(shown) == 1

@@ -36,7 +36,7 @@ def armor(graph: Any, seven_rooms: dict[str, Any]) -> ArmorClient:
 
 def plan(graph: Any, target: str) -> Any:
     caller = GoalCaller(graph.node, Plan, 'motion/planner')
-    return caller.run(Plan.Goal(target=target), accept_timeout=10.0, result_timeout=10.0)
+    return caller.run(Plan.Goal(target=target), accept_timeout=60.0, result_timeout=60.0)
 
 
 def test_a_random_plan_leads_straight_to_the_place_in_equal_steps(
@@ -78,7 +78,7 @@ def control(graph: Any, in_background: Any, point: Point, command: str) -> Any:
     seen: list[Any] = []
     goal = Control.Goal(point_set=[Point(x=5.0, y=10.0), Point(x=7.0, y=9.0), point])
     end = in_background(
-        lambda: caller.run(goal, accept_timeout=10.0, on_feedback=lambda f: seen.append(f))
+        lambda: caller.run(goal, accept_timeout=60.0, on_feedback=lambda f: seen.append(f))
     )
     graph.until(lambda: told)
     console = ServiceCaller(graph.node, ConsoleCommand, 'motion_controller/command')

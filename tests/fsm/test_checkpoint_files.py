@@ -109,7 +109,7 @@ def test_a_reader_never_finds_half_a_checkpoint_whoever_saves(tmp_path):
     finally:
         stop.set()
         for saver in savers:
-            saver.join(10.0)
+            saver.join(60.0)
     assert not faults
     assert [each.name for each in tmp_path.iterdir()] == ['checkpoint']
 

@@ -296,7 +296,7 @@ class Ending(fsm.State):
     def execute(self, ud):
         self.runs += 1
         self.begun.release()
-        self.release.wait(20.0)
+        self.release.wait(60.0)
         return 'done'
 
 

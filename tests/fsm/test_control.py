@@ -24,7 +24,7 @@ class Gate(fsm.State):
 
     def execute(self, ud):
         self.begun.release()
-        self.open.wait(10.0)
+        self.open.wait(60.0)
         return self.outcome
 
 
@@ -220,14 +220,14 @@ def test_a_paused_machine_tells_its_transition_at_once_and_counts_no_pause():
     machine.control.pause()
     clock.until_sleeping()
     clock.advance(3.0)
-    assert told.acquire(timeout=5.0)
+    assert told.acquire(timeout=60.0)
     clock.advance(1000.0)
     machine.control.resume()
     began(second)
     clock.until_sleeping()
     clock.advance(5.0)
     assert run.result() == 'done'
-    assert told.acquire(timeout=5.0)
+    assert told.acquire(timeout=60.0)
     feed.close()
     assert [(t.from_state, t.to_state, t.duration) for t in seen] == [
         ('FIRST', 'SECOND', 3.0),
@@ -249,7 +249,7 @@ def test_an_interrupt_cuts_into_a_pause_and_leads_back():
     run = Background(machine)
     machine.control.step()
     with watching(machine) as watched:
-        assert told.acquire(timeout=5.0)
+        assert told.acquire(timeout=60.0)
         machine.raise_interrupt('CHARGE')
         machine.control.resume()
         assert run.result() == 'done'

@@ -214,7 +214,7 @@ def test_transitions_that_nobody_could_take_in_leave_a_gap_in_the_numbers(monkey
 
     def consume(transition):
         busy.set()
-        go_on.wait(10.0)
+        go_on.wait(60.0)
         seen.append(transition.sequence)
 
     feed = TransitionFeed(machine, consume)

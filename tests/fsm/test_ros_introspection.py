@@ -28,7 +28,7 @@ def watched(graph):
 
 def call(graph, kind, name, **fields):
     caller = ServiceCaller(graph.node, kind, f'robot/fsm/{name}')
-    return caller.call(kind.Request(**fields), timeout=10.0)
+    return caller.call(kind.Request(**fields), timeout=60.0)
 
 
 def test_every_transition_is_published_and_numbered_also_to_those_who_come_late(graph, watched):

@@ -91,10 +91,10 @@ def test_every_state_and_server_works_on_a_plain_node(graph, node):
 
     machine = machine_of(
         NAMED=Named(node),
-        CALL=ServiceState(node, 'trigger', Trigger, timeout=20.0),
+        CALL=ServiceState(node, 'trigger', Trigger, timeout=60.0),
         LISTEN=MonitorState(node, 'level', Int32, lambda ud, m: m.data == 5, 1, qos=LATCHED),
         ASK=ConditionState(node, lambda ud: True, poll_rate=50),
-        ACT=SimpleActionState(node, 'follow_path', FollowPath, server_wait_timeout=20.0),
+        ACT=SimpleActionState(node, 'follow_path', FollowPath, server_wait_timeout=60.0),
     )
     machine.set_clock(ClockWait(node))
     set_preempt_handler(node, machine)
@@ -111,10 +111,10 @@ def test_a_cancelled_goal_of_a_plain_node_preempts_its_machine(graph, node):
     )
     wrapper.run_server()
     client = machine_of(
-        ACT=SimpleActionState(graph.node, 'follow_path', FollowPath, server_wait_timeout=20.0)
+        ACT=SimpleActionState(graph.node, 'follow_path', FollowPath, server_wait_timeout=60.0)
     )
     run = Background(client)
-    began(waiter, timeout=20.0)
+    began(waiter, timeout=60.0)
     client.request_preempt()
     assert run.result() == 'preempted'
 
@@ -149,7 +149,7 @@ def test_an_answer_that_comes_before_the_question_was_noted_is_not_lost(graph, n
     caller = GoalCaller(graph.node, FollowPath, 'follow_path')
     graph.until(caller.is_ready)
     caller._client._client_handle = Slow(caller._client._client_handle)
-    end = caller.run(FollowPath.Goal(), accept_timeout=5.0, result_timeout=5.0)
+    end = caller.run(FollowPath.Goal(), accept_timeout=60.0, result_timeout=60.0)
     assert end.status == 'succeeded'
 
 
@@ -184,10 +184,10 @@ def test_ros_time_that_jumps_back_does_not_delay_a_sleep(graph):
         at(900)
         assert not ended.is_set()
         at(904)
-        assert ended.wait(10.0)
+        assert ended.wait(60.0)
     finally:
         interrupt.set()
-        sleeper.join(10.0)
+        sleeper.join(60.0)
     assert wait.elapsed() - before == pytest.approx(6.0, abs=0.01)
 
 

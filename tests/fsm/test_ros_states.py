@@ -56,7 +56,7 @@ def test_a_preempt_ends_waiting_for_a_service_and_for_its_answer(graph):
         machine = machine_of(service(graph.node))
         run = Background(machine)
         if server is not None:
-            assert server.asked.wait(10.0)
+            assert server.asked.wait(60.0)
         machine.request_preempt()
         assert run.result() == 'preempted'
         assert not machine.preempt_requested()
@@ -66,7 +66,7 @@ def test_a_service_server_that_dies_before_it_answers(graph):
     server = graph.add(SilentServer)
     machine = machine_of(service(graph.node, timeout=1.0))
     run = Background(machine)
-    assert server.asked.wait(10.0)
+    assert server.asked.wait(60.0)
     graph.remove(server)
     assert run.result() == 'aborted'
 
@@ -173,7 +173,7 @@ def test_a_goal_that_is_rejected_aborts(graph, caplog):
 def test_an_action_server_that_dies_in_the_middle_aborts(graph):
     server = graph.add(ScriptedActionServer)
     run = Background(machine_of(action(graph.node, server_wait_timeout=3.0)))
-    assert server.began.wait(10.0)
+    assert server.began.wait(60.0)
     graph.remove(server)
     assert run.result() == 'aborted'
 
@@ -182,7 +182,7 @@ def test_a_result_that_comes_too_late_is_not_waited_for(graph):
     server = graph.add(ScriptedActionServer)
     state = action(graph.node, exec_timeout=SHORT, preempt_timeout=SHORT)
     assert machine_of(state).execute() == 'aborted'
-    assert server.cancelled.wait(10.0)
+    assert server.cancelled.wait(60.0)
 
 
 def test_a_preempt_cancels_the_goal(graph):
@@ -198,7 +198,7 @@ def test_a_preempt_cancels_the_goal(graph):
     GoalServer(server, FollowPath, 'follow_path', execute)
     machine = machine_of(action(graph.node))
     run = Background(machine)
-    assert began_event.wait(10.0)
+    assert began_event.wait(60.0)
     machine.request_preempt()
     assert run.result() == 'preempted'
     # Before the server's yes has come, the cancel follows it.
@@ -210,10 +210,10 @@ def test_a_server_that_refuses_to_cancel_is_given_up_in_time(graph):
     server = graph.add(Stubborn)
     machine = machine_of(action(graph.node, preempt_timeout=SHORT))
     run = Background(machine)
-    assert server.began.wait(10.0)
+    assert server.began.wait(60.0)
     machine.request_preempt()
     assert run.result() == 'preempted'
-    assert server.cancelled.wait(10.0)
+    assert server.cancelled.wait(60.0)
 
 
 def test_a_preempt_ends_waiting_for_an_action_server(graph):
@@ -237,7 +237,7 @@ def test_an_executor_that_stops_in_the_middle_aborts(graph):
     server = next(n for n in graph._nodes if isinstance(n, ScriptedActionServer))
     run = Background(machine_of(state))
     try:
-        assert server.began.wait(10.0)
+        assert server.began.wait(60.0)
         spinner.stop()
         assert run.result() == 'aborted'
     finally:

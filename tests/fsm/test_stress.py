@@ -108,7 +108,7 @@ def test_no_request_is_lost_whenever_it_comes(seed):
                 generator.choice(deeds)()
             time.sleep(generator.random() * 1e-3)
             root.request_preempt()
-            thread.join(20.0)
+            thread.join(60.0)
             assert not thread.is_alive(), f'lost; active: {root.control.active_paths()}'
             assert outcomes == ['preempted']
             root.recall_preempt()

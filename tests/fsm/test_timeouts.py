@@ -183,7 +183,7 @@ def test_an_item_that_hangs_is_followed_by_the_next_item():
         def execute(self, ud):
             began_with.append(ud.item)
             if ud.item == 1:
-                release.wait(20.0)
+                release.wait(60.0)
             return 'done'
 
     each = fsm.Iterator(['late'], [], [], it=[0, 1, 2], it_label='item', exhausted_outcome='all')

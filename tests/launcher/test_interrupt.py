@@ -33,7 +33,7 @@ def test_ctrl_c_leaves_no_traceback(command, moment, tmp_path):
         threading.Event().wait(moment)
         for _ in range(2):
             os.killpg(process.pid, signal.SIGINT)
-        output, _ = process.communicate(timeout=20)
+        output, _ = process.communicate(timeout=60.0)
     # Before Python has read launch.py it says what it says itself.
     early = 'launch' not in output
     assert early or 'Traceback' not in output, output

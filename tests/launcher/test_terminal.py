@@ -81,5 +81,5 @@ def test_commands_are_completed_and_ctrl_c_gives_the_terminal_back(terminal):
     terminal.until(rb'planner_controller has ended by itself')
     terminal.type('\x03')
     terminal.until(rb'every process has ended')
-    assert terminal.process.wait(10) == 0
+    assert terminal.process.wait(60.0) == 0
     assert termios.tcgetattr(terminal.theirs) == terminal.settings

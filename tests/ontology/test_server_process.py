@@ -45,7 +45,7 @@ def test_a_killed_server_comes_back_with_what_it_answered_and_clients_go_on(
         assert graph.until(reached, timeout=30.0) == ['C2', 'E', 'R1', 'R2']
         assert armor.utils.get_ref_client() == 'test'
         server.send_signal(signal.SIGINT)
-        assert server.wait(10) == 0
+        assert server.wait(60.0) == 0
     finally:
         server.kill()
         server.wait()

@@ -187,5 +187,5 @@ def test_the_memory_of_a_large_ontology_is_given_back(
     assert ask('DROP').success
     for thread in threading.enumerate():
         if thread.daemon and thread.name.startswith('Thread-'):
-            thread.join(10)
+            thread.join(60.0)
     assert resident() - before < loaded / 2

@@ -242,7 +242,7 @@ def test_a_service_that_closes_stops_its_queries(service: ArmorService, built: A
     while not service.session.sparql.is_busy():
         thread.join(0.01)
     service.session.sparql.close()
-    thread.join(10)
+    thread.join(60.0)
     assert answers == ['QUERY SPARQL: the server stops']
     assert not asker(service)('QUERY SPARQL', 'SELECT * { ?a ?b ?c }').success
 

@@ -175,19 +175,19 @@ def test_one_snapshot_is_written_at_a_time(tmp_path: Path) -> None:
     @contextmanager
     def hold_all() -> Iterator[list[Reference]]:
         entered.append(threading.current_thread().name)
-        assert may_go.wait(10)
+        assert may_go.wait(60.0)
         yield []
 
     def ask() -> None:
-        asked.wait(10)
+        asked.wait(60.0)
         store.compact_if_large(hold_all, failures.append)
 
     callers = [threading.Thread(target=ask) for _ in range(8)]
     for caller in callers:
         caller.start()
-    asked.wait(10)
+    asked.wait(60.0)
     for caller in callers:
-        caller.join(10)
+        caller.join(60.0)
     may_go.set()
     store.close()
     assert (len(entered), failures) == (1, [])

@@ -69,7 +69,7 @@ class Terminal:
             more = left > 0 and self._read(left)
             assert more, f'{words} not seen in:\n{shown}'
 
-    def ended(self, timeout: float = 20.0) -> int:
+    def ended(self, timeout: float = 90.0) -> int:
         """Return the exit code, once the program has ended."""
         deadline = time.monotonic() + timeout
         while self.process.poll() is None:

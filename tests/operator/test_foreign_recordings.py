@@ -162,7 +162,7 @@ def test_messages_before_a_moment_come_newest_first(bag: Path) -> None:
     for each in threads:
         each.start()
     for each in threads:
-        each.join(10)
+        each.join(60.0)
     last.close()
 
 

@@ -65,7 +65,7 @@ def test_a_simulated_door_is_moved_by_whoever_has_just_started(
     with ThreadPoolExecutor(1) as pool:
         answer = pool.submit(actions.set_door, 'D1', True)
         serve(graph, SetDoor, 'simulation/set_door', success=True, message='moved')
-        assert answer.result(10.0) == 'moved'
+        assert answer.result(60.0) == 'moved'
     assert told == []
 
 

@@ -44,7 +44,7 @@ def page() -> Iterator[Page]:
 
 
 def ask(page: Page, method: str, path: str, body: str = '', **headers: str) -> tuple[int, str]:
-    connection = http.client.HTTPConnection('127.0.0.1', page.port, timeout=10)
+    connection = http.client.HTTPConnection('127.0.0.1', page.port, timeout=60.0)
     named = {name.replace('_', '-'): value for name, value in headers.items()}
     connection.request(method, path, body, named)
     answer = connection.getresponse()
@@ -71,7 +71,7 @@ def test_whoever_is_on_this_machine_may_look(page: Page) -> None:
 
 
 def test_the_token_becomes_a_cookie(page: Page) -> None:
-    connection = http.client.HTTPConnection('127.0.0.1', page.port, timeout=10)
+    connection = http.client.HTTPConnection('127.0.0.1', page.port, timeout=60.0)
     connection.request('GET', '/?token=secret')
     answer = connection.getresponse()
     cookie = answer.headers['set-cookie']
@@ -134,7 +134,7 @@ def test_beyond_this_machine_even_looking_needs_the_token() -> None:
 
 
 def test_no_other_site_may_be_loaded_or_embed_the_page(page: Page) -> None:
-    connection = http.client.HTTPConnection('127.0.0.1', page.port, timeout=10)
+    connection = http.client.HTTPConnection('127.0.0.1', page.port, timeout=60.0)
     connection.request('GET', '/')
     policy = connection.getresponse().headers['content-security-policy']
     connection.close()
@@ -145,7 +145,7 @@ def test_no_other_site_may_be_loaded_or_embed_the_page(page: Page) -> None:
 
 def test_a_viewer_gets_everything_and_then_what_changed(page: Page) -> None:
     page._hub.show(Snapshot(battery=50.0, now=1.0))
-    connection = http.client.HTTPConnection('127.0.0.1', page.port, timeout=10)
+    connection = http.client.HTTPConnection('127.0.0.1', page.port, timeout=60.0)
     connection.request('GET', '/events')
     answer = connection.getresponse()
 

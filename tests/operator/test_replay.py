@@ -62,7 +62,7 @@ def page(run: Path) -> Iterator[Page]:
 
 
 def act(page: Page, name: str, **fields: Any) -> dict[str, Any]:
-    connection = http.client.HTTPConnection('127.0.0.1', page.port, timeout=10)
+    connection = http.client.HTTPConnection('127.0.0.1', page.port, timeout=60.0)
     origin = {'Origin': f'http://127.0.0.1:{page.port}'}
     connection.request('POST', f'/act/{name}', json.dumps(fields), origin)
     answer: dict[str, Any] = json.loads(connection.getresponse().read())
@@ -71,7 +71,7 @@ def act(page: Page, name: str, **fields: Any) -> dict[str, Any]:
 
 
 def shown(page: Page) -> dict[str, Any]:
-    connection = http.client.HTTPConnection('127.0.0.1', page.port, timeout=10)
+    connection = http.client.HTTPConnection('127.0.0.1', page.port, timeout=60.0)
     connection.request('GET', '/events')
     answer = connection.getresponse()
     while not (line := answer.readline()).startswith(b'data: '):

@@ -133,7 +133,7 @@ class FollowingArm:
             self.report()
 
     def wait_for_motion(self):
-        assert self.got.acquire(timeout=5)
+        assert self.got.acquire(timeout=60.0)
 
 
 def in_thread(work):
@@ -150,7 +150,7 @@ def in_thread(work):
     thread.start()
 
     def join():
-        thread.join(10)
+        thread.join(60.0)
         assert not thread.is_alive()
         return outcome[0]
 

@@ -352,7 +352,7 @@ def test_scan_rests_at_each_view_and_can_be_cancelled(graph: Any) -> None:
     scan = GoalCaller(graph.node, ScanSurroundings, 'scan_surroundings')
     views = []
     goal = ScanSurroundings.Goal(lowest=-0.1, highest=0.1, dwell=0.01)
-    end = scan.run(goal, accept_timeout=10.0, on_feedback=views.append)
+    end = scan.run(goal, accept_timeout=60.0, on_feedback=views.append)
     assert end.status == 'succeeded'
     assert end.result.views == views[-1].views >= 3
     assert end.result.coverage == 1.0
@@ -361,9 +361,9 @@ def test_scan_rests_at_each_view_and_can_be_cancelled(graph: Any) -> None:
     interrupt = Interrupt()
     with pytest.raises(CallInterruptedError):
         scan.run(
-            goal, accept_timeout=10.0, interrupt=interrupt, on_feedback=lambda _: interrupt.set()
+            goal, accept_timeout=60.0, interrupt=interrupt, on_feedback=lambda _: interrupt.set()
         )
-    wrong = scan.run(ScanSurroundings.Goal(overlap=0.95), accept_timeout=10.0)
+    wrong = scan.run(ScanSurroundings.Goal(overlap=0.95), accept_timeout=60.0)
     assert wrong.status == 'aborted'
 
 

@@ -25,7 +25,7 @@ wait, ticked = ClockWait(node), threading.Event()
 node.create_timer(0.05, ticked.set)
 spinner.executor.add_node(node)
 spinner.start()
-assert ticked.wait(20.0)
+assert ticked.wait(60.0)
 date = wait.now()
 print('ready', flush=True)
 sleeper = threading.Thread(target=wait.sleep, args=(1.0,), daemon=True)
@@ -34,8 +34,8 @@ sleeper.start()
 sys.stdin.readline()
 print('date', round((wait.now() - date) / 600.0), flush=True)
 ticked.clear()
-assert ticked.wait(20.0), 'the timer rests'
-sleeper.join(20.0)
+assert ticked.wait(60.0), 'the timer rests'
+sleeper.join(60.0)
 assert not sleeper.is_alive(), 'the sleep goes on'
 assert 0.9 < wait.elapsed() - began < 40.0
 spinner.stop()

@@ -89,7 +89,7 @@ def test_stop_wakes_and_joins_threads(graph):
         ended.append(True)
 
     node.spawn(work)
-    assert started.wait(5)
+    assert started.wait(60.0)
     node.stop()
     assert ended == [True]
 
@@ -101,7 +101,7 @@ def test_exception_in_a_thread_fails_the_node(graph, capsys):
         raise LookupError('no such place')
 
     node.spawn(work)
-    assert node.ended.wait(5)
+    assert node.ended.wait(60.0)
     assert node.failure == 'LookupError: no such place'
 
 
@@ -129,7 +129,7 @@ def test_process_stops_cleanly_on_a_signal(number):
     assert process.stdout.readline() == 'spinning\n'
     os.kill(process.pid, number)
     os.kill(process.pid, number)
-    out, err = process.communicate(timeout=10)
+    out, err = process.communicate(timeout=60.0)
     assert process.returncode == 0
     assert 'stopping' in out
     assert re.fullmatch(READY, err)
@@ -179,7 +179,7 @@ def test_a_signal_that_does_not_wake_the_main_thread_stops_the_process():
     assert process.stdout.readline() == 'spinning\n'
     process.terminate()
     try:
-        out, _ = process.communicate(timeout=10)
+        out, _ = process.communicate(timeout=60.0)
     finally:
         process.kill()
     assert process.returncode == 0
@@ -199,7 +199,7 @@ def test_process_with_a_bad_parameter_says_so_in_one_line(arguments, complaint):
         [sys.executable, '-c', PROGRAM, '--ros-args', *arguments],
         capture_output=True,
         text=True,
-        timeout=20,
+        timeout=60.0,
     )
     assert run.returncode == 2
     assert run.stderr.count('\n') == 1
@@ -213,7 +213,7 @@ def test_process_with_a_parameter_given_twice_says_where(tmp_path):
         [sys.executable, '-c', PROGRAM, '--ros-args', '--params-file', str(path)],
         capture_output=True,
         text=True,
-        timeout=20,
+        timeout=60.0,
     )
     assert run.returncode == 2
     complaint = f"parameter file {path}:4: duplicate key 'level', first given in line 3"
@@ -230,7 +230,7 @@ def test_a_stop_waits_for_a_thread_that_is_just_being_started(
     def slow_start(thread: threading.Thread) -> None:
         if thread.name == 'late':
             starting.set()
-            assert go.wait(10.0)
+            assert go.wait(60.0)
         start(thread)
 
     failed: list[BaseException] = []
@@ -244,12 +244,12 @@ def test_a_stop_waits_for_a_thread_that_is_just_being_started(
     monkeypatch.setattr(threading.Thread, 'start', slow_start)
     spawner = threading.Thread(target=lambda: node.spawn(node.stopping.wait, 'late'))
     spawner.start()
-    assert starting.wait(10.0)
+    assert starting.wait(60.0)
     stopper = threading.Thread(target=stop)
     stopper.start()
-    assert node.stopping.wait(10.0)
+    assert node.stopping.wait(60.0)
     stopper.join(0.2)
     go.set()
-    spawner.join(10.0)
-    stopper.join(10.0)
+    spawner.join(60.0)
+    stopper.join(60.0)
     assert not failed

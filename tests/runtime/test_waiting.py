@@ -33,8 +33,8 @@ def test_one_thread_takes_work_in_order_while_two_take_it_at_a_time(graph):
     done = []
 
     async def work():
-        met = pair.run(lambda: both_there.wait(10))
-        await pair.run(lambda: both_there.wait(10))
+        met = pair.run(lambda: both_there.wait(60.0))
+        await pair.run(lambda: both_there.wait(60.0))
         await met
         for number in range(3):
             single.put(lambda number=number: done.append(number))
