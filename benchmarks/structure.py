@@ -9,13 +9,15 @@ examples, documents). Lines of code are lines with a token that is no comment an
 
 from __future__ import annotations
 
+import argparse
 import ast
 import io
 import re
 import subprocess
 import sys
 import tokenize
-from collections import defaultdict
+from collections import Counter, defaultdict
+from collections.abc import Sequence
 from pathlib import Path
 
 VOCABULARY = ('isIn', 'visitedAt', 'Robot1')
@@ -24,10 +26,14 @@ SMALL = 60
 """Lines of code below which a module is asked for a reason to be alone."""
 
 
-def main(words: list[str]) -> int:
+def main(words: Sequence[str] | None = None) -> int:
     """Print the table of one checkout and return the exit code."""
-    checkout = Path(words[0] if words else Path(__file__).parents[1]).resolve()
-    modules = product(checkout)
+    parser = argparse.ArgumentParser(description=(__doc__ or '').split('\n')[0])
+    own = Path(__file__).parents[1]
+    parser.add_argument('checkout', nargs='?', type=Path, default=own, help='default: its own')
+    modules = product(parser.parse_args(words).checkout.resolve())
+    if not modules:
+        parser.error('no product module there: expected a checkout of this project')
     trees = {name: ast.parse(path.read_text(encoding='utf-8')) for name, path in modules.items()}
     lines = {name: code_lines(path) for name, path in modules.items()}
     importers = importers_of(trees)
@@ -52,6 +58,10 @@ def main(words: list[str]) -> int:
         ('classes of errors', str(len(errors))),
         ('of them not named ...Error', listed(e for e in errors if not e.endswith('Error'))),
     ]
+    packages: Counter[str] = Counter()
+    for name, count in lines.items():
+        packages[name.split('.')[0]] += count
+    rows += [(f'lines of {package}', f'{count:,}') for package, count in packages.most_common()]
     width = max(len(title) for title, _ in rows)
     for title, figure in rows:
         print(f'{title:{width}}  {figure}')
@@ -60,12 +70,12 @@ def main(words: list[str]) -> int:
 
 def product(checkout: Path) -> dict[str, Path]:
     """Return the product's modules by dotted name, setup scripts left out."""
+    patterns = ('surveillance_*/*.py', 'armor_api/*.py', 'launcher/*.py', 'launch.py')
     listing = subprocess.run(
-        ['git', 'ls-files', 'surveillance_*/*.py', 'armor_api/*.py', 'launcher/*.py', 'launch.py'],
-        cwd=checkout,
+        ['git', '-C', str(checkout), 'ls-files', *patterns],
         capture_output=True,
         text=True,
-        check=True,
+        check=False,
     )
     found = {}
     for line in listing.stdout.split():
@@ -178,4 +188,4 @@ def listed(names: object) -> str:
 
 
 if __name__ == '__main__':
-    sys.exit(main(sys.argv[1:]))
+    sys.exit(main())
