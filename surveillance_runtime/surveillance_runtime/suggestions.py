@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterable
 
 _MOST = 12
+_ALIKE = 0.6
+_SHARED_WORD = 0.8
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
@@ -16,11 +19,19 @@ def nearest(name: str, known: Iterable[str]) -> str:
         known: The names there are.
 
     Returns:
-        The nearest name, in quotes, where one is like it; else the names, at most twelve of them.
+        The nearest name, in quotes, where one is like it, whatever the case of its letters, or
+        has it as one of its words; else the names, at most twelve of them.
     """
     names = list(dict.fromkeys(known))
-    alike = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
-    if alike:
-        return f"'{alike[0]}'"
+    likest = max(names, key=lambda each: _likeness(name, each), default='')
+    if _likeness(name, likest) >= _ALIKE:
+        return f"'{likest}'"
     more = f' and {len(names) - _MOST} more' if len(names) > _MOST else ''
     return f'one of {", ".join(names[:_MOST])}{more}'
+
+
+def _likeness(given: str, name: str) -> float:
+    """Return 0 to 1, whatever the case; a name that has it as one of its words is much like it."""
+    given, name = given.casefold(), name.casefold()
+    ratio = difflib.SequenceMatcher(None, name, given).ratio()
+    return max(ratio, _SHARED_WORD) if given in re.split(r'[._/ -]', name) else ratio
