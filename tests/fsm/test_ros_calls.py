@@ -129,7 +129,7 @@ def test_calls_take_the_time_that_the_link_needs(graph, server, monkeypatch):
     never_answers(server)
     caller = ServiceCaller(graph.node, Trigger, 'ask')
     caller.round_trips.note(20.0)
-    caller.call(Trigger.Request(), timeout=60.0)
+    caller.call(Trigger.Request(), timeout=10.0)
     assert 30.0 < allowed[0] <= 40.0
     caller.call(Trigger.Request(), timeout=10.0, discovery=5.0)
     assert allowed[1] <= 10.0, 'it waits for work, not for the link'
