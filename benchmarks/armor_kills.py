@@ -197,10 +197,11 @@ def campaign(seed: int) -> Iterator[Campaign]:
     """Provide the clients on a domain of their own, and the server."""
     import rclpy
 
-    from surveillance_runtime.process import ExecutorThread
+    from surveillance_runtime.process import ExecutorThread, prefer_quick_discovery
     from surveillance_runtime.testing import claim_domain
 
     os.environ['ROS_DOMAIN_ID'] = str(claim_domain())
+    prefer_quick_discovery()
     rclpy.init()
     spinner = ExecutorThread()
     with tempfile.TemporaryDirectory() as folder:

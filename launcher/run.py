@@ -18,6 +18,7 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
+import surveillance_runtime
 from launcher import run_folder
 from launcher.instance_lock import claim
 from launcher.log_merge import ROS_FORMAT, MergedLog
@@ -52,7 +53,9 @@ CHILD = Path(__file__).with_name('child.py')
 NETWORK_ROS = {
     # Shared memory that a killed process leaves behind hides later nodes of the same domain.
     'FASTDDS_BUILTIN_TRANSPORTS': 'UDPv4',
-    'FASTRTPS_DEFAULT_PROFILES_FILE': str(Path(__file__).with_name('discovery.xml')),
+    'FASTRTPS_DEFAULT_PROFILES_FILE': str(
+        Path(surveillance_runtime.__file__).with_name('discovery.xml')
+    ),
     'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET',
 }
 """How nodes of several machines find each other where the environment says nothing else."""

@@ -13,7 +13,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from surveillance_ontology.armor import client
 from surveillance_ontology.armor_client import RosTransport
-from surveillance_runtime.process import ExecutorThread
+from surveillance_runtime.process import ExecutorThread, prefer_quick_discovery
 
 __all__ = ['ArmorClient']
 
@@ -61,6 +61,7 @@ class _SpunNode:
     """A node in a ROS context of its own, so that the program's own `rclpy.init` is its own."""
 
     def __init__(self) -> None:
+        prefer_quick_discovery()
         self._context = rclpy.Context()
         rclpy.init(context=self._context, signal_handler_options=SignalHandlerOptions.NO)
         self.node: Any = Node(

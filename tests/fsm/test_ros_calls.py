@@ -85,6 +85,11 @@ def never_answers(server):
     return asked
 
 
+def await_servers(graph, count):
+    name = f'{graph.node.get_namespace().rstrip("/")}/ask'
+    assert graph.until(lambda: graph.node.count_services(name) == count)
+
+
 def test_service_call_ends_by_interrupt_and_by_deadline(graph, server):
     asked = never_answers(server)
     caller = ServiceCaller(graph.node, Trigger, 'ask')
@@ -159,15 +164,40 @@ def test_service_call_notices_that_its_server_went_away(graph, server):
 
 
 def test_service_call_notices_that_another_server_took_the_place_of_one_that_was_killed(
-    graph, server
+    graph, server, monkeypatch
 ):
-    asked = never_answers(server)  # as one that was killed: the middleware still counts it
+    monkeypatch.setattr(calls, 'DOUBTFUL_SECONDS', 60.0)
+    asked = never_answers(server)  # as one that was killed: the middleware still knows it
+    older = graph.add(PatrolNode, name='older')  # was killed before, and is forgotten meanwhile
+    never_answers(older)
     caller = ServiceCaller(graph.node, Trigger, 'ask')
+    await_servers(graph, 2)
     end = in_thread(lambda: caller.call(Trigger.Request(), 60.0))
     assert asked.wait(60.0)
     never_answers(graph.add(PatrolNode, name='restarted'))
+    graph.drop(older)
     with pytest.raises(UnavailableError, match='service ask: another server took the place'):
         end()
+
+
+def test_awaited_call_notices_that_another_server_took_the_place(graph, server):
+    asked = never_answers(server)
+    inner = ServiceCaller(graph.node, Trigger, 'ask')
+    graph.until(inner.is_ready)
+
+    async def relay(_request, response):
+        try:
+            await inner.call_async(Trigger.Request(), timeout=60.0)
+        except UnavailableError as error:
+            response.message = str(error)
+        return response
+
+    graph.node.create_service(Trigger, 'relay', relay)
+    outer = ServiceCaller(graph.node, Trigger, 'relay')
+    end = in_thread(lambda: outer.call(Trigger.Request(), timeout=60.0))
+    assert asked.wait(5)
+    never_answers(graph.add(PatrolNode, name='restarted'))
+    assert 'service ask: another server took the place' in end().message
 
 
 def test_service_call_does_not_wait_long_where_one_of_several_servers_may_be_gone(
@@ -177,8 +207,7 @@ def test_service_call_does_not_wait_long_where_one_of_several_servers_may_be_gon
     never_answers(server)
     never_answers(graph.add(PatrolNode, name='restarted'))
     caller = ServiceCaller(graph.node, Trigger, 'ask')
-    name = f'{graph.node.get_namespace().rstrip("/")}/ask'
-    assert graph.until(lambda: graph.node.count_services(name) == 2)
+    await_servers(graph, 2)
     with pytest.raises(UnavailableError, match='service ask: no answer, and one of 2 servers'):
         caller.call(Trigger.Request(), 60.0)
 

@@ -5,6 +5,11 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from pathlib import Path
+
+import pytest
+
+from surveillance_runtime.process import prefer_quick_discovery
 
 PROGRAM = """
 import numpy, scipy.linalg
@@ -25,6 +30,20 @@ def test_nodes_compute_on_one_thread_whatever_was_imported_before() -> None:
         [sys.executable, '-c', PROGRAM], capture_output=True, text=True, timeout=60
     )
     assert "{'blas': 1" in done.stdout, done
+
+
+def test_a_process_finds_its_peers_quickly_unless_told_how(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    for name in ('FASTRTPS_DEFAULT_PROFILES_FILE', 'FASTDDS_BUILTIN_TRANSPORTS'):
+        monkeypatch.setenv(name, '')
+        monkeypatch.delenv(name)
+    prefer_quick_discovery()
+    profile = Path(os.environ['FASTRTPS_DEFAULT_PROFILES_FILE']).read_text()
+    assert '<leaseAnnouncement>' in profile
+    monkeypatch.setenv('FASTRTPS_DEFAULT_PROFILES_FILE', 'mine.xml')
+    prefer_quick_discovery()
+    assert os.environ['FASTRTPS_DEFAULT_PROFILES_FILE'] == 'mine.xml'
 
 
 SECURED = """

@@ -20,6 +20,7 @@ from typing import Any
 from action_msgs.msg import GoalStatus
 from rclpy.action import ActionClient
 from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import qos_profile_action_status_default
@@ -109,6 +110,7 @@ class ServiceCaller:
         self._client = node.create_client(
             srv_type, name, callback_group=ReentrantCallbackGroup(), qos_profile=CLIENT_QOS
         )
+        self._checks: _PeriodicChecks | None = None
         self.name = name
         self.round_trips = RoundTrips()
 
@@ -167,61 +169,113 @@ class ServiceCaller:
 
     def _look_for_loss(self) -> Callable[[], None]:
         """Return a look that raises `UnavailableError` once the server will never answer."""
-        servers, lost = self._count_servers(), ''
-        doubtful = time.monotonic() + DOUBTFUL_SECONDS if servers > 1 else math.inf
+        asked, lost = self._servers(), ''
+        doubtful = time.monotonic() + DOUBTFUL_SECONDS if len(asked) > 1 else math.inf
 
         def look() -> None:
-            nonlocal servers, lost
+            nonlocal lost
             if lost:
                 raise UnavailableError(f'service {self.name}: {lost}')
-            before, servers = servers, self._count_servers()
             # Not before the next look: an answer may be under way.
             if not self.is_ready():
                 lost = 'the server went away before it answered'
-            elif servers > before:
+            elif self._servers() - asked:
                 lost = 'another server took the place of the one that was asked'
             elif time.monotonic() > doubtful:
-                lost = f'no answer, and one of {servers} servers may be gone'
+                lost = f'no answer, and one of {len(asked)} servers may be gone'
 
         return look
 
-    def _count_servers(self) -> int:
-        # One that answers to `is_ready` may not be counted yet.
-        return max(1, int(self._node.count_services(self._client.service_name)))
+    def _servers(self) -> frozenset[tuple[int, ...]]:
+        """Return the known servers, by the identifiers that DDS gives their readers.
+
+        Their number does not tell that another came: one that was killed may go meanwhile.
+        """
+        topic = f'rq{self._client.service_name}Request'  # as every ROS on DDS calls it
+        readers = self._node.get_subscriptions_info_by_topic(topic, no_mangle=True)
+        return frozenset(tuple(reader.endpoint_gid) for reader in readers)
 
     async def call_async(self, request: Any, timeout: float) -> Any:
         """Call from a callback with `await`; otherwise as `call`.
 
         Raises:
-            UnavailableError: The server is not there when the call is made.
+            UnavailableError: The server is not there when the call is made, or went away before it
+                answered.
             CallTimeoutError: No answer within the time.
         """
         if not self.is_ready():
             raise UnavailableError(f'service {self.name}: no server')
         timeout, asked = self.round_trips.deadline(timeout), time.monotonic()
         future = self._client.call_async(request)
-        executor = self._node.executor
-        late = threading.Event()
+        look, failure = self._look_for_loss(), []
 
-        def expire() -> None:
-            late.set()
-            future.cancel()
-            executor.wake()
+        def check() -> None:
+            try:
+                if time.monotonic() - asked > timeout:
+                    self.round_trips.note_missed()
+                    raise CallTimeoutError(f'service {self.name}: no answer within {timeout:g} s')
+                look()
+            except CallError as error:
+                if not future.done():
+                    failure.append(error)
+                    future.cancel()
 
-        timer = threading.Timer(timeout, expire)
-        timer.daemon = True
-        timer.start()
+        if self._checks is None:
+            self._checks = _PeriodicChecks(self._node)
+        self._checks.add(check)
         try:
             response = await future
         finally:
-            timer.cancel()
-        if late.is_set() and not future.done():
+            self._checks.remove(check)
+        if failure:
             self._client.remove_pending_request(future)
-            self.round_trips.note_missed()
-            raise CallTimeoutError(f'service {self.name}: no answer within {timeout:g} s')
+            raise failure[0]
         self.round_trips.note(time.monotonic() - asked)
         _show(self._node, self.name, self.round_trips)
         return response
+
+
+class _PeriodicChecks:
+    """Functions that the executor calls every `SERVER_PERIOD` while there are any.
+
+    Args:
+        node: A node that an executor spins.
+    """
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self._checks: set[Callable[[], None]] = set()
+        self._lock = threading.Lock()
+        self._timer = node.create_timer(
+            SERVER_PERIOD,
+            self._on_timer,
+            callback_group=ReentrantCallbackGroup(),
+            clock=Clock(clock_type=ClockType.STEADY_TIME),
+            autostart=False,
+        )
+
+    def add(self, check: Callable[[], None]) -> None:
+        """Have a function called from now on."""
+        with self._lock:
+            self._checks.add(check)
+            if not self._timer.is_canceled():
+                return
+            self._timer.reset()
+        self._node.executor.wake()
+
+    def remove(self, check: Callable[[], None]) -> None:
+        """Have it called no more."""
+        with self._lock:
+            self._checks.discard(check)
+
+    def _on_timer(self) -> None:
+        with self._lock:
+            if not self._checks:
+                # Cancelled nowhere else: rclpy fails on one that was due when it was cancelled.
+                self._timer.cancel()
+            checks = tuple(self._checks)
+        for check in checks:
+            check()
 
 
 def await_ready(
