@@ -27,9 +27,12 @@ from surveillance_perception.detection.image_sampling import (
 )
 
 Quads = npt.NDArray[np.float64]
+Outline = npt.NDArray[np.int32]
+Indices = npt.NDArray[np.int64]
 
 _MAX_HULL_CORNERS = 8
-_MIN_SOLIDITY = 0.5
+_MIN_AREA = 12.0
+_QUAD_SCATTER, _MOST_SCATTER = 1.35, 8.0
 _MAX_GROWTH = 1.6
 _WIDE_WINDOW = 21
 _SAME_SIZE = 0.06
@@ -90,7 +93,7 @@ def dark_masks(
     split, _ = cv2.threshold(halved, 0, 255, cv2.THRESH_BINARY_INV + cv2.THRESH_OTSU)
     white = float(np.percentile(halved[::4, ::4], 98.0))
     yield cv2.threshold(image, white / 4.0, 255, cv2.THRESH_BINARY_INV)[1], 1
-    yield cv2.threshold(image, split, 255, cv2.THRESH_BINARY_INV)[1], 1
+    yield cv2.threshold(halved, split, 255, cv2.THRESH_BINARY_INV)[1], 2
     for length in bridges:
         for shape in ((length, 1), (1, length)):
             yield cv2.morphologyEx(first, cv2.MORPH_CLOSE, np.ones(shape, np.uint8)), 1
@@ -101,18 +104,17 @@ def quads_around(
     *,
     min_length: float = 8.0,
     min_width: float = 2.0,
-    min_area: float = 12.0,
     limit: int = 10**9,
 ) -> Quads:
     """Quadrilaterals around the blobs of masks.
 
     Args:
         masks: Images (height, width), blobs are not 0, and by how much each is smaller than the
-            image itself. A blob with the same upright box and area as one before is left out.
+            image itself. A blob with the same upright box as one before is left out.
         min_length: Longer side in pixels of the smallest blob's upright box.
         min_width: Shorter side of it.
-        min_area: Area in pixels of the smallest blob's hull.
-        limit: Once so many blobs were looked at, no further mask is.
+        limit: Once so many blobs were looked at, only those that are nearly quadrilaterals are,
+            and no further mask.
 
     Returns:
         (n, 4, 2) corners in pixels, clockwise as seen.
@@ -122,30 +124,22 @@ def quads_around(
     for mask, scale in masks:
         if len(seen) > limit:
             break
+        contours = _outlines_in(mask, min_length / scale, max(2.0, min_width / scale))
+        if not contours:
+            continue
+        boxes, scatter = _measured(contours)
+        kept = np.flatnonzero(scatter < _MOST_SCATTER)
+        kept = kept[np.argsort(scatter[kept])]
         quads = []
-        length, breadth = min_length / scale, max(2.0, min_width / scale)
-        contours, _ = cv2.findContours(mask, cv2.RETR_LIST, cv2.CHAIN_APPROX_SIMPLE)
-        for contour in contours:
-            if len(contour) < 4:
-                continue
-            left, top, across, down = cv2.boundingRect(contour)
-            if max(across, down) < length or min(across, down) < breadth:
-                continue
-            # outer outlines run the other way round than the outlines of holes
-            area = -cv2.contourArea(contour, oriented=True)
-            if area <= 0:
-                continue
-            right, bottom = (left + across) * scale, (top + down) * scale
-            blob = (
-                left * scale // _SAME_BOX,
-                top * scale // _SAME_BOX,
-                right // _SAME_BOX,
-                bottom // _SAME_BOX,
-            )
-            if blob in seen:
+        for index, box in zip(
+            kept.tolist(), (boxes[kept] * scale // _SAME_BOX).tolist(), strict=True
+        ):
+            if len(seen) > limit and scatter[index] > _QUAD_SCATTER:
+                break
+            if (blob := tuple(box)) in seen:
                 continue
             seen.add(blob)
-            quad = _quad_around(contour, area, min_area / scale**2)
+            quad = _quad_around(contours[index], _MIN_AREA / scale**2)
             if quad is not None:
                 quads.append(quad)
         if quads:
@@ -153,6 +147,57 @@ def quads_around(
             grown = _grown(_clockwise(np.array(quads, dtype=float)), _INSET)
             found.append((grown + 0.5) * scale - 0.5)
     return np.concatenate(found) if found else np.zeros((0, 4, 2))
+
+
+def _outlines_in(mask: Grey, length: float, width: float) -> list[Outline]:
+    """Return the outlines (k, 1, 2) of a mask's blobs of at least a length and a width in pixels.
+
+    One with more corners than its box has pixels around it is no quadrilateral's.
+    """
+    contours, _ = cv2.findContours(mask, cv2.RETR_LIST, cv2.CHAIN_APPROX_SIMPLE)
+    contours = [contour for contour in contours if len(contour) >= 4]
+    if not contours:
+        return []
+    counts, starts, points = _joined(contours)
+    size = np.maximum.reduceat(points, starts) - np.minimum.reduceat(points, starts) + 1
+    kept = (size.max(axis=1) >= length) & (size.min(axis=1) >= width)
+    kept &= counts <= 2 * size.sum(axis=1)
+    return [contours[index] for index in np.flatnonzero(kept).tolist()]
+
+
+def _joined(contours: Sequence[Outline]) -> tuple[Indices, Indices, npt.NDArray[np.int32]]:
+    """Return the lengths and starts of outlines within all their points (n, 2), and these."""
+    counts = np.fromiter(map(len, contours), np.int64, len(contours))
+    return counts, counts.cumsum() - counts, np.concatenate(contours)[:, 0]
+
+
+def _measured(contours: Sequence[Outline]) -> tuple[Indices, Array]:
+    """Measure outlines (k, 1, 2), all at once.
+
+    Returns:
+        (k, 4) left, top, right, bottom of each; and (k,) its scatter: 1 for a parallelogram, 1.33
+        for a triangle, the more, the further its parts lie from its middle; infinite for holes.
+        It is the first affine moment invariant (Flusser and Suk, "Pattern recognition by affine
+        moment invariants", Pattern Recognition 26(1), 1993), relative to a parallelogram's.
+    """
+    counts, starts, points = _joined(contours)
+    low, high = np.minimum.reduceat(points, starts), np.maximum.reduceat(points, starts)
+    following = np.arange(1, len(points) + 1)
+    following[starts + counts - 1] = starts
+    x, y = (points - low.repeat(counts, axis=0)).astype(float).T
+    u, v = x[following], y[following]
+    # moments of polygons by Green's theorem; outlines of holes run the other way round
+    cross = u * y - x * v
+    terms = (x + u, y + v, x * x + x * u + u * u, y * y + y * v + v * v)
+    area = np.add.reduceat(cross, starts) / 2.0
+    hole = area <= 0.0
+    area[hole] = 1.0
+    mean_x, mean_y, xx, yy = (np.add.reduceat(cross * term, starts) / area for term in terms)
+    xy = np.add.reduceat(cross * (2.0 * (x * y + u * v) + x * v + u * y), starts) / area
+    spread_x, spread_y = xx / 12.0 - (mean_x / 6.0) ** 2, yy / 12.0 - (mean_y / 6.0) ** 2
+    spread_xy = xy / 24.0 - mean_x * mean_y / 36.0
+    scatter = 144.0 * (spread_x * spread_y - spread_xy**2) / area**2
+    return np.hstack([low, high + 1]), np.where(hole, np.inf, scatter)
 
 
 def distinct(quads: Quads, distance: float) -> npt.NDArray[np.int64]:
@@ -175,15 +220,20 @@ def distinct(quads: Quads, distance: float) -> npt.NDArray[np.int64]:
     return np.array(kept, dtype=np.int64)
 
 
-def _quad_around(
-    contour: npt.NDArray[np.int32], area: float, min_area: float
-) -> npt.NDArray[np.float32] | None:
+def _quad_around(contour: Outline, least_area: float) -> npt.NDArray[np.float32] | None:
+    """Return the smallest quadrilateral (4, 2) around an outline; None where it is no such thing."""
     hull = cv2.convexHull(contour)
-    hull_area = cv2.contourArea(hull)
-    if hull_area < min_area or area < _MIN_SOLIDITY * hull_area:
+    area = cv2.contourArea(hull)
+    if area < least_area:
         return None
-    quad = _smallest_quad(hull)
-    return quad if quad is not None and cv2.contourArea(quad) <= _MAX_GROWTH * hull_area else None
+    tolerance = max(0.7, 0.02 * cv2.arcLength(hull, True))
+    reduced = cv2.approxPolyDP(hull, tolerance, True)
+    if len(reduced) < 4:
+        reduced = hull
+    if not 4 <= len(reduced) <= _MAX_HULL_CORNERS:
+        return None
+    quad = cv2.approxPolyN(reduced.astype(np.float32), 4, None, -1.0, True).reshape(-1, 2)
+    return quad if len(quad) == 4 and cv2.contourArea(quad) <= _MAX_GROWTH * area else None
 
 
 def _clockwise(quads: Quads) -> Quads:
@@ -202,18 +252,6 @@ def _grown(quads: Quads, distance: float) -> Quads:
     # where both moved sides meet; a corner nearly straight or sharp is not moved without bound
     shift = (before - along) / np.maximum(sine, _LEAST_SINE)[..., None]
     return np.asarray(quads + distance * shift)
-
-
-def _smallest_quad(hull: npt.NDArray[np.int32]) -> npt.NDArray[np.float32] | None:
-    """Return the smallest quadrilateral (4, 2) around a hull; None where it is no such thing."""
-    tolerance = max(0.7, 0.02 * cv2.arcLength(hull, True))
-    reduced = cv2.approxPolyDP(hull, tolerance, True)
-    if len(reduced) < 4:
-        reduced = hull
-    if not 4 <= len(reduced) <= _MAX_HULL_CORNERS:
-        return None
-    quad = cv2.approxPolyN(reduced.astype(np.float32), 4, None, -1.0, True).reshape(-1, 2)
-    return quad if len(quad) == 4 else None
 
 
 class BorderCheck:

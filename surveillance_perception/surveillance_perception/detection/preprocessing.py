@@ -15,6 +15,7 @@ _STRETCHED_LEVEL = 200.0
 _LARGEST_GAIN = 16.0
 _QUIET = 4.0
 _SMOOTHING = 1.2
+_STRIPS = 10
 # the second difference of white noise in both directions has 6 times its deviation (Immerkaer,
 # "Fast noise variance estimation", CVIU 64(2), 1996); 0.6745 turns a median into a deviation
 _SECOND_DIFFERENCE = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], np.float32)
@@ -76,12 +77,12 @@ def _quantile(grey: Grey, share: float) -> int:
 
 
 def _noise(grey: Grey) -> float:
-    """Deviation of the noise, from strips of 8 rows: a fifth of the image is enough."""
-    starts = range(0, grey.shape[0] - 7, 40)
-    strips = [
-        cv2.filter2D(grey[start : start + 8], cv2.CV_32F, _SECOND_DIFFERENCE)[1:-1]
-        for start in starts
-    ]
-    if not strips:
+    """Deviation of the noise, from at most `_STRIPS` strips of 8 rows."""
+    rows = grey.shape[0] - 8
+    if rows < 0:
         return 0.0
-    return float(np.median(np.abs(np.concatenate(strips)))) * _MEDIAN_TO_DEVIATION
+    strips = [
+        np.abs(cv2.filter2D(grey[start : start + 8], cv2.CV_16S, _SECOND_DIFFERENCE)[1:-1])
+        for start in np.unique(np.linspace(0, rows, _STRIPS, dtype=int)).tolist()
+    ]
+    return float(np.median(np.stack(strips))) * _MEDIAN_TO_DEVIATION

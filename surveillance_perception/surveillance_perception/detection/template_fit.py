@@ -110,8 +110,10 @@ class TemplateFit:
         scale = 2.0 ** levels[:, None]
         # a pixel's own square (1/12), linear interpolation (1/6) and the lens
         variance = np.square(blur) + scale * scale / 4.0
-        inverse = np.linalg.inv(jacobians_of(homographies))
-        deviation = np.sqrt(np.einsum('mij,mij->mi', inverse, inverse) * variance)
+        jacobians = jacobians_of(homographies)
+        # lengths of the rows of the inverse
+        rows = np.linalg.norm(jacobians[:, ::-1, ::-1], axis=1)
+        deviation = rows * np.sqrt(variance) / np.abs(np.linalg.det(jacobians))[:, None]
         index = np.searchsorted(_DEVIATIONS, deviation).clip(0, len(_DEVIATIONS) - 1)
         return Footprint(index[:, 1], index[:, 0])
 
@@ -138,7 +140,7 @@ class TemplateFit:
             listed = np.argpartition(-everything, count - 1, axis=1)[:, :count]
         rows = np.arange(len(patches))[:, None]
         codes = self._flat[listed]
-        energy = self._energy(codes, footprint)
+        energy = self._energy(self.codes.cells[listed], footprint)
         spread = np.einsum('mn,mn->m', centred, centred)
         scale = np.sqrt(np.maximum(energy * spread[:, None], 1e-6))
         correlation = (codes @ agreement[:, :, None])[:, :, 0] / scale
@@ -224,14 +226,15 @@ class TemplateFit:
         )
 
     def _energy(self, cells: Patches, footprint: Footprint) -> Patches:
-        """Sum of squares (m, j) of the centred templates of codes (m, j, cells)."""
-        gram = np.einsum('mij,mkl->mikjl', self._gram[footprint.down], self._gram[footprint.across])
-        mean = np.einsum('mi,mj->mij', self._sum[footprint.down], self._sum[footprint.across])
-        size = cells.shape[2]
-        weighed = cells @ gram.reshape(-1, size, size)
-        total = (cells @ mean.reshape(-1, size, 1))[:, :, 0]
-        squares = np.einsum('mjc,mjc->mj', weighed, cells)
-        return np.asarray(squares - total * total / self.count**2)
+        """Sum of squares (m, j) of the centred templates of codes (m, j, rows, columns)."""
+        count, listed, side, _ = cells.shape
+        columns = cells.transpose(0, 2, 1, 3).reshape(count, side, listed * side)
+        weighed = (self._gram[footprint.down] @ columns).reshape(count, side * listed, side)
+        weighed = (weighed @ self._gram[footprint.across]).reshape(count, side, listed, side)
+        squares = np.einsum('mrjc,mjrc->mj', weighed, cells)
+        down, across = self._sum[footprint.down], self._sum[footprint.across]
+        totals = ((cells @ across[:, None, :, None])[..., 0] @ down[:, :, None])[..., 0]
+        return np.asarray(squares - totals * totals / self.count**2)
 
 
 def _profiles(positions: Array, side: int) -> tuple[Patches, Patches]:
