@@ -221,7 +221,7 @@ def distinct(quads: Quads, distance: float) -> npt.NDArray[np.int64]:
 
 
 def _quad_around(contour: Outline, least_area: float) -> npt.NDArray[np.float32] | None:
-    """Return the smallest quadrilateral (4, 2) around an outline; None where it is no such thing."""
+    """Return the smallest quadrilateral (4, 2) around an outline; None where it is none."""
     hull = cv2.convexHull(contour)
     area = cv2.contourArea(hull)
     if area < least_area:

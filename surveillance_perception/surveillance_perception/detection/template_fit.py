@@ -229,9 +229,9 @@ class TemplateFit:
         """Sum of squares (m, j) of the centred templates of codes (m, j, rows, columns)."""
         count, listed, side, _ = cells.shape
         columns = cells.transpose(0, 2, 1, 3).reshape(count, side, listed * side)
-        weighed = (self._gram[footprint.down] @ columns).reshape(count, side * listed, side)
-        weighed = (weighed @ self._gram[footprint.across]).reshape(count, side, listed, side)
-        squares = np.einsum('mrjc,mjrc->mj', weighed, cells)
+        rows = (self._gram[footprint.down] @ columns).reshape(count, side * listed, side)
+        weighed = rows @ self._gram[footprint.across]
+        squares = np.einsum('mrjc,mjrc->mj', weighed.reshape(count, side, listed, side), cells)
         down, across = self._sum[footprint.down], self._sum[footprint.across]
         totals = ((cells @ across[:, None, :, None])[..., 0] @ down[:, :, None])[..., 0]
         return np.asarray(squares - totals * totals / self.count**2)
