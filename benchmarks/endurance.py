@@ -1,12 +1,12 @@
 """Eight simulated hours of patrol while doors close, things stand about and the robot is pushed.
 
     python benchmarks/endurance.py [--hours 8] [--seed 1] [--map FILE] [--people 5] [--range 3]
-        [--quick]
+        [--calm] [--quick]
 
 Runs the whole stack in one process as fast as it goes, makes trouble through the simulator's
 services, and watches from outside: collisions, the battery, what the ontology says about where the
-robot is beside where it really is, and how long each place waits. The exit code is 1 when a promise
-was broken.
+robot is beside where it really is, how many drives arrive, and how long each place waits. Ctrl-C or
+SIGTERM ends a run early; it reports what it saw. The exit code is 1 when a promise was broken.
 """
 
 from __future__ import annotations
@@ -15,7 +15,9 @@ import argparse
 import logging
 import math
 import random
+import signal
 import sys
+import tempfile
 import threading
 import time
 from collections import Counter
@@ -27,6 +29,7 @@ from geometry_msgs.msg import PoseStamped
 from sensor_msgs.msg import BatteryState
 from whole_stack import ROOT, Stack
 
+from surveillance_behaviour.mission.mission_log import Summary, read_all, summarize
 from surveillance_controllers.battery.model import BatteryParameters
 from surveillance_fsm.ros import ServiceCaller
 from surveillance_interfaces.msg import FactChanges
@@ -46,6 +49,8 @@ from surveillance_simulation.world.world import read_world
 
 USUAL_SPEED = 0.45
 """Of a drive, m/s: acceleration, bends and doors included."""
+NEVER = 1e12
+"""Seconds that no run lasts."""
 LONGEST_WRONG = 2.0
 """Simulated seconds that the ontology may be wrong about the robot's place."""
 
@@ -299,10 +304,10 @@ def run(
     log_level: str = 'fatal',
     people: int = 0,
     ranges: float | None = None,
-) -> tuple[Watch, Trouble]:
+) -> tuple[Watch, Trouble, Summary]:
     """Patrol for simulated seconds with trouble every `pause` seconds; return what was seen.
 
-    The seconds count from when the robot first drives.
+    The seconds count from when the robot first drives. A KeyboardInterrupt ends them early.
 
     Args:
         place: The place's file.
@@ -320,25 +325,41 @@ def run(
     }
     if ranges is not None:
         parameters['battery_controller'] = {'battery.capacity': capacity_for(place, ranges)}
-    stack = Stack(place, parameters, log_level=log_level)
-    watch = Watch(stack)
-    trouble = Trouble(stack, watch, rng)
-    stack.start()
-    try:
-        while stack.robot.base.travelled < 0.5:
-            watch.until(watch.now + 1.0)
-        end = watch.now + seconds
-        next_trouble = watch.now + rng.uniform(*pause)
-        while watch.now < end:
-            watch.until(min(next_trouble, trouble.next_mend, end))
-            trouble.mend()
-            if watch.now >= next_trouble:
-                tell(f'{watch.now:8.1f} s  {trouble.make()}')
-                next_trouble = watch.now + rng.uniform(*pause)
-        watch.close()
-    finally:
-        stack.close()
-    return watch, trouble
+    with tempfile.TemporaryDirectory() as folder:
+        record = Path(folder) / 'mission.jsonl'
+        parameters['robot_behavior'] = {'record': str(record)}
+        stack = Stack(place, parameters, log_level=log_level)
+        watch = Watch(stack)
+        trouble = Trouble(stack, watch, rng)
+        stack.start()
+        try:
+            _patrol(stack, watch, trouble, seconds, lambda: rng.uniform(*pause), tell)
+        except KeyboardInterrupt:
+            print('ended early')
+        finally:
+            watch.close()
+            stack.close()
+        return watch, trouble, summarize(read_all(record))
+
+
+def _patrol(
+    stack: Stack,
+    watch: Watch,
+    trouble: Trouble,
+    seconds: float,
+    pause: Callable[[], float],
+    tell: Callable[[str], None],
+) -> None:
+    while stack.robot.base.travelled < 0.5:
+        watch.until(watch.now + 1.0)
+    end = watch.now + seconds
+    next_trouble = watch.now + pause()
+    while watch.now < end:
+        watch.until(min(next_trouble, trouble.next_mend, end))
+        trouble.mend()
+        if watch.now >= next_trouble:
+            tell(f'{watch.now:8.1f} s  {trouble.make()}')
+            next_trouble = watch.now + pause()
 
 
 def main() -> int:
@@ -351,18 +372,20 @@ def main() -> int:
     parser.add_argument(
         '--range', type=float, help='ways to the farthest place and home that a charge lasts for'
     )
+    parser.add_argument('--calm', action='store_true', help='no trouble is made')
     parser.add_argument('--quick', action='store_true', help='ten simulated minutes')
     parser.add_argument('--verbose', action='store_true', help='print each trouble')
     options = parser.parse_args()
     seconds = 600.0 if options.quick else options.hours * 3600.0
     logging.disable()
     begun = time.monotonic()
-    tell = print if options.verbose else lambda _: None
-    watch, trouble = run(
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    watch, trouble, summary = run(
         options.map,
         seconds,
         options.seed,
-        tell=tell,
+        pause=(NEVER, NEVER) if options.calm else (40.0, 120.0),
+        tell=print if options.verbose else lambda _: None,
         people=options.people,
         ranges=options.range,
     )
@@ -379,6 +402,10 @@ def main() -> int:
     print(f' (longest {watch.longest_wrong:.1f} s)')
     for since, lasted, said, true in watch.wrong[:20]:
         print(f'  at {since:.1f} s for {lasted:.1f} s: {said} instead of {true}')
+    visits, failures = sum(summary.visits.values()), sum(summary.failures.values())
+    print(f'drives that arrive    {visits} of {visits + failures}; {summary.recharges} recharges')
+    for what, times in summary.failures.items():
+        print(f'  failed {times} times: {what}')
     print(f'{"place":<8} {"entered":>8} {"longest wait":>13}')
     for place, wait in watch.waits.items():
         print(f'{place:<8} {watch.visits[place]:>8} {wait:>11.0f} s')

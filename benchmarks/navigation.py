@@ -44,8 +44,8 @@ from whole_stack import ROOT, Stack, ros_arguments
 from launcher import run
 from surveillance_behaviour.policy.leg_times import PERCENTILE_99, LegTimes
 from surveillance_controllers import geometry
+from surveillance_controllers.geometry import Scan
 from surveillance_controllers.motion.driving import Drive, State
-from surveillance_controllers.motion.localisation import Scan
 from surveillance_controllers.motion.navigator import Navigator
 from surveillance_controllers.motion.path_following import Velocity
 from surveillance_controllers.planning.grid_map import GridMap
@@ -479,11 +479,10 @@ def silence(*, quick: bool) -> None:
     speeds = (0.2, 0.58) if quick else (0.1, 0.2, 0.3, 0.4, 0.5, 0.58)
     rounds = 1 if quick else 5
     rows = []
-    with stack_at_speed() as patrol:
+    with stack_in_real_time() as patrol:
         for topic in ('scan', 'odom'):
-            rows += stops_after_silence(patrol, f'motion_controller, {topic}', speeds, rounds)
-    nodes = ('simulator', 'collision_monitor')
-    with stack_at_speed({'simulator': {'command_topic': 'cmd_vel_monitored'}}, nodes) as patrol:
+            rows += stops_after_silence(patrol, f'a mission, {topic}', speeds, rounds)
+    with stack_in_real_time(('simulator', 'collision_monitor')) as patrol:
         commands = patrol.observer.create_publisher(Twist, 'cmd_vel', 1)
         began = time.monotonic()
 
@@ -495,7 +494,7 @@ def silence(*, quick: bool) -> None:
             commands.publish(twist)
 
         patrol.observer.create_timer(0.05, command)
-        rows += stops_after_silence(patrol, 'collision_monitor, scan', speeds, rounds)
+        rows += stops_after_silence(patrol, 'a foreign cmd_vel, scan', speeds, rounds)
     table(
         'A sensor of 10 Hz falls silent at a speed, real time, worst of '
         f'{rounds}; times from the first message that did not come.',
@@ -505,12 +504,9 @@ def silence(*, quick: bool) -> None:
 
 
 @contextmanager
-def stack_at_speed(
-    parameters: dict[str, dict[str, Any]] | None = None, nodes: Sequence[str] = ()
-) -> Iterator[Stack]:
-    """Provide a stack in real time."""
-    given = {'simulator': {}, **(parameters or {})}
-    given['simulator']['speed'] = 1.0
+def stack_in_real_time(nodes: Sequence[str] = ()) -> Iterator[Stack]:
+    """Provide a stack on the machine's clock, as a mission runs by default."""
+    given = {'*': {'use_sim_time': False}, 'simulator': {'speed': 1.0}}
     patrol = Stack(ROOT / 'config' / 'seven_rooms.yaml', given, nodes)
     patrol.start()
     try:

@@ -1,8 +1,8 @@
 """The node `collision_monitor`: lets no command through that the lidar does not allow.
 
 It stands between whoever commands `cmd_vel` (`motion_controller`, a joystick, any other program)
-and the base, which then listens to `cmd_vel_monitored`. A command is slowed down so that the robot
-can brake before the nearest thing on its arc; without a fresh scan, or without a fresh command, the
+and the base, which listens to `cmd_vel_monitored`. A command is slowed down so that the robot can
+brake before the nearest thing on its arc; without a fresh scan, or without a fresh command, the
 robot stands. As a process of its own it also stops a robot whose controller hangs.
 """
 
@@ -17,19 +17,21 @@ from geometry_msgs.msg import Twist
 from sensor_msgs.msg import LaserScan
 
 from surveillance_controllers import conversions
-from surveillance_controllers.geometry import Points
-from surveillance_controllers.motion.base_interface import Transforms
+from surveillance_controllers.geometry import Points, Scan
+from surveillance_controllers.motion.command_publisher import CommandPublisher
 from surveillance_controllers.motion.path_following import Velocity, room_ahead
-from surveillance_controllers.motion.robot_parameters import lidar_mount
-from surveillance_controllers.motion.sensor_age import STANDSTILL, WATCH_PERIOD, SensorAge
+from surveillance_controllers.motion.sensor_age import STANDSTILL
+from surveillance_controllers.motion.transforms import Transforms, lidar_mount
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import Described, declare_fields
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import SENSOR_QOS
-from surveillance_runtime.robot_base import ROBOT_DECELERATION
+from surveillance_runtime.robot_base import ROBOT_DECELERATION, ROBOT_RADIUS
 
-HORIZON = 3.0
-"""How far ahead is looked, metres."""
+MONITORED = 'cmd_vel_monitored'
+"""Topic that the base listens to."""
+UNGUARDED_AFTER = 5.0
+"""A base that does not listen is told of after this time, seconds."""
 LATENCY = 0.15
 """Time between seeing and braking, seconds: a period of the lidar and a half."""
 
@@ -45,7 +47,7 @@ class MonitorSettings:
         longest_silence: The robot stands when a scan or a command is overdue by this, seconds.
     """
 
-    radius: float = 0.25
+    radius: float = ROBOT_RADIUS
     margin: float = 0.02
     deceleration: float = ROBOT_DECELERATION
     longest_silence: float = STANDSTILL
@@ -82,14 +84,14 @@ def allowed(wanted: Velocity, seen: Points, settings: MonitorSettings) -> Veloci
     if wanted.speed < 0.0:
         # Seen from behind the robot drives forwards, and turns to the same side.
         curvature = -curvature
-    reach = settings.radius + settings.margin
-    room = room_ahead(ahead, curvature, reach, HORIZON)
-    if room >= HORIZON:
+    a, wanted_speed = settings.deceleration, abs(wanted.speed)
+    to_stand = wanted_speed * LATENCY + wanted_speed**2 / (2.0 * a)
+    room = room_ahead(ahead, curvature, settings.radius + settings.margin, to_stand)
+    if room >= to_stand:
         return wanted
     # Braking begins after the latency.
-    late = settings.deceleration * LATENCY
-    speed = math.sqrt(late**2 + 2.0 * settings.deceleration * room) - late
-    share = min(1.0, speed / abs(wanted.speed))
+    speed = math.sqrt((a * LATENCY) ** 2 + 2.0 * a * room) - a * LATENCY
+    share = min(1.0, speed / wanted_speed)
     return Velocity(wanted.speed * share, wanted.turn * share)
 
 
@@ -102,17 +104,19 @@ class CollisionMonitor(PatrolNode):
         self._mount = lidar_mount(self)
         self._frames = Transforms(self)
         self._wanted = Velocity()
-        self._seen: Points | None = None
-        settings = self._settings
-        self._age = SensorAge(('scan', 'cmd_vel'), settings.deceleration, settings.longest_silence)
-        self._stands_for = ''
-        self._base = self.create_publisher(Twist, 'cmd_vel_monitored', 1)
+        self._scan: Scan | None = None
+        self._is_held_back = False
+        self._base = CommandPublisher(
+            self,
+            MONITORED,
+            ('scan', 'cmd_vel'),
+            self._settings.deceleration,
+            self._warn_of_silence,
+            self._settings.longest_silence,
+        )
         self.create_subscription(Twist, 'cmd_vel', self._on_command, 1)
         self.create_subscription(LaserScan, 'scan', self._on_scan, SENSOR_QOS)
-        self.create_timer(WATCH_PERIOD, self._on_time)
-
-    def _now(self) -> float:
-        return float(self.get_clock().now().nanoseconds) / 1e9
+        self._unguarded = self.create_timer(UNGUARDED_AFTER, self._look_for_base)
 
     def _on_command(self, message: Twist) -> None:
         speed, turn = message.linear.x, message.angular.z
@@ -120,42 +124,44 @@ class CollisionMonitor(PatrolNode):
             self.get_logger().error(f'cmd_vel: {speed} m/s, {turn} rad/s: expected finite numbers')
             speed = turn = 0.0
         self._wanted = Velocity(speed, turn)
-        self._age.hear('cmd_vel', self._now())
-        self._pass_on()
+        self._base.hear('cmd_vel')
+        self._base.command(self._allowed())
 
     def _on_scan(self, message: LaserScan) -> None:
         try:
             mount = self._mount or self._frames.mount_of(message.header.frame_id)
-            self._seen = conversions.scan_from(message, mount).points
+            self._scan = conversions.scan_from(message, mount)
         except ValueError as error:
             self.get_logger().error(f'scan: {error}')
             return
-        self._age.hear('scan', self._now())
-        if self._wanted.speed != 0.0:
-            self._pass_on()
+        self._base.hear('scan')
+        allowed_now = self._allowed()
+        # Only what cannot wait for the next command.
+        if abs(allowed_now.speed) < abs(self._base.wanted.speed):
+            self._base.command(allowed_now)
 
-    def _on_time(self) -> None:
-        if self._wanted != Velocity() and self._age.share(self._wanted.speed, self._now()) < 1.0:
-            self._pass_on()
+    def _allowed(self) -> Velocity:
+        if self._scan is None:
+            return self._wanted  # Nothing was seen yet, so the publisher lets nothing through.
+        velocity = allowed(self._wanted, self._scan.points, self._settings)
+        held_back = abs(velocity.speed) < 0.5 * abs(self._wanted.speed)
+        if held_back and not self._is_held_back:
+            self.get_logger().warn('something is in the way: the robot is held back')
+        self._is_held_back = held_back
+        return velocity
 
-    def _pass_on(self) -> None:
-        now = self._now()
-        if self._seen is None or self._age.share(self._wanted.speed, now) == 0.0:
-            topic = self._age.left(now)[1]
-            velocity, why = Velocity(), f'nothing on the topic {topic}'
-            if topic == 'cmd_vel':
-                self._wanted, why = Velocity(), ''
-        else:
-            velocity = allowed(self._wanted, self._seen, self._settings)
-            near = abs(velocity.speed) < 0.5 * abs(self._wanted.speed)
-            why = 'something is in the way' if near else ''
-            share = self._age.share(velocity.speed, now)
-            velocity = Velocity(share * velocity.speed, share * velocity.turn)
-        if why != self._stands_for:
-            self._stands_for = why
-            if why:
-                self.get_logger().warn(f'{why}: the robot is held back')
-        self._base.publish(conversions.twist_from(velocity))
+    def _warn_of_silence(self, topic: str) -> None:
+        # Commands may end at any time.
+        if topic != 'cmd_vel':
+            self.get_logger().warn(f'nothing on the topic {topic}: the robot stands')
+
+    def _look_for_base(self) -> None:
+        if self._wanted != Velocity() and not self.count_subscribers(MONITORED):
+            self._unguarded.cancel()
+            self.get_logger().warn(
+                f'the base is not guarded: nobody listens to {MONITORED}, expected the base to '
+                'take its commands from there instead of cmd_vel'
+            )
 
 
 def main(args: Sequence[str] | None = None) -> int:

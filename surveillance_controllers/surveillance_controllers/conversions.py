@@ -21,10 +21,9 @@ from nav_msgs.msg import Path as PathMessage
 from sensor_msgs.msg import BatteryState, LaserScan
 
 from surveillance_controllers.battery.model import Battery
-from surveillance_controllers.geometry import Points, Pose
+from surveillance_controllers.geometry import Points, Pose, Scan
 
 if TYPE_CHECKING:
-    from surveillance_controllers.motion.localisation import Scan
     from surveillance_controllers.motion.path_following import Velocity
     from surveillance_controllers.planning.grid_map import GridMap
 
@@ -178,8 +177,6 @@ def scan_from(message: LaserScan, mount: Pose = (0.0, 0.0, 0.0)) -> Scan:
         ValueError: Angles or reach are no lidar's, there are too many rays, or it was made before
             time began.
     """
-    from surveillance_controllers.motion.localisation import Scan
-
     count = len(message.ranges)
     first, step, reach = message.angle_min, message.angle_increment, message.range_max
     if message.header.stamp.sec < 0:

@@ -1,8 +1,10 @@
-"""Poses in the plane, and paths as lines through points."""
+"""Poses in the plane, paths as lines through points, and the scans of a lidar."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -119,3 +121,34 @@ def distance_nearest(path: ArrayLike, position: ArrayLike) -> float:
 def points_passed(path: ArrayLike, distance: float) -> int:
     """Return how many of a path's points lie at most `distance` metres along it."""
     return int(np.searchsorted(distances_along(path), distance + 1e-6, side='right'))
+
+
+@dataclass(frozen=True, eq=False)
+class Scan:
+    """One turn of a lidar.
+
+    Attributes:
+        angles: Direction of each ray in the lidar's frame, shape (n,), rad.
+        ranges: How far each ray went, shape (n,), metres; infinite where it met nothing.
+        range_max: The lidar's reach, metres.
+        mount: Where the lidar sits on the robot, robot's frame.
+    """
+
+    angles: Points
+    ranges: Points
+    range_max: float
+    mount: Pose = (0.0, 0.0, 0.0)
+
+    @cached_property
+    def points(self) -> Points:
+        """The points met, in the robot's frame, shape (m, 2), m at most n."""
+        met = np.isfinite(self.ranges) & (self.ranges < self.range_max)
+        ranges, angles = self.ranges[met], self.angles[met]
+        x, y, yaw = self.mount
+        turned = angles + yaw
+        return np.stack([x + ranges * np.cos(turned), y + ranges * np.sin(turned)], axis=1)
+
+    def thinned(self, count: int) -> Scan:
+        """About `count` of the rays, evenly taken."""
+        step = max(1, len(self.angles) // count)
+        return Scan(self.angles[::step], self.ranges[::step], self.range_max, self.mount)

@@ -173,7 +173,8 @@ _OF_PATROL = (
     'marker_server',
     'arm_controller',
 )
-RUN_NODES = frozenset((*_ALWAYS, *_OF_PATROL))
+_OF_BASE = ('simulator', 'collision_monitor')
+RUN_NODES = frozenset((*_ALWAYS, *_OF_PATROL, *_OF_BASE))
 """The nodes of which a robot has one each."""
 
 
@@ -198,7 +199,7 @@ def select(
     """Return the nodes that a run starts, in start order.
 
     Args:
-        mode: one of `MODES`; SIMULATED adds the simulator.
+        mode: one of `MODES`; SIMULATED adds the simulator and what guards its base.
         behaviour: one of `BEHAVIOURS`; patrol adds what learns the place from its markers.
         only: if not empty, exactly these nodes, also ones that the mode would not start.
         without: nodes to leave out, because they run elsewhere.
@@ -213,7 +214,7 @@ def select(
         if behaviour == 'patrol':
             wanted.update(_OF_PATROL)
         if mode == 'SIMULATED':
-            wanted.add('simulator')
+            wanted.update(_OF_BASE)
     chosen = tuple(node for node in NODES if node.name in wanted - left_out)
     if not chosen:
         raise ValueError('no node is left to start: check --only and --without')

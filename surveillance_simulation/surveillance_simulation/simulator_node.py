@@ -89,8 +89,9 @@ class Simulator(PatrolNode):
         except (PlaceError, ImportError) as error:
             raise StartError(f'simulator: {error}') from None
         FaultServices(self, self.robot, self._changing, self._changed)
-        commands = simulator_parameters.command_topic(self)
-        self.create_subscription(Twist, commands, self._on_command, 1)
+        self._is_monitored = False
+        self.create_subscription(Twist, 'cmd_vel', self._on_command, 1)
+        self.create_subscription(Twist, 'cmd_vel_monitored', self._on_monitored, 1)
         self.create_subscription(
             PoseWithCovarianceStamped, 'amcl_pose', self._on_estimate, STATE_QOS
         )
@@ -164,6 +165,15 @@ class Simulator(PatrolNode):
         self._told_of_clock = others > 0
 
     def _on_command(self, message: Twist) -> None:
+        if not self._is_monitored:
+            self._obey(message)
+
+    def _on_monitored(self, message: Twist) -> None:
+        """Obey the collision monitor; who commands past it is not obeyed from now on."""
+        self._is_monitored = True
+        self._obey(message)
+
+    def _obey(self, message: Twist) -> None:
         speed, turn_speed = message.linear.x, message.angular.z
         with self._changing:
             self.robot.base.command(speed, turn_speed)

@@ -131,18 +131,6 @@ def map_resolution(node: PatrolNode) -> float:
     return resolution
 
 
-def command_topic(node: PatrolNode) -> str:
-    """Declare the topic of the commands that the base obeys."""
-    topic: str = node.parameter(
-        'command_topic',
-        'cmd_vel',
-        'Topic of the commands that the base obeys; cmd_vel_monitored behind collision_monitor.',
-        choices=('cmd_vel', 'cmd_vel_monitored'),
-        read_only=True,
-    )
-    return topic
-
-
 def announces_pose(node: PatrolNode) -> bool:
     """Declare whether the start is told to a localisation that asks for it."""
     announces: bool = node.parameter(

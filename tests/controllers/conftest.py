@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import yaml
 
-from surveillance_controllers.motion.localisation import Scan
+from surveillance_controllers.geometry import Scan
 from surveillance_controllers.planning.grid_map import GridMap, with_walls
 
 

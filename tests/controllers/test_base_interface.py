@@ -12,13 +12,13 @@ from geometry_msgs.msg import PoseWithCovarianceStamped, TransformStamped, Twist
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
 
-from surveillance_controllers.geometry import composed
+from surveillance_controllers.geometry import Scan, composed
 from surveillance_controllers.motion.base_interface import (
     RobotBase,
     Transforms,
 )
 from surveillance_controllers.motion.driving import Drive, Spin
-from surveillance_controllers.motion.localisation import Localiser, Scan
+from surveillance_controllers.motion.localisation import Localiser
 from surveillance_controllers.motion.path_following import Velocity
 from surveillance_runtime.qos import SENSOR_QOS
 

@@ -10,6 +10,7 @@ import pytest
 from geometry_msgs.msg import Twist
 from sensor_msgs.msg import LaserScan
 
+from surveillance_controllers import collision_monitor_node
 from surveillance_controllers.collision_monitor_node import (
     CollisionMonitor,
     MonitorSettings,
@@ -63,7 +64,7 @@ def test_a_foreign_command_is_stopped_before_a_wall_and_without_a_scan(
         if gap is not None:
             scans.publish(
                 LaserScan(
-                    angle_min=-0.2, angle_increment=0.02, range_max=8.0, ranges=[0.27 + gap] * 21
+                    angle_min=-0.2, angle_increment=0.02, range_max=8.0, ranges=[0.24 + gap] * 21
                 )
             )
         commands.publish(command)
@@ -78,3 +79,21 @@ def test_a_foreign_command_is_stopped_before_a_wall_and_without_a_scan(
     graph.until(lambda: told[-1].linear.x == 0.0)
     command.linear.x = math.nan
     graph.until(lambda: passes(3.0) == 0.0)
+
+
+def test_a_base_that_goes_round_the_monitor_is_told_of_once(
+    graph: Any, capfd: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(collision_monitor_node, 'UNGUARDED_AFTER', 0.02)
+    graph.add(CollisionMonitor)
+    commands = graph.node.create_publisher(Twist, 'cmd_vel', 1)
+    command = Twist()
+    command.angular.z = 0.5
+    logged: list[str] = []
+
+    def warned() -> bool:
+        commands.publish(command)
+        logged.append(capfd.readouterr().err)
+        return 'the base is not guarded' in ''.join(logged)
+
+    graph.until(warned)

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from surveillance_controllers.geometry import Pose, composed, relative
-from surveillance_controllers.motion.localisation import Localiser, Scan
+from surveillance_controllers.geometry import Pose, Scan, composed, relative
+from surveillance_controllers.motion.localisation import Localiser
 from surveillance_controllers.planning.grid_map import GridMap
 
 POSES = st.tuples(st.floats(-5, 5), st.floats(-5, 5), st.floats(-3, 3))

@@ -35,10 +35,10 @@ def test_every_executable_of_the_packages_is_in_the_table():
         assert listed == sum(node.package == package for node in NODES), package
 
 
-def test_the_first_behaviour_needs_six_nodes_and_the_simulation_one_more():
+def test_the_first_behaviour_needs_six_nodes_and_the_simulation_two_more():
     assert set(names('RANDOM')) == SEED
     assert set(names('MANUAL')) == SEED
-    assert set(names('SIMULATED')) == SEED | {'simulator'}
+    assert set(names('SIMULATED')) == SEED | {'simulator', 'collision_monitor'}
 
 
 def test_the_patrol_adds_what_learns_the_place_from_markers():

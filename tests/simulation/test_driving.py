@@ -10,8 +10,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from surveillance_controllers import geometry
+from surveillance_controllers.geometry import Scan
 from surveillance_controllers.motion.driving import Drive, State
-from surveillance_controllers.motion.localisation import Scan
 from surveillance_controllers.motion.navigator import Navigator
 from surveillance_controllers.planning.grid_map import GridMap
 from surveillance_controllers.planning.grid_planning import GridPlanner, NoPathError

@@ -15,7 +15,7 @@ import endurance  # noqa: E402
 
 @pytest.mark.timeout(300)  # About 10 s of CPU, which a busy machine stretches.
 def test_minutes_of_trouble_cost_neither_collisions_nor_the_way_home() -> None:
-    watch, trouble = endurance.run(
+    watch, trouble, _ = endurance.run(
         ROOT / 'config' / 'seven_rooms.yaml', 150.0, seed=3, pause=(8.0, 20.0), log_level='info'
     )
     assert sum(trouble.made.values()) >= 5

@@ -123,6 +123,26 @@ def test_it_drives_on_command_and_stops_at_the_wall(graph: Any) -> None:
     assert truth[-1].pose.position.x > 0.27
 
 
+def test_a_base_behind_the_collision_monitor_obeys_nobody_else(graph: Any) -> None:
+    base = simulator(graph, **{'speed': 0.0}).robot.base
+    foreign = graph.node.create_publisher(Twist, 'cmd_vel', 1)
+    monitor = graph.node.create_publisher(Twist, 'cmd_vel_monitored', 1)
+    turn = Twist()
+    turn.angular.z = 1.0
+
+    def turned(commands: Any) -> bool:
+        commands.publish(turn)
+        return base.turn_speed != 0.0
+
+    graph.until(lambda: turned(foreign))
+    turn.angular.z = -1.0
+    graph.until(lambda: turned(monitor) and base.turn_speed < 0.0)
+    turn.angular.z = 1.0
+    odometry = graph.listen(Odometry, 'odom', SENSOR_QOS)
+    graph.until(lambda: (foreign.publish(turn), len(odometry) > 20)[1])
+    assert base.turn_speed <= 0.0
+
+
 def test_a_scan_is_measured_while_somebody_listens(graph: Any) -> None:
     simulator(graph)
     scans = graph.listen(LaserScan, 'scan', SENSOR_QOS)

@@ -11,19 +11,18 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
-from geometry_msgs.msg import PoseWithCovarianceStamped, TransformStamped, Twist
+from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid, Odometry
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import LaserScan, PointCloud2
 
 from surveillance_controllers import conversions
-from surveillance_controllers.geometry import Points, Pose, composed, point_of, relative
+from surveillance_controllers.geometry import Points, Pose, Scan, point_of
 from surveillance_controllers.motion.arrival import MotionFailedError
+from surveillance_controllers.motion.command_publisher import CommandPublisher
 from surveillance_controllers.motion.driving import Drive, Spin, State
-from surveillance_controllers.motion.localisation import Scan
 from surveillance_controllers.motion.navigator import Navigator
 from surveillance_controllers.motion.path_following import Velocity
-from surveillance_controllers.motion.sensor_age import WATCH_PERIOD, SensorAge
+from surveillance_controllers.motion.transforms import Transforms
 from surveillance_controllers.planning.grid_planning import NoPathError
 from surveillance_fsm import Interrupt
 from surveillance_interfaces.msg import DoorStates
@@ -32,16 +31,8 @@ from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 from surveillance_runtime.robot_base import ROBOT_DECELERATION
 
-BASE_FRAMES = ('base_link', 'base_footprint', '')
-"""Frames at the robot's centre."""
 POSE_PERIOD = 0.19
 """Least time between two messages on amcl_pose, seconds: with every second scan at 10 Hz."""
-
-
-try:
-    from tf2_msgs.msg import TFMessage
-except ImportError:
-    TFMessage = None
 
 
 class RobotBase:
@@ -78,15 +69,13 @@ class RobotBase:
         self._pose_sent = float('-inf')
         self._was_lost = False
         self._jumps = 0
-        self._commands = node.create_publisher(Twist, 'cmd_vel', 1)
+        self._base = CommandPublisher(
+            node, 'cmd_vel', ('scan', 'odom'), deceleration, self._warn_of_silence
+        )
         self._poses = node.create_publisher(PoseWithCovarianceStamped, 'amcl_pose', STATE_QOS)
         self._obstacles = node.create_publisher(PointCloud2, 'obstacles', STATE_QOS)
         self._tf = Transforms(node)
         self._mount = mount
-        self._age = SensorAge(('scan', 'odom'), deceleration)
-        self._wanted = Velocity()
-        self._silent = ''
-        node.create_timer(WATCH_PERIOD, self._watch)
         node.create_subscription(OccupancyGrid, 'map', self._on_map, STATE_QOS)
         node.create_subscription(DoorStates, 'door_states', self._on_doors, STATE_QOS)
         node.create_subscription(Odometry, 'odom', self._on_odometry, SENSOR_QOS)
@@ -181,7 +170,7 @@ class RobotBase:
             unsubscribe()
             with self._lock:
                 self._navigator.task = None
-                self._command(Velocity())
+                self._base.command(Velocity())
 
     def _await(self, condition: Callable[[], bool], interrupt: Interrupt) -> None:
         """Wait until a condition holds after a scan, or for the interrupt.
@@ -220,7 +209,7 @@ class RobotBase:
         with self._refusing('odom'):
             pose = conversions.pose_from(message.pose.pose)
             with self._lock:
-                self._age.hear('odom', self._now())
+                self._base.hear('odom')
                 self._navigator.move(pose)
 
     def _on_initial_pose(self, message: PoseWithCovarianceStamped) -> None:
@@ -239,10 +228,10 @@ class RobotBase:
         measured = seconds_of(stamp)
         with self._stepped:
             before = self.place
-            self._age.hear('scan', self._now())
+            self._base.hear('scan')
             velocity = self._navigator.see(scan, measured)
             if velocity is not None and self._navigator.task is not None:
-                self._command(velocity)
+                self._base.command(velocity)
                 if self._navigator.pose is not None:
                     self._on_step(self._navigator.pose)
             self._publish_pose(measured, stamp)
@@ -261,35 +250,8 @@ class RobotBase:
         except ValueError as error:
             self._node.get_logger().error(f'{topic}: {error}')
 
-    # --- a robot that sees nothing stands ---
-
-    def _command(self, velocity: Velocity) -> None:
-        self._wanted = velocity
-        self._publish_command(self._age.share(velocity.speed, self._now()))
-
-    def _publish_command(self, share: float) -> None:
-        wanted = self._wanted
-        velocity = Velocity(share * wanted.speed, share * wanted.turn)
-        self._commands.publish(conversions.twist_from(velocity))
-
-    def _now(self) -> float:
-        return float(self._node.get_clock().now().nanoseconds) / 1e9
-
-    def _watch(self) -> None:
-        with self._lock:
-            moving = self._wanted != Velocity()
-            if not (moving or self._silent):
-                return
-            now = self._now()
-            share = self._age.share(self._wanted.speed, now)
-            if moving and share < 1.0:
-                self._publish_command(share)
-            silent = self._age.left(now)[1] if share == 0.0 else ''
-            if silent:
-                self._wanted = Velocity()
-            if silent and not self._silent:
-                self._node.get_logger().warn(f'nothing on the topic {silent}: the robot stands')
-            self._silent = silent
+    def _warn_of_silence(self, topic: str) -> None:
+        self._node.get_logger().warn(f'nothing on the topic {topic}: the robot stands')
 
     def _publish_pose(self, measured: float, stamp: Any) -> None:
         navigator = self._navigator
@@ -321,68 +283,3 @@ class RobotBase:
             self._obstacles.publish(cloud)
         if navigator.odometry is not None:
             self._tf.tick(navigator.pose, navigator.odometry, stamp)
-
-
-class Transforms:
-    """What the robot's frames are to each other, where tf2_msgs is installed.
-
-    Publishes map -> odom on `tf`, and reads from `tf_static` where the lidar sits.
-
-    Args:
-        node: The node that localises.
-    """
-
-    def __init__(self, node: PatrolNode) -> None:
-        self._node = node
-        self._parents: dict[str, tuple[str, Pose]] = {}
-        self._unknown: set[str] = set()
-        self._publisher = None
-        if TFMessage is not None:
-            self._publisher = node.create_publisher(TFMessage, 'tf', 10)
-            latched = QoSProfile(
-                depth=100,
-                reliability=ReliabilityPolicy.RELIABLE,
-                durability=DurabilityPolicy.TRANSIENT_LOCAL,
-            )
-            node.create_subscription(TFMessage, 'tf_static', self._on_static, latched)
-
-    def tick(self, pose: Pose, odometry: Pose, stamp: Any) -> None:
-        """Publish the correction that leads from the odometry to the pose."""
-        if self._publisher is None:
-            return
-        # map <- odom = (map <- base) (base <- odom)
-        x, y, yaw = composed(pose, relative(odometry, (0.0, 0.0, 0.0)))
-        transform = TransformStamped(child_frame_id='odom')
-        transform.header.frame_id, transform.header.stamp = 'map', stamp
-        transform.transform.translation.x, transform.transform.translation.y = x, y
-        transform.transform.rotation = conversions.pose_message((x, y, yaw)).orientation
-        self._publisher.publish(TFMessage(transforms=[transform]))
-
-    def mount_of(self, frame: str) -> Pose:
-        """Return where a sensor's frame is on the robot; at its centre while nobody says."""
-        pose: Pose = (0.0, 0.0, 0.0)
-        at, passed = frame, 0
-        while at.rpartition('/')[2] not in BASE_FRAMES:
-            if at not in self._parents or passed > len(self._parents):
-                if frame not in self._unknown:
-                    self._unknown.add(frame)
-                    self._node.get_logger().warn(
-                        f'scan: where its frame {frame!r} is on the robot is not known: expected '
-                        f'it on tf_static below {BASE_FRAMES[0]}, or the parameter lidar_mount; '
-                        "it is taken for the robot's centre"
-                    )
-                return (0.0, 0.0, 0.0)
-            at, step = self._parents[at]
-            pose = composed(step, pose)
-            passed += 1
-        return pose
-
-    def _on_static(self, message: Any) -> None:
-        for each in message.transforms:
-            try:
-                pose = conversions.planar_from(each.transform)
-            except ValueError as error:
-                # Cameras and arms are tilted; only the lidar must not be.
-                self._node.get_logger().debug(f'tf_static: {each.child_frame_id}: {error}')
-                continue
-            self._parents[each.child_frame_id] = each.header.frame_id, pose

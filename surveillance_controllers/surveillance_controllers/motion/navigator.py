@@ -13,9 +13,9 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
-from surveillance_controllers.geometry import Points, Pose, in_map, relative
+from surveillance_controllers.geometry import Points, Pose, Scan, in_map, relative
 from surveillance_controllers.motion.driving import Drive, Spin
-from surveillance_controllers.motion.localisation import LocalisationParameters, Localiser, Scan
+from surveillance_controllers.motion.localisation import LocalisationParameters, Localiser
 from surveillance_controllers.motion.obstacle_memory import ObstacleMemory
 from surveillance_controllers.motion.path_following import Velocity
 from surveillance_controllers.motion.place_regions import PlaceRegions, Segment

@@ -12,8 +12,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from surveillance_controllers.geometry import Points, Pose, composed, in_map
-from surveillance_controllers.motion.localisation import Scan
+from surveillance_controllers.geometry import Points, Pose, Scan, composed, in_map
 from surveillance_controllers.planning.grid_map import GridMap, distance_to
 
 

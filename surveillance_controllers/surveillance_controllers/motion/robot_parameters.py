@@ -11,6 +11,7 @@ from surveillance_controllers.controller_parameters import MotionSettings
 from surveillance_controllers.geometry import Points, Pose
 from surveillance_controllers.motion.path_following import DriveParameters
 from surveillance_controllers.motion.place_regions import Segment, door_segment
+from surveillance_controllers.motion.transforms import lidar_mount
 from surveillance_controllers.planning.grid_planning import PlanningParameters
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import Described, ParameterError, declare_fields
@@ -132,21 +133,3 @@ def robot_settings(node: PatrolNode, motion: MotionSettings) -> RobotSettings:
         ),
         lidar_mount=lidar_mount(node),
     )
-
-
-def lidar_mount(node: PatrolNode) -> Pose | None:
-    """Declare where the lidar sits on the robot; None: `tf_static` says it.
-
-    Raises:
-        ParameterError: A value is of the wrong type.
-    """
-    given: list[float] = node.parameter(
-        'lidar_mount',
-        [],
-        'Where the lidar sits on the robot: x, y in metres, yaw in radians; empty: as '
-        "tf_static says of the scan's frame.",
-        of=float,
-        check=lambda values: None if len(values) in (0, 3) else 'three numbers: x, y, yaw',
-        read_only=True,
-    )
-    return (given[0], given[1], given[2]) if given else None

@@ -16,8 +16,6 @@ STANDSTILL = 0.3
 """The robot stands this long after the first message that did not come, seconds."""
 REACTION = 0.05
 """Time between a decision and the base's obedience, seconds."""
-WATCH_PERIOD = 0.02
-"""Time between two looks at the age of what was heard, seconds."""
 LONGEST_PERIOD = 0.25
 """A sensor that is slower than this lets the robot drive slowly, or not at all; seconds."""
 _COUNT = 10
@@ -56,6 +54,10 @@ class SensorAge:
             (at + min(fmean(intervals), LONGEST_PERIOD) + self._standstill - now, topic)
             for topic, (at, intervals) in self._heard.items()
         )
+
+    def seconds_to_brake(self, speed: float, now: float) -> float:
+        """Return after how long a robot of some speed, m/s, must brake if nothing is heard."""
+        return self.left(now)[0] - REACTION - abs(speed) / self._deceleration
 
     def share(self, speed: float, now: float) -> float:
         """Return the part of a wanted speed, m/s, that the robot may drive with, 0 to 1."""

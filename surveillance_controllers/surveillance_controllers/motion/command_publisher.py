@@ -1,0 +1,97 @@
+"""Publishes velocity commands, limited by the age of what the robot's sensors told.
+
+A new command goes out at once. When a message is overdue, the last command goes out again and
+again, slower each time, until the robot stands.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterable
+
+from geometry_msgs.msg import Twist
+
+from surveillance_controllers import conversions
+from surveillance_controllers.motion.path_following import Velocity
+from surveillance_controllers.motion.sensor_age import STANDSTILL, SensorAge
+from surveillance_runtime.node import PatrolNode
+
+WATCH_PERIOD = 0.01
+"""Time between two commands of a robot that is stopped, seconds."""
+LEAD = 0.03
+"""Such a command is for this much later, seconds: a base that waits for a late one loses time that
+it cannot make up, since it brakes as hard as it can."""
+
+
+class CommandPublisher:
+    """The only publisher of a node's velocity commands; may be used from any thread.
+
+    Args:
+        node: The node that commands.
+        topic: Of the commands, geometry_msgs/Twist.
+        heard: Topics without which the robot stands; `hear` is to be told of their messages.
+        deceleration: With which the base brakes when it must, m/s^2.
+        on_silence: Told the topic for whose silence the robot stands, once until it drives again.
+        standstill: The robot stands this long after the first message that did not come, seconds.
+
+    Attributes:
+        wanted: The last command, before it was limited.
+    """
+
+    def __init__(
+        self,
+        node: PatrolNode,
+        topic: str,
+        heard: Iterable[str],
+        deceleration: float,
+        on_silence: Callable[[str], None],
+        standstill: float = STANDSTILL,
+    ) -> None:
+        self._clock = node.get_clock()
+        self._on_silence = on_silence
+        self._age = SensorAge(heard, deceleration, standstill)
+        self._lock = threading.Lock()
+        self._publisher = node.create_publisher(Twist, topic, 1)
+        self._timer = node.create_timer(WATCH_PERIOD, self._limit_again, autostart=False)
+        self._silent = ''
+        self.wanted = Velocity()
+
+    def hear(self, topic: str) -> None:
+        """Note that a message of a topic has come."""
+        with self._lock:
+            self._age.hear(topic, self._now())
+
+    def command(self, velocity: Velocity) -> None:
+        """Publish a command as far as the age of what was heard allows it."""
+        with self._lock:
+            self.wanted = velocity
+            self._publish(self._now())
+            self._watch()
+
+    def _limit_again(self) -> None:
+        with self._lock:
+            now = self._now()
+            if self._age.share(self.wanted.speed, now) < 1.0:
+                self._publish(now + LEAD)
+            self._watch()
+
+    def _publish(self, now: float) -> None:
+        share = self._age.share(self.wanted.speed, now)
+        limited = Velocity(share * self.wanted.speed, share * self.wanted.turn)
+        self._publisher.publish(conversions.twist_from(limited))
+        silent = self._age.left(now)[1] if share == 0.0 and self.wanted != Velocity() else ''
+        if silent and not self._silent:
+            self._on_silence(silent)
+        self._silent = silent
+
+    def _watch(self) -> None:
+        """Look again when the speed must fall."""
+        if self.wanted == Velocity() or self._silent:
+            self._timer.cancel()
+            return
+        wait = self._age.seconds_to_brake(self.wanted.speed, self._now())
+        self._timer.timer_period_ns = int(1e9 * max(wait, WATCH_PERIOD))
+        self._timer.reset()
+
+    def _now(self) -> float:
+        return float(self._clock.now().nanoseconds) / 1e9
