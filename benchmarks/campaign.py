@@ -411,14 +411,13 @@ class Campaign:
             list(pool.map(await_return, names))
 
     def _outage(self, name: str, began: float, answered: float) -> Outage:
-        seen = self.launcher.steps[name]
-        # A step whose line was not read yet took no time of its own.
-        moments, last = {}, began
+        seen = {**self.launcher.steps[name], 'answers': answered}
+        steps, last = {}, began
         for step in (*STEPS, 'answers'):
-            last = min(answered, max(last, seen.get(step, last)))
-            moments[step] = answered if step == 'answers' else last
-        before = [began, *moments.values()]
-        return Outage(name, {step: at - before[i] for i, (step, at) in enumerate(moments.items())})
+            # A step whose line was not read yet took no time of its own.
+            at = min(answered, max(last, seen.get(step, last)))
+            steps[step], last = at - last, at
+        return Outage(name, steps)
 
     def _second_opinion(self, name: str) -> str:
         """Return whether a node that seems to be away is: somebody new asks it, too."""
