@@ -13,6 +13,8 @@ BUSY_AFTER = 3.5
 """The same for one that computes, of its own processor time: an endless loop."""
 STARVED_AFTER = 20.0
 """The same for one that gets little processor time, on a busy machine."""
+IDLE_AFTER = 1.0
+"""Seconds without processor time after which a process does nothing, as far as one can see."""
 SILENT_START = 90.0
 """Seconds that a process may take until its first heartbeat."""
 BEAT = 'LAUNCH_HEARTBEAT'
@@ -49,32 +51,46 @@ def look_at(pid: int) -> Look | None:
     return Look(fields[0], (int(fields[11]) + int(fields[12])) / ticks, int(fields[21]) * _PAGE)
 
 
+class Activity:
+    """How long a process has done nothing.
+
+    One that gets no processor time on a busy machine is ready to run, or waits for a device: it
+    does something.
+    """
+
+    def __init__(self) -> None:
+        self._since = self._cpu = 0.0
+        self._begun = False
+
+    def idle(self, now: float, look: Look) -> float:
+        """Take a look, and return for how many seconds the process has done nothing."""
+        used, least = look.cpu - self._cpu, _LEAST_SHARE * (now - self._since)
+        if not self._begun or look.state in ('R', 'D') or used > least:
+            self._begun, self._since, self._cpu = True, now, look.cpu
+        return now - self._since
+
+
 class Heartbeats:
     """Judges one process by its heartbeats and by what the kernel says of it.
-
-    A process that gets no processor time on a busy machine is waited for: it is ready to run.
 
     Args:
         now: Steady time, seconds.
     """
 
     def __init__(self, now: float) -> None:
-        self._last = now
         self._beats = 0
-        self._cpu: float | None = None
-        self._idle_since: float | None = None
-        self._cpu_at_beat: float | None = None
+        self.excuse(now)
 
     def beat(self, now: float) -> None:
         """Note a heartbeat."""
-        self._last = now
         self._beats += 1
-        self._cpu = self._idle_since = self._cpu_at_beat = None
+        self.excuse(now)
 
     def excuse(self, now: float) -> None:
         """Begin to count anew: the watcher itself did not run."""
         self._last = now
-        self._cpu = self._idle_since = self._cpu_at_beat = None
+        self._activity = Activity()
+        self._cpu_at_beat: float | None = None
 
     def problem(self, now: float, look: Look | None) -> str:
         """Return why the process is to be ended, empty while it is not."""
@@ -89,12 +105,8 @@ class Heartbeats:
             return f'was stopped {quiet:.1f} s ago'
         if not self._beats:
             return f'did not come up in {SILENT_START:g} s' if quiet >= SILENT_START else ''
-        if self._cpu is None or self._idle_since is None:
-            self._cpu, self._idle_since = look.cpu, now
-        used, least = look.cpu - self._cpu, _LEAST_SHARE * (now - self._idle_since)
-        if look.state in ('R', 'D') or used > least:
-            self._cpu, self._idle_since = look.cpu, now
-        stuck = quiet >= STUCK_AFTER and now - self._idle_since >= 1.0
+        idle = self._activity.idle(now, look)
+        stuck = quiet >= STUCK_AFTER and idle >= IDLE_AFTER
         loops = look.cpu - self._cpu_at_beat >= BUSY_AFTER
         if stuck or loops or quiet >= STARVED_AFTER:
             return f'hangs: no heartbeat for {quiet:.1f} s'

@@ -18,7 +18,15 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from launcher.log_merge import MergedLog
-from launcher.process_watch import BEAT, FINISHED, Heartbeats, look_at, shown
+from launcher.process_watch import (
+    BEAT,
+    FINISHED,
+    IDLE_AFTER,
+    Activity,
+    Heartbeats,
+    look_at,
+    shown,
+)
 from launcher.service import notify
 
 PAUSES = (0.1, 0.5, 1.0, 2.0, 4.0, 8.0, 15.0, 30.0)
@@ -35,8 +43,11 @@ STEADY_AFTER = 20.0
 """A process that ran this long, in seconds, starts again from the first pause."""
 STOP_LEADERS_WITHIN = 1.2
 """Seconds that the processes which use the others have before those are told to stop as well."""
-STOP_WITHIN = 2.5
-"""Seconds until whatever is left is killed."""
+STOP_WITHIN, STOP_AT_MOST = 2.5, 12.0
+"""Seconds until whatever is left and does nothing is killed, and until all that is left is."""
+STOP_AGAIN_AFTER = 0.5
+"""Seconds from a stop signal on which another one kills all that is left; one Ctrl-C may come as
+two signals."""
 LOOK_PERIOD = 0.5
 """Seconds between two looks at the heartbeats and the memory of the processes."""
 TROUBLE_AFTER = 5
@@ -88,6 +99,7 @@ class Child:
     coming_up: bool = False
     finished: bool = False
     heartbeats: Heartbeats | None = None
+    activity: Activity = field(default_factory=Activity)
     ended_for: str = ''
     rest: bytes = field(default=b'', repr=False)
 
@@ -131,6 +143,7 @@ class Supervisor:
         self._look_at = math.inf
         self._selector = selectors.DefaultSelector()
         self._stopping_since: float | None = None
+        self._stop_at_once = False
         self._code = 0
         self.time_is_over = False
 
@@ -389,7 +402,7 @@ class Supervisor:
             if not all(child.told_to_stop for child in running):
                 times.append(self._stopping_since + STOP_LEADERS_WITHIN)
             if not all(child.killed for child in running):
-                times.append(self._stopping_since + STOP_WITHIN)
+                times.append(time.monotonic() + LOOK_PERIOD)
         elif end is not None:
             times.append(end)
         if self._stopping_since is None and any(c.heartbeats for c in self.children.values()):
@@ -407,17 +420,23 @@ class Supervisor:
                 child.process.terminate()
 
     def _keep_stopping(self, now: float) -> None:
-        """Go on with a stop: leaders first, then the rest, at last by force."""
+        """Go on with a stop: leaders first, then the rest, at last by force.
+
+        On a busy machine an orderly end takes long: who still does something is waited for.
+        """
         since = self._stopping_since
         if since is None:
             return
         running = [child for child in self.children.values() if child.process is not None]
         if now >= since + STOP_LEADERS_WITHIN or not any(c.program.leads for c in running):
             self._tell_to_stop(leaders_only=False)
-        if now < since + STOP_WITHIN:
-            return
         for child in running:
-            if child.process is not None and not child.killed:
+            if child.process is None or child.killed:
+                continue
+            look = look_at(child.process.pid)
+            works = look is not None and child.activity.idle(now, look) < IDLE_AFTER
+            allowed = STOP_AT_MOST if works else STOP_WITHIN
+            if self._stop_at_once or now >= since + allowed:
                 self._log.warn(f'{child.program.name} did not end in time: killed')
                 child.killed = True
                 _kill_group(child.process.pid)
@@ -450,9 +469,13 @@ class Supervisor:
 
         def on_signal() -> None:
             for number in reader.recv(4096):
-                if number in _STOP_SIGNALS and self._stopping_since is None:
+                if number not in _STOP_SIGNALS:
+                    continue
+                if self._stopping_since is None:
                     self._log.say(f'{signal.Signals(number).name}: stopping')
                     self.stop()
+                elif time.monotonic() - self._stopping_since >= STOP_AGAIN_AFTER:
+                    self._stop_at_once = True
 
         def nothing(_number: int, _frame: object) -> None:
             pass

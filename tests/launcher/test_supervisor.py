@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from launcher.supervisor import describe_exit
+from launcher.supervisor import STOP_AGAIN_AFTER, STOP_AT_MOST, STOP_WITHIN, describe_exit
 from tests.launcher.conftest import ROOT, gone
 
 DRIVER = str(Path(__file__).with_name('supervised.py'))
@@ -42,18 +42,51 @@ def test_a_stop_signal_ends_all_and_counts_as_wanted(start, number):
     assert f'{number.name}: stopping' in '\n'.join(launch.lines)
 
 
-def test_a_child_that_heeds_no_signal_is_killed_within_three_seconds(start):
+def test_a_child_that_heeds_no_signal_and_does_nothing_is_killed(start):
     launch = start(DRIVER, f'deaf={STUBBORN}', f'grown={PARENT}', environ=ENVIRON)
     deaf = int(launch.until(r'started deaf \(process (\d+)\)')[1])
     launch.until(r'deaf +\| up')
     grandchild = int(launch.until(r'grandchild (\d+)')[1])
-    launch.process.send_signal(signal.SIGINT)
-    launch.until('stopping')
-    code, seconds = launch.end(signal.SIGINT)  # a second Ctrl-C changes nothing
+    code, seconds = launch.end(signal.SIGINT)
     assert code == 0
-    assert seconds < 3
+    assert 2 < seconds < STOP_AT_MOST
     assert gone([deaf, grandchild], 1)
     assert 'deaf did not end in time: killed' in '\n'.join(launch.lines)
+    assert 'Traceback' not in '\n'.join(launch.lines)
+
+
+WORKING = STUBBORN.replace('signal.pause()', 'pass')
+
+
+def test_a_child_that_still_works_at_a_stop_is_waited_for(start):
+    last_words = (
+        'import signal, time\n'
+        'stops = []\n'
+        'signal.signal(signal.SIGTERM, lambda *_: stops.append(1))\n'
+        'print("up", flush=True)\n'
+        'while not stops: signal.pause()\n'
+        f'end = time.monotonic() + {STOP_WITHIN + 1.0}\n'
+        'while time.monotonic() < end: pass\n'
+        'print("all is written", flush=True)'
+    )
+    launch = start(DRIVER, f'slow={last_words}', environ=ENVIRON)
+    launch.until(r'slow +\| up')
+    assert launch.end(signal.SIGINT)[0] == 0
+    assert 'all is written' in '\n'.join(launch.lines)
+    assert 'killed' not in '\n'.join(launch.lines)
+
+
+def test_another_ctrl_c_ends_at_once_but_not_the_echo_of_the_first(start):
+    launch = start(DRIVER, f'deaf={WORKING}', environ=ENVIRON)
+    launch.until(r'deaf +\| up')
+    for _ in range(2):
+        launch.process.send_signal(signal.SIGINT)
+    launch.until('stopping')
+    with pytest.raises(subprocess.TimeoutExpired):
+        launch.process.wait(2 * STOP_AGAIN_AFTER)
+    code, seconds = launch.end(signal.SIGINT)
+    assert code == 0
+    assert seconds < STOP_AT_MOST / 2
     assert 'Traceback' not in '\n'.join(launch.lines)
 
 
