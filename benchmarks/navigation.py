@@ -41,7 +41,8 @@ from scipy.sparse.csgraph import dijkstra
 from skimage.graph import MCP_Geometric
 from whole_stack import ROOT, Stack, ros_arguments
 
-from launcher import run
+from launcher.run import Run
+from launcher.run_processes import command, node_environ
 from surveillance_behaviour.policy.leg_times import PERCENTILE_99, LegTimes
 from surveillance_controllers import geometry
 from surveillance_controllers.geometry import Scan
@@ -613,10 +614,10 @@ def processes(seconds: float) -> tuple[float, float, float]:
     with tempfile.TemporaryDirectory() as folder:
         arguments = ros_arguments(ROOT / 'config' / 'seven_rooms.yaml', Path(folder))
         arguments += ['--log-level', 'fatal']
-        environ = run.node_environ(run.Run(domain=domain))
+        environ = node_environ(Run(domain=domain))
         try:
             for each in node_table.select('SIMULATED'):
-                words = run.command([each], arguments, os.getpid())
+                words = command([each], arguments, os.getpid())
                 started.append(subprocess.Popen(words, env=environ))
             _await(lambda: poses and _driven(poses) > 1.0, 90.0)
             first, used, begun = len(poses), _cpu(started), time.monotonic()

@@ -106,7 +106,8 @@ def _run(argv: list[str]) -> int:
     options = make_parser().parse_args(argv)
     node_table.select('RANDOM', only=options.only, without=options.without)
     _enter(['run', *argv])
-    from launcher.run import resumed, run_mission
+    from launcher.run import resumed
+    from launcher.run_mission import run_mission
 
     run, folder = wanted_run(options), None
     if options.resume is not None:
@@ -148,26 +149,26 @@ def _node(argv: list[str]) -> int:
     options = parser.parse_args(own)
     node = node_table.find(options.name)
     _enter(['node', *argv])
-    from launcher import run as runs
+    from launcher import run_configuration, run_processes
     from surveillance_runtime.configuration import split_arguments
     from surveillance_runtime.run_parameters import full_name
 
     run = wanted_run(options)
     run.check()
     given = split_arguments(rest)
-    merged = runs.configuration(CONFIG, run, more=given)
-    runs.check_assignments(merged, [node])
+    merged = run_configuration.configuration(CONFIG, run, more=given)
+    run_configuration.check_assignments(merged, [node])
     renamed = any('__ns:=' in word or '__node:=' in word for word in rest)
     name = given.full_name(node.name) if renamed else full_name(run.namespace, node.name)
-    file = runs.parameters_in_memory(name, merged.resolve(node.name, name))
-    arguments = runs.ros_arguments([file], run)
+    file = run_configuration.parameters_in_memory(name, merged.resolve(node.name, name))
+    arguments = run_processes.ros_arguments([file], run)
     arguments += [word for word in given.rest if word not in ('--ros-args', '--')]
     if not renamed:
-        for descriptor in claim([node], runs.ros_domain(run), run.namespace):
+        for descriptor in claim([node], run_processes.ros_domain(run), run.namespace):
             os.set_inheritable(descriptor, True)
-    words = runs.command([node], arguments, 0)
+    words = run_processes.command([node], arguments, 0)
     _hold_stop_signals_back()
-    os.execve(words[0], words, runs.node_environ(run))
+    os.execve(words[0], words, run_processes.node_environ(run))
 
 
 def _split(argv: list[str], word: str) -> tuple[list[str], list[str]]:
@@ -200,8 +201,7 @@ def _params(argv: list[str]) -> int:
     options = parser.parse_args(argv)
     chosen = [node_table.find(options.name)] if options.name else list(node_table.NODES)
     _enter(['params', *argv])
-    from launcher import parameter_tables
-    from launcher import run as runs
+    from launcher import parameter_tables, run_configuration
 
     if options.write:
         for path in parameter_tables.write(CHECKOUT):
@@ -209,8 +209,8 @@ def _params(argv: list[str]) -> int:
         return 0
     run = wanted_run(options)
     run.check()
-    merged = runs.configuration(CONFIG, run)
-    runs.check_assignments(merged, chosen)
+    merged = run_configuration.configuration(CONFIG, run)
+    run_configuration.check_assignments(merged, chosen)
     namespace = (run.namespace or '').strip('/')
     parameter_tables.show(merged, chosen, f'/{namespace}' if namespace else '', print)
     return 0

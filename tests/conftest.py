@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import pytest
 
-from launcher.run import LOCAL_ROS
+from launcher.run_processes import LOCAL_ROS
 from surveillance_runtime.testing import claim_domain
 
 T = TypeVar('T')

@@ -8,7 +8,8 @@ import signal
 import pytest
 
 from launcher.instance_lock import claim, runtime_folder
-from launcher.run import Run, ros_domain
+from launcher.run import Run
+from launcher.run_processes import ros_domain
 from launcher.system import LaunchError
 from surveillance_runtime.node_table import select
 

@@ -15,7 +15,8 @@ from typing import Any
 
 import pytest
 
-from launcher.run import Run, configuration
+from launcher.run import Run
+from launcher.run_configuration import configuration
 from surveillance_runtime.configuration import Configuration, file_layer
 from surveillance_runtime.node_table import BEHAVIOURS, MODES, find, select
 from surveillance_runtime.parameters import ParameterError

@@ -15,27 +15,12 @@ import yaml
 from launcher.cli import CONFIG, wanted_run
 from launcher.log_merge import MergedLog
 from launcher.options import make_parser
-from launcher.run import (
-    MARKERS,
-    NETWORK_ROS,
-    PAGE,
-    RECORDER,
-    LaunchError,
-    Run,
-    alarm_caller,
-    check_assignments,
-    command,
-    configuration,
-    node_environ,
-    options_of,
-    resumed,
-    ros_arguments,
-    run_from,
-    summary,
-    watch_command,
-    with_mode_of,
-)
+from launcher.run import MARKERS, PAGE, RECORDER, Run, options_of, resumed, run_from
+from launcher.run_configuration import check_assignments, configuration, with_mode_of
 from launcher.run_folder import RunState, make_folder
+from launcher.run_mission import alarm_caller, summary, watch_command
+from launcher.run_processes import NETWORK_ROS, command, node_environ, ros_arguments
+from launcher.system import LaunchError
 from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_runtime.node_table import DEFAULT_MODE
 from surveillance_runtime.run_parameters import place_file, run_layers, write_parameters

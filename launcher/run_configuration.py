@@ -1,0 +1,162 @@
+"""The parameters of the nodes of a run, merged from all that gives them and checked."""
+
+from __future__ import annotations
+
+import os
+import secrets
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from launcher.run import PAGE, RECORDER, Run
+from launcher.system import LaunchError
+from surveillance_runtime import node_table
+from surveillance_runtime.configuration import (
+    Configuration,
+    Entry,
+    RosArguments,
+    Setting,
+    argument_layer,
+    resolved_text,
+)
+from surveillance_runtime.parameters import ParameterError
+from surveillance_runtime.run_parameters import (
+    BEHAVIOUR_NODE,
+    for_node,
+    full_name,
+    mode_entries,
+    record_entries,
+    run_layers,
+)
+from surveillance_runtime.yaml_file import YamlFileError
+
+RECORD = 'mission.jsonl'
+ONTOLOGIES = 'ontologies'
+STORE = 'armor_store'
+RECORDING = 'recording'
+
+
+def configuration(
+    config: Path, run: Run, folder: Path | None = None, more: RosArguments | None = None
+) -> Configuration:
+    """Merge all that gives parameters to the nodes of a run; each entry and the place are checked.
+
+    Args:
+        config: The folder with the parameter files.
+        run: What the command line asks for.
+        folder: Where the run leaves its record, its ontologies and their store.
+        more: Further arguments in ROS's own form.
+
+    Raises:
+        LaunchError: One line about the first entry that is wrong.
+    """
+    try:
+        merged = _merged(config, run, folder, more)
+        merged.check()
+        merged.place('simulator', full_name(run.namespace, 'simulator'))
+        _check_behaviour(merged, run)
+    except YamlFileError as error:
+        raise LaunchError(f'parameter file {error}') from None
+    except ParameterError as error:
+        raise LaunchError(str(error)) from None
+    return merged
+
+
+def _merged(
+    config: Path, run: Run, folder: Path | None, more: RosArguments | None
+) -> Configuration:
+    files = [run.parameters] if run.parameters is not None else []
+    layers = run_layers(
+        config,
+        run.behaviour,
+        place=run.place,
+        chosen=_folders_of(folder.resolve()) if folder is not None else (),
+        files=[*files, *(Path(file) for file in (more.files if more else ()))],
+        options=_option_entries(run, folder),
+    )
+    assignments = (*run.assignments, *(more.assignments if more else ()))
+    return Configuration((*layers, argument_layer(assignments)))
+
+
+def _folders_of(folder: Path) -> Iterator[Entry]:
+    """Yield where the nodes of a run write, if the user's file names no other place."""
+    for name, part in (('ontologies_folder', ONTOLOGIES), ('store', STORE)):
+        yield for_node('armor_server', name, str(folder / part), 'this run')
+    for node in ('battery_controller', 'motion_controller', 'simulator'):
+        yield for_node(node, 'state_file', str(folder / f'{node}.json'), 'this run')
+
+
+def _option_entries(run: Run, folder: Path | None) -> Iterator[Entry]:
+    """Yield what the options say as parameters, for the nodes that they concern."""
+    if folder is not None:
+        yield from record_entries(folder / RECORD)
+        yield from _observer_entries(run, folder)
+    # Without one that was asked for, the mode is what the parameter files say.
+    if run.mode:
+        # In a whole run one console reads for all.
+        yield from mode_entries(run.mode, prompts=run.mode != 'MANUAL' or folder is None)
+
+
+def _observer_entries(run: Run, folder: Path) -> Iterator[Entry]:
+    """Yield what the recorder and the page are told."""
+    yield for_node(RECORDER, 'folder', str(folder / RECORDING), 'this run')
+    yield for_node(RECORDER, 'keep', float(run.keep), '--keep')
+    if run.web or run.web_control:
+        yield for_node(PAGE, 'control', run.web_control, '--web-control')
+        # Made here, so that a page that is started again keeps it.
+        yield for_node(PAGE, 'token', secrets.token_urlsafe(24), 'this run')
+    if run.web_address is not None:
+        host, _, port = run.web_address.rpartition(':')
+        yield for_node(PAGE, 'host', host.strip('[]') or '127.0.0.1', '--web-address')
+        yield for_node(PAGE, 'port', int(port), '--web-address')
+
+
+def _check_behaviour(merged: Configuration, run: Run) -> None:
+    given = merged.resolve(BEHAVIOUR_NODE, full_name(run.namespace, BEHAVIOUR_NODE)).get(
+        'behaviour'
+    )
+    if given is not None and given.value != run.behaviour:
+        raise LaunchError(
+            f'{given.origin}: behaviour {given.value}, but the run is one of {run.behaviour}: '
+            f'expected --behaviour {given.value}, which starts its nodes too'
+        )
+
+
+def check_assignments(merged: Configuration, nodes: Sequence[node_table.Node]) -> None:
+    """Make sure that each `-p` is for a node that is started.
+
+    Raises:
+        LaunchError: One would be ignored.
+    """
+    for entry in merged.layers[-1].entries:
+        takers = [
+            node.name
+            for node in nodes
+            if merged.schema[node.name].takes(entry.name)
+            and (entry.rank == 0 or entry.pattern.rsplit('/', 1)[-1] in (node.name, '*', '**'))
+        ]
+        if not takers:
+            names = ', '.join(node.name for node in nodes)
+            raise LaunchError(f'{entry.origin}: no node that is started takes it: {names}')
+
+
+def with_mode_of(run: Run, merged: Configuration) -> Run:
+    """Return the run, where none was asked for with the mode that all controllers are given."""
+    if run.mode:
+        return run
+    modes = set()
+    for node in node_table.NODES:
+        if node.name in node_table.RUN_NODES and node.console:
+            setting = merged.resolve(node.name, full_name(run.namespace, node.name)).get(
+                'execution_mode'
+            )
+            modes.add(setting.value if setting is not None else node_table.DEFAULT_MODE)
+    mode = modes.pop()
+    return run if modes or mode == node_table.DEFAULT_MODE else replace(run, mode=mode)
+
+
+def parameters_in_memory(name: str, settings: Mapping[str, Setting]) -> Path:
+    """Return a file with a node's parameters that lives as long as this process."""
+    descriptor = os.memfd_create('parameters', 0)
+    os.write(descriptor, resolved_text(name, settings).encode())
+    return Path(f'/proc/self/fd/{descriptor}')

@@ -1,0 +1,176 @@
+"""One run from its start to its summary."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shlex
+import shutil
+import subprocess
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from launcher import run_folder
+from launcher.instance_lock import claim
+from launcher.log_merge import MergedLog
+from launcher.run import NOT_RECORDED, Run, options_of
+from launcher.run_configuration import RECORD, check_assignments, configuration, with_mode_of
+from launcher.run_processes import COMPOSED, node_environ, programs_of, ros_domain
+from launcher.supervisor import Supervisor
+from surveillance_behaviour.mission import mission_log
+from surveillance_runtime import node_table
+from surveillance_runtime.run_parameters import BEHAVIOUR_NODE, place_file, write_parameters
+
+PLACE = 'place.yaml'
+NOTHING_RECORDED = 'Mission: nothing was recorded.'
+EXIT_NOTHING_DONE = 1
+"""The exit code of a run that had all its time and in which the mission did not begin."""
+HELP = 'waiting for help: '
+"""What the behaviour says when it needs somebody."""
+
+
+def run_mission(run: Run, config: Path, runs: Path, resume: Path | None = None) -> int:
+    """Start the nodes, supervise them to the end, print the summary; return the exit code."""
+    run.check()
+    merged = configuration(config, run)  # before anything is written
+    run = with_mode_of(run, merged)
+    nodes = run.nodes()
+    observers = run.observers()
+    check_assignments(merged, (*nodes, *observers))
+    claims = claim(nodes, ros_domain(run), run.namespace)
+    if run.record not in (None, NOT_RECORDED):
+        runs = Path(run.record)
+    folder, how = _chosen_folder(run, runs, resume)
+    deleted = run_folder.prune(runs, run.keep * 1e9)
+    state = run_folder.RunState(folder, options_of(run))
+    merged = configuration(config, run, folder)
+    everyone = (*nodes, *observers)
+    files = write_parameters(folder / 'parameters', run.namespace, merged, everyone)
+    programs = programs_of(run, nodes, observers, files, node_environ(run, folder / 'ros'))
+    place = place_file(config, run.behaviour, run.place)
+    shutil.copyfile(place, folder / PLACE)
+    names = [*(node.name for node in everyone), *([COMPOSED] if run.composed else [])]
+    log = MergedLog(None, names, path=folder / 'launch.log')
+    log.say(
+        f'{run.behaviour} in mode {run.mode or node_table.DEFAULT_MODE}, '
+        f'place {place.name}, '
+        f'ROS domain {ros_domain(run)}, files in {_short(folder)}'
+    )
+    if how:
+        log.say(how)
+    for old in deleted:
+        log.say(f'deleted {_short(old)}: the runs take more than --keep {run.keep:g} GB')
+    if run.network:
+        log.say('nodes of other machines are heard: see docs/security.md')
+    log.say(f'watch it in a second terminal: {watch_command(run)}')
+    call = alarm_caller(run.alarm, log)
+    log.listen(lambda name, text: call(text) if name == BEHAVIOUR_NODE and HELP in text else None)
+    code = _supervised(run, nodes, Supervisor(programs, log, on_trouble=call), folder, log)
+    for line in what_to_look_at(folder):
+        log.plain(line)
+    log.close()
+    state.end()
+    for descriptor in claims:
+        os.close(descriptor)
+    return code
+
+
+def _chosen_folder(run: Run, runs: Path, resume: Path | None) -> tuple[Path, str]:
+    """Return the folder to work in, and what there is to say about it."""
+    if resume is not None:
+        return resume, f'going on with {_short(resume)}'
+    found = run_folder.latest(runs) if not run.fresh else None
+    if found is not None and not found.ended and not found.running:
+        same = {**found.options, 'seconds': None} == {**options_of(run), 'seconds': None}
+        if same:
+            how = 'whose launcher was killed; --fresh begins anew'
+            return found.folder, f'going on with {_short(found.folder)}, {how}'
+    return run_folder.make_folder(runs), ''
+
+
+def alarm_caller(alarm: str, log: MergedLog) -> Callable[[str], None]:
+    """Return what calls somebody: it runs the user's command with one line as its argument."""
+
+    def call(text: str) -> None:
+        if not alarm:
+            return
+        try:
+            subprocess.Popen(
+                [*shlex.split(alarm), text],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+                start_new_session=True,
+            )
+        except (OSError, ValueError) as error:
+            log.error(f'--alarm {alarm}: {error}')
+
+    return call
+
+
+def _supervised(
+    run: Run,
+    nodes: Sequence[node_table.Node],
+    supervisor: Supervisor,
+    folder: Path,
+    log: MergedLog,
+) -> int:
+    """Run the processes to the end, print the summary; return the exit code."""
+    console = None
+    if any(node.name == node_table.CONSOLE for node in nodes):
+        from launcher.console import OperatorConsole
+
+        reader = COMPOSED if run.composed else node_table.CONSOLE
+        console = OperatorConsole(supervisor, log, reader)
+        console.start()
+    try:
+        code = supervisor.run(run.seconds)
+    finally:
+        if console is not None:
+            console.stop()
+    if any(node.name == BEHAVIOUR_NODE for node in nodes):
+        done = summary(folder / RECORD)
+        log.plain(done)
+        if supervisor.time_is_over and done == NOTHING_RECORDED:
+            code = code or EXIT_NOTHING_DONE
+    return code
+
+
+def what_to_look_at(folder: Path) -> list[str]:
+    """Write the report of a run; return where it is, and how to replay the run."""
+    from surveillance_operator.recording import RecordingError, timeline
+    from surveillance_operator.report import write_report
+
+    lines = []
+    with contextlib.suppress(RecordingError):  # nothing was visited: the summary says so
+        lines.append(f'report: {_short(write_report(folder))}')
+    if (folder / timeline.NAME).exists():
+        lines.append(f'replay: python3 launch.py replay {_short(folder)}')
+    return lines
+
+
+def watch_command(run: Run) -> str:
+    """Return what to type in another terminal to see this run."""
+    words = ['python3', 'launch.py', 'watch']
+    if ros_domain(run) != '0':
+        words += ['--domain', ros_domain(run)]
+    if run.namespace is not None:
+        words += ['--namespace', run.namespace]
+    return ' '.join(words)
+
+
+def summary(record: Path) -> str:
+    """Return the mission's summary as text, also when there is none."""
+    if not record.exists():
+        return NOTHING_RECORDED
+    try:
+        return str(mission_log.summarize(mission_log.read(record)))
+    except mission_log.MissionLogError as error:
+        return f'Mission: {error}'
+
+
+def _short(path: Path) -> str:
+    try:
+        return str(path.relative_to(Path.cwd()))
+    except ValueError:
+        return str(path)

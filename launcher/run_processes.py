@@ -1,0 +1,155 @@
+"""The processes of a run: their commands, their environment, and which nodes share one."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import surveillance_runtime
+from launcher.log_merge import ROS_FORMAT
+from launcher.run import MARKERS, MAX_DOMAIN, PAGE, RECORDER, Run
+from launcher.supervisor import Program
+from launcher.system import LaunchError
+from surveillance_runtime import node_table
+from surveillance_runtime.run_parameters import BEHAVIOUR_NODE
+
+CHILD = Path(__file__).with_name('child.py')
+NETWORK_ROS = {
+    # Shared memory that a killed process leaves behind hides later nodes of the same domain.
+    'FASTDDS_BUILTIN_TRANSPORTS': 'UDPv4',
+    'FASTRTPS_DEFAULT_PROFILES_FILE': str(
+        Path(surveillance_runtime.__file__).with_name('discovery.xml')
+    ),
+    'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET',
+}
+"""How nodes of several machines find each other where the environment says nothing else."""
+LOCAL_ROS = {
+    'FASTRTPS_DEFAULT_PROFILES_FILE': str(Path(__file__).with_name('local_discovery.xml')),
+    # The profile says it: LOCALHOST would add shared memory, whatever else is said.
+    'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SYSTEM_DEFAULT',
+}
+"""The same for one machine, which is what a robot's nodes run on unless somebody says otherwise."""
+COMPOSED = 'composed'
+COMPOSED_SHARE = 3
+
+
+def ros_domain(run: Run) -> str:
+    """Return the ROS domain of a run: as asked for, else as the environment says.
+
+    Raises:
+        LaunchError: what the environment says is no domain.
+    """
+    if run.domain is not None:
+        return str(run.domain)
+    given = os.environ.get('ROS_DOMAIN_ID') or '0'
+    if not given.isdecimal() or int(given) > MAX_DOMAIN:
+        raise LaunchError(
+            f'environment variable ROS_DOMAIN_ID: got {given!r}, '
+            f'expected a number from 0 to {MAX_DOMAIN}'
+        )
+    return str(int(given))
+
+
+def ros_arguments(files: Sequence[Path], run: Run) -> list[str]:
+    """Return the ROS arguments of a node of a run."""
+    arguments = ['--ros-args']
+    for path in files:
+        arguments += ['--params-file', str(path)]
+    if run.namespace is not None:
+        arguments += ['-r', f'__ns:=/{run.namespace.strip("/")}']
+    if run.log_level is not None:
+        arguments += ['--log-level', run.log_level]
+    return arguments
+
+
+def _merged_arguments(files: Sequence[Path], run: Run) -> list[str]:
+    """Return the arguments of a node that prints into the launcher's log.
+
+    A log file of its own, as ROS writes it, would grow without bound.
+    """
+    return [*ros_arguments(files, run), '--disable-external-lib-logs']
+
+
+def node_environ(run: Run, logs: Path | None = None) -> dict[str, str]:
+    """Return the environment of a node's process."""
+    environ = dict(os.environ)
+    if run.domain is not None:
+        environ['ROS_DOMAIN_ID'] = str(run.domain)
+    for name, value in (NETWORK_ROS if run.network else _local_ros(environ)).items():
+        environ.setdefault(name, value)
+    if run.network:
+        environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'SUBNET'
+    for name in ('NOTIFY_SOCKET', 'WATCHDOG_USEC', 'WATCHDOG_PID'):
+        environ.pop(name, None)  # of the launcher alone
+    if logs is not None:
+        environ['PYTHONUNBUFFERED'] = '1'
+        environ['PYTHONIOENCODING'] = 'utf-8'
+        environ['RCUTILS_CONSOLE_OUTPUT_FORMAT'] = ROS_FORMAT
+        environ['RCUTILS_COLORIZED_OUTPUT'] = '0'
+        environ.setdefault('ROS_LOG_DIR', str(logs))
+    return environ
+
+
+def _local_ros(environ: Mapping[str, str]) -> Mapping[str, str]:
+    """Return how nodes of one machine find each other with the middleware that is asked for."""
+    others = not environ.get('RMW_IMPLEMENTATION', 'rmw_fastrtps_cpp').startswith('rmw_fastrtps')
+    if others or 'FASTRTPS_DEFAULT_PROFILES_FILE' in environ:
+        return {**NETWORK_ROS, 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
+    return LOCAL_ROS
+
+
+def command(nodes: Sequence[node_table.Node], arguments: Sequence[str], parent: int) -> list[str]:
+    """Return the command of one process that holds `nodes`; it ends with `parent`, unless that
+    is 0.
+    """
+    # Nodes of one process are stopped from the last to the first: the one that uses the others
+    # comes last.
+    ordered = sorted(nodes, key=lambda node: node.name == BEHAVIOUR_NODE)
+    targets = ','.join(f'{n.name}={n.module}:{n.class_name}' for n in ordered)
+    return [sys.executable, '-P', str(CHILD), str(parent), targets, *arguments]
+
+
+def programs_of(
+    run: Run,
+    nodes: Sequence[node_table.Node],
+    observers: Sequence[node_table.Node],
+    files: Mapping[str, Path],
+    environ: Mapping[str, str],
+) -> list[Program]:
+    """Return the processes of a run, each with the nodes that share it."""
+
+    def program(members: Sequence[node_table.Node]) -> Program:
+        own = [files[node.name] for node in members]
+        words = command(members, _merged_arguments(own, run), os.getpid())
+        memory = run.memory * 2**20
+        return Program(members[0].name, words, environ, says_up=True, watched=True, memory=memory)
+
+    if run.composed:
+        everything = program(nodes)
+        programs = [
+            replace(
+                everything,
+                name=COMPOSED,
+                takes_input=run.mode == 'MANUAL',
+                says_up=False,
+                # Together they may hold what each may hold by itself, and share much.
+                memory=everything.memory * COMPOSED_SHARE,
+            )
+        ]
+    else:
+        programs = [
+            replace(
+                program([node]),
+                takes_input=node.name == node_table.CONSOLE,
+                leads=node.name == BEHAVIOUR_NODE,
+            )
+            for node in nodes
+        ]
+    # What only listens shares a process; the page, which strangers talk to, has its own.
+    for together in ((RECORDER, MARKERS), (PAGE,)):
+        if members := [node for node in observers if node.name in together]:
+            programs.append(program(members))
+    return programs
