@@ -113,7 +113,12 @@ class ArmorServer(PatrolNode):
         self._work.stop()
         self._queries.stop()
         self._documents.stop()
+        self._service.session.sparql.close()
+
+    def destroy_node(self) -> None:
+        """Close the store as well: nothing is answered any more."""
         self._service.close()
+        super().destroy_node()
 
     async def _on_directive(self, request: Any, response: Any) -> Any:
         self._take_more()

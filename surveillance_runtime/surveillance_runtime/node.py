@@ -9,6 +9,7 @@ from __future__ import annotations
 import inspect
 import os
 import threading
+import time
 import traceback
 from collections.abc import Callable, Sequence
 from typing import Any, Protocol
@@ -57,7 +58,7 @@ MOST_WAITING = 200
 """How many requests to one service may wait at a time: rclpy's executor looks at each in each
 round, and one whose client is gone waits as well."""
 JOIN_SECONDS = 2.0
-"""How long a stopping node waits for each of its threads, seconds."""
+"""How long a stopping node waits for its threads, seconds."""
 
 
 _given: RosArguments | None = None
@@ -360,11 +361,13 @@ class PatrolNode(Node):  # type: ignore[misc]
         self.on_stop()
         with self._spawning:
             threads = list(self._threads)
-        for thread in threads:
-            if thread is not threading.current_thread():
-                thread.join(JOIN_SECONDS)
-                if thread.is_alive():
-                    self.get_logger().warn(f'{thread.name} did not end in {JOIN_SECONDS} s')
+        deadline = time.monotonic() + JOIN_SECONDS
+        others = [each for each in threads if each is not threading.current_thread()]
+        for thread in others:
+            thread.join(max(0.0, deadline - time.monotonic()))
+        late = ', '.join(thread.name for thread in others if thread.is_alive())
+        if late:
+            self.get_logger().warn(f'{late} did not end in {JOIN_SECONDS} s')
 
     def _check_parameters(self, parameters: list[Parameter]) -> SetParametersResult:
         for parameter in parameters:

@@ -59,7 +59,20 @@ def run_node(factory: Callable[[], PatrolNode], args: Sequence[str] | None = Non
 def run_nodes(
     factories: Sequence[Callable[[], PatrolNode]], args: Sequence[str] | None = None
 ) -> int:
-    """Run several nodes in this process on one executor; otherwise as `run_node`."""
+    """Run several nodes in this process on one executor; otherwise as `run_node`.
+
+    Where threads have not ended in time, this ends the process: the interpreter would take apart
+    what they use, and die of a signal.
+    """
+    code = _run_nodes(factories, args)
+    if any(thread.daemon for thread in threading.enumerate()):
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)
+    return code
+
+
+def _run_nodes(factories: Sequence[Callable[[], PatrolNode]], args: Sequence[str] | None) -> int:
     use_one_thread_for_matrices()
     prefer_quick_discovery()
     # A client that was killed, or is not fully discovered, gets no answer and asks again.
@@ -104,10 +117,11 @@ def run_nodes(
             node.stop()
         if diagnostics is not None:
             diagnostics.stop()
-        spinner.stop()
-        for node in reversed(nodes):
-            node.destroy_node()
-        rclpy.try_shutdown()
+        # What a callback that has not ended uses is not taken away from under it.
+        if spinner.stop():
+            for node in reversed(nodes):
+                node.destroy_node()
+            rclpy.try_shutdown()
     if spinner.error is not None:
         traceback.print_exception(spinner.error)
         code = 1
@@ -246,14 +260,21 @@ class ExecutorThread:
                 raise
             report_exception(error, node, 'callback')
 
-    def stop(self) -> None:
-        """End the spinning and join the thread, so that the nodes may be destroyed."""
+    def stop(self) -> bool:
+        """End the spinning and join the thread.
+
+        Returns:
+            Whether it ended in time, so that the nodes may be destroyed.
+        """
         self._stopping = True
         # The executor's own shutdown would take its guard conditions away under a running callback.
         self.executor.create_task(lambda: None)
         if self._thread is not None:
             self._thread.join(JOIN_SECONDS)
+            if self._thread.is_alive():
+                return False
         self.executor.shutdown(timeout_sec=JOIN_SECONDS)
+        return True
 
 
 def _node_of(error: BaseException) -> Node | None:

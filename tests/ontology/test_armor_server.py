@@ -186,6 +186,31 @@ def test_a_stored_ontology_outlives_its_server(graph: Any, tmp_path: Path) -> No
     assert armor.utils.get_ref_client() == 'test'
 
 
+def test_a_change_that_is_under_way_at_a_stop_is_kept(
+    graph: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    server = graph.add(ArmorServer, {'store': str(tmp_path / 'store')})
+    armor = ArmorClient(graph.node, 'test', 'map')
+    build_seven_rooms(armor, False, True)
+    begun, told_to_stop = threading.Event(), threading.Event()
+    execute, on_stop = server._service.execute, server.on_stop
+
+    def held(directive: Any) -> Any:
+        begun.set()
+        told_to_stop.wait(60.0)
+        return execute(directive)
+
+    monkeypatch.setattr(server._service, 'execute', held)
+    monkeypatch.setattr(server, 'on_stop', lambda: (on_stop(), told_to_stop.set()))
+    change = threading.Thread(target=armor.manipulation.add_ind_to_class, args=('X', 'ROOM'))
+    change.start()
+    assert begun.wait(60.0)
+    graph.remove(server)
+    change.join(60.0)
+    graph.add(ArmorServer, {'store': str(tmp_path / 'store')})
+    assert 'X' in armor.query.ind_b2_class('ROOM')
+
+
 def test_facts_come_and_go_at_a_subscriber(graph: Any) -> None:
     server = graph.add(ArmorServer)
     armor = ArmorClient(graph.node, 'test', 'map')

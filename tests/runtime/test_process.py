@@ -71,6 +71,32 @@ def test_a_ros_without_dds_security_says_so_in_one_line() -> None:
     assert 'expected a ROS with DDS security' in done.stderr
 
 
+STUCK = """
+import sys, threading, time
+from surveillance_runtime import node, process
+
+node.JOIN_SECONDS = process.JOIN_SECONDS = 0.1
+
+class Stuck(node.PatrolNode):
+    def __init__(self):
+        super().__init__('stuck')
+        for name in ('one', 'two'):
+            self.spawn(lambda: threading.Event().wait(), name)
+        self.create_timer(0.0, self.work)
+    def work(self):
+        self.finish()
+        time.sleep(1000.0)
+
+sys.exit(process.run_node(Stuck, []))
+"""
+
+
+def test_a_process_whose_threads_do_not_end_ends_all_the_same() -> None:
+    done = subprocess.run([sys.executable, '-c', STUCK], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0
+    assert 'one, two did not end in 0.1 s' in done.stderr
+
+
 LEFT_BEHIND = """
 import warnings
 warnings.simplefilter('error')

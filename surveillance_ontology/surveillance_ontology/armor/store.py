@@ -135,8 +135,7 @@ class Journal:
         Raises:
             JournalError: They could not be written; none of them is there.
         """
-        if self._file.closed:
-            raise JournalError(f'{self._directory}: closed')
+        self._check_open()
         self._found = None
         *first, last = records
         lines = b''.join([*(_line(record, more=True) for record in first), _line(last)])
@@ -160,6 +159,7 @@ class Journal:
         Returns:
             What `finish_snapshot` is to be called with.
         """
+        self._check_open()
         number = self._number + 1
         try:
             file = self._segment(number)
@@ -198,6 +198,10 @@ class Journal:
         """Let another process open the journal."""
         self._file.close()
         self._lock.close()
+
+    def _check_open(self) -> None:
+        if self._file.closed:
+            raise JournalError(f'{self._directory}: closed')
 
     def _cut(self) -> None:
         """Remove what a write that failed may have left behind the records."""
@@ -519,7 +523,8 @@ class Store:
         """Finish a snapshot that is being written, and let another process open the store."""
         if self._snapshot is not None:
             self._snapshot.join()
-        self._journal.close()
+        with self._lock:
+            self._journal.close()
 
     def _write(self, *records: Record) -> None:
         pending: list[Record] | None = getattr(self._batch, 'records', None)
