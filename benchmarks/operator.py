@@ -34,10 +34,11 @@ from sensor_msgs.msg import CompressedImage, LaserScan
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
+from surveillance_operator.page.hub import Hub  # noqa: E402
 from surveillance_operator.recording.bag import METADATA, BagWriter, TopicType  # noqa: E402
+from surveillance_operator.recording.runs import find_recording  # noqa: E402
 from surveillance_operator.recording.schemas import definition  # noqa: E402
-from surveillance_operator.recording.sights import RecordedSights  # noqa: E402
-from surveillance_operator.recording.timeline import Timeline  # noqa: E402
+from surveillance_operator.replay import open_player  # noqa: E402
 from surveillance_runtime.testing import claim_domain  # noqa: E402
 from tests.operator.browser import CHROMIUM, DRIVER, Viewer  # noqa: E402
 
@@ -169,9 +170,58 @@ def heap(viewer: Viewer) -> float:
     return float(viewer.js('return performance.memory.usedJSHeapSize')) / 1e6
 
 
-def replay_rows(folder: Path) -> list[Row]:
-    """Measure a time line of 24 hours."""
-    path = folder / 'timeline.jsonl'
+def replay_rows(folder: Path, hours: float) -> list[Row]:
+    """Measure the replay of a long run, then of its messages alone, as a killed writer leaves them.
+
+    The moments that are jumped to are those that the slider offers: of a recording without a time
+    line what has been read so far.
+    """
+    run = folder / 'run'
+    recording = run / 'recording'
+    write_messages(recording, hours)
+    write_timeline(run / 'timeline.jsonl', hours)
+    size = sum(path.stat().st_size for path in recording.iterdir()) / 1e6
+    rows = replayed(run, f'replay of {hours:g} h, {size:.0f} MB')
+    foreign = folder / 'foreign'
+    recording.rename(foreign)
+    (foreign / METADATA).unlink()
+    for path in foreign.iterdir():
+        content_end = path.stat().st_size - 28  # of the footer's fields and the magic
+        with open(path, 'rb') as file:
+            file.seek(content_end)
+            (summary,) = struct.unpack('<Q', file.read(8))
+        os.truncate(path, summary)
+    return rows + replayed(foreign, 'the same without time line, metadata, index')
+
+
+def replayed(recording: Path, name: str) -> list[Row]:
+    """Measure from the command to the first picture, and jumps with lidar and camera."""
+    with contextlib.ExitStack() as stack:
+        began = time.perf_counter()
+        player = open_player(find_recording(str(recording), recording.parent), Hub(), stack)
+        ready = time.perf_counter() - began
+        thread = threading.Thread(target=player.run, daemon=True)
+        thread.start()
+        stack.callback(thread.join)
+        stack.callback(player.stop)
+        while player.length < 600.0:
+            time.sleep(0.1)
+
+        def jump() -> None:
+            player.seek(random.uniform(5.0, player.length - 5.0))
+            player.see()
+            player.jpeg()
+
+        seconds = slowest(50, jump)
+        hours = player.length / 3600
+    return [
+        (f'{name}: ready', f'{ready:.2f} s', '2 s'),
+        (f'a jump in the {hours:.2g} h read so far, slowest of 50', f'{seconds:.3f} s', '0.3 s'),
+    ]
+
+
+def write_timeline(path: Path, hours: float) -> None:
+    """Write a time line as a recorder does: a line each 0.4 s, all parts each minute."""
     parts = {
         'pose': [1.0, 2.0, 0.5],
         'places': {f'R{n}': {'at': [n, n], 'visited': 5.0, 'urgent': False} for n in range(10)},
@@ -179,28 +229,18 @@ def replay_rows(folder: Path) -> list[Row]:
         'trail': [[1.0, 2.0]] * 600,
     }
     with open(path, 'w', encoding='utf-8') as file:
-        for tick in range(24 * 3600 * 5 // 2):
+        for tick in range(int(hours * 9000)):
             at, whole = START + tick * 0.4, tick % 150 == 0
             content = parts if whole else {'pose': [tick % 20, 2.0, 0.5]}
             body = json.dumps({'now': at, 'p': content}, separators=(',', ':'))
             file.write(f'{{"t":{at:.3f},"k":{int(whole)},"e":"",{body[1:]}\n')
-    began = time.perf_counter()
-    line = Timeline(path)
-    ready = time.perf_counter() - began
-    jumps = slowest(50, lambda: line.at(random.uniform(line.times[0], line.times[-1])))
-    size = path.stat().st_size / 1e6
-    return [
-        (f'replay of 24 h, time line of {size:.0f} MB: ready', f'{ready:.2f} s', '2 s'),
-        ('a jump in it, slowest of 50', f'{1000 * jumps:.0f} ms', '300 ms'),
-    ]
 
 
-def sight_rows(folder: Path, hours: float) -> list[Row]:
-    """Measure what lidar and camera saw in a long recording, in segments of an hour.
+def write_messages(recording: Path, hours: float) -> None:
+    """Write what lidar and camera saw, in segments of an hour.
 
     Each second is the first one again, with later stamps.
     """
-    recording = folder / 'recording'
     bag = BagWriter(recording, segment_seconds=1e9)
     jpeg = b'\xff\xd8' + random.randbytes(40_000)
     image = serialize_message(CompressedImage(format='jpeg', data=jpeg))
@@ -226,25 +266,6 @@ def sight_rows(folder: Path, hours: float) -> list[Row]:
         bag.write('/camera/rgb/image_raw/compressed', image, at, at)
         bag.seal()
     bag.close()
-    size = sum(path.stat().st_size for path in recording.iterdir()) / 1e6
-    rows: list[Row] = []
-    for kind in ('own', 'without metadata'):
-        began = time.perf_counter()
-        sights = RecordedSights(recording)
-        ready = time.perf_counter() - began
-
-        def jump(sights: RecordedSights = sights) -> None:
-            at = START + random.uniform(5.0, hours * 3600 - 1)
-            assert sights.scan(at)
-            assert sights.jpeg(at)
-
-        name = f'lidar and camera of {hours:g} h, {kind}'
-        rows.append((f'{name}, {size:.0f} MB: ready', f'{ready:.2f} s', '2 s'))
-        longest = 1000 * slowest(50, jump)
-        rows.append((f'{name}: a jump, slowest of 50', f'{longest:.0f} ms', '300 ms'))
-        sights.close()
-        (recording / METADATA).unlink(missing_ok=True)
-    return rows
 
 
 def slowest(times: int, do: Callable[[], object]) -> float:
@@ -327,8 +348,7 @@ def main() -> None:
     size = sum(path.stat().st_size for path in PAGE_FILES.iterdir())
     rows: list[Row] = [('page, all files', f'{size / 1000:.0f} kB', '150 kB')]
     with tempfile.TemporaryDirectory() as folder:
-        rows += replay_rows(Path(folder))
-        rows += sight_rows(Path(folder), 1.0 if options.quick else 24.0)
+        rows += replay_rows(Path(folder), 1.0 if options.quick else 24.0)
         rows += mission_rows(Path(folder), options.quick)
         if not options.quick:
             rows += memory_rows(Path(folder), options.minutes)

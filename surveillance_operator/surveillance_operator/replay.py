@@ -84,12 +84,22 @@ class Player:
                     self._line.extend()
                     self._tell({}, None)
                 at = self._time
-            if self._sights is not None and now >= next_look and at != seen_at:
+            if now >= next_look and at != seen_at:
                 seen_at = at
-                self._hub.show_parts({'scan': self._sights.scan(at)}, None, whole=False)
+                self.see()
             if now >= next_look:
                 next_look = now + LOOK_PERIOD
             before = now
+
+    @property
+    def length(self) -> float:
+        """Seconds of the recording that can be shown."""
+        return self._line.times[-1] - self._line.times[0]
+
+    def see(self) -> None:
+        """Show what the lidar saw at this moment of the recording."""
+        if self._sights is not None:
+            self._hub.show_parts({'scan': self._sights.scan(self._time)}, None, whole=False)
 
     def jpeg(self) -> bytes | None:
         """Return what the camera saw at this moment of the recording."""
@@ -165,7 +175,7 @@ class Player:
     def _tell(self, parts: dict[str, Any], now: float | None, *, whole: bool = False) -> None:
         replay = {
             'at': round(self._time - self._line.times[0], 1),
-            'length': round(self._line.times[-1] - self._line.times[0], 1),
+            'length': round(self.length, 1),
             'playing': self._playing,
             'speed': self._speed,
             'read': round(self._read(), 2),
@@ -185,7 +195,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         try:
             recording = find_recording(options.run, options.runs)
             hub = Hub()
-            player = _player(recording, hub, stack)
+            player = open_player(recording, hub, stack)
             page = Page(
                 hub,
                 questions={},
@@ -211,18 +221,21 @@ def main(argv: Sequence[str] | None = None) -> int:
     return 0
 
 
-def _player(recording: Recording, hub: Hub, stack: contextlib.ExitStack) -> Player:
-    """Return a player of a recording; what it needs ends with the stack."""
-    read: Callable[[], float] = lambda: 1.0  # noqa: E731
-    path = recording.timeline
-    if path is None:
+def open_player(recording: Recording, hub: Hub, stack: contextlib.ExitStack) -> Player:
+    """Return a player of a recording; what it needs ends with the stack.
+
+    Raises:
+        RecordingError: It cannot be read, or holds nothing of a mission.
+    """
+    path, read = recording.timeline, lambda: 1.0
+    if not recording.is_whole:
         assert recording.messages is not None  # one of the two was found
         # Only here: a recording with a time line is replayed where no ROS is installed.
         from surveillance_operator.recording.conversion import Conversion
 
         folder = stack.enter_context(tempfile.TemporaryDirectory(prefix='replay-'))
         path = Path(folder) / timeline.NAME
-        conversion = Conversion(recording.messages, path)
+        conversion = Conversion(recording.messages, path, keep=recording.timeline)
         stack.callback(conversion.stop)
         conversion.start()
         read = conversion.share

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import io
+import os
+import shutil
 import threading
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -12,6 +15,8 @@ import numpy as np
 import pytest
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseWithCovarianceStamped
+from mcap.writer import CompressionType, IndexType
+from mcap.writer import Writer as McapWriter
 from PIL import Image
 from rclpy.serialization import serialize_message
 from rosbags.rosbag2 import StoragePlugin, Writer
@@ -23,8 +28,8 @@ from surveillance_interfaces.msg import Decision, FactChange, FactChanges, Missi
 from surveillance_interfaces.msg import Fact as FactMessage
 from surveillance_operator.mission_markers_node import markers_of
 from surveillance_operator.recording.bag import RecordingError
-from surveillance_operator.recording.conversion import Conversion, namespace_of
-from surveillance_operator.recording.reading import LastMessages
+from surveillance_operator.recording.conversion import Conversion, prefix_of
+from surveillance_operator.recording.reading import Messages
 from surveillance_operator.recording.runs import find_recording
 from surveillance_operator.recording.schemas import definition
 from surveillance_operator.recording.sights import RecordedSights
@@ -147,15 +152,15 @@ def test_a_bag_and_its_file_are_found_by_name(bag: Path, tmp_path: Path) -> None
     (file,) = bag.glob('*.mcap')
     for name in (bag, file):
         found = find_recording(str(name), tmp_path)
-        assert (found.timeline, found.messages) == (None, name)
+        assert (found.is_whole, found.messages) == (False, name)
     with pytest.raises(RecordingError, match='expected'):
         find_recording(str(tmp_path / 'nothing.mcap'), tmp_path)
 
 
 def test_messages_before_a_moment_come_newest_first(bag: Path) -> None:
-    last = LastMessages(bag)
+    last = Messages(bag)
     topics = ['/two/battery_level']
-    found = [data[4] for _, data in last.before(topics, START + 5.5, 3.0)]
+    found = [data[4] for _, _, data in last.before(topics, START + 5.5, 3.0)]
     assert found == [90 - 5, 90 - 4, 90 - 3]
     assert len(last.before(topics, START + 5.5, 3.0, 1)) == 1
     threads = [threading.Thread(target=last.before, args=(topics, START + 5, 5.0)) for _ in 'abcd']
@@ -180,6 +185,85 @@ def test_a_file_alone_and_a_folder_without_metadata_show_the_same(
         sights.close()
 
 
+SERIALISED = [
+    (int((START + at) * 1e9), topic, message, serialize_message(message))
+    for at, topic, message in said()
+]
+
+
+def mission_file(path: Path, **options: Any) -> bytes:
+    """Write what a mission said with the library mcap; return the file."""
+    with open(path, 'wb') as file:
+        writer = McapWriter(file, chunk_size=2000, **options)
+        writer.start(profile='ros2', library='another')
+        channels: dict[str, int] = {}
+        for at, topic, message, data in SERIALISED:
+            kind = f'{type(message).__module__.split(".")[0]}/msg/{type(message).__name__}'
+            if topic not in channels:
+                schema = writer.register_schema(kind, 'ros2msg', definition(kind).encode())
+                channels[topic] = writer.register_channel(topic, 'cdr', schema)
+            writer.add_message(channels[topic], at, data, at)
+        writer.finish()
+    return path.read_bytes()
+
+
+@pytest.mark.parametrize(
+    'options',
+    [
+        {},
+        {'compression': CompressionType.LZ4, 'index_types': IndexType.NONE},
+        {'compression': CompressionType.NONE, 'index_types': IndexType.CHUNK},
+        {'use_chunking': False},
+        {'use_chunking': False, 'use_statistics': False, 'use_summary_offsets': False},
+    ],
+)
+def test_what_other_programs_write_is_read_whole_or_torn(
+    options: dict[str, Any], tmp_path: Path
+) -> None:
+    path = tmp_path / 'other.mcap'
+    content = mission_file(path, **options)
+    every = list(Messages(path).in_order())
+    assert every == [(topic, at, data) for at, topic, _, data in SERIALISED]
+    # As a writer leaves it that was killed: no index, and the last record is torn.
+    path.write_bytes(content[: int(len(content) * 0.6)])
+    torn = Messages(path)
+    saved = list(torn.in_order())
+    assert len(saved) > 40
+    assert saved == every[: len(saved)]
+    assert torn.share == 1.0
+    assert torn.types['/two/battery_level'] == 'std_msgs/msg/UInt8'
+    sights = RecordedSights(path)
+    assert sights.scan(START + 4.5) == [[4.0, 0.0]]
+    assert sights.jpeg(START + 4.5) is not None
+    sights.close()
+
+
+def test_no_damaged_byte_ends_the_reader(tmp_path: Path) -> None:
+    path = tmp_path / 'damaged.mcap'
+    content = mission_file(path)
+    for place in range(8, len(content), len(content) // 60):
+        path.write_bytes(content[:place] + b'\xff' * 8 + content[place + 8 :])
+        messages = Messages(path)
+        assert len(list(messages.in_order())) <= len(SERIALISED)
+        messages.close()
+
+
+def test_the_time_line_is_kept_for_the_next_time(bag: Path, tmp_path: Path) -> None:
+    recording = tmp_path / 'rosbag2'
+    shutil.copytree(bag, recording)
+    first = find_recording(str(recording), tmp_path)
+    assert not first.is_whole
+    conversion = Conversion(recording, tmp_path / 'made.jsonl', keep=first.timeline)
+    conversion.start()
+    conversion._thread.join(60)
+    again = find_recording(str(recording), tmp_path)
+    assert again.is_whole
+    assert Timeline(again.timeline).at(START + 12.9)[2]['status']['state'] == 'S12'
+    (file,) = recording.glob('*.mcap')
+    os.utime(file, (time.time() + 10, time.time() + 10))  # it was written on
+    assert not find_recording(str(recording), tmp_path).is_whole
+
+
 def test_a_recording_of_something_else_is_refused(tmp_path: Path) -> None:
     store = get_typestore(Stores.ROS2_JAZZY)
     folder = tmp_path / 'other'
@@ -189,11 +273,11 @@ def test_a_recording_of_something_else_is_refused(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match='no topic of a mission'):
         Conversion(folder, tmp_path / 'timeline.jsonl')
     (file,) = folder.glob('*.mcap')
-    file.write_bytes(file.read_bytes()[:-20])
-    with pytest.raises(RecordingError, match='cannot be read'):
+    file.write_bytes(b'no such file')
+    with pytest.raises(RecordingError, match='no MCAP file'):
         Conversion(folder, tmp_path / 'timeline.jsonl')
 
 
 def test_the_namespace_is_that_of_most_topics() -> None:
-    assert namespace_of(['/decision', '/plan', '/robot/plan']) == ''
-    assert namespace_of(['/a/b/decision', '/a/b/plan', '/tf']) == 'a/b'
+    assert prefix_of(['/decision', '/plan', '/robot/plan']) == '/'
+    assert prefix_of(['/a/b/decision', '/a/b/plan', '/tf']) == '/a/b/'

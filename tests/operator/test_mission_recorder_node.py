@@ -20,7 +20,7 @@ from surveillance_interfaces.action import FollowPath
 from surveillance_interfaces.msg import Decision
 from surveillance_operator import mission_recorder_node
 from surveillance_operator.mission_recorder_node import MissionRecorder
-from surveillance_operator.recording.reading import messages
+from surveillance_operator.recording.reading import Messages
 from surveillance_operator.recording.timeline import Timeline
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 from tests.operator.conftest import Disk
@@ -54,11 +54,7 @@ def test_every_message_comes_back_as_it_was_published(graph: Any, tmp_path: Path
     assert images.get_subscription_count() == 0
     graph.remove(recorder)
 
-    found = {
-        channel.topic: message.data
-        for _, channel, message in messages(folder)
-        if channel.topic in published
-    }
+    found = {topic: data for topic, _, data in Messages(folder).in_order() if topic in published}
     assert found.keys() == published.keys()
     for topic, data in found.items():
         message = published[topic][0]
@@ -94,7 +90,7 @@ def test_a_full_disk_is_waited_for(
     graph.remove(recorder)
     assert recorder.failure is None
     assert len([line for line in said if line.name == 'mission_recorder']) <= 5
-    assert [channel.topic for _, channel, _ in messages(folder)].count('/words') <= 1
+    assert [topic for topic, _, _ in Messages(folder).in_order()].count('/words') <= 1
 
 
 def test_an_image_a_second_is_kept_where_somebody_looks(graph: Any, tmp_path: Path) -> None:
@@ -115,10 +111,10 @@ def test_an_image_a_second_is_kept_where_somebody_looks(graph: Any, tmp_path: Pa
     assert unseen.get_subscription_count() == 0
     graph.remove(recorder)
     kept = [
-        deserialize_message(message.data, CompressedImage)
-        for _, channel, message in messages(folder)
-        if channel.topic == '/seen/compressed'
+        deserialize_message(data, CompressedImage)
+        for topic, _, data in Messages(folder).in_order()
+        if topic == '/seen/compressed'
     ]
     assert kept[0].header.frame_id == 'camera'
     assert PictureFile.open(io.BytesIO(bytes(kept[0].data))).size == (4, 2)
-    assert not [c for _, c, _ in messages(folder) if c.topic in ('/seen', '/unseen')]
+    assert not [t for t, _, _ in Messages(folder).in_order() if t in ('/seen', '/unseen')]

@@ -7,16 +7,16 @@ from surveillance_operator.recording.bag import (
     prune,
     repair,
 )
-from surveillance_operator.recording.reading import messages
+from surveillance_operator.recording.reading import Messages
 from surveillance_operator.recording.timeline import Timeline, TimelineWriter
 
 __all__ = [
     'BagWriter',
+    'Messages',
     'RecordingError',
     'Timeline',
     'TimelineWriter',
     'TopicType',
-    'messages',
     'prune',
     'repair',
 ]

@@ -7,6 +7,9 @@ visits and URGENT from `fact_changes`, the nodes from `/diagnostics`.
 
 from __future__ import annotations
 
+import contextlib
+import shutil
+import sys
 import threading
 import time
 from collections import deque
@@ -23,7 +26,7 @@ from surveillance_interfaces.msg import FactChanges
 from surveillance_ontology.conversions import changes_from_ros
 from surveillance_operator import conversions
 from surveillance_operator.recording.bag import RecordingError
-from surveillance_operator.recording.reading import Contents, messages
+from surveillance_operator.recording.reading import Messages
 from surveillance_operator.recording.timeline import TimelineWriter
 from surveillance_operator.snapshot import Snapshot, follow
 from surveillance_operator.topics import BEHAVIOUR, TOPICS, Fields, Topic, read_message, with_fact
@@ -53,16 +56,13 @@ STORED_TOPICS = (
 """All that a snapshot takes from in a recording."""
 
 
-def namespace_of(topics: Iterable[str]) -> str:
-    """Return the namespace of the robot that a recording is of, without slashes."""
+def prefix_of(topics: Iterable[str]) -> str:
+    """Return how the topics of the robot begin that a recording is of: a slash, its namespace."""
     known = {topic.name for topic in TOPICS if not topic.name.startswith('/')}
     found = sorted(
-        topic.removesuffix(name).strip('/')
-        for topic in topics
-        for name in known
-        if topic.endswith(f'/{name}')
+        topic.removesuffix(name) for topic in topics for name in known if topic.endswith(f'/{name}')
     )
-    return max(found, key=found.count, default='')
+    return max(found, key=found.count, default='/')
 
 
 class Conversion:
@@ -71,83 +71,76 @@ class Conversion:
     Args:
         recording: Its folder, or its only file.
         path: The time line to write.
+        keep: Where it is put when it is complete; nothing is kept where that cannot be written.
 
     Raises:
         RecordingError: A file cannot be read, or holds nothing of a mission.
     """
 
-    def __init__(self, recording: Path, path: Path) -> None:
-        self._done = 0.0
+    def __init__(self, recording: Path, path: Path, keep: Path | None = None) -> None:
+        self._messages = Messages(recording)
+        self._path, self._keep = path, keep
         self._begun, self._stopped = threading.Event(), threading.Event()
-        self._error: RecordingError | None = None
         self._thread = threading.Thread(target=self._run, name='conversion', daemon=True)
-        self._recording = recording
-        self._path = path
-        self._contents = Contents.of(recording)
-        names = self._contents.topics
-        namespace = namespace_of(names)
-        prefix = f'/{namespace}/' if namespace else '/'
-        every = {
+        self._clock: float | None = None
+        prefix = prefix_of(self._messages.first_types())
+        self._snapshot = Snapshot(where='a recording', namespace=prefix.strip('/'))
+        self._topics = {
             each.name if each.name.startswith('/') else prefix + each.name: each
             for each in STORED_TOPICS
         }
-        self._topics = {name: topic for name, topic in every.items() if name in names}
-        if not self._topics:
+        if not self._topics.keys() & self._messages.types.keys():
             raise RecordingError(f'{recording}: holds no topic of a mission, like mission_status')
-        self._clock: float | None = None
-        self._snapshot = Snapshot(where='a recording', namespace=namespace)
 
     def share(self) -> float:
         """Return which share of the recording is in the time line, 0 to 1."""
-        return self._done
+        return self._messages.share if self._thread.is_alive() else 1.0
 
     def start(self) -> None:
-        """Begin on a thread of its own; return when the time line has its first lines.
-
-        Raises:
-            RecordingError: The recording cannot be read.
-        """
+        """Begin on a thread of its own; return when the time line has its first lines."""
         self._thread.start()
         self._begun.wait()
-        if self._error is not None:
-            raise self._error
 
     def stop(self) -> None:
         """End it."""
         self._stopped.set()
         if self._thread.is_alive():
             self._thread.join()
+        self._messages.close()
 
     def _run(self) -> None:
         try:
             self._convert()
-        except RecordingError as error:
-            self._error = error
+        except OSError as error:
+            print(f'replay: the time line cannot be written: {error}', file=sys.stderr)
         finally:
-            self._done = 1.0
             self._begun.set()
 
     def _convert(self) -> None:
-        start, end = self._contents.start, self._contents.end
         writer = TimelineWriter(self._path)
         window: dict[str, deque[bytes]] = {}
         closes = 0.0
         try:
-            for _, channel, message in messages(self._recording, [*self._topics, CLOCK]):
+            for name, nanoseconds, data in self._messages.in_order([*self._topics, CLOCK]):
                 if self._stopped.is_set():
                     return
-                at = message.log_time / 1e9
+                at = nanoseconds / 1e9
                 if at >= closes:
                     if window:
                         self._take(window, closes, writer)
                         self._begun.set()
                     window, closes = {}, at + WINDOW
-                    self._done = min(0.999, (at - start) / max(1e-9, end - start))
-                depth = 1 if channel.topic == CLOCK else self._topics[channel.topic].qos.depth
-                window.setdefault(channel.topic, deque(maxlen=depth)).append(message.data)
-            self._take(window, end, writer)
+                depth = 1 if name == CLOCK else self._topics[name].qos.depth
+                window.setdefault(name, deque(maxlen=depth)).append(data)
+            if window:
+                self._take(window, closes, writer)
         finally:
             writer.close()
+        if self._keep is not None:
+            part = self._keep.with_suffix('.part')
+            with contextlib.suppress(OSError):
+                shutil.copyfile(self._path, part)
+                part.replace(self._keep)
 
     def _take(self, window: dict[str, deque[bytes]], at: float, writer: TimelineWriter) -> None:
         """Take one window's messages into the snapshot."""

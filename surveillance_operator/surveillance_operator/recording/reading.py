@@ -1,23 +1,53 @@
-"""Reading recordings, also those that other programs wrote: files, topics, messages at a moment."""
+"""Reading recordings, also those that other programs wrote: topics, messages in order, at a moment.
+
+To find a message one needs to know where the parts of a file lie and which time each covers. A
+file's summary tells that; where a killed writer left none, the heads of the file's records do. Only
+that is read of a file, and only as far as it is needed: the library `mcap` parses a summary whole,
+which takes seconds for a long recording.
+"""
 
 from __future__ import annotations
 
+import bisect
 import contextlib
+import heapq
+import mmap
 import re
+import struct
 import threading
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator, Sequence
+from io import BytesIO
 from pathlib import Path
-from typing import IO, Any
+from typing import Any, NamedTuple
 
 import yaml
+from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
-from mcap.reader import SeekingReader, make_reader
-from mcap.records import Channel, Message, Schema
+from mcap.opcode import Opcode
+from mcap.records import Channel, Chunk, Schema
+from mcap.stream_reader import get_chunk_data_stream
 
-from surveillance_operator.recording.bag import METADATA, RecordingError
+from surveillance_operator.recording.bag import ENCODING, METADATA, RecordingError
 
 SUFFIX = '.mcap'
+MAGIC = b'\x89MCAP0\r\n'
+FIRST_SPANS = 20
+"""So many chunks tell of the topics that a recording begins with."""
+RUN_BYTES = 1_000_000
+"""Messages outside of chunks are taken together up to this size."""
+_HEAD, _TIMES = struct.Struct('<BQ'), struct.Struct('<QQ')
+_MESSAGE, _CHUNK_INDEX = struct.Struct('<HIQQ'), struct.Struct('<QQQQ')
+_SUMMARY_START = struct.Struct('<Q')
+_LEAST_BYTES = {
+    Opcode.MESSAGE: _MESSAGE.size,
+    Opcode.CHUNK: _TIMES.size,
+    Opcode.CHUNK_INDEX: _CHUNK_INDEX.size,
+}
+_FOOTER_BYTES = 20
+"""Of the footer's fields: where the summary starts and its offsets, and a checksum."""
+
+Stored = tuple[str, int, bytes]
+"""A message: its topic, when it was received (nanoseconds since 1970), itself as serialised."""
 
 
 def files_of(recording: Path) -> list[Path]:
@@ -31,25 +61,22 @@ def files_of(recording: Path) -> list[Path]:
     else:
         files = _listed(recording) or sorted(recording.glob(f'*{SUFFIX}'), key=_number)
     if not files:
-        raise RecordingError(f'{recording}: expected a file *{SUFFIX}, or a folder that holds some')
+        raise RecordingError(
+            f'{recording}: expected a file *{SUFFIX}, or a folder that holds some '
+            f'(`ros2 bag convert` makes one of a *.db3)'
+        )
     return files
-
-
-def _metadata(folder: Path) -> dict[str, Any]:
-    """Return what rosbag2's metadata says of a folder, nothing where there is none."""
-    try:
-        text = (folder / METADATA).read_text(encoding='utf-8')
-        loader = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
-        content = yaml.load(text, loader)['rosbag2_bagfile_information']
-    except (OSError, ValueError, TypeError, KeyError, yaml.YAMLError):
-        return {}
-    return content if isinstance(content, dict) else {}
 
 
 def _listed(folder: Path) -> list[Path]:
     """Return the files that the folder's metadata names, those of them that there are."""
-    names = _metadata(folder).get('relative_file_paths') or []
-    paths = [folder / str(name) for name in names]
+    try:
+        text = (folder / METADATA).read_text(encoding='utf-8')
+        loader = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
+        names = yaml.load(text, loader)['rosbag2_bagfile_information']['relative_file_paths']
+        paths = [folder / str(name) for name in names]
+    except (OSError, ValueError, TypeError, KeyError, yaml.YAMLError):
+        return []
     # The file that is being written is not listed yet.
     listed = [path for path in paths if path.suffix == SUFFIX and path.is_file()]
     newer = set(folder.glob(f'*{SUFFIX}')) - set(listed)
@@ -61,111 +88,224 @@ def _number(path: Path) -> tuple[int, str]:
     return (int(numbers[-1]) if numbers else 0, path.stem)
 
 
-def messages(
-    recording: Path, topics: Sequence[str] | None = None, start: int | None = None
-) -> Iterator[tuple[Schema, Channel, Message]]:
-    """Yield the messages of a recording in the order in which they were received.
+class _Span(NamedTuple):
+    """A chunk, or a run of messages outside of chunks: its times, and the file's bytes."""
+
+    start: int
+    end: int
+    offset: int
+    size: int
+
+
+class _RecordedFile:
+    """One file: where its messages lie, found out as far as somebody needs it.
+
+    Args:
+        path: The file, whole or torn.
+
+    Attributes:
+        size: Its bytes.
+        spans: What is known so far, in the file's order.
+        types: Of the topics that are known so far; only of those with messages as ROS 2 has them.
+        is_known: Whether that is all.
+
+    Raises:
+        RecordingError: It cannot be read.
+    """
+
+    def __init__(self, path: Path) -> None:
+        try:
+            with open(path, 'rb') as file:
+                self._bytes = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+        except (OSError, ValueError) as error:
+            raise RecordingError(f'{path}: cannot be read: {error}') from None
+        if self._bytes[: len(MAGIC)] != MAGIC:
+            raise RecordingError(f'{path}: cannot be read: this is no MCAP file')
+        self.size = len(self._bytes)
+        self.spans: list[_Span] = []
+        self.types: dict[str, str] = {}
+        self.is_known = False
+        self._ends: list[int] = []
+        self._schemas: dict[int, str] = {}
+        self._channels: dict[int, str] = {}
+        self._walk = self._find()
+
+    def find_next(self) -> bool:
+        """Find the next span; tell whether there is one."""
+        self.is_known = next(self._walk, None) is None
+        return not self.is_known
+
+    def between(self, start: int, end: int) -> list[_Span]:
+        """Return the spans with messages from a time on, before another one."""
+        while not self.is_known and (not self.spans or self.spans[-1].start < end):
+            self.find_next()
+        first = bisect.bisect_left(self._ends, start)
+        return [each for each in self.spans[first:] if each.start < end and each.end >= start]
+
+    def messages(self, span: _Span, topics: Collection[str] | None) -> list[Stored]:
+        """Return what a span holds of some topics, or of all; nothing of one that is damaged."""
+        data = self._content(span)
+        found = []
+        for opcode, start, end in _records(data, 0):
+            self._learn(opcode, data, start, end)
+            if opcode == Opcode.MESSAGE:
+                channel, _, at, _ = _MESSAGE.unpack_from(data, start)
+                topic = self._channels.get(channel, '')
+                if topics is None or topic in topics:
+                    found.append((topic, at, bytes(data[start + _MESSAGE.size : end])))
+        return found
+
+    def close(self) -> None:
+        """Close the file."""
+        self._bytes.close()
+
+    def _find(self) -> Iterator[_Span]:
+        tail = self.size - len(MAGIC)
+        if self._bytes[tail:] == MAGIC and tail > len(MAGIC) + _FOOTER_BYTES:
+            (summary,) = _SUMMARY_START.unpack_from(self._bytes, tail - _FOOTER_BYTES)
+            for opcode, start, end in _records(self._bytes, summary or tail):
+                self._learn(opcode, self._bytes, start, end)
+                if opcode == Opcode.CHUNK_INDEX:
+                    yield self._add(_Span(*_CHUNK_INDEX.unpack_from(self._bytes, start)))
+        if not self.spans:
+            yield from self._find_without_summary()
+
+    def _find_without_summary(self) -> Iterator[_Span]:
+        run: _Span | None = None
+        chunk: _Span | None = None
+        for opcode, start, end in _records(self._bytes, len(MAGIC)):
+            head = start - _HEAD.size
+            # A chunk may hold topics that no later one names: it is unpacked for that, unless an
+            # index says that all of it is known.
+            if chunk is not None and not (
+                opcode == Opcode.MESSAGE_INDEX
+                and int.from_bytes(self._bytes[start : start + 2], 'little') in self._channels
+            ):
+                self.messages(chunk, ())
+            self._learn(opcode, self._bytes, start, end)
+            if opcode == Opcode.MESSAGE:
+                _, _, at, _ = _MESSAGE.unpack_from(self._bytes, start)
+                first, last, offset, _ = run or (at, at, head, 0)
+                run = _Span(min(first, at), max(last, at), offset, end - offset)
+            if run is not None and (opcode != Opcode.MESSAGE or run.size > RUN_BYTES):
+                yield self._add(run)
+                run = None
+            if opcode == Opcode.CHUNK:
+                first, last = _TIMES.unpack_from(self._bytes, start)
+                chunk = _Span(first, last, head, end - head)
+                yield self._add(chunk)
+            elif opcode != Opcode.MESSAGE_INDEX:
+                chunk = None
+        if run is not None:
+            yield self._add(run)
+
+    def _add(self, span: _Span) -> _Span:
+        self.spans.append(span)
+        self._ends.append(max(span.end, self._ends[-1] if self._ends else 0))
+        return span
+
+    def _learn(self, opcode: int, data: Any, start: int, end: int) -> None:
+        """Take note of a topic; of none where the record is damaged."""
+        if opcode not in (Opcode.SCHEMA, Opcode.CHANNEL):
+            return
+        content = ReadDataStream(BytesIO(data[start:end]))
+        with contextlib.suppress(McapError, ValueError, struct.error):
+            if opcode == Opcode.SCHEMA:
+                schema = Schema.read(content)
+                self._schemas[schema.id] = schema.name
+                return
+            channel = Channel.read(content)
+            self._channels[channel.id] = channel.topic
+            if channel.message_encoding == ENCODING:
+                self.types[channel.topic] = self._schemas.get(channel.schema_id, '')
+
+    def _content(self, span: _Span) -> bytes:
+        data = self._bytes[span.offset : span.offset + span.size]
+        if not data or data[0] != Opcode.CHUNK:
+            return data
+        try:
+            chunk = Chunk.read(ReadDataStream(BytesIO(data[_HEAD.size :])))
+            stream, size = get_chunk_data_stream(chunk)
+            return stream.read(size)
+        except Exception:  # whatever the compression finds: the bytes may be anything
+            return b''
+
+
+def _records(data: Any, at: int) -> Iterator[tuple[int, int, int]]:
+    """Yield the opcode of each record and where its content starts and ends; not of a torn one."""
+    while at + _HEAD.size <= len(data):
+        opcode, length = _HEAD.unpack_from(data, at)
+        start, at = at + _HEAD.size, at + _HEAD.size + length
+        if at > len(data) or opcode == Opcode.FOOTER:
+            return
+        if length >= _LEAST_BYTES.get(opcode, 0):
+            yield opcode, start, at
+
+
+class Messages:
+    """The messages of a recording; safe from any thread.
 
     Args:
         recording: Its folder, or its only file.
-        topics: Only these; None for all.
-        start: From this time on, nanoseconds since 1970.
 
     Raises:
         RecordingError: There is no file, or one cannot be read.
     """
-    for path in files_of(recording):
-        try:
-            with open(path, 'rb') as file:
-                for schema, channel, message in make_reader(file).iter_messages(
-                    topics, starting_at=start
-                ):
-                    if schema is not None:
-                        yield schema, channel, message
-        except (OSError, McapError) as error:
-            raise RecordingError(f'{path}: cannot be read: {error}') from None
-
-
-@dataclass(frozen=True)
-class Contents:
-    """What a recording holds.
-
-    Attributes:
-        topics: Their types by name.
-        start, end: Of its messages, seconds since 1970.
-        starts: Of each file's messages, nanoseconds since 1970.
-    """
-
-    topics: dict[str, str]
-    start: float
-    end: float
-    starts: dict[Path, int]
-
-    @classmethod
-    def of(cls, recording: Path) -> Contents:
-        """Read the summaries of a recording's files.
-
-        Raises:
-            RecordingError: A file cannot be read, or has no summary.
-        """
-        topics: dict[str, str] = {}
-        starts: dict[Path, int] = {}
-        end = 0
-        for path in files_of(recording):
-            try:
-                with open(path, 'rb') as file:
-                    summary = make_reader(file).get_summary()
-            except (OSError, McapError) as error:
-                raise RecordingError(f'{path}: cannot be read: {error}') from None
-            if summary is None or summary.statistics is None:
-                raise RecordingError(f'{path}: has no index; `mcap recover` gives it one')
-            for channel in summary.channels.values():
-                schema = summary.schemas.get(channel.schema_id)
-                topics[channel.topic] = schema.name if schema is not None else ''
-            if summary.statistics.message_count:
-                starts[path] = summary.statistics.message_start_time
-                end = max(end, summary.statistics.message_end_time)
-        if not starts:
-            raise RecordingError(f'{recording}: holds no messages')
-        return cls(topics, min(starts.values()) / 1e9, end / 1e9, starts)
-
-
-class LastMessages:
-    """Finds the last messages of a topic before a moment; safe from any thread.
-
-    Args:
-        recording: Its folder, or its only file.
-
-    Attributes:
-        topics: Types by the names of the recording's topics.
-
-    Raises:
-        RecordingError: There is no file, or it cannot be read.
-    """
 
     def __init__(self, recording: Path) -> None:
-        self._files = files_of(recording)
+        self._files = [_RecordedFile(path) for path in files_of(recording)]
         self._lock = threading.Lock()
-        self._open: dict[Path, tuple[IO[bytes], SeekingReader]] = {}
-        # A file's own summary takes long to read: the metadata says when which file begins.
-        known = _metadata(recording) if recording.is_dir() else {}
-        try:
-            self.topics = {
-                str(each['topic_metadata']['name']): str(each['topic_metadata']['type'])
-                for each in known['topics_with_message_count']
-            }
-            self._starts = {
-                recording / str(each['path']): int(each['starting_time']['nanoseconds_since_epoch'])
-                for each in known['files']
-            }
-        except (KeyError, TypeError, ValueError):
-            contents = Contents.of(recording)
-            self.topics, self._starts = contents.topics, contents.starts
+        self._passed = 0
+
+    @property
+    def types(self) -> dict[str, str]:
+        """The types of the topics that are known so far, by name."""
+        with self._lock:
+            return {name: kind for file in self._files for name, kind in file.types.items()}
+
+    def first_types(self) -> dict[str, str]:
+        """Return the types of the topics that the recording begins with, by name."""
+        with self._lock:
+            for file in self._files:
+                while len(file.spans) < FIRST_SPANS and file.find_next():
+                    pass
+                if file.spans:
+                    break
+        return self.types
+
+    @property
+    def share(self) -> float:
+        """Which share of the recording `in_order` has passed, 0 to 1."""
+        return self._passed / sum(file.size for file in self._files)
+
+    def in_order(self, topics: Collection[str] | None = None) -> Iterator[Stored]:
+        """Yield the messages of some topics, or of all, in the order of their receipt."""
+        before = 0
+        for file in self._files:
+            waiting: list[tuple[int, int, Stored]] = []
+            number = count = 0
+            while True:
+                with self._lock:
+                    if number == len(file.spans) and (file.is_known or not file.find_next()):
+                        break
+                    span = file.spans[number]
+                    found = file.messages(span, topics)
+                while waiting and waiting[0][0] < span.start:
+                    yield heapq.heappop(waiting)[2]
+                for each in found:
+                    heapq.heappush(waiting, (each[1], count, each))
+                    count += 1
+                number += 1
+                self._passed = before + span.offset
+            while waiting:
+                yield heapq.heappop(waiting)[2]
+            before += file.size
+            self._passed = before
 
     def before(
         self, topics: Sequence[str], at: float, within: float, most: int = 10
-    ) -> list[tuple[str, bytes]]:
-        """Return topics and messages, the newest first.
+    ) -> list[Stored]:
+        """Return messages, the newest first.
 
         Args:
             topics: Of these.
@@ -174,38 +314,18 @@ class LastMessages:
             most: How many at most.
         """
         start, end = int((at - within) * 1e9), int(at * 1e9) + 1
-        found: list[tuple[str, bytes]] = []
+        found: list[Stored] = []
         with self._lock:
-            for path in reversed(self._files):
-                if self._starts.get(path, 0) >= end:
-                    continue
-                # A file that is torn or being written shows nothing.
-                with contextlib.suppress(OSError, McapError):
-                    reader = self._reader(path)
-                    summary = reader.get_summary()
-                    if summary is None or summary.statistics is None:
-                        continue
-                    if summary.statistics.message_start_time >= end:
-                        continue
-                    for _, channel, message in reader.iter_messages(
-                        topics, starting_at=start, ending_before=end, reverse=True
-                    ):
-                        found.append((channel.topic, message.data))
-                        if len(found) == most:
-                            return found
-                    if summary.statistics.message_start_time <= start:
-                        return found
-        return found
+            for file in reversed(self._files):
+                for span in reversed(file.between(start, end)):
+                    if len(found) >= most and span.end < found[most - 1][1]:
+                        break
+                    found += [m for m in file.messages(span, topics) if start <= m[1] < end]
+                    found.sort(key=lambda message: -message[1])
+        return found[:most]
 
     def close(self) -> None:
         """Close the files."""
         with self._lock:
-            for file, _ in self._open.values():
+            for file in self._files:
                 file.close()
-            self._open.clear()
-
-    def _reader(self, path: Path) -> SeekingReader:
-        if path not in self._open:
-            file = open(path, 'rb')  # noqa: SIM115 - kept open
-            self._open[path] = file, SeekingReader(file)
-        return self._open[path][1]

@@ -44,13 +44,15 @@ class Recording:
 
     Attributes:
         name: Where it is.
-        timeline: Its time line, if it has one.
+        timeline: Where its time line is, or is to be kept.
         messages: The folder or file of its messages, if there are any.
+        is_whole: Whether it has its time line.
     """
 
     name: Path
-    timeline: Path | None
+    timeline: Path
     messages: Path | None
+    is_whole: bool
 
 
 def find_recording(name: str, runs: Path) -> Recording:
@@ -61,15 +63,23 @@ def find_recording(name: str, runs: Path) -> Recording:
     """
     given = Path(name)
     if given.suffix == SUFFIX and given.is_file():
-        return Recording(given, None, given)
+        return _foreign(given, given)
     if given.is_dir() and not is_run(given) and not is_run(given.parent):
-        return Recording(given, None, files_of(given)[0].parent)
+        return _foreign(given, files_of(given)[0].parent)
     folder = find_run(name, runs)
     line, recorded = folder / timeline.NAME, folder / NAME
     has_messages = recorded.is_dir() and any(recorded.glob(f'*{SUFFIX}'))
     if not line.is_file() and not has_messages:
         raise RecordingError(f'{folder}: nothing was recorded')
-    return Recording(folder, line if line.is_file() else None, recorded if has_messages else None)
+    return Recording(folder, line, recorded if has_messages else None, line.is_file())
+
+
+def _foreign(name: Path, messages: Path) -> Recording:
+    """Return what another program recorded; the time line from an earlier look lies beside it."""
+    whole = messages.resolve()
+    line = whole.with_name(f'{whole.name}.{timeline.NAME}')
+    newest = max(path.stat().st_mtime for path in files_of(messages))
+    return Recording(name, line, messages, line.is_file() and line.stat().st_mtime > newest)
 
 
 def is_run(folder: Path) -> bool:
