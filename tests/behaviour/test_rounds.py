@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
-
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -12,15 +10,7 @@ from benchmarks.rule_bound import default_ranks, rule_bound
 from surveillance_behaviour.decision import Rules
 from surveillance_behaviour.policy.graph import PatrolGraph
 from surveillance_behaviour.policy.plan import Plan
-from surveillance_behaviour.policy.rollout import (
-    Guide,
-    Lookahead,
-    Oldest,
-    Outcome,
-    RuleMap,
-    State,
-    roll_out,
-)
+from surveillance_behaviour.policy.rollout import RuleMap, State, lookahead, oldest, roll_out
 from surveillance_behaviour.policy.rounds import RoundSearch
 from surveillance_behaviour.policy.simulation import Patrol
 
@@ -32,17 +22,6 @@ def rules_of(graph: PatrolGraph, threshold: float) -> RuleMap:
     return RuleMap(graph, threshold, default_ranks(graph), 0)
 
 
-def outcome_of(moves: Generator[int, None, Outcome]) -> Outcome:
-    found = []
-
-    def run() -> Generator[int]:
-        found.append((yield from moves))
-
-    for _ in run():
-        pass
-    return found[0]
-
-
 def at_start(graph: PatrolGraph) -> State:
     count = len(graph.places)
     return State(0, 0.0, [0.0] * count, [False] * count)
@@ -50,7 +29,7 @@ def at_start(graph: PatrolGraph) -> State:
 
 def test_the_shortest_lawful_round_of_a_grid_is_found() -> None:
     graph = grid(3, 3)
-    search = RoundSearch(rules_of(graph, 0.1 * graph.tour.length), graph.tour.order)
+    search = RoundSearch(rules_of(graph, 0.1 * graph.tour.length), [graph.tour.order])
     search.improve(200_000.0)
     assert not search.best.breaches
     assert search.best.length == pytest.approx(1.2 * graph.tour.length)
@@ -60,7 +39,7 @@ def test_the_shortest_lawful_round_of_a_grid_is_found() -> None:
 @given(graphs(), st.floats(0.1, 2.0))
 def test_a_round_visits_every_place_in_its_length(graph: PatrolGraph, factor: float) -> None:
     rules = rules_of(graph, factor * graph.tour.length)
-    search = RoundSearch(rules, graph.tour.order)
+    search = RoundSearch(rules, [graph.tour.order])
     search.improve(5_000.0)
     assert set(search.best.targets) == set(range(len(graph.places)))
     walked = rules.length(search.best.targets)
@@ -77,8 +56,8 @@ def test_a_policy_followed_ahead_does_what_it_does_in_a_patrol(kind: str, factor
     for _ in patrol.until(60.0 * graph.tour.length):
         pass
     rules = rules_of(graph, threshold)
-    guide: Guide = Oldest(rules) if kind == 'oldest' else Lookahead(rules)
-    found = outcome_of(roll_out(rules, guide, at_start(graph), 60.0 * graph.tour.length))
+    choose = oldest if kind == 'oldest' else lookahead
+    found = roll_out(rules, choose, at_start(graph), 60.0 * graph.tour.length)
     assert found.settled == pytest.approx(patrol.run.settled)
     assert found.first == pytest.approx(patrol.run.longest)
 

@@ -89,16 +89,9 @@ def lookahead(world: World, allowed: Sequence[str]) -> Scores:
 
 
 def tour(world: World, allowed: Sequence[str]) -> Scores:
-    """Return the next place of the plan, then by how near each place is to its target; see `plan`.
-
-    Where `oldest` or `lookahead` does better than every round that was found, it is followed.
-    """
-    plan = plan_of(world)
-    step = plan.advance(world)
-    if step is None:
-        return (oldest if plan.kind == 'oldest' else lookahead)(world, allowed)
-    graph = world.graph
-    next_place, target = (graph.places[index] for index in step)
+    """Return the next place of the plan, then how near each place is to its target; see `plan`."""
+    plan, graph = plan_of(world), world.graph
+    next_place, target = (graph.places[index] for index in plan.advance(world))
     words = (
         f'which {world.wait_in_words(target)}; '
         f'this round leaves no place longer than {plan.longest:.1f} s'

@@ -1,22 +1,20 @@
-"""Follows a way of patrolling ahead in thought, within the rules, and tells how long places wait.
+"""The map as the rules see it, and patrols on it that are simulated ahead.
 
-A `RuleMap` is the map as the rules see it: at each place the robot may only go to neighbours of
-the first class in the list of rules that has a member there, and a place is URGENT once it went
-unvisited for longer than the threshold. A guide says which neighbour is taken; `roll_out` moves a
-`State` with it until the state comes back, which proves the longest wait for ever, or until a
-horizon.
+At each place the robot may only go to neighbours of the first class in the list of rules that has a
+member there, and a place is URGENT once it went unvisited for longer than the threshold
+(`RuleMap`). `roll_out` moves a `State` by a choice function until the state comes back, which
+proves the longest wait for ever, or until a horizon (a rollout, as in Bertsekas, "Rollout
+algorithms for combinatorial optimization", 1997).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Generator, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from surveillance_behaviour.policy.graph import PatrolGraph
 from surveillance_behaviour.policy.world import World
@@ -27,8 +25,6 @@ NEVER = 9
 """A rank behind that of every place."""
 NEAR = 8
 """How many nearest places of each place are known."""
-SLICE = 100
-"""After so many moves that are followed ahead, whoever waits for them may do something else."""
 HALF_OPEN = 1e-3
 """Seconds by which a wait must be longer than the threshold, so that rounding does not decide."""
 
@@ -136,6 +132,18 @@ class RuleMap:
                 found.append(place)
         return found
 
+    def laps(self, walk: Sequence[int]) -> Iterator[tuple[int, ...]]:
+        """Yield the stretches at the end of a walk that visit every place, as targets."""
+        last: dict[int, int] = {}
+        begun = -1
+        for step, place in enumerate(walk[-4 * self.count :]):
+            last[place] = step
+            start = min(last.values())
+            if len(last) == self.count and start > begun:
+                begun = start
+                lap = walk[-4 * self.count :][start : step + 1]
+                yield tuple(lap)
+
     def allowed(self, state: State) -> list[int]:
         """Return the neighbours that the rules allow; empty: there are none at all."""
         seen, ranks, urgent = state.seen, self.ranks, self.urgent
@@ -177,6 +185,7 @@ class State:
         seen: When each place was visited last, seconds.
         met: Whether the robot came to each place since the patrol began.
         avoided: Places that could not be reached lately: they count only when no other is open.
+        position: How far the robot is on the course that it follows.
     """
 
     place: int
@@ -184,135 +193,112 @@ class State:
     seen: list[float]
     met: list[bool]
     avoided: frozenset[int] = frozenset()
+    position: int = 0
 
-    def copy(self) -> State:
-        """Return a copy to follow ahead, in which every place can be reached."""
+    def fresh(self) -> State:
+        """Return a copy at the beginning of a course, in which every place can be reached."""
         return State(self.place, self.now, self.seen.copy(), self.met.copy())
 
-    def enter(self, place: int, seconds: float) -> float:
-        """Move to a place in so many seconds, and return how long it went unvisited."""
-        self.now += seconds
-        wait = self.now - self.seen[place]
-        self.place, self.seen[place] = place, self.now
-        return wait
 
-
-class Guide(Protocol):
-    """Says where a robot goes next."""
-
-    position: int
-    """What a guide knows beside the state; with an equal state and position it goes on equally."""
-
-    def next(self, state: State) -> int:
-        """Return a neighbour that the rules allow; the place itself when there is none."""
+Choice = Callable[[RuleMap, State], int]
+"""Returns a neighbour that the rules allow; the robot's own place when there is none. It may change
+the position, and goes on equally from an equal state."""
 
 
 @dataclass(frozen=True, order=True)
 class Outcome:
-    """What following a guide comes to; less is better.
+    """What a way to choose comes to; less is better.
 
     Attributes:
         settled: The longest wait from visit to visit, seconds.
         first: The longest wait, that before a place's first visit included, seconds.
-        steps: Places entered in thought.
+        walk: The places that were entered.
+        back: From where on the walk repeats itself; None: that was not found.
+        covered: How many moves it took until every place was visited; None: never.
     """
 
     settled: float
     first: float
-    steps: int = 0
+    walk: Sequence[int] = field(default=(), compare=False)
+    back: int | None = field(default=None, compare=False)
+    covered: int | None = field(default=None, compare=False)
 
-    def grade(self, bound: float, accepted: float) -> tuple[int, int, float]:
-        """Return what to compare by, less is better, in whole percents of the bound.
-
-        Waits from visit to visit come again and again, so they count first, as far as they are
-        longer than what is accepted. Then the first waits do, which come once.
-        """
-        lasting = max(0, round(100.0 * (self.settled - accepted) / bound))
-        return lasting, round(100.0 * self.first / bound), self.settled
+    def back_or_last_lap(self, count: int) -> int | None:
+        """Return from where on the walk may be repeated; None: it does not visit all places."""
+        if self.back is not None:
+            return self.back
+        last = {place: step for step, place in enumerate(self.walk)}
+        return min(last.values()) if len(last) == count else None
 
 
 def roll_out(
-    rules: RuleMap, guide: Guide, state: State, horizon: float, stop: float = math.inf
-) -> Generator[int, None, Outcome]:
-    """Follow a guide until the state comes back, the horizon, or a wait longer than ``stop``.
+    rules: RuleMap,
+    choose: Choice,
+    state: State,
+    horizon: float,
+    stop: float = math.inf,
+    moves: float = math.inf,
+) -> Outcome:
+    """Simulate a patrol until the state comes back, the horizon, or a wait that is too long.
 
     Args:
         rules: The map.
-        guide: Says where to go; its position changes.
+        choose: Says where to go.
         state: Where to begin; it is not changed.
         horizon: Seconds at most.
         stop: A wait from visit to visit that is too long, seconds.
-
-    Yields:
-        How many places were entered in thought since the last time, every `SLICE` of them.
-
-    Returns:
-        The `Outcome`.
+        moves: How many at most.
     """
-    at = state.copy()
+    at = state.fresh()
     seen, met, legs = at.seen, at.met, rules.legs
     end = at.now + horizon
     settled = first = 0.0
-    steps = 0
+    walk: list[int] = []
+    unmet = rules.count - sum(met)
+    covered = None if unmet else 0
     anchor = min(range(rules.count), key=lambda place: len(legs[place]))
-    states: set[tuple[float, ...]] = set()
-    while at.now < end and settled <= stop:
-        place = guide.next(at)
+    states: dict[tuple[float, ...], int] = {}
+    back = None
+    while at.now < end and settled <= stop and len(walk) < moves:
+        place = choose(rules, at)
         if place == at.place:
             break
-        wait = at.enter(place, legs[at.place][place])
-        steps += 1
-        if steps % SLICE == 0:
-            yield SLICE
-        if not met[place]:
+        at.now += legs[at.place][place]
+        wait = at.now - seen[place]
+        at.place, seen[place] = place, at.now
+        walk.append(place)
+        if met[place]:
+            settled = max(settled, wait)
+        else:
             met[place] = True
             first = max(first, wait)
-        elif wait > settled:
-            settled = wait
+            unmet -= 1
+            if not unmet:
+                covered = len(walk)
         if place == anchor:
-            key = (guide.position, *(round(at.now - last, 3) for last in seen))
+            key = (at.position, *(round(at.now - last, 3) for last in seen))
             if key in states:
+                back = states[key]
                 break
-            states.add(key)
+            states[key] = len(walk)
     else:
         settled = max(settled, at.now - min(seen))
-    yield steps % SLICE
-    return Outcome(settled, max(first, settled), steps)
+    return Outcome(settled, max(first, settled), walk, back, covered)
 
 
-class Oldest:
-    """Goes to the allowed neighbour that went unvisited longest."""
-
-    position = 0
-
-    def __init__(self, rules: RuleMap) -> None:
-        self._rules = rules
-
-    def next(self, state: State) -> int:
-        """Return the neighbour; see `Guide`."""
-        allowed = self._rules.allowed(state)
-        return min(allowed, key=lambda place: (state.seen[place], place), default=state.place)
+def oldest(rules: RuleMap, state: State) -> int:
+    """Choose the allowed neighbour that went unvisited longest."""
+    seen = state.seen
+    return min(rules.allowed(state), key=lambda place: (seen[place], place), default=state.place)
 
 
-class Lookahead:
-    """Goes towards wherever (time unvisited - time to get there) is highest."""
-
-    position = 0
-
-    def __init__(self, rules: RuleMap) -> None:
-        self._rules = rules
-        self._away: NDArray[np.float64] = rules.graph.distances
-
-    def next(self, state: State) -> int:
-        """Return the neighbour; see `Guide`."""
-        allowed = self._rules.allowed(state)
-        if len(allowed) < 2:
-            return allowed[0] if allowed else state.place
-        idle = state.now - np.array(state.seen)
-        idle[state.place] = -np.inf
-        legs = self._rules.legs[state.place]
-        worth = {
-            place: round(float((idle - self._away[place]).max()) - legs[place], 6)
-            for place in allowed
-        }
-        return max(allowed, key=lambda place: (worth[place], -state.seen[place], -place))
+def lookahead(rules: RuleMap, state: State) -> int:
+    """Choose the way towards wherever (time unvisited - time to get there) is highest."""
+    allowed = rules.allowed(state)
+    if len(allowed) < 2:
+        return allowed[0] if allowed else state.place
+    idle = state.now - np.array(state.seen)
+    idle[state.place] = -np.inf
+    legs, away = rules.legs[state.place], rules.graph.distances
+    worth = {p: round(float((idle - away[p]).max()) - legs[p], 6) for p in allowed}
+    return max(allowed, key=lambda place: (worth[place], -state.seen[place], -place))

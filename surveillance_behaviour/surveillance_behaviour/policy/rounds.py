@@ -14,6 +14,7 @@ import itertools
 import math
 import random
 from bisect import bisect_right
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from surveillance_behaviour.policy.rollout import RuleMap
@@ -63,25 +64,21 @@ class RoundSearch:
 
     Args:
         rules: The map.
-        targets: The round to begin with.
-        work: Work done before.
+        starts: Rounds, of which the best is begun with.
 
     Attributes:
         best: The best round so far.
         work: Work done so far.
     """
 
-    def __init__(self, rules: RuleMap, targets: tuple[int, ...], work: float = 0.0) -> None:
+    def __init__(self, rules: RuleMap, starts: Iterable[tuple[int, ...]]) -> None:
         self._rules = rules
-        self._draw = random.Random(int(work))
+        self._draw = random.Random(0)
         self._penalty = PENALTY * rules.mean_leg
-        self.work = work
-        found = self.judged(targets)
-        if not work:
-            found = min(found, self.judged(targets[::-1]), key=self.cost)
-        self._take(found)
+        self.work = 0.0
+        self._take(min((self.judged(targets) for targets in starts), key=self.cost))
         self.best, self._best_cost = self._round, self._cost
-        self._cycle, self._cycle_end = FIRST_CYCLE, work + FIRST_CYCLE
+        self._cycle = self._cycle_end = FIRST_CYCLE
 
     def cost(self, found: Round) -> float:
         """Return the length of a round with the penalties for what the rules forbid, seconds."""
@@ -242,19 +239,6 @@ class RoundChanges:
         rest = targets[:old] + targets[old + 1 :]
         position -= old < position
         return (*rest[:position], place, *rest[position:])
-
-    def doubled(self, limit: float) -> tuple[int, ...] | None:
-        """Return the targets with one more visit of a place that is near the round there."""
-        targets, away = self._targets, self._rules.away
-        position = self._draw.randrange(len(targets))
-        before, after = targets[position - 1], targets[position]
-        if not self._rules.near[after]:
-            return None
-        place = self._draw.choice(self._rules.near[after])
-        added = away[before][place] + away[place][after] - away[before][after]
-        if self._length + added > limit:
-            return None
-        return (*targets[:position], place, *targets[position:])
 
     def _without_double(self) -> tuple[int, ...] | None:
         """Leave out one of the targets that stand twice."""
