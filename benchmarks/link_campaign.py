@@ -19,15 +19,13 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.hosts import Host, Network, may_be_made
+from surveillance_runtime.testing import claim_domain
 
 ROOT = Path(__file__).resolve().parents[1]
 ROBOT = ('simulator', 'motion_controller', 'planner_controller', 'battery_controller')
 DESK = ('armor_server', 'ontology_map_builder', 'robot_behavior')
 PATIENCE = 120.0
 """Seconds that the next visit may take."""
-DOMAIN = 7
-"""Of the namespaces' own: nobody else is there."""
-
 
 LOSS, DELAY = 0.2, 0.2
 """Of a frame in either direction: the chance that it is lost, and seconds that it takes."""
@@ -88,6 +86,7 @@ class LinkCampaign:
         self._scratch = scratch
         self._events = events
         self._chance = random.Random(seed)
+        self._domain = claim_domain()
         self.network = Network(2, seed)
         robot, desk = self.network.hosts
         self._launchers = [
@@ -96,7 +95,7 @@ class LinkCampaign:
         ]
 
     def _launch(self, host: Host, name: str, nodes: Sequence[str]) -> subprocess.Popen[bytes]:
-        words = ['--network', '--domain', str(DOMAIN), '--record', str(self._scratch / name)]
+        words = ['--network', '--domain', str(self._domain), '--record', str(self._scratch / name)]
         words += ['--only', ','.join(nodes)]
         with (self._scratch / f'{name}.log').open('wb') as log:
             return subprocess.Popen(

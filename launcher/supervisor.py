@@ -1,13 +1,12 @@
 """Child processes under supervision: started, their output merged, restarted, stopped together.
 
 One thread, one `selectors` loop: output, input, deaths and signals all arrive as readable file
-descriptors, pauses and deadlines as the loop's timeout.
+descriptors; pauses and deadlines are looked at in each round.
 """
 
 from __future__ import annotations
 
 import contextlib
-import math
 import os
 import selectors
 import signal
@@ -16,6 +15,7 @@ import subprocess
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 from launcher.log_merge import MergedLog
 from launcher.process_watch import (
@@ -48,6 +48,8 @@ STOP_WITHIN, STOP_AT_MOST = 2.5, 12.0
 STOP_AGAIN_AFTER = 0.5
 """Seconds from a stop signal on which another one kills all that is left; one Ctrl-C may come as
 two signals."""
+TICK = 0.1
+"""Seconds that a round of the loop takes at most."""
 LOOK_PERIOD = 0.5
 """Seconds between two looks at the heartbeats and the memory of the processes."""
 TROUBLE_AFTER = 5
@@ -101,7 +103,7 @@ class Child:
     heartbeats: Heartbeats | None = None
     activity: Activity = field(default_factory=Activity)
     ended_for: str = ''
-    rest: bytes = field(default=b'', repr=False)
+    read: Callable[[], bool] = lambda: False
 
     @property
     def running(self) -> bool:
@@ -140,31 +142,41 @@ class Supervisor:
         self._log = log
         self._pauses = tuple(pauses)
         self._on_trouble = on_trouble
-        self._look_at = math.inf
+        self._look_at = 0.0
         self._selector = selectors.DefaultSelector()
         self._stopping_since: float | None = None
         self._stop_at_once = False
         self._code = 0
         self.time_is_over = False
 
-    def read_from(self, descriptor: int, on_line: Callable[[str], None]) -> None:
-        """Call `on_line` for each line that can be read from a descriptor until its end."""
+    def read_from(self, source: int, on_line: Callable[[str], None]) -> Callable[[], bool]:
+        """Call `on_line` for each line that can be read from a descriptor until its end.
+
+        Returns:
+            Reads at once what is there; returns whether there may be more.
+        """
         rest = b''
 
-        def take() -> None:
+        def take() -> bool:
             nonlocal rest
             try:
-                chunk = os.read(descriptor, 65536)
+                chunk = os.read(source, 65536)
+            except BlockingIOError:
+                return False
             except OSError:
                 chunk = b''
             *lines, rest = (rest + chunk).split(b'\n')
             if not chunk:
-                self._selector.unregister(descriptor)
-                lines = [rest] if rest else []
+                self._selector.unregister(source)
+            if rest and (not chunk or len(rest) > _LONGEST_LINE):
+                lines.append(rest)
+                rest = b''
             for line in lines:
                 on_line(line.decode('utf-8', 'replace'))
+            return bool(chunk)
 
-        self._selector.register(descriptor, selectors.EVENT_READ, take)
+        self._selector.register(source, selectors.EVENT_READ, take)
+        return take
 
     def send(self, name: str, line: str) -> bool:
         """Write a line to a program's input; return whether somebody is there to read it."""
@@ -203,7 +215,7 @@ class Supervisor:
             while self._to_start or any(
                 child.running or child.restart_at for child in self.children.values()
             ):
-                for key, _ in self._selector.select(self._timeout(end)):
+                for key, _ in self._selector.select(TICK):
                     key.data()
                 self._reap()
                 self._keep_time(end)
@@ -220,9 +232,8 @@ class Supervisor:
 
     def _start(self, child: Child) -> None:
         child.restart_at = None
-        child.rest = b''
         child.finished, child.ended_for = False, ''
-        with self._awaited(child) as up, self._listening(child) as beat:
+        with self._pipe(self._awaiting(child)) as up, self._pipe(self._listening(child)) as beat:
             process = self._spawn(child, {UP: up, BEAT: beat})
         child.process = process
         child.started = time.monotonic()
@@ -231,57 +242,56 @@ class Supervisor:
         os.set_blocking(process.stdout.fileno(), False)
         if process.stdin is not None:
             os.set_blocking(process.stdin.fileno(), False)
-        self._selector.register(
-            process.stdout, selectors.EVENT_READ, lambda: self._read(child, process)
+        child.read = self.read_from(
+            process.stdout.fileno(), partial(self._log.line, child.program.name)
         )
         self._log.say(f'started {child.program.name} (process {process.pid})')
 
     @contextlib.contextmanager
-    def _awaited(self, child: Child) -> Iterator[int | None]:
-        """Give what a process closes when it is up, or lets go of when it dies before that."""
-        if not child.program.says_up:
+    def _pipe(self, on_read: Callable[[bytes], None] | None) -> Iterator[int | None]:
+        """Give what a process writes to, None for nobody who reads it; its end is read as b''."""
+        if on_read is None:
             yield None
             return
         reader, writer = os.pipe()
-
-        def up() -> None:
-            self._selector.unregister(reader)
-            os.close(reader)
-            child.coming_up = False
-            self._start_next()
-
-        self._selector.register(reader, selectors.EVENT_READ, up)
-        child.coming_up = True
-        try:
-            yield writer
-        finally:
-            os.close(writer)
-
-    @contextlib.contextmanager
-    def _listening(self, child: Child) -> Iterator[int | None]:
-        """Give what a process writes its heartbeats to."""
-        if not child.program.watched:
-            yield None
-            return
-        reader, writer = os.pipe()
-        os.set_blocking(writer, False)
-        heartbeats = child.heartbeats = Heartbeats(time.monotonic())
 
         def take() -> None:
             chunk = os.read(reader, 4096)
             if not chunk:
                 self._selector.unregister(reader)
                 os.close(reader)
-            elif child.heartbeats is heartbeats:
-                heartbeats.beat(time.monotonic())
-                child.finished = child.finished or FINISHED in chunk
+            on_read(chunk)
 
         self._selector.register(reader, selectors.EVENT_READ, take)
-        self._look_at = min(self._look_at, time.monotonic() + LOOK_PERIOD)
         try:
             yield writer
         finally:
             os.close(writer)
+
+    def _awaiting(self, child: Child) -> Callable[[bytes], None] | None:
+        """Return what is told that a process is up, or is dead before that."""
+        if not child.program.says_up:
+            return None
+        child.coming_up = True
+
+        def up(_nothing: bytes) -> None:
+            child.coming_up = False
+            self._start_next()
+
+        return up
+
+    def _listening(self, child: Child) -> Callable[[bytes], None] | None:
+        """Return what is told a process's heartbeats."""
+        if not child.program.watched:
+            return None
+        heartbeats = child.heartbeats = Heartbeats(time.monotonic())
+
+        def beat(chunk: bytes) -> None:
+            if chunk and child.heartbeats is heartbeats:
+                heartbeats.beat(time.monotonic())
+                child.finished = child.finished or FINISHED in chunk
+
+        return beat
 
     def _spawn(self, child: Child, given: Mapping[str, int | None]) -> subprocess.Popen[bytes]:
         environ = {**child.program.environ, RESTARTS: str(child.starts)}
@@ -303,23 +313,6 @@ class Supervisor:
             start_new_session=True,
         )
 
-    def _read(self, child: Child, process: subprocess.Popen[bytes]) -> bool:
-        """Take what a process printed; return whether there may be more."""
-        assert process.stdout is not None
-        try:
-            chunk = os.read(process.stdout.fileno(), 65536)
-        except BlockingIOError:
-            return False
-        *lines, child.rest = (child.rest + chunk).split(b'\n')
-        if not chunk:
-            self._selector.unregister(process.stdout)
-        if child.rest and (not chunk or len(child.rest) > _LONGEST_LINE):
-            lines.append(child.rest)
-            child.rest = b''
-        for line in lines:
-            self._log.line(child.program.name, line.decode('utf-8', 'replace'))
-        return bool(chunk)
-
     def _reap(self) -> None:
         for child in self.children.values():
             process = child.process
@@ -337,7 +330,7 @@ class Supervisor:
         assert process.stdout is not None
         # A process that left its group may hold the pipe open: its end is not waited for.
         if process.stdout in self._selector.get_map():
-            while self._read(child, process):
+            while child.read():
                 pass
         if process.stdout in self._selector.get_map():
             self._selector.unregister(process.stdout)
@@ -394,23 +387,6 @@ class Supervisor:
                 child.ended_for = problem
                 self._log.warn(f'{child.program.name} {problem}: ending it')
                 _kill_group(child.process.pid)
-
-    def _timeout(self, end: float | None) -> float | None:
-        times = [child.restart_at for child in self.children.values() if child.restart_at]
-        if self._stopping_since is not None:
-            running = [child for child in self.children.values() if child.running]
-            if not all(child.told_to_stop for child in running):
-                times.append(self._stopping_since + STOP_LEADERS_WITHIN)
-            if not all(child.killed for child in running):
-                times.append(time.monotonic() + LOOK_PERIOD)
-        elif end is not None:
-            times.append(end)
-        if self._stopping_since is None and any(c.heartbeats for c in self.children.values()):
-            times.append(self._look_at)
-        if self._to_start:
-            coming = [child.started for child in self.children.values() if child.coming_up]
-            times += [started + START_WITHIN for started in coming]
-        return max(0.0, min(times) - time.monotonic()) if times else None
 
     def _tell_to_stop(self, *, leaders_only: bool) -> None:
         for child in reversed(self.children.values()):
