@@ -56,6 +56,7 @@ from std_msgs.msg import UInt32  # noqa: E402
 
 from benchmarks.link_campaign import LinkCampaign  # noqa: E402
 from benchmarks.machine_faults import SmallDisk, SteppedClock  # noqa: E402
+from surveillance_fsm.ros import ServiceCaller  # noqa: E402
 from surveillance_interfaces.srv import ArmorDirective  # noqa: E402
 from surveillance_runtime.place import read_place_file  # noqa: E402
 from surveillance_runtime.place.regions import Regions  # noqa: E402
@@ -158,7 +159,7 @@ class Watcher:
             PoseStamped, 'ground_truth', self._on_truth, qos_profile_sensor_data
         )
         self.node.create_subscription(UInt32, 'collisions', self._on_collisions, STATE_QOS)
-        self._armor = self.node.create_client(ArmorDirective, 'armor_interface_srv')
+        self._armor = ServiceCaller(self.node, ArmorDirective, 'armor_interface_srv')
         self._clients: dict[str, Any] = {}
         self._executor = SingleThreadedExecutor(context=self.context)
         self._executor.add_node(self.node)
@@ -205,23 +206,13 @@ class Watcher:
             asked.client_name, asked.reference_name = 'campaign', reference
             asked.command, asked.primary_command_spec = 'QUERY', 'DATAPROP'
             asked.secondary_command_spec, asked.args = 'IND', ['visitedAt', place]
-            answer = self._ask(self._armor, request, 5.0)
-            values = answer.armor_response.queried_objects if answer else []
+            values = self._armor.call(request, 20.0).armor_response.queried_objects
             numbers = [
                 int(number) for value in values for number in re.findall(r'"(-?\d+)"', value)
             ]
             if numbers:
                 found[place] = max(numbers)
         return found
-
-    def _ask(self, client: Any, request: Any, seconds: float) -> Any:
-        future = client.call_async(request)
-        done = threading.Event()
-        future.add_done_callback(lambda _: done.set())
-        if not done.wait(seconds):
-            client.remove_pending_request(future)
-            return None
-        return future.result()
 
 
 @dataclass(frozen=True)
@@ -403,9 +394,7 @@ class Campaign:
             if self.watcher.answers(name, late - time.monotonic()):
                 self.results.outages.append(self._outage(name, began, time.monotonic()))
             else:
-                self.results.away.append(
-                    f'{name} after {signal.Signals(kind).name}: {self._second_opinion(name)}'
-                )
+                self.results.away.append(f'{name} after {signal.Signals(kind).name}')
 
         with ThreadPoolExecutor() as pool:
             list(pool.map(await_return, names))
@@ -418,14 +407,6 @@ class Campaign:
             at = min(answered, max(last, seen.get(step, last)))
             steps[step], last = at - last, at
         return Outage(name, steps)
-
-    def _second_opinion(self, name: str) -> str:
-        """Return whether a node that seems to be away is: somebody new asks it, too."""
-        other = Watcher(self._domain)
-        try:
-            return 'answers a new client' if other.answers(name, 10.0) else 'answers nobody'
-        finally:
-            other.close()
 
     def _hit_machine(self) -> None:
         faults: dict[str, Callable[[], None]] = {'freeze': self._freeze}

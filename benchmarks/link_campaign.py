@@ -2,9 +2,9 @@
 
 The simulated robot and its controllers are on one host, ontology and behaviour on the other. First
 the visits are counted over an undisturbed link, then over one that loses and delays frames, then
-the hosts are cut off from each other, at any moment of a leg, and joined again. How long the first
-visit takes after that is told with the drive to it, and without the time that the drive takes at
-the speed of the undisturbed phase.
+the hosts are cut off from each other, at any moment of a leg, and joined again. What counts then is
+when the mission goes on: when it decides anew, or the leg ends that it was on. How long the first
+visit takes, whose drive depends on the place, is told as well.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ PATIENCE = 120.0
 LOSS, DELAY = 0.2, 0.2
 """Of a frame in either direction: the chance that it is lost, and seconds that it takes."""
 ALLOWED_SHARE, ALLOWED_SECONDS = 0.5, 5.0
-"""What a campaign that passed has reached: share of undisturbed visits, seconds without a drive."""
+"""What a campaign that passed has reached: share of undisturbed visits, seconds to go on."""
 
 
 @dataclass
@@ -41,7 +41,7 @@ class LinkResults:
         undisturbed, disturbed: Visits a minute.
         lost_frames: Share that was lost while the link was disturbed.
         visits: Seconds from each joining to the first visit after it.
-        waits: The same without the drive.
+        waits: Seconds until the mission went on.
     """
 
     undisturbed: float = 0.0
@@ -58,14 +58,14 @@ class LinkResults:
     def rows(self) -> list[tuple[str, str]]:
         """Return the table to print."""
         shown = ', '.join(
-            f'{visit:.1f} s ({wait:.1f} s without the drive)'
-            for visit, wait in zip(self.visits, self.waits, strict=True)
+            f'{wait:.1f} s, {visit:.1f} s'
+            for wait, visit in zip(self.waits, self.visits, strict=True)
         )
         return [
             ('visits a minute, undisturbed', f'{self.undisturbed:.1f}'),
             (f'with {LOSS:.0%} loss, {DELAY * 1000:.0f} ms each way', f'{self.disturbed:.1f}'),
             ('frames lost meanwhile', f'{self.lost_frames:.0%}'),
-            ('first visit after the hosts were joined again', shown or 'not tried'),
+            ('joined again: mission goes on, first visit', shown or 'not tried'),
         ]
 
 
@@ -110,10 +110,7 @@ class LinkCampaign:
         """Go through the phases; `seconds` for each of the first two."""
         results = LinkResults()
         self._await_visit()
-        began = time.time()
         results.undisturbed = self._rate(seconds)
-        driven = [visit for visit in self._of('visit') if float(visit['time']) > began]
-        speed = sum(float(visit['distance']) for visit in driven) / seconds
         network = self.network
         network.loss, network.delay = LOSS, DELAY
         network.passed = network.lost = 0
@@ -126,11 +123,11 @@ class LinkCampaign:
             network.cut = True
             time.sleep(cut_seconds)
             network.cut = False
-            joined = time.monotonic()
-            visit = self._await_visit()
-            results.visits.append(time.monotonic() - joined)
-            drive = float(visit['distance']) / speed if speed else 0.0
-            results.waits.append(max(0.0, results.visits[-1] - drive))
+            joined = time.time()
+            self._await_visit()
+            results.visits.append(time.time() - joined)
+            steps = [float(each['time']) for each in (*self._of('decision'), *self._of('visit'))]
+            results.waits.append(min(step for step in steps if step > joined) - joined)
         return results
 
     def _of(self, kind: str) -> list[dict[str, Any]]:
@@ -141,14 +138,12 @@ class LinkCampaign:
             if event.get('event') == kind
         ]
 
-    def _await_visit(self) -> dict[str, Any]:
-        """Wait for the next visit and return it."""
+    def _await_visit(self) -> None:
         before, late = len(self._of('visit')), time.monotonic() + PATIENCE
-        while len(visits := self._of('visit')) == before:
+        while len(self._of('visit')) == before:
             if time.monotonic() > late:
                 raise SystemExit(f'campaign: no visit in {PATIENCE:g} s, see {self._scratch}')
             time.sleep(0.1)
-        return visits[-1]
 
     def _rate(self, seconds: float) -> float:
         """Return visits a minute."""

@@ -68,19 +68,16 @@ class Allowance:
 
     Args:
         rate: Lines a second in the long run.
+        burst: Lines after a pause.
         now: Steady time, seconds.
-        burst: Lines after a pause; default: those of four seconds.
     """
 
     def __init__(
-        self,
-        rate: float,
-        now: Callable[[], float] = time.monotonic,
-        burst: float | None = None,
+        self, rate: float, burst: float, now: Callable[[], float] = time.monotonic
     ) -> None:
         self._rate = rate
         self._now = now
-        self._most = self._left = 4.0 * rate if burst is None else burst
+        self._most = self._left = burst
         self._at = now()
 
     def take(self) -> bool:
@@ -100,8 +97,8 @@ class CleanLogger(rcutils.RcutilsLogger):  # type: ignore[misc]
     def __init__(self, name: str) -> None:
         super().__init__(name)
         self._lock = threading.Lock()
-        self._lines = Allowance(LINES_PER_SECOND, burst=LINES_AT_ONCE)
-        self._warnings = Allowance(WARNINGS_PER_SECOND, burst=WARNINGS_AT_ONCE)
+        self._lines = Allowance(LINES_PER_SECOND, LINES_AT_ONCE)
+        self._warnings = Allowance(WARNINGS_PER_SECOND, WARNINGS_AT_ONCE)
         self._left_out = 0
 
     def log(self, message: Any, severity: Any, **options: Any) -> bool:

@@ -15,7 +15,15 @@ from std_srvs.srv import Trigger
 
 from surveillance_fsm.ros import ServiceCaller
 from surveillance_fsm.ros.waiting import CLIENT_QOS
-from surveillance_runtime.logging import LONGEST, Allowance, clean
+from surveillance_runtime.logging import (
+    LINES_AT_ONCE,
+    LINES_PER_SECOND,
+    LONGEST,
+    WARNINGS_AT_ONCE,
+    WARNINGS_PER_SECOND,
+    Allowance,
+    clean,
+)
 from surveillance_runtime.node import MOST_WAITING, PatrolNode
 from surveillance_runtime.waiting import AwaitedEvent
 
@@ -144,9 +152,14 @@ def test_no_node_has_the_service_that_logs_requests_as_they_came(graph):
     assert not any('get_type_description' in name for name in names)
 
 
+def test_no_minute_of_a_node_has_more_than_600_lines():
+    rate = LINES_PER_SECOND + WARNINGS_PER_SECOND
+    assert LINES_AT_ONCE + WARNINGS_AT_ONCE + 60.0 * rate <= 600.0
+
+
 def test_an_allowance_grows_with_time():
     time = 0.0
-    allowance = Allowance(2.0, lambda: time)
+    allowance = Allowance(2.0, 8.0, lambda: time)
     assert sum(allowance.take() for _ in range(100)) == 8
     time = 1.0
     assert sum(allowance.take() for _ in range(100)) == 2
