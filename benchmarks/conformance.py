@@ -74,13 +74,13 @@ def reasoned(source: bytes | Path) -> tuple[KnowledgeBase, bool, list[str], floa
     """Return the document reasoned over: (knowledge, consistent, unsupported, seconds)."""
     document = read_ontology(source, BASE)
     kb = KnowledgeBase(document.iri or BASE, document.axioms)
-    start = time.perf_counter()
+    start = time.process_time()
     consistent = kb.reason()
     return (
         kb,
         consistent,
         [*document.unsupported, *kb.unsupported],
-        time.perf_counter() - start,
+        time.process_time() - start,
     )
 
 

@@ -52,26 +52,51 @@ COLUMNS = ('ontologies', 'refused', 'no answer', 'inconsistent', 'questions', 'r
 FAULTS = ('named', 'silent', 'unsound', 'false inconsistency', 'crash')
 
 
-def questions(axioms: list[Axiom]) -> Iterator[tuple[Axiom, tuple[str, ...]]]:
-    """Every fact that could follow, and the words that ask for it."""
+def questions(axioms: list[Axiom]) -> Iterator[Axiom]:
+    """Yield every fact that could follow."""
     values = {(a.prop, a.literal) for a in axioms if isinstance(a, DataPropertyAssertion)}
     for one in INDIVIDUALS:
         for cls in CLASSES:
-            yield ClassAssertion(cls, one), ('class', cls, one)
+            yield ClassAssertion(cls, one)
         for prop, value in sorted(values, key=repr):
-            words = ('data', prop, one, value.lexical, value.datatype)
-            yield DataPropertyAssertion(prop, one, value), words
+            yield DataPropertyAssertion(prop, one, value)
         for other in INDIVIDUALS:
             for prop in OBJECTS:
-                yield ObjectPropertyAssertion(prop, one, other), ('object', prop, one, other)
+                yield ObjectPropertyAssertion(prop, one, other)
             if one < other:
-                pair = frozenset((one, other))
-                yield SameIndividual(pair), ('same', one, other)
-                yield DifferentIndividuals(pair), ('different', one, other)
+                yield SameIndividual(frozenset((one, other)))
+                yield DifferentIndividuals(frozenset((one, other)))
     for sub in CLASSES:
         for sup in (*CLASSES, NOTHING):
             if sub != sup:
-                yield SubClassOf(sub, sup), ('subclass', sub, sup)
+                yield SubClassOf(sub, sup)
+
+
+def words_for(fact: Axiom) -> tuple[str, ...]:
+    """Return the words that ask a Java reasoner for a fact.
+
+    Raises:
+        TypeError: It is no fact of the kinds that `questions` has.
+    """
+    if isinstance(fact, ClassAssertion):
+        return 'class', str(fact.cls), fact.individual
+    if isinstance(fact, DataPropertyAssertion):
+        return 'data', fact.prop, fact.subject, fact.literal.lexical, fact.literal.datatype
+    if isinstance(fact, ObjectPropertyAssertion):
+        return 'object', fact.prop, fact.subject, fact.object
+    if isinstance(fact, SameIndividual):
+        return 'same', *sorted(fact.individuals)
+    if isinstance(fact, DifferentIndividuals):
+        return 'different', *sorted(fact.individuals)
+    if isinstance(fact, SubClassOf):
+        return 'subclass', str(fact.sub), str(fact.sup)
+    raise TypeError(fact)
+
+
+def drawn_axioms(seed: int, cases: float = 0.2, special: float = 0.0) -> list[Axiom]:
+    """Return the random ontology of a seed."""
+    drawn = WideOntology(seed, cases, special)
+    return drawn.ontology(drawn.random.randrange(1, 13), drawn.random.randrange(3, 14))
 
 
 def spelt_out(axioms: list[Axiom]) -> Iterator[Axiom]:
@@ -119,7 +144,7 @@ class Comparison:
             yield f'{seed}: slow: {took:.1f} s'
         asked = list(questions(axioms))
         try:
-            theirs, answers = self._answers(path, [words for _, words in asked])
+            theirs, answers = self._answers(path, [words_for(fact) for fact in asked])
         except JavaReasonerError as error:
             late = 'no answer' in str(error)
             counts['no answer' if late else 'refused'] += 1
@@ -143,14 +168,14 @@ class Comparison:
                 counts['false inconsistency'] += 1
                 yield f'{seed}: false inconsistency: {kb.explain_inconsistency()}'
         elif theirs:
-            for (axiom, words), answer in zip(asked, answers, strict=True):
+            for axiom, answer in zip(asked, answers, strict=True):
                 if answer == 'e':
                     continue
                 counts['questions'] += 1
                 ours = kb.holds(axiom)
                 if ours == (answer == 't'):
                     counts['right'] += 1
-                elif self._judged(path, words) == ours:
+                elif self._judged(path, words_for(axiom)) == ours:
                     counts['settled'] += 1
                 elif ours:
                     counts['unsound'] += 1
@@ -208,8 +233,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / 'random.owl'
         for seed in range(arguments.first, arguments.first + number):
-            drawn = WideOntology(seed, arguments.cases, arguments.special)
-            axioms = drawn.ontology(drawn.random.randrange(1, 13), drawn.random.randrange(3, 14))
+            axioms = drawn_axioms(seed, arguments.cases, arguments.special)
             for line in comparison.compare(seed, axioms, path):
                 print(line, flush=True)
     comparison.close()

@@ -94,6 +94,20 @@ def changeable(kb: KnowledgeBase) -> list[Axiom]:
     ]
 
 
+def change_at_random(kb: KnowledgeBase, drawn: RandomOntology) -> None:
+    """Retract or assert something; every fifth time an axiom about classes or properties."""
+    rng = drawn.random
+    if rng.random() < 0.2:
+        pool = [a for a in kb.axioms() if not isinstance(a, Assertion | Declaration)]
+        fresh = drawn.schema_axiom
+    else:
+        pool, fresh = changeable(kb), drawn.assertion
+    if pool and rng.random() < 0.5:
+        assert kb.remove(rng.choice(pool))
+    else:
+        kb.add(fresh())
+
+
 def walk(seed: int) -> None:
     """Compare a random ontology and random changes after each `reason`; the feed too."""
     drawn = RandomOntology(seed)
@@ -106,11 +120,7 @@ def walk(seed: int) -> None:
     for _ in range(4):
         feed.clear()
         for _ in range(rng.choice([1, 2, 3])):
-            pool = changeable(kb)
-            if pool and rng.random() < 0.5:
-                assert kb.remove(rng.choice(pool))
-            else:
-                kb.add(drawn.assertion())
+            change_at_random(kb, drawn)
         kb.reason()
         assert_as_from_nothing(kb)
         for changes in feed:
