@@ -2,8 +2,8 @@
 of its classes.
 
 What a class implies through individuals that must exist, but are not known, is found in its context
-(`contexts`) and added to the program as clauses. Where several restrictions act together, the
-engine asks for the context of all that an individual is (`requirements`).
+(`contexts`) and added to the program as clauses. Where several restrictions act together, what
+follows is left to reasoning by cases.
 """
 
 from __future__ import annotations
@@ -185,7 +185,7 @@ class Classification:
     # --- what existentials mean for named individuals ---
 
     def _requirements(self) -> None:
-        """Add what each existential implies alone; ask for contexts where several interact."""
+        """Add what each existential implies alone; note whether several interact."""
         program, contexts = self.program, self._contexts
         labels = list(dict.fromkeys(existential.label for existential in program.existentials))
         alone: set[HeadAtom] = set()
@@ -202,7 +202,7 @@ class Classification:
             return
         everything = contexts.context(relevant, bare=True)
         if everything.clash or not self._follow_alone(relevant, alone):
-            program.contexts, program.relevant = contexts, relevant
+            program.interacting = True
 
     def _follow_alone(self, relevant: frozenset[Predicate], alone: set[HeadAtom]) -> bool:
         """Tell whether all classes together imply no more than the existentials do one by one."""

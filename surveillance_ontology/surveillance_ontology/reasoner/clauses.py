@@ -9,15 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 from surveillance_ontology.owl.axioms import Axiom
 from surveillance_ontology.owl.expressions import ClassExpression, PropertyExpression
 from surveillance_ontology.reasoner.datatypes import Test, Value
 from surveillance_ontology.reasoner.value_sets import ValueSet
-
-if TYPE_CHECKING:
-    from surveillance_ontology.reasoner.contexts import Contexts
 
 
 class UnsupportedError(Exception):
@@ -272,9 +269,8 @@ class Program:
             have, and the sentence that reports it.
         meetings: Existentials whose individuals or values a lower bound counts.
         uses_thing: Whether the extension of owl:Thing must be kept.
-        contexts: Completes what an individual is by all its classes together; None where each
-            class alone says all.
-        relevant: The classes that matter to `contexts`.
+        interacting: Whether several classes of one individual together imply more than each of
+            them does alone.
     """
 
     classes: dict[str, Predicate] = field(default_factory=dict)
@@ -294,8 +290,7 @@ class Program:
     partial: list[tuple[Predicate, Predicate, str]] = field(default_factory=list)
     meetings: list[tuple[Existential, AtLeast]] = field(default_factory=list)
     uses_thing: bool = False
-    contexts: Contexts | None = None
-    relevant: frozenset[Predicate] = frozenset()
+    interacting: bool = False
     thing: Predicate = field(default_factory=lambda: Predicate('class', 'owl:Thing'))
     nothing: Predicate = field(default_factory=lambda: Predicate('class', 'owl:Nothing'))
     different: Predicate = field(default_factory=lambda: Predicate('different', 'different from'))

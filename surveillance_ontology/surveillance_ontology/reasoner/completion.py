@@ -88,7 +88,7 @@ class Completion:
         says all by itself and nothing is counted or excluded, or rules, which take no part in
         cases, do the rest.
         """
-        if program.unsupported or program.contexts is not None:
+        if program.unsupported or program.interacting:
             return True
         clauses = [clause for clause in program.clauses if not clause.named_only]
         if any(isinstance(c.head, SameAtom) and _names(c.head) for c in clauses):

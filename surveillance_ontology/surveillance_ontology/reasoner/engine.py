@@ -105,8 +105,6 @@ class Engine:
         for index in self._network.thresholds:
             index.proves = self.proofs.proves
         self._flushes = [index.flush for index in self._network.thresholds]
-        if self._network.contexts is not None:
-            self._flushes.append(self._network.contexts.flush)
         for predicate in dict.fromkeys(program.predicates()):
             self._attach_touching(predicate)
         self._start()
@@ -235,8 +233,6 @@ class Engine:
         network = self._network
         cases = OpenCases(self.program, network.context, network.lower, network.counters)
         yield from cases.sentences()
-        if network.contexts is not None:
-            yield from network.contexts.gaps()
 
     # --- touching ---
 

@@ -22,7 +22,6 @@ from surveillance_ontology.reasoner.clauses import (
     SameAtom,
     Term,
 )
-from surveillance_ontology.reasoner.context_index import ContextIndex
 from surveillance_ontology.reasoner.difference import (
     AsymmetricEvidence,
     Difference,
@@ -53,7 +52,6 @@ class Network:
             changed.
         touch_related: Like these, for individuals that differ because their values do.
         thresholds: The rules run by a sorted index.
-        contexts: What follows from individuals that must exist, where that takes an index.
         lower, counters: The watchers of lower and of upper bounds.
         context: The engine's tables, for compiled joins.
     """
@@ -103,16 +101,6 @@ class Network:
             self.attach(clause)
         self._attach_disjoint()
         self._attach_evidence()
-        self.contexts: ContextIndex | None = None
-        if program.contexts is not None:
-            index = ContextIndex(
-                program, program.contexts, representative, enqueue, overdelete, merge
-            )
-            self.naming.append(index.rename)
-            self.contexts = index
-            difference.evidence.append(index)
-            for predicate in program.relevant:
-                predicate.touching = (1,)
 
     # --- clauses ---
 

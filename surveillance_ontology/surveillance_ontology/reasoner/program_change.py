@@ -145,7 +145,6 @@ class _Keys:
         """Return all but clauses and what serves the classification alone."""
         program, predicate = self._program, self.predicate
         return (
-            program.contexts is None or program.contexts,
             program.uses_thing,
             tuple(map(self._record, program.at_least)),
             tuple(map(self._record, program.at_most)),
