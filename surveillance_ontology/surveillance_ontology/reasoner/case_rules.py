@@ -19,11 +19,16 @@ from surveillance_ontology.owl.axiom_text import axiom_text
 from surveillance_ontology.owl.axioms import Axiom
 from surveillance_ontology.owl.expressions import ClassExpression, PropertyExpression
 from surveillance_ontology.owl.vocabulary import NOTHING, OWL, THING, TOP_LITERAL, local_name
-from surveillance_ontology.reasoner.clauses import UnsupportedError
-from surveillance_ontology.reasoner.contexts import closure
+from surveillance_ontology.reasoner.clauses import UnsupportedError, closure, turned
 from surveillance_ontology.reasoner.datatypes import unfolded, value_of
 from surveillance_ontology.reasoner.property_chains import AnyRole, Chains
-from surveillance_ontology.reasoner.translation import directed, negated, normal
+from surveillance_ontology.reasoner.translation import (
+    bounds,
+    directed,
+    inclusions,
+    negated,
+    normal,
+)
 from surveillance_ontology.reasoner.value_sets import EVERY, ValueSet, point, value_set
 
 _X, _Y = 0, 1
@@ -207,28 +212,16 @@ class CaseRules:
         found = self.above.get(role)
         if found is None:
             key = (self.role_names[abs(role)], role < 0)
-            seen = {key: None}
-            pending = [key]
-            while pending:
-                for other in self._inclusions.get(pending.pop(), ()):
-                    if other not in seen:
-                        seen[other] = None
-                        pending.append(other)
-            found = self.above[role] = tuple(self.role(one) for one in seen)
+            above = closure(key, lambda one: self._inclusions.get(one, ()))
+            found = self.above[role] = tuple(self.role(one) for one in above)
         return found
 
     def data_above(self, prop: str) -> tuple[str, ...]:
         """Return the data property and every one that it implies."""
         found = self.props_above.get(prop)
         if found is None:
-            seen = {prop: None}
-            pending = [prop]
-            while pending:
-                for other in self._data_inclusions.get(pending.pop(), ()):
-                    if other not in seen:
-                        seen[other] = None
-                        pending.append(other)
-            found = self.props_above[prop] = tuple(seen)
+            above = closure(prop, lambda one: self._data_inclusions.get(one, ()))
+            found = self.props_above[prop] = tuple(above)
         return found
 
     def is_complex(self, prop: str) -> bool:
@@ -377,38 +370,23 @@ class CaseRules:
     # --- axioms ---
 
     def _property_inclusion(self, axiom: Axiom) -> None:
-        if isinstance(axiom, ax.SubObjectPropertyOf):
-            self._below(directed(axiom.sub), directed(axiom.sup))
-        elif isinstance(axiom, ax.EquivalentObjectProperties):
-            for sub in axiom.props:
-                for sup in axiom.props:
-                    self._below(directed(sub), directed(sup))
-        elif isinstance(axiom, ax.InverseObjectProperties):
-            first, (iri, inverted) = directed(axiom.first), directed(axiom.second)
-            self._below(first, (iri, not inverted))
-            self._below((iri, not inverted), first)
-            self.has_inverse = True
-        elif isinstance(axiom, ax.SymmetricObjectProperty):
-            iri, inverted = directed(axiom.prop)
-            self._below((iri, inverted), (iri, not inverted))
-            self.has_inverse = True
-        elif isinstance(axiom, ax.TransitiveObjectProperty):
+        data = isinstance(axiom, (ax.SubDataPropertyOf, ax.EquivalentDataProperties))
+        for sub, sup in inclusions(axiom):
+            if data:
+                self._data_inclusions.setdefault(sub[0], set()).add(sup[0])
+            else:
+                self._below(sub, sup)
+        if isinstance(axiom, ax.TransitiveObjectProperty):
             role = directed(axiom.prop)
             self._chains.imply((role, role), role)
         elif isinstance(axiom, ax.SubPropertyChainOf):
             self._chains.imply(tuple(map(directed, axiom.chain)), directed(axiom.sup))
-        elif isinstance(axiom, ax.SubDataPropertyOf):
-            self._data_inclusions.setdefault(axiom.sub, set()).add(axiom.sup)
-        elif isinstance(axiom, ax.EquivalentDataProperties):
-            for data_prop in axiom.props:
-                self._data_inclusions.setdefault(data_prop, set()).update(axiom.props)
 
     def _below(self, sub: AnyRole, sup: AnyRole) -> None:
         for role in (sub, sup):
             self.role(role)
         self._inclusions.setdefault(sub, set()).add(sup)
-        turned = (sub[0], not sub[1])
-        self._inclusions.setdefault(turned, set()).add((sup[0], not sup[1]))
+        self._inclusions.setdefault(turned(sub), set()).add(turned(sup))
         self._chains.imply((sub,), sup)
 
     def _check_chains(self, axiom: Axiom) -> None:
@@ -566,7 +544,7 @@ class _Clause:
                 role = rules.role(one.prop)
                 self._heads.append(rules._counted(rules.at_most, Count(one.n, role, concept)))
         elif isinstance(one, (ex.ObjectExactCardinality, ex.DataExactCardinality)):
-            self._both.append(_exactly(one))
+            self._both.append(ex.ObjectIntersectionOf(bounds(one)))
         else:
             return self._take_values(one)
         return True
@@ -728,20 +706,6 @@ def _flat(disjuncts: Iterable[ClassExpression]) -> Iterator[ClassExpression]:
             yield from _flat(one.operands)
         else:
             yield one
-
-
-def _exactly(
-    one: ex.ObjectExactCardinality | ex.DataExactCardinality,
-) -> ex.ObjectIntersectionOf:
-    if isinstance(one, ex.ObjectExactCardinality):
-        parts = (one.n, one.prop, one.filler)
-        return ex.ObjectIntersectionOf(
-            (ex.ObjectMinCardinality(*parts), ex.ObjectMaxCardinality(*parts))
-        )
-    counted = (one.n, one.prop, one.range)
-    return ex.ObjectIntersectionOf(
-        (ex.DataMinCardinality(*counted), ex.DataMaxCardinality(*counted))
-    )
 
 
 def _is_negative(expression: ClassExpression) -> bool:

@@ -25,6 +25,8 @@ from surveillance_ontology.reasoner.clauses import (
     Predicate,
     PredicateAtom,
     RangeAtom,
+    closure,
+    turned,
 )
 from surveillance_ontology.reasoner.contexts import (
     Context,
@@ -32,8 +34,6 @@ from surveillance_ontology.reasoner.contexts import (
     Role,
     Token,
     Tokens,
-    closure,
-    turned,
 )
 from surveillance_ontology.reasoner.property_chains import spell_out_chains
 from surveillance_ontology.reasoner.simplify import drop_implied_atoms, simplify

@@ -9,12 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeVar
 
 from surveillance_ontology.owl.axioms import Axiom
 from surveillance_ontology.owl.expressions import ClassExpression, PropertyExpression
 from surveillance_ontology.reasoner.datatypes import Test, Value
 from surveillance_ontology.reasoner.value_sets import ValueSet
+
+T = TypeVar('T')
 
 
 class UnsupportedError(Exception):
@@ -325,6 +327,23 @@ class Program:
         yield from self.datas.values()
         yield from self.labels.values()
         yield from self.negatives.values()
+
+
+def closure(start: T, following: Callable[[T], Iterable[T]]) -> dict[T, None]:
+    """Return what is reached from `start` by following again and again, itself included."""
+    found = {start: None}
+    pending = [start]
+    while pending:
+        for other in following(pending.pop()):
+            if other not in found:
+                found[other] = None
+                pending.append(other)
+    return found
+
+
+def turned(role: tuple[T, bool]) -> tuple[T, bool]:
+    """Return a property, and whether it is inverted, in the other direction."""
+    return role[0], not role[1]
 
 
 def property_atom(program: Program, prop: PropertyExpression, x: Term, y: Term) -> PredicateAtom:

@@ -15,10 +15,10 @@ A token is a class predicate, ('is', individual), ('has', property, turned, indi
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Any, TypeAlias, TypeVar
+from typing import Any, TypeAlias
 
 from surveillance_ontology.owl.axiom_text import axiom_text
 from surveillance_ontology.owl.axioms import Axiom
@@ -33,33 +33,17 @@ from surveillance_ontology.reasoner.clauses import (
     Program,
     RangeAtom,
     SameAtom,
+    closure,
+    turned,
 )
 from surveillance_ontology.reasoner.value_sets import EVERY, ValueSet, point
 
-T = TypeVar('T')
 Token: TypeAlias = 'Predicate | tuple[Any, ...]'
 Tokens: TypeAlias = frozenset[Token]
 Role: TypeAlias = tuple[Predicate, bool]
 _CASES = 'which of the related individuals are the same would need reasoning by cases'
 _DATES = 'whether its values suit another range is not decided'
 _NOMINALS = 'facts about the individual are not used for classes and unnamed individuals'
-
-
-def closure(start: T, following: Callable[[T], Iterable[T]]) -> dict[T, None]:
-    """Return what is reached from `start` by following again and again, itself included."""
-    found = {start: None}
-    pending = [start]
-    while pending:
-        for other in following(pending.pop()):
-            if other not in found:
-                found[other] = None
-                pending.append(other)
-    return found
-
-
-def turned(role: Role) -> Role:
-    """Return the role in the other direction."""
-    return role[0], not role[1]
 
 
 @dataclass(frozen=True, slots=True)

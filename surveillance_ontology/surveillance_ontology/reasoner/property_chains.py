@@ -25,8 +25,10 @@ from surveillance_ontology.reasoner.clauses import (
     SameAtom,
     Term,
     UnsupportedError,
+    closure,
+    turned,
 )
-from surveillance_ontology.reasoner.contexts import Role, closure, turned
+from surveillance_ontology.reasoner.contexts import Role
 
 AnyRole: TypeAlias = tuple[Any, bool]
 Step: TypeAlias = tuple[int, 'AnyRole | None', int]

@@ -7,8 +7,8 @@ clause can express is reported, with the axiom, in `Program.unsupported`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from itertools import product
+from collections.abc import Callable, Iterable, Iterator
+from itertools import permutations, product
 from typing import Any
 
 from surveillance_ontology.owl import axioms as ax
@@ -42,7 +42,9 @@ from surveillance_ontology.reasoner.clauses import (
     SameAtom,
     Term,
     UnsupportedError,
+    closure,
     property_atom,
+    turned,
 )
 from surveillance_ontology.reasoner.datatypes import Test, range_test, unfolded, value_of
 from surveillance_ontology.reasoner.swrl_builtins import builtin
@@ -124,6 +126,17 @@ def normal(expression: ClassExpression) -> ClassExpression:
     return expression
 
 
+def bounds(
+    exactly: ex.ObjectExactCardinality | ex.DataExactCardinality,
+) -> tuple[ClassExpression, ClassExpression]:
+    """Return the lower and the upper bound that an exact number consists of."""
+    if isinstance(exactly, ex.ObjectExactCardinality):
+        parts = (exactly.n, exactly.prop, exactly.filler)
+        return ex.ObjectMinCardinality(*parts), ex.ObjectMaxCardinality(*parts)
+    counted = (exactly.n, exactly.prop, exactly.range)
+    return ex.DataMinCardinality(*counted), ex.DataMaxCardinality(*counted)
+
+
 def is_positive(expression: ClassExpression) -> bool:
     """Tell whether facts that hold can show membership, so that a clause body can state it."""
     if isinstance(expression, str):
@@ -143,6 +156,18 @@ def directed(prop: PropertyExpression) -> _Directed:
     return (prop, False) if isinstance(prop, str) else (prop.prop, True)
 
 
+def inclusions(axiom: Axiom) -> Iterator[tuple[_Directed, _Directed]]:
+    """Yield the pairs of properties, one included in the other, that an axiom states."""
+    if isinstance(axiom, (ax.SubObjectPropertyOf, ax.SubDataPropertyOf)):
+        yield directed(axiom.sub), directed(axiom.sup)
+    elif isinstance(axiom, (ax.EquivalentObjectProperties, ax.EquivalentDataProperties)):
+        yield from permutations(dict.fromkeys(map(directed, axiom.props)), 2)
+    elif isinstance(axiom, ax.InverseObjectProperties):
+        yield from permutations((directed(axiom.first), turned(directed(axiom.second))))
+    elif isinstance(axiom, ax.SymmetricObjectProperty):
+        yield directed(axiom.prop), turned(directed(axiom.prop))
+
+
 class PropertyHierarchy:
     """The reflexive and transitive closure of the stated property inclusions."""
 
@@ -150,39 +175,17 @@ class PropertyHierarchy:
         self._above: dict[_Directed, set[_Directed]] = {}
         self._functional: set[_Directed] = set()
         for axiom in axioms:
-            if isinstance(axiom, (ax.SubObjectPropertyOf, ax.SubDataPropertyOf)):
-                self._edge(directed(axiom.sub), directed(axiom.sup))
-            elif isinstance(axiom, (ax.EquivalentObjectProperties, ax.EquivalentDataProperties)):
-                for sub in axiom.props:
-                    for sup in axiom.props:
-                        self._edge(directed(sub), directed(sup))
-            elif isinstance(axiom, ax.InverseObjectProperties):
-                first, (name, inverted) = directed(axiom.first), directed(axiom.second)
-                self._edge(first, (name, not inverted))
-                self._edge((name, not inverted), first)
-            elif isinstance(axiom, ax.SymmetricObjectProperty):
-                name, inverted = directed(axiom.prop)
-                self._edge((name, inverted), (name, not inverted))
-            elif isinstance(axiom, (ax.FunctionalObjectProperty, ax.FunctionalDataProperty)):
+            for sub, sup in inclusions(axiom):
+                self._above.setdefault(sub, set()).add(sup)
+                self._above.setdefault(turned(sub), set()).add(turned(sup))
+            if isinstance(axiom, (ax.FunctionalObjectProperty, ax.FunctionalDataProperty)):
                 self._functional.add(directed(axiom.prop))
             elif isinstance(axiom, ax.InverseFunctionalObjectProperty):
-                name, inverted = directed(axiom.prop)
-                self._functional.add((name, not inverted))
-
-    def _edge(self, sub: _Directed, sup: _Directed) -> None:
-        self._above.setdefault(sub, set()).add(sup)
-        self._above.setdefault((sub[0], not sub[1]), set()).add((sup[0], not sup[1]))
+                self._functional.add(turned(directed(axiom.prop)))
 
     def above(self, prop: PropertyExpression) -> set[_Directed]:
         """Return the property and everything it is included in."""
-        found = {directed(prop)}
-        pending = list(found)
-        while pending:
-            for sup in self._above.get(pending.pop(), ()):
-                if sup not in found:
-                    found.add(sup)
-                    pending.append(sup)
-        return found
+        return set(closure(directed(prop), lambda one: self._above.get(one, ())))
 
     def above_role(self, iri: str, inverted: bool) -> set[_Directed]:
         """Return a directed property and everything it is included in."""
@@ -505,14 +508,9 @@ class Translation:
         bodies: list[Body] = [(PredicateAtom(label, (x,)),)]
         if isinstance(expression, (ex.ObjectMinCardinality, ex.DataMinCardinality)):
             self._count(label, expression)
-        elif isinstance(expression, ex.ObjectExactCardinality):
-            parts = (expression.n, expression.prop, expression.filler)
+        elif isinstance(expression, (ex.ObjectExactCardinality, ex.DataExactCardinality)):
             if expression.n >= 1 and functional(expression.prop):
-                return bodies + self.bodies(ex.ObjectMinCardinality(*parts), x)
-        elif isinstance(expression, ex.DataExactCardinality):
-            values = (expression.n, expression.prop, expression.range)
-            if expression.n >= 1 and functional(expression.prop):
-                return bodies + self.bodies(ex.DataMinCardinality(*values), x)
+                return bodies + self.bodies(bounds(expression)[0], x)
         elif isinstance(expression, ex.ObjectAllValuesFrom):
             if normal(expression.filler) == THING:
                 return [()]
@@ -533,12 +531,9 @@ class Translation:
         An exact number has members that are in more than what is asked for: enough related ones.
         """
         weaker: ClassExpression = THING
-        if isinstance(expression, ex.ObjectExactCardinality) and expression.n:
-            parts = (expression.n, expression.prop, expression.filler)
-            weaker = ex.ObjectMinCardinality(*parts)
-        elif isinstance(expression, ex.DataExactCardinality) and expression.n:
-            counted = (expression.n, expression.prop, expression.range)
-            weaker = ex.DataMinCardinality(*counted)
+        exact = (ex.ObjectExactCardinality, ex.DataExactCardinality)
+        if isinstance(expression, exact) and expression.n:
+            weaker = bounds(expression)[0]
         subject = self._context if self._origin is None else axiom_text(self._origin)
         text = f'{subject}: not all members of {expression_text(expression)} are recognised'
         self.program.partial.append((label, self.required(weaker), text))
@@ -614,73 +609,83 @@ class Translation:
     def _describe(self, label: Predicate, expression: ClassExpression) -> None:
         """Add what membership in a labelled expression implies."""
         x, body = _X, (PredicateAtom(label, (_X,)),)
-        program = self.program
         if isinstance(expression, (ex.ObjectSomeValuesFrom, ex.ObjectMinCardinality)):
-            n = expression.n if isinstance(expression, ex.ObjectMinCardinality) else 1
-            filler = normal(expression.filler)
-            if n == 1 and isinstance(filler, ex.ObjectOneOf) and len(filler.individuals) == 1:
-                self.clause(
-                    body, self.property(expression.prop, x, Constant(filler.individuals[0]))
-                )
-            elif n > 0:
-                prop, inverse = self._direction(expression.prop)
-                required = None if filler == THING else self.required(filler)
-                program.existentials.append(
-                    Existential(label, n, prop, inverse, required, self._origin)
-                )
+            self._describe_some(label, expression)
         elif isinstance(expression, (ex.DataSomeValuesFrom, ex.DataMinCardinality)):
             n = expression.n if isinstance(expression, ex.DataMinCardinality) else 1
-            data = program.data(expression.prop)
             if n > 0:
                 admitted = self.test(expression.range)
                 every = EVERY if admitted is None else admitted[1]
-                program.existentials.append(Existential(label, n, data, False, every, self._origin))
+                self._exist(label, n, (self.program.data(expression.prop), False), every)
         elif isinstance(expression, ex.ObjectAllValuesFrom):
             y = self.fresh()
             self.imply((*body, self.property(expression.prop, x, y)), expression.filler, y)
         elif isinstance(expression, ex.DataAllValuesFrom):
             self.only(body, expression.prop, expression.range)
-        elif isinstance(expression, ex.ObjectMaxCardinality):
-            prop, inverse = self._direction(expression.prop)
-            if expression.n == 0 and isinstance(normal(expression.filler), str | ex.ObjectOneOf):
-                y = self.fresh()
-                link = self.property(expression.prop, x, y)
-                self.imply((*body, link), negated(normal(expression.filler)), y)
-            elif expression.n == 0:
-                for related in self._related(expression.prop, expression.filler, x):
-                    self.contradict((*body, *related), x)
-            else:
-                filler_label = self._filler(expression.filler)
-                program.at_most.append(
-                    AtMost(label, expression.n, prop, inverse, filler_label, self._origin)
-                )
-        elif isinstance(expression, ex.DataMaxCardinality):
-            data = program.data(expression.prop)
-            if expression.n == 0:
+        elif isinstance(expression, (ex.ObjectMaxCardinality, ex.DataMaxCardinality)):
+            self._describe_most(label, expression)
+        elif isinstance(expression, (ex.ObjectExactCardinality, ex.DataExactCardinality)):
+            for bound in bounds(expression):
+                self.imply(body, bound, x)
+        elif isinstance(expression, ex.ObjectComplementOf):
+            self._describe_complement(label, expression.operand)
+
+    def _describe_some(
+        self, label: Predicate, expression: ex.ObjectSomeValuesFrom | ex.ObjectMinCardinality
+    ) -> None:
+        n = expression.n if isinstance(expression, ex.ObjectMinCardinality) else 1
+        filler = normal(expression.filler)
+        if n == 1 and isinstance(filler, ex.ObjectOneOf) and len(filler.individuals) == 1:
+            known = Constant(filler.individuals[0])
+            self.clause((PredicateAtom(label, (_X,)),), self.property(expression.prop, _X, known))
+        elif n > 0:
+            required = None if filler == THING else self.required(filler)
+            self._exist(label, n, self._direction(expression.prop), required)
+
+    def _exist(
+        self,
+        label: Predicate,
+        n: int,
+        direction: tuple[Predicate, bool],
+        filler: Predicate | ValueSet | None,
+    ) -> None:
+        existential = Existential(label, n, *direction, filler, self._origin)
+        self.program.existentials.append(existential)
+
+    def _describe_most(
+        self, label: Predicate, expression: ex.ObjectMaxCardinality | ex.DataMaxCardinality
+    ) -> None:
+        x, body, n = _X, (PredicateAtom(label, (_X,)),), expression.n
+        if isinstance(expression, ex.DataMaxCardinality):
+            if n == 0:
                 self.contradict((*body, *self._valued(expression.prop, expression.range, x)), x)
             else:
                 test, values = self.test(expression.range) or (None, None)
-                program.at_most.append(
-                    AtMost(label, expression.n, data, False, test, self._origin, values)
-                )
-        elif isinstance(expression, ex.ObjectExactCardinality):
-            parts = (expression.n, expression.prop, expression.filler)
-            self.imply(body, ex.ObjectMinCardinality(*parts), x)
-            self.imply(body, ex.ObjectMaxCardinality(*parts), x)
-        elif isinstance(expression, ex.DataExactCardinality):
-            counted = (expression.n, expression.prop, expression.range)
-            self.imply(body, ex.DataMinCardinality(*counted), x)
-            self.imply(body, ex.DataMaxCardinality(*counted), x)
-        elif isinstance(expression, ex.ObjectComplementOf):
-            if isinstance(expression.operand, str):
-                self._disjoint(label, program.cls(expression.operand))
-            else:
-                for other in self.bodies(expression.operand, x):
-                    self.contradict((*body, *other), x)
-                if isinstance(expression.operand, ex.ObjectOneOf):
-                    for name in expression.operand.individuals:
-                        pair = (x, Constant(name))
-                        self.clause(body, PredicateAtom(program.different, pair))
+                data = self.program.data(expression.prop)
+                most = AtMost(label, n, data, False, test, self._origin, values)
+                self.program.at_most.append(most)
+        elif n:
+            filler = self._filler(expression.filler)
+            direction = self._direction(expression.prop)
+            self.program.at_most.append(AtMost(label, n, *direction, filler, self._origin))
+        elif isinstance(normal(expression.filler), str | ex.ObjectOneOf):
+            y = self.fresh()
+            link = self.property(expression.prop, x, y)
+            self.imply((*body, link), negated(normal(expression.filler)), y)
+        else:
+            for related in self._related(expression.prop, expression.filler, x):
+                self.contradict((*body, *related), x)
+
+    def _describe_complement(self, label: Predicate, operand: ClassExpression) -> None:
+        if isinstance(operand, str):
+            self._disjoint(label, self.program.cls(operand))
+            return
+        for other in self.bodies(operand, _X):
+            self.contradict((PredicateAtom(label, (_X,)), *other), _X)
+        if isinstance(operand, ex.ObjectOneOf):
+            for name in operand.individuals:
+                differs = self._differs(_X, Constant(name))
+                self.clause((PredicateAtom(label, (_X,)),), differs)
 
     def only(self, body: Body, prop: str, data_range: ex.DataRange) -> None:
         if self.test(data_range) is not None:
@@ -789,74 +794,64 @@ class Translation:
     # --- property axioms ---
 
     def _property_axiom(self, axiom: Axiom) -> None:
-        """Add the clauses of one property axiom to the self's program."""
-        program, clause, prop = self.program, self.clause, self.property
-        if isinstance(axiom, ax.SubObjectPropertyOf):
-            clause((prop(axiom.sub, _X, _Y),), prop(axiom.sup, _X, _Y))
-        elif isinstance(axiom, ax.SubPropertyChainOf):
+        """Add the clauses of an axiom about properties."""
+        data = isinstance(axiom, (ax.SubDataPropertyOf, ax.EquivalentDataProperties))
+        link = self._data_link if data else self._object_link
+        for sub, sup in inclusions(axiom):
+            self.clause((link(*sub),), link(*sup))
+        if isinstance(axiom, (ax.DisjointObjectProperties, ax.DisjointDataProperties)):
+            data = isinstance(axiom, ax.DisjointDataProperties)
+            self._disjoint_properties(axiom.props, self._data_link if data else self._object_link)
+        elif isinstance(axiom, ax.ObjectPropertyDomain):
+            self.imply((self.property(axiom.prop, _X, _Y),), axiom.domain, _X)
+        elif isinstance(axiom, ax.ObjectPropertyRange):
+            self.imply((self.property(axiom.prop, _X, _Y),), axiom.range, _Y)
+        elif isinstance(axiom, ax.DataPropertyDomain):
+            self.imply((self._data_link(axiom.prop),), axiom.domain, _X)
+        elif isinstance(axiom, ax.DataPropertyRange):
+            self.only((), axiom.prop, axiom.range)
+        else:
+            self._characteristic(axiom)
+
+    def _characteristic(self, axiom: Axiom) -> None:
+        """Add the clauses of an axiom that says of what kind a property, or a chain, is."""
+        program, prop = self.program, self.property
+        if isinstance(axiom, ax.SubPropertyChainOf):
             body = tuple(prop(part, place, place + 1) for place, part in enumerate(axiom.chain))
-            clause(body, prop(axiom.sup, 0, len(axiom.chain)))
-        elif isinstance(axiom, ax.EquivalentObjectProperties):
-            for sub in axiom.props:
-                for sup in axiom.props:
-                    if sub != sup:
-                        clause((prop(sub, _X, _Y),), prop(sup, _X, _Y))
-        elif isinstance(axiom, ax.InverseObjectProperties):
-            clause((prop(axiom.first, _X, _Y),), prop(axiom.second, _Y, _X))
-            clause((prop(axiom.second, _X, _Y),), prop(axiom.first, _Y, _X))
-        elif isinstance(axiom, ax.SymmetricObjectProperty):
-            clause((prop(axiom.prop, _X, _Y),), prop(axiom.prop, _Y, _X))
+            self.clause(body, prop(axiom.sup, 0, len(axiom.chain)))
         elif isinstance(axiom, ax.TransitiveObjectProperty):
-            clause((prop(axiom.prop, _X, _Y), prop(axiom.prop, _Y, _Z)), prop(axiom.prop, _X, _Z))
+            both = prop(axiom.prop, _X, _Y), prop(axiom.prop, _Y, _Z)
+            self.clause(both, prop(axiom.prop, _X, _Z))
         elif isinstance(axiom, ax.ReflexiveObjectProperty):
-            clause((), prop(axiom.prop, _X, _X))
+            self.clause((), prop(axiom.prop, _X, _X))
         elif isinstance(axiom, ax.IrreflexiveObjectProperty):
-            name = axiom.prop if isinstance(axiom.prop, str) else axiom.prop.prop
-            program.irreflexive.append(program.object(name))
+            program.irreflexive.append(prop(axiom.prop, _X, _X).predicate)
             self.contradict((prop(axiom.prop, _X, _X),), _X)
         elif isinstance(axiom, ax.AsymmetricObjectProperty):
-            name = axiom.prop if isinstance(axiom.prop, str) else axiom.prop.prop
-            program.asymmetric.append(program.object(name))
+            program.asymmetric.append(prop(axiom.prop, _X, _Y).predicate)
             self.contradict((prop(axiom.prop, _X, _Y), prop(axiom.prop, _Y, _X)), _X)
-        elif isinstance(axiom, ax.DisjointObjectProperties):
-            for first, second in ax.pairs_of(axiom.props):
-                one, two = prop(first, _X, _Y), prop(second, _X, _Y)
-                pair = (one.predicate, one.terms[0] == _Y, two.predicate, two.terms[0] == _Y)
-                program.disjoint_properties.append(pair)
-                self.contradict((one, two), _X)
         elif isinstance(axiom, (ax.FunctionalObjectProperty, ax.InverseFunctionalObjectProperty)):
             atom = prop(axiom.prop, _X, _Y)
             inverse = (atom.terms[0] == _Y) != isinstance(axiom, ax.InverseFunctionalObjectProperty)
             program.at_most.append(AtMost(None, 1, atom.predicate, inverse, None, axiom))
-        elif isinstance(axiom, ax.ObjectPropertyDomain):
-            self.imply((prop(axiom.prop, _X, _Y),), axiom.domain, _X)
-        elif isinstance(axiom, ax.ObjectPropertyRange):
-            self.imply((prop(axiom.prop, _X, _Y),), axiom.range, _Y)
-        elif isinstance(axiom, ax.SubDataPropertyOf):
-            self._imply_data(axiom.sub, axiom.sup)
-        elif isinstance(axiom, ax.EquivalentDataProperties):
-            for data_sub in axiom.props:
-                for data_sup in axiom.props:
-                    if data_sub != data_sup:
-                        self._imply_data(data_sub, data_sup)
-        elif isinstance(axiom, ax.DisjointDataProperties):
-            for name, other in ax.pairs_of(axiom.props):
-                one = PredicateAtom(program.data(name), (_X, _Y))
-                two = PredicateAtom(program.data(other), (_X, _Y))
-                program.disjoint_properties.append((one.predicate, False, two.predicate, False))
-                self.contradict((one, two), _X)
         elif isinstance(axiom, ax.FunctionalDataProperty):
             program.at_most.append(AtMost(None, 1, program.data(axiom.prop), False, None, axiom))
-        elif isinstance(axiom, ax.DataPropertyDomain):
-            body = (PredicateAtom(program.data(axiom.prop), (_X, _Y)),)
-            self.imply(body, axiom.domain, _X)
-        elif isinstance(axiom, ax.DataPropertyRange):
-            self.only((), axiom.prop, axiom.range)
 
-    def _imply_data(self, sub: str, sup: str) -> None:
-        program = self.program
-        body = (PredicateAtom(program.data(sub), (_X, _Y)),)
-        self.clause(body, PredicateAtom(program.data(sup), (_X, _Y)))
+    def _disjoint_properties(
+        self, props: Iterable[PropertyExpression], link: Callable[..., PredicateAtom]
+    ) -> None:
+        for first, second in ax.pairs_of(props):
+            one, two = link(*directed(first)), link(*directed(second))
+            pair = (one.predicate, one.terms[0] == _Y, two.predicate, two.terms[0] == _Y)
+            self.program.disjoint_properties.append(pair)
+            self.contradict((one, two), _X)
+
+    def _object_link(self, iri: str, inverted: bool = False) -> PredicateAtom:
+        pair = (_Y, _X) if inverted else (_X, _Y)
+        return PredicateAtom(self.program.object(iri), pair)
+
+    def _data_link(self, iri: str, _: bool = False) -> PredicateAtom:
+        return PredicateAtom(self.program.data(iri), (_X, _Y))
 
     # --- rules ---
 
