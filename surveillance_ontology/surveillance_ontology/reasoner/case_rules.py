@@ -17,8 +17,9 @@ from surveillance_ontology.owl import axioms as ax
 from surveillance_ontology.owl import expressions as ex
 from surveillance_ontology.owl.axiom_text import axiom_text
 from surveillance_ontology.owl.axioms import Axiom
+from surveillance_ontology.owl.entities import entities_of
 from surveillance_ontology.owl.expressions import ClassExpression, PropertyExpression
-from surveillance_ontology.owl.vocabulary import NOTHING, OWL, THING, TOP_LITERAL, local_name
+from surveillance_ontology.owl.vocabulary import NOTHING, OWL, THING, TOP_LITERAL
 from surveillance_ontology.reasoner.clauses import UnsupportedError, closure, turned
 from surveillance_ontology.reasoner.datatypes import unfolded, value_of
 from surveillance_ontology.reasoner.property_chains import AnyRole, Chains
@@ -34,7 +35,10 @@ from surveillance_ontology.reasoner.value_sets import EVERY, ValueSet, point, va
 _X, _Y = 0, 1
 Heads = tuple[tuple[int, int], ...]
 """Alternatives: pairs of place (0: the individual, 1: the related one) and concept."""
-_FRESH = 'urn:case:'
+FRESH = 'urn:case:'
+"""Names that begin so are no ontology's; an individual with one is unnamed."""
+TOP, BOTTOM = OWL + 'topObjectProperty', OWL + 'bottomObjectProperty'
+_BOTTOM_DATA = OWL + 'bottomDataProperty'
 _MOST = 300
 _NONE: frozenset[int] = frozenset()
 
@@ -119,6 +123,7 @@ class CaseRules:
     """
 
     def __init__(self, axioms: Iterable[Axiom]) -> None:
+        axioms = list(axioms)
         tbox = [axiom for axiom in axioms if not isinstance(axiom, (ax.Assertion, ax.Annotation))]
         self.names: list[str] = ['']
         self._numbers: dict[str, int] = {}
@@ -159,6 +164,7 @@ class CaseRules:
         }
         for axiom in tbox:
             self._attempt(axiom, self._property_inclusion)
+        self._top_and_bottom({iri for axiom in axioms for _, iri in entities_of(axiom)})
         for axiom in tbox:
             self._attempt(axiom, self._check_chains)
             self._attempt(axiom, self._axiom)
@@ -176,14 +182,14 @@ class CaseRules:
         number = self._numbers.get(iri)
         if number is None:
             number = self._numbers[iri] = len(self.names)
-            self.names.append('' if iri.startswith(_FRESH) else iri)
+            self.names.append('' if iri.startswith(FRESH) else iri)
             if iri == NOTHING:
                 self.node_rule(frozenset((number,)), ())
         return number
 
     def fresh(self) -> str:
         """Return a name for a concept of its own."""
-        return f'{_FRESH}{len(self.names)}'
+        return f'{FRESH}{len(self.names)}'
 
     def nominal(self, individual: str) -> int:
         """Return the concept of one individual."""
@@ -197,8 +203,6 @@ class CaseRules:
     def role(self, prop: PropertyExpression | AnyRole) -> int:
         """Return the number of a role."""
         iri, inverted = prop if isinstance(prop, tuple) else directed(prop)
-        if iri in (f'{OWL}topObjectProperty', f'{OWL}bottomObjectProperty'):
-            raise UnsupportedError(f'owl:{local_name(iri)} is not reasoned about by cases')
         number = self._roles.get(iri)
         if number is None:
             number = self._roles[iri] = len(self.role_names)
@@ -381,6 +385,23 @@ class CaseRules:
             self._chains.imply((role, role), role)
         elif isinstance(axiom, ax.SubPropertyChainOf):
             self._chains.imply(tuple(map(directed, axiom.chain)), directed(axiom.sup))
+
+    def _top_and_bottom(self, used: set[str]) -> None:
+        """Add what the properties mean that OWL itself defines, where they are used.
+
+        Everybody is related to one individual by owl:topObjectProperty, which is symmetric and
+        transitive: so everybody is related to everybody.
+        """
+        if TOP in used:
+            role = directed(TOP)
+            self._below(role, turned(role))
+            self._chains.imply((role, role), role)
+            somebody = Count(1, self.role(TOP), self.nominal(self.fresh()))
+            self.always.append(((_X, self._counted(self.at_least, somebody)),))
+        if BOTTOM in used:
+            self.edge_rule(EdgeRule(_NONE, self.role(BOTTOM), _NONE, ()))
+        if _BOTTOM_DATA in used:
+            self.value_rule(_BOTTOM_DATA, _NONE, EVERY, ())
 
     def _below(self, sub: AnyRole, sup: AnyRole) -> None:
         for role in (sub, sup):

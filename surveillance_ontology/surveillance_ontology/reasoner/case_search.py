@@ -14,7 +14,14 @@ from collections.abc import Callable, Iterable, Iterator
 from itertools import combinations, count
 from typing import Any, TypeAlias
 
-from surveillance_ontology.reasoner.case_rules import CaseRules, Count, EdgeRule, Heads, ValueCount
+from surveillance_ontology.reasoner.case_rules import (
+    FRESH,
+    CaseRules,
+    Count,
+    EdgeRule,
+    Heads,
+    ValueCount,
+)
 from surveillance_ontology.reasoner.clauses import StoppedError
 from surveillance_ontology.reasoner.datatypes import Value
 from surveillance_ontology.reasoner.value_sets import ValueSet, point
@@ -149,7 +156,8 @@ class CaseSearch:
         if known is None:
             known = self._new(None)
             self._put(self._individuals, iri, known)
-            self._put(self.names, known, (iri,))
+            if not iri.startswith(FRESH):
+                self._put(self.names, known, (iri,))
             self.concept(known, self.rules.nominal(iri), 0)
         return self.find(known)[0] or known
 

@@ -16,7 +16,7 @@ from surveillance_ontology.owl import expressions as ex
 from surveillance_ontology.owl.axioms import Axiom
 from surveillance_ontology.owl.expressions import ClassExpression, PropertyExpression
 from surveillance_ontology.owl.vocabulary import NOTHING, THING, TOP_LITERAL
-from surveillance_ontology.reasoner.case_rules import CaseRules
+from surveillance_ontology.reasoner.case_rules import FRESH, TOP, CaseRules
 from surveillance_ontology.reasoner.case_search import CaseSearch
 from surveillance_ontology.reasoner.clauses import StoppedError, UnsupportedError
 from surveillance_ontology.reasoner.datatypes import literal_of, value_of
@@ -210,7 +210,7 @@ class CaseReasoner:
                     if role > 0 and not rules.is_complex(rules.role_names[role]):
                         yield rules.role_names[role], y, choices
         for prop in rules.role_names[1:]:
-            if rules.is_complex(prop):
+            if prop != TOP and rules.is_complex(prop):
                 yield from self._along(x, prop)
 
     def _along(self, x: int, prop: str) -> Iterator[tuple[str, int, int]]:
@@ -372,7 +372,7 @@ def entails(axioms: Iterable[Axiom], goal: Axiom | None) -> bool | None:
     return True if certain else None
 
 
-_A, _B = 'urn:case:someone', 'urn:case:another'
+_A, _B = FRESH + 'someone', FRESH + 'another'
 Denial = tuple[Axiom, ...]
 
 
