@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from textwrap import wrap
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 from surveillance_controllers.manual.commands import (
     BATTERY,
@@ -24,6 +24,9 @@ from surveillance_controllers.manual.commands import (
     number,
 )
 
+if TYPE_CHECKING:  # the launcher's prompt needs the words alone, without ROS
+    from surveillance_operator.mission_actions import MissionActions
+
 CONTROLLED = {
     'battery_controller': BATTERY,
     'planner_controller': PLANNER,
@@ -32,27 +35,6 @@ CONTROLLED = {
 """The controllers with the commands that each of them understands itself."""
 LIMIT = 10_000.0
 """Coordinates are within this many metres."""
-
-
-class Actions(Protocol):
-    """What the console can have done, see `mission_actions.MissionActions`; each raises
-    `ValueError` with one line."""
-
-    def set_door(self, door: str, is_open: bool) -> str: ...
-    def place_obstacle(self, name: str, x: float, y: float, radius: float) -> str: ...
-    def remove_obstacle(self, name: str) -> str: ...
-    def drain_battery(self, percent: float) -> str: ...
-    def add_room(self, name: str, x: float, y: float, doors: Sequence[str]) -> str: ...
-    def remove_room(self, name: str) -> str: ...
-    def go_to(self, place: str) -> str: ...
-    def why_not(self, place: str) -> tuple[str, list[str]]: ...
-    def machine(self, word: str) -> str: ...
-    def set_threshold(self, seconds: float) -> str: ...
-    def set_policy(self, policy: str) -> str: ...
-    def move_arm(self, pose: str) -> str: ...
-    def command(self, controller: str, line: str) -> str: ...
-    def facts(self, place: str) -> list[tuple[str, bool]]: ...
-    def explain(self, fact: str) -> list[tuple[int, str]]: ...
 
 
 def _word(name: str, expected: str) -> Argument:
@@ -69,12 +51,12 @@ _X, _Y = number('X', -LIMIT, LIMIT, 'metres'), number('Y', -LIMIT, LIMIT, 'metre
 Do = Callable[..., str]
 
 
-def _why_not(actions: Actions, place: str) -> str:
+def _why_not(actions: MissionActions, place: str) -> str:
     text, premises = actions.why_not(place)
     return '\n'.join([text, *(f'  {premise}' for premise in premises)])
 
 
-def _known(actions: Actions, place: str) -> str:
+def _known(actions: MissionActions, place: str) -> str:
     """Return what is known of a place, with the proof of each derived fact."""
     lines = []
     for fact, asserted in actions.facts(place):
@@ -219,7 +201,7 @@ def completions(text: str) -> list[str]:
 
 
 def answer(
-    line: str, actions: Actions, why: Callable[[], str], columns: int = 1000
+    line: str, actions: MissionActions, why: Callable[[], str], columns: int = 1000
 ) -> list[Answer]:
     """Do what a line says, and return what came of it.
 
@@ -254,13 +236,13 @@ def answer(
         return [Answer(f'{command.name}: {error}')]
 
 
-def _exit(name: str, actions: Actions) -> Answer:
+def _exit(name: str, actions: MissionActions) -> Answer:
     if name not in CONTROLLED:
         return Answer(f'exit {name}: expected one of {", ".join(CONTROLLED)}')
     return _told(actions, name, EXIT.name)
 
 
-def _told(actions: Actions, controller: str, line: str) -> Answer:
+def _told(actions: MissionActions, controller: str, line: str) -> Answer:
     try:
         return Answer(actions.command(controller, line), controller)
     except LookupError as error:  # it does not answer at all

@@ -10,7 +10,7 @@ import base64
 import io
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import fields
+from dataclasses import asdict, fields
 from typing import Any
 
 import numpy as np
@@ -102,20 +102,6 @@ def _places(snapshot: Snapshot) -> Any:
         }
         for name in names
     }
-
-
-def _machine(snapshot: Snapshot) -> Any:
-    return [
-        {
-            'path': each.path,
-            'kind': each.kind,
-            'states': list(each.states),
-            'initial': list(each.initial),
-            'outcomes': list(each.outcomes),
-            'edges': [list(edge) for edge in each.edges],
-        }
-        for each in snapshot.containers
-    ]
 
 
 def _transitions(snapshot: Snapshot) -> Any:
@@ -223,7 +209,7 @@ PARTS: Mapping[str, tuple[tuple[str, ...], Callable[[Snapshot], Any]]] = {
     'plan': (('plan',), lambda s: _points(s.plan)),
     'scan': (('scan',), lambda s: _points(s.scan)),
     'obstacles': (('obstacles',), lambda s: _points(s.obstacles)),
-    'machine': (('containers',), _machine),
+    'machine': (('containers',), lambda s: [asdict(each) for each in s.containers]),
     'active': (('active', 'paused'), lambda s: {'paths': list(s.active), 'paused': s.paused}),
     'transitions': (('transitions',), _transitions),
     'markers': (

@@ -14,7 +14,7 @@ import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from surveillance_operator.page.hub import Hub
 from surveillance_operator.page.server import Action, Page
@@ -22,6 +22,9 @@ from surveillance_operator.recording import timeline
 from surveillance_operator.recording.bag import RecordingError
 from surveillance_operator.recording.runs import Recording, find_recording, run_parser
 from surveillance_operator.recording.timeline import MARKS, Timeline
+
+if TYPE_CHECKING:
+    from surveillance_operator.recording.sights import RecordedSights
 
 EXIT_BAD_INPUT = 2
 
@@ -32,13 +35,6 @@ LOOK_PERIOD = 0.2
 """Seconds between two looks at what lidar and camera saw."""
 MOST_LINES = 400
 """Lines that one step applies; where more have passed, it jumps."""
-
-
-class Sights(Protocol):
-    """What was seen at a moment, seconds since 1970; see `recording.sights`."""
-
-    def scan(self, at: float) -> list[list[float]]: ...
-    def jpeg(self, at: float) -> bytes | None: ...
 
 
 class Player:
@@ -55,7 +51,7 @@ class Player:
         self,
         line: Timeline,
         hub: Hub,
-        sights: Sights | None = None,
+        sights: RecordedSights | None = None,
         read: Callable[[], float] = lambda: 1.0,
     ) -> None:
         self._line = line
@@ -244,7 +240,7 @@ def open_player(recording: Recording, hub: Hub, stack: contextlib.ExitStack) -> 
     return Player(line, hub, _sights(recording, stack), read)
 
 
-def _sights(recording: Recording, stack: contextlib.ExitStack) -> Sights | None:
+def _sights(recording: Recording, stack: contextlib.ExitStack) -> RecordedSights | None:
     if recording.messages is None:
         return None
     try:

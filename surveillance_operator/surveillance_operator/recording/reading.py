@@ -322,6 +322,8 @@ class Messages:
                         break
                     found += [m for m in file.messages(span, topics) if start <= m[1] < end]
                     found.sort(key=lambda message: -message[1])
+                if file.spans and file.spans[0].start <= start:
+                    break  # What lies in earlier files is older.
         return found[:most]
 
     def close(self) -> None:
