@@ -5,7 +5,7 @@ The controllers' own commands (`battery`, `plan`, `move`) are handed on as they 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from textwrap import wrap
 from typing import TYPE_CHECKING

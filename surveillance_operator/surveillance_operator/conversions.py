@@ -283,6 +283,7 @@ def health_from(message: DiagnosticArray) -> dict[str, Health]:
             each.level[0] if isinstance(each.level, bytes) else int(each.level),
             each.message,
             tuple((value.key, value.value) for value in each.values[:50]),
+            each.hardware_id,
             heard,
         )
         for each in message.status[:MOST_NAMES]

@@ -28,7 +28,7 @@ from surveillance_ontology.armor_client import ArmorClient, FactSubscription
 from surveillance_ontology.patrol_ontology import CONNECTIONS, PLACES, URGENT_PLACES, VISITS
 from surveillance_operator import conversions
 from surveillance_operator.polled_subscription import PolledSubscription, await_message
-from surveillance_operator.snapshot import Change, Pose, Snapshot, follow
+from surveillance_operator.snapshot import STALE, Change, Pose, Snapshot, follow
 from surveillance_operator.topics import (
     BEHAVIOUR,
     POSE_TOPIC,
@@ -39,7 +39,7 @@ from surveillance_operator.topics import (
     with_fact,
     without,
 )
-from surveillance_runtime.conversions import clean_texts
+from surveillance_runtime.conversions import clean_texts, seconds_of
 from surveillance_runtime.diagnostics import STALE_AFTER
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
@@ -167,11 +167,8 @@ class MissionFeed:
 
     def _take(self) -> None:
         """Take all messages that came into one new snapshot."""
-        clock = None
-        while (taken := self._clock.take()) is not None:
-            clock = taken[0].clock
-        if clock is not None:
-            self._clock_time = clock.sec + clock.nanosec / 1e9
+        if (newest := self._clock.newest()) is not None:
+            self._clock_time = seconds_of(newest[0].clock)
         came: list[tuple[Topic, Any]] = []
         for topic, subscription in self._topics:
             if topic.beside and not any(each.name == topic.beside for each, _ in came):
@@ -248,12 +245,12 @@ class MissionFeed:
         now = time.monotonic()
         health = dict(self._snapshot.health)
         for name, each in self._snapshot.health.items():
-            if each.level == 3 or now - each.heard <= STALE_AFTER:
+            if each.level == STALE or now - each.heard <= STALE_AFTER:
                 continue
-            if is_terminal(name):
+            if _is_terminal(name):
                 del health[name]
             else:
-                health[name] = replace(each, level=3, message=f'silent, last: {each.message}')
+                health[name] = replace(each, level=STALE, message=f'silent, last: {each.message}')
         if health != self._snapshot.health:
             self.update(lambda old: replace(old, health=health), begins=False)
 
@@ -417,13 +414,13 @@ class _OtherRobots:
         """Return the poses that came."""
         came = {}
         for robot, subscription in self._poses.items():
-            while (taken := subscription.take()) is not None:
+            if (newest := subscription.newest()) is not None:
                 with contextlib.suppress(ValueError):
-                    came[robot] = conversions.pose_from(taken[0].pose.pose)
+                    came[robot] = conversions.pose_from(newest[0].pose.pose)
         return came
 
 
-def is_terminal(name: str) -> bool:
+def _is_terminal(name: str) -> bool:
     """Tell whether a part of this name, which reports on `/diagnostics`, is a person's terminal."""
     return name.rpartition('/')[2].partition(':')[0] in TERMINALS
 

@@ -17,11 +17,11 @@ from nav_msgs.msg import Path
 from std_msgs.msg import ColorRGBA, String
 from visualization_msgs.msg import Marker, MarkerArray
 
-from surveillance_operator.conversions import MOST_NAMES, URGENT_MARK
-from surveillance_operator.mission_feed import MissionFeed, is_terminal
+from surveillance_operator.conversions import URGENT_MARK
+from surveillance_operator.mission_feed import MissionFeed
 from surveillance_operator.robot_description import urdf
-from surveillance_operator.snapshot import Snapshot
-from surveillance_runtime.diagnostics import STALE_AFTER, TOPIC
+from surveillance_operator.snapshot import STALE, Snapshot
+from surveillance_runtime.diagnostics import TOPIC
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
@@ -47,8 +47,6 @@ class MissionMarkers(PatrolNode):
         self._markers = self.create_publisher(MarkerArray, 'place_markers', STATE_QOS)
         self._driven = self.create_publisher(Path, 'driven_path', STATE_QOS)
         self._diagnostics = self.create_publisher(DiagnosticArray, TOPIC, 10)
-        self._reports: dict[str, tuple[float, str]] = {}
-        self.create_subscription(DiagnosticArray, TOPIC, self._on_diagnostics, 100)
         description = self.create_publisher(String, 'robot_description', STATE_QOS)
         description.publish(String(data=urdf()))
         if TFMessage is None:
@@ -64,31 +62,24 @@ class MissionMarkers(PatrolNode):
             if snapshot.trail is not drawn and time.monotonic() >= due:
                 drawn, due = snapshot.trail, time.monotonic() + PATH_PERIOD
                 self._driven.publish(path_of(snapshot, self.get_clock().now().to_msg()))
-            if silent := self._silent(snapshot):
+            if silent := silent_of(snapshot):
                 message = DiagnosticArray(status=silent)
                 message.header.stamp = self.get_clock().now().to_msg()
                 self._diagnostics.publish(message)
 
-    def _on_diagnostics(self, message: DiagnosticArray) -> None:
-        now = time.monotonic()
-        for status in message.status[:MOST_NAMES]:
-            known = status.name in self._reports or len(self._reports) < MOST_NAMES
-            if known and status.level != DiagnosticStatus.STALE:
-                self._reports[status.name] = now, status.hardware_id
 
-    def _silent(self, snapshot: Snapshot) -> list[DiagnosticStatus]:
-        """Return a status for each node that reported and does not any more."""
-        late = time.monotonic() - STALE_AFTER
-        return [
-            DiagnosticStatus(
-                level=DiagnosticStatus.STALE,
-                name=name,
-                message='has ended' if name in snapshot.ended else 'does not report',
-                hardware_id=hardware,
-            )
-            for name, (at, hardware) in sorted(self._reports.items())
-            if at < late and not is_terminal(name)
-        ]
+def silent_of(snapshot: Snapshot) -> list[DiagnosticStatus]:
+    """Return a status for each node that reported and does not any more."""
+    return [
+        DiagnosticStatus(
+            level=DiagnosticStatus.STALE,
+            name=name,
+            message='has ended' if name in snapshot.ended else 'does not report',
+            hardware_id=health.hardware,
+        )
+        for name, health in sorted(snapshot.health.items())
+        if health.level == STALE
+    ]
 
 
 def markers_of(snapshot: Snapshot, stamp: Any) -> MarkerArray:

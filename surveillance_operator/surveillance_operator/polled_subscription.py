@@ -66,6 +66,13 @@ class PolledSubscription:
             taken = subscription.handle.take_message(subscription.msg_type, subscription.raw)
         return None if taken is None else (taken[0], taken[1])
 
+    def newest(self) -> tuple[Any, dict[str, Any]] | None:
+        """Drop all messages that wait but the newest; return that as `take` does, or None."""
+        newest = None
+        while (taken := self.take()) is not None:
+            newest = taken
+        return newest
+
     def destroy(self) -> None:
         """Leave the topic."""
         self._node.destroy_subscription(self._subscription)

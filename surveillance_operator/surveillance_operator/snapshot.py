@@ -23,6 +23,8 @@ TRAIL_STEP = 0.1
 BATTERY_STEP = 10
 """Percent between two lines about the battery."""
 KEPT_EVENTS = 50
+STALE = 3
+"""The level of health of what no longer reports."""
 HISTORY_SECONDS = 3600.0
 MOST_HISTORY = 5000
 """How far back histories go, seconds of the mission's time, and their most entries."""
@@ -130,15 +132,17 @@ class Health:
     """What one node reports on `/diagnostics`.
 
     Attributes:
-        level: 0 is good, 1 a warning, 2 an error, 3 stale.
+        level: 0 is good, 1 a warning, 2 an error, `STALE`.
         message: In words.
         values: Further figures by name.
+        hardware: What it runs on.
         heard: When it came, seconds of steady time.
     """
 
     level: int
     message: str
     values: tuple[tuple[str, str], ...]
+    hardware: str = ''
     heard: float = 0.0
 
 

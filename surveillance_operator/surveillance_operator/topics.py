@@ -36,6 +36,7 @@ from surveillance_ontology.armor.facts import ShortFact, parse_fact
 from surveillance_ontology.armor_client import value_in
 from surveillance_ontology.patrol_ontology import CONNECTIONS, URGENT_PLACES, VISITS
 from surveillance_operator import conversions
+from surveillance_operator.conversions import MOST_NAMES
 from surveillance_operator.snapshot import NO_POINTS, TRAIL_STEP, Pose, Snapshot
 from surveillance_runtime.conversions import seconds_of
 from surveillance_runtime.qos import STATE_QOS
@@ -60,7 +61,7 @@ _QUEUE = QoSProfile(
     depth=200, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
 )
 _STREAM = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-_MANY = QoSProfile(depth=50, reliability=ReliabilityPolicy.RELIABLE)
+_MANY = QoSProfile(depth=200, reliability=ReliabilityPolicy.RELIABLE)
 
 Fields = dict[str, Any]
 
@@ -176,7 +177,16 @@ def _on_detections(message: MarkerDetectionArray, old: Snapshot) -> Fields:
             round(float(x + ahead * math.cos(yaw) - left * math.sin(yaw)), 2),
             round(float(y + ahead * math.sin(yaw) + left * math.cos(yaw)), 2),
         )
+    if len(placed) > MOST_NAMES:
+        raise ValueError(f'{len(placed)} markers: expected at most {MOST_NAMES}')
     return {**fields, 'markers': placed} if placed != old.markers else fields
+
+
+def _on_diagnostics(message: DiagnosticArray, old: Snapshot) -> Fields:
+    health = {**old.health, **conversions.health_from(message)}
+    if len(health) > MOST_NAMES:
+        raise ValueError(f'{len(health)} parts report: expected at most {MOST_NAMES}')
+    return {'health': health}
 
 
 def _on_parameters(message: ParameterEvent, _old: Snapshot) -> Fields:
@@ -305,7 +315,7 @@ TOPICS: tuple[Topic, ...] = (
         '/diagnostics',
         DiagnosticArray,
         _MANY,
-        lambda m, old: {'health': {**old.health, **conversions.health_from(m)}},
+        _on_diagnostics,
         period=1.0,
     ),
     Topic('/parameter_events', ParameterEvent, _MANY, _on_parameters),

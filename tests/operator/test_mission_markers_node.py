@@ -14,7 +14,7 @@ from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from std_msgs.msg import String
 
-from surveillance_operator import mission_markers_node
+from surveillance_operator import mission_feed, mission_markers_node
 from surveillance_operator.mission_markers_node import (
     FRESH,
     LATE,
@@ -70,13 +70,13 @@ def test_the_description_has_the_joints_of_joint_states() -> None:
 
 def test_a_node_that_reports_no_more_is_stale(graph: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(mission_markers_node, 'PERIOD', 0.05)
-    monkeypatch.setattr(mission_markers_node, 'STALE_AFTER', 0.5)
+    monkeypatch.setattr(mission_feed, 'STALE_AFTER', 0.5)
     node_speaks = graph.node.create_publisher(DiagnosticArray, '/diagnostics', 10)
     status = DiagnosticStatus(name='planner', hardware_id='robot7', message='up')
     heard = graph.listen(DiagnosticArray, '/diagnostics')
     described = graph.listen(String, 'robot_description', STATE_QOS)
-    markers = graph.add(MissionMarkers)
-    listeners = len([heard, markers, 'its feed'])
+    graph.add(MissionMarkers)
+    listeners = len([heard, 'the feed of the markers'])
     graph.until(lambda: node_speaks.get_subscription_count() == listeners)
     terminal = DiagnosticStatus(name='robot7/console', message='up')  # its end is no fault
     node_speaks.publish(DiagnosticArray(status=[terminal, status]))

@@ -64,10 +64,8 @@ class Camera:
         if topic not in self._subscriptions:
             qos = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
             self._subscriptions[topic] = PolledSubscription(self._node, ImageMessage, topic, qos)
-        newest = None
-        while (taken := self._subscriptions[topic].take()) is not None:
-            newest = taken[0]
-        return newest
+        newest = self._subscriptions[topic].newest()
+        return None if newest is None else newest[0]
 
     def _leave(self, topic: str) -> None:
         if (subscription := self._subscriptions.pop(topic, None)) is not None:

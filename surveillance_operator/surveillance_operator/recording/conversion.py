@@ -28,7 +28,7 @@ from surveillance_operator import conversions
 from surveillance_operator.recording.bag import RecordingError
 from surveillance_operator.recording.reading import Messages
 from surveillance_operator.recording.timeline import TimelineWriter
-from surveillance_operator.snapshot import Snapshot, follow
+from surveillance_operator.snapshot import STALE, Snapshot, follow
 from surveillance_operator.topics import BEHAVIOUR, TOPICS, Fields, Topic, read_message, with_fact
 
 CLOCK = '/clock'
@@ -153,7 +153,7 @@ class Conversion:
             topic = self._topics[name]
             for data in window[name]:
                 new = read_stored(new, topic, data)
-        nodes = {name for name in new.health if ':' not in name and new.health[name].level != 3}
+        nodes = {name for name in new.health if ':' not in name and new.health[name].level != STALE}
         if not nodes and new.status is not None:
             nodes = {BEHAVIOUR}
         if nodes != new.nodes.keys():

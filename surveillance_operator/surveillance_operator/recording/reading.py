@@ -12,7 +12,6 @@ import bisect
 import contextlib
 import heapq
 import mmap
-import re
 import struct
 import threading
 from collections.abc import Collection, Iterator, Sequence
@@ -20,14 +19,13 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import yaml
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, Schema
 from mcap.stream_reader import get_chunk_data_stream
 
-from surveillance_operator.recording.bag import ENCODING, METADATA, RecordingError
+from surveillance_operator.recording.bag import ENCODING, RecordingError
 
 SUFFIX = '.mcap'
 MAGIC = b'\x89MCAP0\r\n'
@@ -51,41 +49,18 @@ Stored = tuple[str, int, bytes]
 
 
 def files_of(recording: Path) -> list[Path]:
-    """Return the MCAP files of a recording in the order of time: its folder's, or itself.
+    """Return the MCAP files of a recording: its folder's, or itself.
 
     Raises:
         RecordingError: There is none.
     """
-    if recording.is_file():
-        files = [recording] if recording.suffix == SUFFIX else []
-    else:
-        files = _listed(recording) or sorted(recording.glob(f'*{SUFFIX}'), key=_number)
-    if not files:
+    files = sorted(recording.glob(f'*{SUFFIX}')) if recording.is_dir() else [recording]
+    if not files or files[0].suffix != SUFFIX or not files[0].is_file():
         raise RecordingError(
             f'{recording}: expected a file *{SUFFIX}, or a folder that holds some '
             f'(`ros2 bag convert` makes one of a *.db3)'
         )
     return files
-
-
-def _listed(folder: Path) -> list[Path]:
-    """Return the files that the folder's metadata names, those of them that there are."""
-    try:
-        text = (folder / METADATA).read_text(encoding='utf-8')
-        loader = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
-        names = yaml.load(text, loader)['rosbag2_bagfile_information']['relative_file_paths']
-        paths = [folder / str(name) for name in names]
-    except (OSError, ValueError, TypeError, KeyError, yaml.YAMLError):
-        return []
-    # The file that is being written is not listed yet.
-    listed = [path for path in paths if path.suffix == SUFFIX and path.is_file()]
-    newer = set(folder.glob(f'*{SUFFIX}')) - set(listed)
-    return [*listed, *sorted(newer, key=_number)]
-
-
-def _number(path: Path) -> tuple[int, str]:
-    numbers = re.findall(r'\d+', path.stem)
-    return (int(numbers[-1]) if numbers else 0, path.stem)
 
 
 class _Span(NamedTuple):
@@ -253,7 +228,11 @@ class Messages:
     """
 
     def __init__(self, recording: Path) -> None:
-        self._files = [_RecordedFile(path) for path in files_of(recording)]
+        files = [_RecordedFile(path) for path in files_of(recording)]
+        self._files = sorted(
+            (file for file in files if file.find_next()), key=lambda file: file.spans[0].start
+        )
+        self._size = sum(file.size for file in self._files) or 1
         self._lock = threading.Lock()
         self._passed = 0
 
@@ -266,17 +245,15 @@ class Messages:
     def first_types(self) -> dict[str, str]:
         """Return the types of the topics that the recording begins with, by name."""
         with self._lock:
-            for file in self._files:
+            for file in self._files[:1]:
                 while len(file.spans) < FIRST_SPANS and file.find_next():
                     pass
-                if file.spans:
-                    break
         return self.types
 
     @property
     def share(self) -> float:
         """Which share of the recording `in_order` has passed, 0 to 1."""
-        return self._passed / sum(file.size for file in self._files)
+        return self._passed / self._size
 
     def in_order(self, topics: Collection[str] | None = None) -> Iterator[Stored]:
         """Yield the messages of some topics, or of all, in the order of their receipt."""
@@ -322,7 +299,7 @@ class Messages:
                         break
                     found += [m for m in file.messages(span, topics) if start <= m[1] < end]
                     found.sort(key=lambda message: -message[1])
-                if file.spans and file.spans[0].start <= start:
+                if file.spans[0].start <= start:
                     break  # What lies in earlier files is older.
         return found[:most]
 
