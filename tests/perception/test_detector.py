@@ -250,6 +250,7 @@ MIDDLE = tuple(corners_in_image(Panel(14, 2.0), CAMERA).mean(axis=0))
         (Degradation(shadows=(Shadow(MIDDLE, 2.1, 0.3),)), {}),
         (Degradation(shadows=(Shadow(MIDDLE, 4.0, 0.5, 4.0),)), {}),
         (Degradation(glares=(Glare(MIDDLE, 8.0),)), {}),
+        (Degradation(glares=(Glare(MIDDLE, 12.0),)), {}),
         (Degradation(vignette=0.8, light=0.5), {}),
         (Degradation(shutter=50.0), {}),
         (Degradation(jpeg=15), {}),

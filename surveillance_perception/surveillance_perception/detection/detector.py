@@ -13,7 +13,7 @@ The way from an image to markers:
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import cv2
@@ -38,6 +38,7 @@ from surveillance_perception.detection.image_sampling import (
     homographies_of,
 )
 from surveillance_perception.detection.preprocessing import PreparedImage, prepare
+from surveillance_perception.detection.template_fit import Indices
 
 _SAME_QUAD = 2.0
 _SAME_MARKER = 0.5
@@ -49,12 +50,12 @@ _CLEAR, _CLEAR_KNOWN = 1.8, 1.3
 _WRONG, _AGREED = 0.2, 0.12
 _WRONG_BORDER = 0.3
 _CONTRADICTED = 0.6
-_RIGHT_BORDER = 3
-_RIGHT_LEAD = 1.6
-_RIGHT_CORRELATION = 0.8
-_SURE_LEAD, _SURE_BORDER = 6.0, 6
 _FEW_SPARE_BITS = 12.0
 _STRICT_BITS = 4.0
+# correlation of cells' differences above which softer blur need not be tried
+_SHARP = 0.9
+# wrong ids that may be expected of one candidate
+_LARGEST_ERROR = 1e-5
 
 
 @dataclass(frozen=True)
@@ -135,7 +136,6 @@ class MarkerDetector:
             MarkerCodes.of(dictionary, self.settings.known_ids)
         codes = MarkerCodes.of(dictionary)
         self._reader = MarkerReader(codes, self.settings.blur)
-        self._even_reader = MarkerReader(codes, self.settings.blur, even=True)
         self._border = BorderCheck(self._reader.codes.side)
         self._edges = EdgeFit(self._reader.codes.side)
 
@@ -167,36 +167,36 @@ class MarkerDetector:
             quads = np.concatenate([np.asarray(expected, dtype=float), quads])
         if not len(quads):
             return []
-        found: list[Detection] = []
-        # what shows a code without a mistake is read first, and what is left with more care
-        steps = (
-            (self._reader.read_plain, len(quads)),
-            (self._reader.read, _CAREFUL),
-            (self._even_reader.read, _CAREFUL),
-        )
-        for read, most in steps:
-            quads = quads[~_covered(quads, found)]
-            if not len(quads):
-                break
-            if read == self._even_reader.read:
-                quads = quads[self._reader.uneven(pyramid, homographies_of(quads))]
-            self.left_out += max(0, len(quads) - most)
-            quads = quads[:most]
-            found += self._read(read, pyramid, quads, prepared.grey)
+        found, blurred = self._read_cells(pyramid, quads, prepared.grey)
+        quads = quads[~_covered(quads, found)]
+        self.left_out += max(0, len(quads) - _CAREFUL)
+        for start in range(0, min(len(quads), _CAREFUL), _BATCH):
+            homographies = homographies_of(quads[start : min(start + _BATCH, _CAREFUL)])
+            cells = self._reader.read_cells(pyramid, homographies)
+            readings = self._reader.read(pyramid, homographies, cells)
+            if readings is not None:
+                found += self._accepted(readings, prepared.grey)
+        found += [each for each in blurred if not _covered(each.corners[None], found).any()]
         return _best(found)
 
-    def _read(
-        self,
-        read: Callable[[ImagePyramid, Array], Readings],
-        pyramid: ImagePyramid,
-        quads: Quads,
-        grey: Grey,
-    ) -> list[Detection]:
-        found: list[Detection] = []
-        for start in range(0, len(quads), _BATCH):
-            readings = read(pyramid, homographies_of(quads[start : start + _BATCH]))
-            found += self._accepted(readings, grey)
-        return found
+    def _read_cells(
+        self, pyramid: ImagePyramid, quads: Quads, grey: Grey
+    ) -> tuple[list[Detection], list[Detection]]:
+        """Return markers whose cells show their codes: the sharp ones, and the others."""
+        homographies = homographies_of(quads)
+        cells = self._reader.read_cells(pyramid, homographies)
+        plain = cells.error < _LARGEST_ERROR
+        if not plain.any():
+            return [], []
+        cells = cells.chosen(plain)
+        homographies = self._reader.aligned(pyramid, homographies[plain], cells)
+        confidence = cells.correlation * (1.0 - 1.0 / cells.lead)
+        found = self._detections(homographies, cells.entries, confidence, grey)
+        sharp = (cells.correlation > _SHARP).tolist()
+        return (
+            [each for each, is_sharp in zip(found, sharp, strict=True) if is_sharp],
+            [each for each, is_sharp in zip(found, sharp, strict=True) if not is_sharp],
+        )
 
     def _candidates(self, prepared: PreparedImage, pyramid: ImagePyramid) -> Quads:
         settings = self.settings
@@ -221,23 +221,17 @@ class MarkerDetector:
 
     def _accepted(self, readings: Readings, grey: Grey) -> list[Detection]:
         settings, codes = self.settings, self._reader.codes
-        glared = readings.glared >= 0
-        entries = np.where(glared, readings.glared, readings.entries)
-        ids = codes.ids[entries]
-        known = np.ones(len(ids), bool)
-        lead = np.full(len(ids), settings.unknown_lead)
-        if settings.known_ids is not None:
-            known = np.isin(ids, list(settings.known_ids))
-            lead = np.where(known, settings.known_lead, settings.unknown_lead)
+        known = self._known(codes.ids[readings.entries])
+        listed = known & (settings.known_ids is not None)
+        lead = np.where(listed, settings.known_lead, settings.unknown_lead)
+        # how much a code says beyond telling the dictionary's markers apart
+        spare = codes.bits**2 - np.log2(len(codes.ids))
+        # print looks like some code where a dictionary uses a large part of all there are
+        lead = lead * max(1.0, (_FEW_SPARE_BITS - spare) / _STRICT_BITS)
         plausible = (readings.wrong <= _WRONG * codes.bits**2) & (
             readings.wrong_border <= _WRONG_BORDER * 4 * (codes.side - 1)
         )
-        # how much a code says beyond telling the dictionary's markers apart
-        spare = codes.bits**2 - np.log2(len(codes.ids))
-        strict = 1.0 + max(0.0, _FEW_SPARE_BITS - spare) / _STRICT_BITS
-        # print looks like some code where a dictionary uses a large part of all there are
-        lead = lead * max(1.0, strict - 1.0)
-        # where nearly all votes are the code's, its own cells may speak for a short lead
+        # where nearly all cells are the code's, they alone may speak for a short lead
         agreed = (readings.wrong <= _AGREED * codes.bits**2) & (spare >= _FEW_SPARE_BITS)
         joint_lead = np.sqrt(readings.lead * np.maximum(readings.inner_lead, readings.lead))
         correlated = (
@@ -245,37 +239,39 @@ class MarkerDetector:
             & (readings.inner > settings.least_inner_correlation)
             & (np.where(agreed, joint_lead, readings.lead) > lead)
         )
-        # letters look like codes of 16 cells: without a border that fits, the code must be clear
-        sure = readings.inner_lead > _SURE_LEAD * strict
-        right = (
-            (readings.wrong_border <= np.where(sure, _SURE_BORDER, _RIGHT_BORDER))
-            & (sure | (readings.correlation > _RIGHT_CORRELATION))
-            & (
-                ((readings.wrong == 0) & (readings.inner_lead > _RIGHT_LEAD * strict))
-                | (
-                    (readings.wrong <= min(1, codes.correction))
-                    & (readings.inner_lead > lead * strict)
-                )
-            )
-        )
-        clear = (
-            readings.lead
-            > np.where(known & (settings.known_ids is not None), _CLEAR_KNOWN, _CLEAR) * lead
-        )
-        # votes of cells a pixel wide are weak, but nearly all of them are not wrong by chance
+        clear = readings.lead > np.where(listed, _CLEAR_KNOWN, _CLEAR) * lead
+        # cells a pixel wide show little, but nearly all of them are not wrong by chance
         clear &= readings.wrong_border <= _CONTRADICTED * 4 * (codes.side - 1)
-        accepted = (correlated & (plausible | clear)) | (plausible & right) | glared
+        accepted = correlated & (plausible | clear) | (readings.error < _LARGEST_ERROR)
         confidence = readings.correlation * (1.0 - 1.0 / np.maximum(readings.lead, 1.0))
-        chosen = np.flatnonzero(accepted)
-        corners = corners_of(readings.homographies)
-        detections: list[Detection] = []
-        for index in chosen:
-            outline = np.roll(corners[index], -int(codes.turns[entries[index]]), axis=0)
-            outline = _sharpened(outline, grey, codes.side)
-            detections.append(
-                Detection(int(ids[index]), outline, float(confidence[index]), bool(known[index]))
+        return self._detections(
+            readings.homographies[accepted],
+            readings.entries[accepted],
+            confidence[accepted],
+            grey,
+        )
+
+    def _known(self, ids: Indices) -> npt.NDArray[np.bool_]:
+        known = self.settings.known_ids
+        return np.ones(len(ids), bool) if known is None else np.isin(ids, list(known))
+
+    def _detections(
+        self, homographies: Array, entries: Indices, confidence: Array, grey: Grey
+    ) -> list[Detection]:
+        codes = self._reader.codes
+        ids = codes.ids[entries]
+        outlines = [
+            np.roll(corners, -turn, axis=0)
+            for corners, turn in zip(
+                corners_of(homographies), codes.turns[entries].tolist(), strict=True
             )
-        return detections
+        ]
+        return [
+            Detection(marker_id, _sharpened(outline, grey, codes.side), sure, known)
+            for marker_id, outline, sure, known in zip(
+                ids.tolist(), outlines, confidence.tolist(), self._known(ids).tolist(), strict=True
+            )
+        ]
 
 
 def _best(found: Sequence[Detection]) -> list[Detection]:

@@ -20,7 +20,6 @@ import numpy.typing as npt
 from scipy.special import ndtr
 
 from surveillance_perception.detection.dictionaries import MarkerCodes
-from surveillance_perception.detection.illumination import evenly_lit
 from surveillance_perception.detection.image_sampling import (
     Array,
     ImagePyramid,
@@ -31,7 +30,7 @@ from surveillance_perception.detection.image_sampling import (
 
 Indices = npt.NDArray[np.int64]
 
-SAMPLES_PER_CELL = 3
+_SAMPLES_PER_CELL = 3
 _MARGIN_SAMPLES = 1
 _LEVEL_CELL_PIXELS = 4.0
 _DAMPING = 1e-3
@@ -53,20 +52,18 @@ class TemplateFit:
 
     Args:
         codes: The dictionary.
-        even: Whether patches are read by local contrast, as under shadows.
 
     Attributes:
         codes: The dictionary.
         count: Samples along a side of a patch.
     """
 
-    def __init__(self, codes: MarkerCodes, *, even: bool = False) -> None:
+    def __init__(self, codes: MarkerCodes) -> None:
         self.codes = codes
-        self._even = even
         cells = codes.side + 2
         self._flat = codes.cells.reshape(len(codes.ids), cells * cells)
-        step = 2.0 / codes.side / SAMPLES_PER_CELL
-        self.count = codes.side * SAMPLES_PER_CELL + 2 * _MARGIN_SAMPLES
+        step = 2.0 / codes.side / _SAMPLES_PER_CELL
+        self.count = codes.side * _SAMPLES_PER_CELL + 2 * _MARGIN_SAMPLES
         positions: Array = (np.arange(self.count, dtype=float) - (self.count - 1) / 2.0) * step
         x, y = (each.ravel() for each in np.meshgrid(positions, positions))
         self._grid = np.stack([x, y, np.ones_like(x)])
@@ -86,12 +83,11 @@ class TemplateFit:
 
     def sample(self, pyramid: ImagePyramid, homographies: Array, levels: Indices) -> Patches:
         """Patches (m, n) of the image under each homography."""
-        patches = pyramid.sample(homographies, self._grid, levels)
-        return evenly_lit(patches, self.count, SAMPLES_PER_CELL) if self._even else patches
+        return pyramid.sample(homographies, self._grid, levels)
 
     def cells(self, patches: Patches) -> Patches:
         """Return values (m, side, side) of the marker's cells, their middles counting most."""
-        side, step = self.codes.side, SAMPLES_PER_CELL
+        side, step = self.codes.side, _SAMPLES_PER_CELL
         square = patches.reshape(-1, self.count, self.count)
         inside = square[:, _MARGIN_SAMPLES:-_MARGIN_SAMPLES, _MARGIN_SAMPLES:-_MARGIN_SAMPLES]
         parts = inside.reshape(-1, side, step, side, step)
@@ -193,12 +189,11 @@ class TemplateFit:
         damping = _DAMPING * np.trace(hessian, axis1=1, axis2=2) / 8.0 + 1e-9
         hessian += damping[:, None, None] * np.eye(8)
         solve = np.linalg.inv(hessian).astype(np.float32)
-        least = 0.05 if self._even else 1.0
         result = homographies
         for _ in range(iterations):
             patches = self.sample(pyramid, result, levels)[:, :, None]
             contrast = (flat[:, None] @ patches)[:, 0, 0] / energy
-            contrast = np.where(np.abs(contrast) < least, least, contrast)
+            contrast = np.where(np.abs(contrast) < 1.0, 1.0, contrast)
             change = np.asarray((solve @ (steepest @ patches))[:, :, 0], dtype=float)
             change /= contrast[:, None]
             largest = np.abs(change).max(axis=1, keepdims=True)

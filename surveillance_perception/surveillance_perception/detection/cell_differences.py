@@ -1,0 +1,163 @@
+"""Codes by the differences between neighbouring cells, which uneven light hardly changes.
+
+A shadow or a reflection changes grey levels slowly, print changes them from one cell to the next.
+So the differences between a marker's neighbouring cells are correlated with those of each code.
+They are taken of grey levels, to which a reflection adds, and of their logarithms, on which a
+shadow's factor has no effect away from its edge. Where a reflection leaves less room up to white
+than print needs, the expected difference is smaller by as much: saturated cells are erasures.
+
+How likely it is that something else agrees as well is computed. For differences that have nothing
+to do with a code, the square of the correlation follows a beta distribution, as in the test of a
+correlation coefficient. Differences that share a cell depend on each other; their degrees of
+freedom are trace(C)^2 / trace(C^2) of their covariance C (Satterthwaite, "An approximate
+distribution of estimates of variance components", Biometrics 2(6), 1946). The number of codes
+times that probability is what is expected of false alarms (Desolneux, Moisan and Morel, "From
+Gestalt Theory to Image Analysis", 2008).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from scipy.special import betainc
+
+from surveillance_perception.detection.dictionaries import MarkerCodes
+from surveillance_perception.detection.image_sampling import Array, Patches
+
+Indices = npt.NDArray[np.int64]
+
+_SATURATED = 252.0
+_LEAST_STEP = 20.0
+_STEP_QUANTILE = 0.85
+_DARK_LEVEL = 12.0
+_OTHER_CODE = 1.4
+
+
+class CellReadings(NamedTuple):
+    """What the cells of candidates show; arrays run over candidates.
+
+    Attributes:
+        entries: (m,) index of the best code.
+        correlation: (m,) of its differences with those in the image, -1 to 1.
+        lead: (m,) what the second best code leaves unexplained, as a multiple of what the best
+            one does: 1 is a draw.
+        error: (m,) bound of the probability of a wrong id: how often so good an agreement is
+            expected where there is no marker, and the odds of the second best code.
+    """
+
+    entries: Indices
+    correlation: Patches
+    lead: Patches
+    error: Array
+
+    def chosen(self, which: npt.NDArray[np.bool_]) -> CellReadings:
+        """Return the readings of some of the candidates (m,)."""
+        return CellReadings(
+            self.entries[which], self.correlation[which], self.lead[which], self.error[which]
+        )
+
+
+class CellDifferences:
+    """Correlates differences between the cells of candidates with the codes of a dictionary."""
+
+    def __init__(self, codes: MarkerCodes) -> None:
+        self._white = (codes.cells[:, 1:-1, 1:-1] > 0).astype(np.float32)
+        self._codes = _differences(self._white)
+        cells = codes.side**2
+        self._flips = _differences(np.eye(cells, dtype=np.float32).reshape(cells, codes.side, -1))
+        covariance = self._flips @ self._flips.T
+        self._freedom = float(np.trace(covariance) ** 2 / np.square(covariance).sum())
+
+    def read(self, cells: Patches) -> CellReadings:
+        """Read grey levels (m, side, side) of the black square's cells."""
+        unlit = np.log(cells + np.float32(_DARK_LEVEL))
+        room = _room(cells)
+        level = self._best(_normalised(cells), room)
+        ratio = self._best(_normalised(unlit), np.ones_like(room))
+        better = ratio.error < level.error
+        return CellReadings(
+            np.where(better, ratio.entries, level.entries),
+            np.where(better, ratio.correlation, level.correlation),
+            np.where(better, ratio.lead, level.lead),
+            np.where(better, ratio.error, level.error),
+        )
+
+    def wrong(self, cells: Patches, entries: Indices) -> tuple[Indices, Indices]:
+        """Count cells that agree better when they are taken for the other colour.
+
+        Args:
+            cells: (m, side, side) grey levels.
+            entries: (m,) index of the code that each shows.
+
+        Returns:
+            (m,) such cells of the code, and of its border.
+        """
+        seen = _normalised(np.log(cells + np.float32(_DARK_LEVEL)))
+        before, flipped = self._flipped(seen, np.ones_like(seen), entries)
+        better = (flipped > before).reshape(cells.shape)
+        inner = better[:, 1:-1, 1:-1].sum(axis=(1, 2))
+        return inner, better.sum(axis=(1, 2)) - inner
+
+    def _flipped(self, seen: Patches, room: Patches, entries: Indices) -> tuple[Patches, Patches]:
+        """Return correlations (m, 1) with codes, and (m, cells) with one cell of them flipped."""
+        expected, white = room * self._codes[entries], self._white[entries]
+        sign = 1.0 - 2.0 * white.reshape(len(white), -1)
+        agreement = (seen * expected).sum(axis=1, keepdims=True)
+        energy = np.square(expected).sum(axis=1, keepdims=True)
+        flipped = agreement + sign * ((seen * room) @ self._flips.T)
+        flipped_energy = energy + 2.0 * sign * ((room * expected) @ self._flips.T)
+        flipped_energy += np.square(room) @ np.square(self._flips).T
+        size = np.maximum(np.linalg.norm(seen, axis=1, keepdims=True), 1e-3)
+        before = agreement / np.sqrt(np.maximum(energy, 1e-3)) / size
+        return before, flipped / np.sqrt(np.maximum(flipped_energy, 1e-3)) / size
+
+    def _best(self, seen: Patches, room: Patches) -> CellReadings:
+        """Return the best codes for differences (m, n) that show in so much room.
+
+        Where one cell of the other colour explains much of the rest, print shows another code.
+        """
+        scale = np.sqrt(np.square(room) @ np.square(self._codes).T)
+        scale *= np.linalg.norm(seen, axis=1)[:, None]
+        correlation = (seen * room) @ self._codes.T / np.maximum(scale, 1e-6)
+        two = np.partition(correlation, -2, axis=1)[:, -2:]
+        second, best = 1.0 - np.square(np.maximum(two.T, 0.0)) + 1e-6
+        freedom = self._freedom * room.mean(axis=1, dtype=float)
+        by_chance = betainc((freedom - 1.0) / 2.0, 0.5, np.minimum(best, 1.0)) / 2.0
+        # each code is tried with levels and with logarithms
+        error = 2.0 * len(self._codes) * by_chance + (second / best) ** (-freedom / 2.0)
+        entries = correlation.argmax(axis=1)
+        nearer = self._flipped(seen, room, entries)[1].max(axis=1, initial=0.0)
+        other_code = best > _OTHER_CODE * (1.0 - np.square(nearer) + 1e-6)
+        return CellReadings(entries, two[:, 1], second / best, np.where(other_code, np.inf, error))
+
+
+def _differences(cells: Patches) -> Patches:
+    """Differences (m, 2 * side * (side - 1)) between neighbours of cells (m, side, side)."""
+    return _pairs(cells[:, :, 1:] - cells[:, :, :-1], cells[:, 1:] - cells[:, :-1])
+
+
+def _normalised(cells: Patches) -> Patches:
+    """Return differences of cells, 1 for those from black to white."""
+    differences = _differences(cells)
+    return np.asarray(np.clip(differences / _step(differences), -1.0, 1.0))
+
+
+def _step(differences: Patches) -> Patches:
+    """Return the difference (m, 1) between black and white."""
+    large = np.quantile(np.abs(differences), _STEP_QUANTILE, axis=1, keepdims=True)
+    return np.asarray(np.maximum(large, 1e-3), dtype=np.float32)
+
+
+def _room(cells: Patches) -> Patches:
+    """Return which share of the difference between black and white each pair can show."""
+    lower = _pairs(
+        np.minimum(cells[:, :, 1:], cells[:, :, :-1]), np.minimum(cells[:, 1:], cells[:, :-1])
+    )
+    step = np.maximum(_step(_differences(cells)), _LEAST_STEP)
+    return np.asarray(np.clip((_SATURATED - lower) / step, 0.0, 1.0))
+
+
+def _pairs(beside: Patches, below: Patches) -> Patches:
+    return np.concatenate([beside.reshape(len(beside), -1), below.reshape(len(below), -1)], axis=1)

@@ -1,0 +1,68 @@
+"""Codes read from the grey levels of cells, and the probability that they are wrong."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from surveillance_perception.detection.cell_differences import CellDifferences
+from surveillance_perception.detection.dictionaries import MarkerCodes, dictionary_named
+
+CODES = MarkerCodes.of(dictionary_named('DICT_5X5_100'))
+DIFFERENCES = CellDifferences(CODES)
+ROW, COLUMN = np.mgrid[:7, :7]
+
+
+def levels(entry, black=25.0, white=225.0):
+    printed = CODES.cells[entry, 1:-1, 1:-1] > 0
+    return np.where(printed, white, black).astype(np.float32)
+
+
+def glare(row, column, cells):
+    return 255.0 * np.exp(-((ROW - row) ** 2 + (COLUMN - column) ** 2) / (2.0 * cells**2))
+
+
+@pytest.mark.parametrize(
+    'light',
+    [
+        lambda cells: cells,
+        lambda cells: cells * np.where(COLUMN > 3, 0.2, 1.0),
+        lambda cells: cells * (0.2 + 0.1 * ROW),
+        lambda cells: cells * 0.5 + 90.0,
+        lambda cells: np.minimum(cells + 0.7 * glare(3.0, 2.5, 1.5), 255.0),
+    ],
+    ids=['even', 'shadow', 'falling', 'haze', 'glare'],
+)
+def test_codes_are_read_under_any_light_with_little_doubt(light):
+    entries = np.arange(0, len(CODES.ids), 7)
+    read = DIFFERENCES.read(np.array([light(levels(entry)) for entry in entries], np.float32))
+    assert read.entries.tolist() == entries.tolist()
+    assert read.error.max() < 1e-4
+
+
+def test_cells_without_a_code_are_read_with_much_doubt():
+    generator = np.random.default_rng(1)
+    noise = generator.uniform(0, 255, (500, 7, 7)).astype(np.float32)
+    ramp = np.broadcast_to(20.0 * (ROW + COLUMN), (1, 7, 7)).astype(np.float32)
+    even = np.full((1, 7, 7), 128.0, np.float32)
+    error = DIFFERENCES.read(np.concatenate([noise, ramp, even])).error
+    assert (error < 0.01).mean() < 0.02
+    assert error.min() > 1e-4
+    assert error[-2:].min() > 1.0
+
+
+def test_print_of_another_code_is_not_taken_for_the_nearest_one():
+    cells = np.array([levels(entry) for entry in range(100)])
+    cells[:, 3, 3] = 250.0 - cells[:, 3, 3]
+    assert np.isinf(DIFFERENCES.read(cells).error).all()
+
+
+def test_cells_of_the_other_colour_are_counted():
+    entries = np.array([40])
+    cells = levels(40)[None]
+    inner, border = DIFFERENCES.wrong(cells, entries)
+    assert (inner.item(), border.item()) == (0, 0)
+    cells[0, 3, 3] = 250.0 - cells[0, 3, 3]
+    cells[0, 0, 2] = 225.0
+    inner, border = DIFFERENCES.wrong(cells, entries)
+    assert (inner.item(), border.item()) == (1, 1)
