@@ -191,6 +191,19 @@ def renderer(node: PatrolNode) -> str:
     return kind
 
 
+def wall_brightness(node: PatrolNode) -> float:
+    """Declare how dark the walls behind the markers are."""
+    brightness: float = node.parameter(
+        'camera.wall_brightness',
+        1.0,
+        'Brightness of the walls: 1 white plaster, 0.2 dark paint.',
+        minimum=0.0,
+        maximum=1.0,
+        read_only=True,
+    )
+    return brightness
+
+
 def camera_rate(node: PatrolNode) -> float:
     """Declare how often a picture is taken."""
     rate: float = node.parameter(

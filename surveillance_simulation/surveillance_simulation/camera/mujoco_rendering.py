@@ -108,7 +108,8 @@ def _model(world: World, camera: Camera) -> Any:
         height=16,
     )
     _floor(spec, (west, south, east, north))
-    _material(spec, 'plaster', textures.plaster(), mujoco.mjtTexture.mjTEXTURE_CUBE)
+    plaster = (textures.plaster() * world.wall_brightness).astype(np.uint8)
+    _material(spec, 'plaster', plaster, mujoco.mjtTexture.mjTEXTURE_CUBE)
     _material(spec, 'leaf', textures.leaf(), mujoco.mjtTexture.mjTEXTURE_CUBE)
     for start, end in world.plan.wall_pieces():
         _box(spec, start, end, 0.0, WALL_HEIGHT, 'plaster')

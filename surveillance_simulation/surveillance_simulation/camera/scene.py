@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -70,7 +70,14 @@ def faces_of(world: World) -> list[Face]:
         faces.append(_panel(panel, plan.marker_dictionary))
     x, y, yaw = plan.station
     faces.append(_lying(x, y, 0.004, yaw, STATION_SIDE, textures.station()))
-    return faces
+    if world.wall_brightness == 1.0:
+        return faces
+    return [
+        replace(face, shade=face.shade * world.wall_brightness)
+        if face.texture is textures.plaster()
+        else face
+        for face in faces
+    ]
 
 
 def _floor(bounds: tuple[float, float, float, float]) -> Iterator[Face]:

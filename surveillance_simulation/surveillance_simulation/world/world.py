@@ -56,7 +56,10 @@ class World:
         plan: The place's unchanging geometry.
         regions: Which room a point of it lies in.
         version: Counts the changes; whoever caches something drawn from the world compares it.
+        wall_brightness: 1 is white plaster; to be set before anything is drawn.
     """
+
+    wall_brightness = 1.0
 
     def __init__(self, plan: FloorPlan) -> None:
         """Start with every door open and no obstacles.
