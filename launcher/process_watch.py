@@ -111,8 +111,3 @@ class Heartbeats:
         if stuck or loops or quiet >= STARVED_AFTER:
             return f'hangs: no heartbeat for {quiet:.1f} s'
         return ''
-
-
-def shown(size: int) -> str:
-    """Return a size of memory in words."""
-    return f'{size / 2**20:.0f} MB'

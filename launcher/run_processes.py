@@ -125,7 +125,7 @@ def programs_of(
         own = [files[node.name] for node in members]
         words = command(members, _merged_arguments(own, run), os.getpid())
         memory = run.memory * 2**20
-        return Program(members[0].name, words, environ, says_up=True, watched=True, memory=memory)
+        return Program(members[0].name, words, environ, memory=memory)
 
     if run.composed:
         everything = program(nodes)
@@ -134,7 +134,6 @@ def programs_of(
                 everything,
                 name=COMPOSED,
                 takes_input=run.mode == 'MANUAL',
-                says_up=False,
                 # Together they may hold what each may hold by itself, and share much.
                 memory=everything.memory * COMPOSED_SHARE,
             )

@@ -25,7 +25,6 @@ from launcher.process_watch import (
     Activity,
     Heartbeats,
     look_at,
-    shown,
 )
 from launcher.service import notify
 
@@ -64,15 +63,15 @@ _STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 class Program:
     """A process to run.
 
+    It closes the descriptor in `UP` when the bulk of its start is done, and writes heartbeats to
+    the one in `process_watch.BEAT`. It is ended and started again when it hangs, and started again
+    when it ends without having said that it has finished.
+
     Attributes:
         name: in the log.
         command, environ: as for `subprocess`.
         takes_input: whether it reads lines, see `Supervisor.send`.
         leads: whether it uses the others, and so is stopped before them.
-        says_up: whether it closes the descriptor in `UP` when the bulk of its start is done.
-        watched: whether it writes heartbeats to the descriptor in `process_watch.BEAT`. Such a
-            process is ended and started again when it hangs, and started again when it ends
-            without having said that it has finished.
         memory: bytes of resident memory beyond which it is ended and started again; 0: any.
     """
 
@@ -81,8 +80,6 @@ class Program:
     environ: Mapping[str, str]
     takes_input: bool = False
     leads: bool = False
-    says_up: bool = False
-    watched: bool = False
     memory: int = 0
 
 
@@ -233,7 +230,7 @@ class Supervisor:
     def _start(self, child: Child) -> None:
         child.restart_at = None
         child.finished, child.ended_for = False, ''
-        with self._pipe(self._awaiting(child)) as up, self._pipe(self._listening(child)) as beat:
+        with self._pipe(self._when_up(child)) as up, self._pipe(self._when_it_beats(child)) as beat:
             process = self._spawn(child, {UP: up, BEAT: beat})
         child.process = process
         child.started = time.monotonic()
@@ -248,11 +245,8 @@ class Supervisor:
         self._log.say(f'started {child.program.name} (process {process.pid})')
 
     @contextlib.contextmanager
-    def _pipe(self, on_read: Callable[[bytes], None] | None) -> Iterator[int | None]:
-        """Give what a process writes to, None for nobody who reads it; its end is read as b''."""
-        if on_read is None:
-            yield None
-            return
+    def _pipe(self, on_read: Callable[[bytes], None]) -> Iterator[int]:
+        """Give what a process writes to; its end is read as b''."""
         reader, writer = os.pipe()
 
         def take() -> None:
@@ -268,10 +262,8 @@ class Supervisor:
         finally:
             os.close(writer)
 
-    def _awaiting(self, child: Child) -> Callable[[bytes], None] | None:
+    def _when_up(self, child: Child) -> Callable[[bytes], None]:
         """Return what is told that a process is up, or is dead before that."""
-        if not child.program.says_up:
-            return None
         child.coming_up = True
 
         def up(_nothing: bytes) -> None:
@@ -280,10 +272,8 @@ class Supervisor:
 
         return up
 
-    def _listening(self, child: Child) -> Callable[[bytes], None] | None:
+    def _when_it_beats(self, child: Child) -> Callable[[bytes], None]:
         """Return what is told a process's heartbeats."""
-        if not child.program.watched:
-            return None
         heartbeats = child.heartbeats = Heartbeats(time.monotonic())
 
         def beat(chunk: bytes) -> None:
@@ -293,19 +283,16 @@ class Supervisor:
 
         return beat
 
-    def _spawn(self, child: Child, given: Mapping[str, int | None]) -> subprocess.Popen[bytes]:
+    def _spawn(self, child: Child, given: Mapping[str, int]) -> subprocess.Popen[bytes]:
         environ = {**child.program.environ, RESTARTS: str(child.starts)}
-        descriptors = [descriptor for descriptor in given.values() if descriptor is not None]
-        for name, descriptor in given.items():
-            if descriptor is not None:
-                environ[name] = str(descriptor)
+        environ |= {name: str(descriptor) for name, descriptor in given.items()}
         if child.program.memory:
             # What is mapped is more than what is held.
             environ[MEMORY] = str(2 * child.program.memory + 2**30)
         return subprocess.Popen(
             child.program.command,
             env=environ,
-            pass_fds=descriptors,
+            pass_fds=tuple(given.values()),
             stdin=subprocess.PIPE if child.program.takes_input else subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
@@ -346,7 +333,7 @@ class Supervisor:
             if code not in (0, -signal.SIGTERM) and not child.killed:
                 self._log.warn(f'{name} ended with {describe_exit(code)}')
             return
-        if child.finished or (code == 0 and not child.program.watched):
+        if child.finished:
             self._log.say(f'{name} has ended by itself')
             return
         if code == EXIT_UNUSABLE and not child.deaths:
@@ -359,11 +346,9 @@ class Supervisor:
         why = child.ended_for or describe_exit(code)
         self._log.warn(f'{name} died ({why}): starting it again in {pause:g} s')
         if child.deaths == TROUBLE_AFTER:
-            self._trouble(f'{name} died {child.deaths} times in a row, last: {why}')
-
-    def _trouble(self, text: str) -> None:
-        self._log.error(f'{text}: somebody should have a look')
-        self._on_trouble(text)
+            text = f'{name} died {child.deaths} times in a row, last: {why}'
+            self._log.error(f'{text}: somebody should have a look')
+            self._on_trouble(text)
 
     def _watch(self, now: float) -> None:
         """End what hangs or holds too much memory; it is started again as after a death."""
@@ -382,7 +367,8 @@ class Supervisor:
             problem = child.heartbeats.problem(now, look)
             most = child.program.memory
             if look is not None and most and look.memory > most:
-                problem = f'holds {shown(look.memory)} of memory, at most {shown(most)} are allowed'
+                held, allowed = look.memory >> 20, most >> 20
+                problem = f'holds {held} MB of memory, at most {allowed} MB are allowed'
             if problem and not child.ended_for:
                 child.ended_for = problem
                 self._log.warn(f'{child.program.name} {problem}: ending it')

@@ -21,8 +21,6 @@ for argument in sys.argv[1:]:
             os.environ,
             takes_input=True,
             leads=name.startswith('lead'),
-            says_up=at_once > 0,
-            watched=name.startswith('watched'),
             memory=int(os.environ.get('MEMORY', '0')),
         )
     )

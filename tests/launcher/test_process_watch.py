@@ -27,11 +27,7 @@ BEATING = (
     'print("up", flush=True)\n'
     'while True: os.write(pipe, b"."); time.sleep(0.1)'
 )
-ENDING = (
-    'import os, sys\n'
-    'os.write(int(os.environ["LAUNCH_HEARTBEAT"]), b"F" if {finished} else b".")\n'
-    'print("up", flush=True)\n'
-)
+ENDING = 'import os; os.write(int(os.environ["LAUNCH_HEARTBEAT"]), b".")'
 
 
 def after(seconds: float, *looks: Look) -> str:
@@ -118,14 +114,8 @@ def test_a_stop_from_elsewhere_is_no_stop(start, number):
     assert launch.end(signal.SIGINT)[0] == 0
 
 
-def test_a_child_that_says_it_has_finished_is_left_alone(start):
-    launch = start(DRIVER, f'watched={ENDING.format(finished=True)}', environ=ENVIRON)
-    assert launch.end()[0] == 0
-    assert sum('started watched' in line for line in launch.lines) == 1
-
-
 def test_a_child_that_dies_again_and_again_calls_somebody(start):
-    launch = start(DRIVER, f'watched={ENDING.format(finished=False)}', environ=ENVIRON)
+    launch = start(DRIVER, f'watched={ENDING}', environ=ENVIRON)
     launch.until(r'ERROR: watched died 5 times in a row, last: exit code 0: somebody should')
     launch.until(r'alarm: watched died 5 times in a row')
     assert launch.end(signal.SIGINT)[0] == 0

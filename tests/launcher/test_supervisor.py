@@ -21,6 +21,7 @@ STUBBORN = (
     'print("up", flush=True)\n'
     'while True: signal.pause()'
 )
+FINISHED = 'import os; os.write(int(os.environ["LAUNCH_HEARTBEAT"]), b"F")'
 PARENT = (
     'import subprocess, sys, signal\n'
     'child = subprocess.Popen([sys.executable, "-c", "import signal; signal.pause()"])\n'
@@ -111,8 +112,7 @@ def test_no_more_processes_come_up_at_once_than_allowed(start):
         'print("coming", flush=True); input(); print("up", flush=True)\n'
         'os.close(int(os.environ["LAUNCH_UP"])); signal.pause()'
     )
-    mortal = 'raise SystemExit(0)'
-    programs = (f'one={slow}', f'two={mortal}', f'three={WAIT}')
+    programs = (f'one={slow}', f'two={FINISHED}', f'three={WAIT}')
     launch = start(DRIVER, *programs, environ={**ENVIRON, 'AT_ONCE': '1'})
     launch.until(r'one +\| coming')
     launch.write('one go')
@@ -160,8 +160,8 @@ def test_a_child_that_cannot_be_configured_ends_the_launch(start):
     assert 'starting it again' not in output
 
 
-def test_a_child_that_ends_by_itself_is_left_alone(start):
-    launch = start(DRIVER, 'one=print("bye", end="")', environ=ENVIRON)
+def test_a_child_that_says_it_has_finished_is_left_alone(start):
+    launch = start(DRIVER, f'one={FINISHED}; print("bye", end="")', environ=ENVIRON)
     assert launch.end()[0] == 0
     assert any(line.endswith('| bye') for line in launch.lines)
     assert sum('started one' in line for line in launch.lines) == 1
