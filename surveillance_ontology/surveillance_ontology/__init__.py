@@ -17,7 +17,6 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from surveillance_ontology.documents.rdf_xml import OntologyFileError
     from surveillance_ontology.documents.reading import (
         OntologyDocument,
         read_ontology,
@@ -26,6 +25,7 @@ if TYPE_CHECKING:
         ontology_bytes,
         write_ontology,
     )
+    from surveillance_ontology.documents.xml_reading import OntologyFileError
     from surveillance_ontology.knowledge_base import Changes, KnowledgeBase
     from surveillance_ontology.reasoner.explanation import Explanation
 
@@ -34,7 +34,7 @@ _HOME = {
     'Explanation': 'reasoner.explanation',
     'KnowledgeBase': 'knowledge_base',
     'OntologyDocument': 'documents.reading',
-    'OntologyFileError': 'documents.rdf_xml',
+    'OntologyFileError': 'documents.xml_reading',
     'ontology_bytes': 'documents.writing',
     'read_ontology': 'documents.reading',
     'write_ontology': 'documents.writing',

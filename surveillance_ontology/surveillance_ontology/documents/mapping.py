@@ -188,8 +188,8 @@ class Mapping(NodeReader):
             other: ex.ClassExpression = ex.ObjectComplementOf(self.expression(operands[0]))
         elif predicate == OWL + 'oneOf':
             if self._is_data_range(subject):
-                literals = tuple(item for item in operands if isinstance(item, Literal))
-                self._add(ax.DatatypeDefinition(subject, ex.DataOneOf(literals)))
+                values = ex.DataOneOf(self._literals(subject, operands))
+                self._add(ax.DatatypeDefinition(subject, values))
                 return
             other = ex.ObjectOneOf(tuple(self._resources(value)))
         elif predicate == OWL + 'unionOf':

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
-from surveillance_ontology.documents.rdf_xml import Graph, Node, OntologyFileError
+from surveillance_ontology.documents.rdf_xml import Graph, Node
+from surveillance_ontology.documents.xml_reading import OntologyFileError
 from surveillance_ontology.owl import axioms as ax
 from surveillance_ontology.owl import expressions as ex
 from surveillance_ontology.owl.axioms import Axiom
@@ -40,6 +41,11 @@ _CARDINALITIES = (
     ('minCardinality', 'minQualifiedCardinality', ex.ObjectMinCardinality, ex.DataMinCardinality),
     ('maxCardinality', 'maxQualifiedCardinality', ex.ObjectMaxCardinality, ex.DataMaxCardinality),
     ('cardinality', 'qualifiedCardinality', ex.ObjectExactCardinality, ex.DataExactCardinality),
+)
+_CONSTRUCTORS = ('intersectionOf', 'unionOf', 'complementOf', 'oneOf', 'onProperty')
+_RESTRICTIONS = (
+    *('someValuesFrom', 'allValuesFrom', 'hasValue', 'hasSelf'),
+    *(name for row in _CARDINALITIES for name in row[:2]),
 )
 BUILT_IN = (OWL, RDF, RDFS, XSD, SWRL)
 
@@ -128,12 +134,13 @@ class NodeReader:
             if not isinstance(node, str) or node in seen:
                 raise self._fail(str(head), 'expected a list that ends in rdf:nil')
             seen.add(node)
-            first = self._one(node, RDF + 'first')
-            rest = self._one(node, RDF + 'rest')
-            if first is None or rest is None:
-                raise self._fail(node, 'expected rdf:first and rdf:rest in a list')
-            items.append(first)
-            node = rest
+            properties = self._nodes.get(node, {})
+            firsts = set(properties.get(RDF + 'first', ()))
+            rests = set(properties.get(RDF + 'rest', ()))
+            if len(firsts) != 1 or len(rests) != 1:
+                raise self._fail(node, 'expected one rdf:first and one rdf:rest in a list')
+            items.append(firsts.pop())
+            node = rests.pop()
         return items
 
     def _resources(self, head: Node) -> list[str]:
@@ -146,10 +153,11 @@ class NodeReader:
         return items  # type: ignore[return-value]
 
     def _property(self, node: str) -> ex.PropertyExpression:
-        inverse = self._one(node, OWL + 'inverseOf')
-        if node.startswith('_:') and isinstance(inverse, str):
-            return ex.ObjectInverseOf(inverse)
-        return node
+        inverse = self._one(node, OWL + 'inverseOf') if node.startswith('_:') else None
+        if not isinstance(inverse, str):
+            return node
+        inner = self._property(inverse)
+        return inner.prop if isinstance(inner, ex.ObjectInverseOf) else ex.ObjectInverseOf(inner)
 
     def _is_data(self, prop: str, range_node: Node | None = None) -> bool:
         kinds = self._kinds.get(prop, ())
@@ -175,20 +183,22 @@ class NodeReader:
         if number < 0:
             shown = value.lexical if isinstance(value, Literal) else value
             raise self._fail(
-                node, f'expected a whole number as {local_name(predicate)}, got {shown!r}'
+                node, f'expected a whole number as {local_name(predicate)}, got {shown[:40]!r}'
             )
         return number
 
     def data_range(self, node: Node) -> ex.DataRange:
         """Return the data range a node stands for."""
         if not isinstance(node, str):
-            raise OntologyFileError(f'expected a data range, got the literal {node.lexical!r}')
+            raise self._ill_formed(
+                self._subject_read, f'expected a data range, got the literal {node.lexical!r}'
+            )
         if not node.startswith('_:'):
             return node
         properties = self._nodes.get(node, {})
         if OWL + 'oneOf' in properties:
             items = self._list(properties[OWL + 'oneOf'][0])
-            return ex.DataOneOf(tuple(item for item in items if isinstance(item, Literal)))
+            return ex.DataOneOf(self._literals(node, items))
         for predicate, record in (
             (OWL + 'intersectionOf', ex.DataIntersectionOf),
             (OWL + 'unionOf', ex.DataUnionOf),
@@ -201,14 +211,34 @@ class NodeReader:
             facets = []
             for facet in self._resources(self._one(node, OWL + 'withRestrictions') or RDF + 'nil'):
                 for name, values in self._nodes.get(facet, {}).items():
-                    facets += [(name, value) for value in values if isinstance(value, Literal)]
+                    if name != _TYPE:
+                        facets += [(name, value) for value in self._literals(node, values)]
             return ex.DatatypeRestriction(self._resource(node, OWL + 'onDatatype'), tuple(facets))
         raise self._ill_formed(node, 'expected a data range')
+
+    def _literals(self, node: str, values: Iterable[Node]) -> tuple[Literal, ...]:
+        """Return values of a data range, which must be literals."""
+        found = []
+        for value in values:
+            if not isinstance(value, Literal):
+                raise self._ill_formed(node, f'expected a literal in a data range, got {value}')
+            found.append(value)
+        return tuple(found)
+
+    def _check_one(self, node: str, names: Iterable[str], what: str) -> None:
+        """Check that a node has one of some properties at most, and one value of it."""
+        properties = self._nodes.get(node, {})
+        said = [name for name in names if OWL + name in properties]
+        if len(said) > 1 or any(len(set(properties[OWL + name])) > 1 for name in said):
+            several = ', '.join(said)
+            raise self._ill_formed(node, f'{what} says several things at once: {several}')
 
     def expression(self, node: Node) -> ex.ClassExpression:
         """Return the class expression a node stands for."""
         if not isinstance(node, str):
-            raise OntologyFileError(f'expected a class, got the literal {node.lexical!r}')
+            raise self._ill_formed(
+                self._subject_read, f'expected a class, got the literal {node.lexical!r}'
+            )
         if not node.startswith('_:'):
             return node
         known = self._expressions.get(node)
@@ -223,6 +253,7 @@ class NodeReader:
 
     def _expression(self, node: str) -> ex.ClassExpression:
         properties = self._nodes.get(node, {})
+        self._check_one(node, _CONSTRUCTORS, 'a class expression')
         for predicate, record in (
             (OWL + 'intersectionOf', ex.ObjectIntersectionOf),
             (OWL + 'unionOf', ex.ObjectUnionOf),
@@ -240,6 +271,7 @@ class NodeReader:
     def _restriction(self, node: str, properties: dict[str, list[Node]]) -> ex.ClassExpression:
         on = self._resource(node, OWL + 'onProperty')
         prop = self._property(on)
+        self._check_one(node, _RESTRICTIONS, f'restriction on {local_name(on)}')
         filler = self._one(node, OWL + 'someValuesFrom') or self._one(node, OWL + 'allValuesFrom')
         if OWL + 'hasValue' in properties:
             value = properties[OWL + 'hasValue'][0]
@@ -247,7 +279,10 @@ class NodeReader:
                 return ex.DataHasValue(on, value)
             return ex.ObjectHasValue(prop, value)
         if OWL + 'hasSelf' in properties:
-            return ex.ObjectHasSelf(prop)
+            self_value = properties[OWL + 'hasSelf'][0]
+            if isinstance(self_value, Literal) and self_value.lexical in ('true', '1'):
+                return ex.ObjectHasSelf(prop)
+            raise self._ill_formed(node, f'restriction on {local_name(on)}: hasSelf is not true')
         if filler is not None:
             some = OWL + 'someValuesFrom' in properties
             if self._is_data(on, filler):

@@ -1,9 +1,6 @@
 """RDF/XML to triples, with exact datatypes and the place of every error.
 
-Follows RDF 1.1 XML Syntax (https://www.w3.org/TR/rdf-syntax-grammar/) on top of expat. Document
-type declarations may define short plain-text entities (Protégé writes namespaces that way);
-entities inside entities, external ones and parameter entities are refused, so a document cannot
-expand itself.
+Follows RDF 1.1 XML Syntax (https://www.w3.org/TR/rdf-syntax-grammar/).
 """
 
 from __future__ import annotations
@@ -11,45 +8,17 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field
 from typing import TypeAlias
-from urllib.parse import urljoin
-from xml.parsers import expat
 
+from surveillance_ontology.documents.xml_reading import XML, OntologyFileError, XmlReader
 from surveillance_ontology.owl.expressions import Literal
 from surveillance_ontology.owl.vocabulary import RDF, XSD
 
 Node: TypeAlias = str | Literal
 Triple: TypeAlias = tuple[str, str, Node]
 
-_XML = 'http://www.w3.org/XML/1998/namespace'
-_ABSOLUTE = re.compile(r'[A-Za-z][A-Za-z0-9+.\-]*:')
-_FORBIDDEN = re.compile(r'[\x00-\x20<>"{}|\\^`]')
-_MAX_ENTITY = 512
-_MAX_DEPTH = 20_000
-
 _SYNTAX = {
     RDF + name for name in ('about', 'ID', 'nodeID', 'resource', 'datatype', 'parseType', 'bagID')
 }
-
-
-class OntologyFileError(ValueError):
-    """A document that cannot be read, or an ontology that cannot be written.
-
-    Its text is one line: path, line and column where they are known, and what was expected.
-
-    Attributes:
-        message: What was wrong.
-        line, column: From 1; 0 when not known.
-        path: The document; '' when not known.
-    """
-
-    def __init__(self, message: str, line: int = 0, column: int = 0, path: str = '') -> None:
-        super().__init__(message)
-        self.message = ' '.join(message.split())
-        self.line, self.column, self.path = line, column, path
-
-    def __str__(self) -> str:
-        place = f':{self.line}:{self.column}' if self.line else ''
-        return f'{self.path}{place}: {self.message}' if self.path else self.message
 
 
 @dataclass
@@ -79,76 +48,25 @@ class _Frame:
     reified: str = ''
 
 
-def resolve(base: str, reference: str) -> str:
-    """Return an IRI reference against a base IRI (RFC 3986).
-
-    Raises:
-        OntologyFileError: It has a forbidden character.
-    """
-    found = _FORBIDDEN.search(reference)
-    if found:
-        raise OntologyFileError(f'IRI {reference!r} contains {found.group()!r}')
-    if _ABSOLUTE.match(reference):
-        return reference
-    stem = base.partition('#')[0]
-    if not reference:
-        return stem
-    if reference[0] == '#':
-        return stem + reference
-    try:
-        return urljoin(stem, reference)
-    except ValueError as error:
-        raise OntologyFileError(f'IRI {reference!r} with base {stem!r}: {error}') from None
-
-
+_NAME = re.compile(r'[^\W\d][\w.\-]*')
 _TAG = re.compile(rb'<(?:[^"\'>]|"[^"]*"|\'[^\']*\')*>')
 
 
-class _Reader:
+class _Reader(XmlReader):
     def __init__(self, base: str, data: bytes) -> None:
+        super().__init__(data)
         self.graph = Graph()
-        self.data = data
         self.stack = [_Frame('root', base=base)]
         self.blank = 0
         self.ids: set[str] = set()
         self.seen_root = False
-        parser = expat.ParserCreate(namespace_separator='')
-        parser.buffer_text = True
-        parser.namespace_prefixes = False
-        parser.StartElementHandler = self.start
-        parser.EndElementHandler = self.end
-        parser.CharacterDataHandler = self.characters
-        parser.StartNamespaceDeclHandler = self.namespace
-        parser.EntityDeclHandler = self.entity
-        parser.ExternalEntityRefHandler = self.external
-        self.parser = parser
 
-    def fail(self, message: str) -> OntologyFileError:
-        parser = self.parser
-        return OntologyFileError(message, parser.CurrentLineNumber, parser.CurrentColumnNumber + 1)
-
-    def external(self, *_: object) -> int:
-        raise self.fail('external entities are refused')
-
-    def entity(self, name: str, is_parameter: bool, value: str | None, *_: object) -> None:
-        if is_parameter or value is None:
-            raise self.fail(f'entity {name!r} is refused: only plain text may stand in an entity')
-        if '&' in value or '<' in value or len(value) > _MAX_ENTITY:
-            expected = f'plain text of at most {_MAX_ENTITY} characters'
-            raise self.fail(f'entity {name!r} is refused: expected {expected}')
-
-    def namespace(self, prefix: str | None, uri: str | None) -> None:
-        self.graph.prefixes.setdefault(prefix or '', uri or '')
+    def namespace(self, prefix: str | None, iri: str | None) -> None:
+        self.graph.prefixes.setdefault(prefix or '', iri or '')
 
     def new_blank(self) -> str:
         self.blank += 1
         return f'_:g{self.blank}'
-
-    def resolve(self, base: str, reference: str) -> str:
-        try:
-            return resolve(base, reference)
-        except OntologyFileError as error:
-            raise self.fail(error.message) from None
 
     def emit(self, subject: str, predicate: str, value: Node, reified: str = '') -> None:
         graph = self.graph
@@ -171,12 +89,13 @@ class _Reader:
         self.ids.add(iri)
         return iri
 
-    # --- expat handlers ---
+    def blank_named(self, name: str) -> str:
+        if not _NAME.fullmatch(name):
+            raise self.fail(f'rdf:nodeID {name!r} is no name')
+        return '_:n' + name
 
     def start(self, name: str, attributes: dict[str, str]) -> None:
         parent = self.stack[-1]
-        if len(self.stack) > _MAX_DEPTH:
-            raise self.fail(f'elements nest deeper than {_MAX_DEPTH}')
         if parent.kind == 'xml':
             literal = next(frame for frame in reversed(self.stack) if frame.predicate)
             literal.items = ['markup']
@@ -184,10 +103,10 @@ class _Reader:
             return
         base, language = parent.base, parent.language
         if attributes:
-            if _XML + 'base' in attributes:
-                base = self.resolve(base, attributes.pop(_XML + 'base'))
-            if _XML + 'lang' in attributes:
-                language = attributes.pop(_XML + 'lang').lower()
+            if XML + 'base' in attributes:
+                base = self.resolve(base, attributes.pop(XML + 'base'))
+            if XML + 'lang' in attributes:
+                language = attributes.pop(XML + 'lang').lower()
         if parent.kind == 'root':
             if name == RDF + 'RDF' and not self.seen_root:
                 self.seen_root = True
@@ -214,12 +133,14 @@ class _Reader:
         about = attributes.pop(RDF + 'about', None)
         ident = attributes.pop(RDF + 'ID', None)
         node_id = attributes.pop(RDF + 'nodeID', None)
+        if [about, ident, node_id].count(None) < 2:
+            raise self.fail('expected one of rdf:about, rdf:ID and rdf:nodeID')
         if about is not None:
             subject = self.resolve(base, about)
         elif ident is not None:
             subject = self.named(base, ident)
         elif node_id is not None:
-            subject = '_:n' + node_id
+            subject = self.blank_named(node_id)
         else:
             subject = self.new_blank()
         if name != RDF + 'Description':
@@ -260,6 +181,9 @@ class _Reader:
             frame.datatype = self.resolve(base, frame.datatype)
         resource = attributes.pop(RDF + 'resource', None)
         node_id = attributes.pop(RDF + 'nodeID', None)
+        kinds = (parse_type, frame.datatype or None, resource, node_id)
+        if kinds.count(None) < 3 or (attributes and (parse_type or frame.datatype)):
+            raise self.fail(f'property {name!r} has attributes that exclude each other')
         if parse_type == 'Collection':
             frame.kind = 'collection'
         elif parse_type == 'Resource':
@@ -273,12 +197,11 @@ class _Reader:
         elif resource is not None:
             frame.kind, frame.object = 'empty', self.resolve(base, resource)
         elif node_id is not None:
-            frame.kind, frame.object = 'empty', '_:n' + node_id
+            frame.kind, frame.object = 'empty', self.blank_named(node_id)
         elif attributes:
             frame.kind, frame.object = 'empty', self.new_blank()
         if attributes:
-            if not isinstance(frame.object, str):
-                raise self.fail(f'attribute {next(iter(attributes))!r} does not belong here')
+            assert isinstance(frame.object, str)
             for key, value in attributes.items():
                 self.attribute(frame.object, key, value, base, language)
 
@@ -294,6 +217,8 @@ class _Reader:
         if frame.kind == 'property':
             value = frame.object
             text = ''.join(frame.text)
+            if value is not None and frame.datatype:
+                raise self.fail('an element where rdf:datatype announces text')
             if value is None:
                 value = _text(text, frame.datatype, frame.language)
             elif text.strip():
@@ -314,7 +239,7 @@ class _Reader:
             text = ''.join(frame.text)
             if frame.items:  # With elements inside, the literal is what is written.
                 inside = self.data[frame.counter : self.parser.CurrentByteIndex]
-                text = inside.decode('utf-8', 'replace')
+                text = inside.decode()
             value = Literal(text, frame.datatype)
             self.emit(frame.subject, frame.predicate, value, frame.reified)
 
@@ -335,16 +260,7 @@ def parse_rdf_xml(data: bytes, base: str) -> Graph:
             entities.
     """
     reader = _Reader(base, data)
-    try:
-        reader.parser.Parse(data, True)
-    except expat.ExpatError as error:
-        raise OntologyFileError(
-            f'not well-formed XML: {expat.ErrorString(error.code)}', error.lineno, error.offset + 1
-        ) from None
-    except OntologyFileError:
-        raise
-    except (LookupError, ValueError) as error:
-        raise OntologyFileError(f'its encoding cannot be read: {error}', 1, 1) from None
+    reader.read()
     if not reader.seen_root:
         raise OntologyFileError('the document holds no element', 1, 1)
     return reader.graph

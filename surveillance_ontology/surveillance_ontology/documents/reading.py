@@ -2,22 +2,41 @@
 
 from __future__ import annotations
 
+import codecs
 import re
 from dataclasses import dataclass, replace
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
-from surveillance_ontology.documents import foreign_formats
-from surveillance_ontology.documents.functional_syntax import FunctionalSyntax, is_functional
+from surveillance_ontology.documents.functional_syntax import is_functional, parse_functional
 from surveillance_ontology.documents.mapping import Mapping
-from surveillance_ontology.documents.ntriples import parse_ntriples
-from surveillance_ontology.documents.rdf_xml import Graph, OntologyFileError, parse_rdf_xml
+from surveillance_ontology.documents.ntriples import parse_by_library, parse_ntriples
+from surveillance_ontology.documents.owl_xml import is_owl_xml, parse_owl_xml
+from surveillance_ontology.documents.rdf_xml import Graph, parse_rdf_xml
+from surveillance_ontology.documents.structural import Axioms
+from surveillance_ontology.documents.xml_reading import OntologyFileError
 from surveillance_ontology.memory import uncollected
 from surveillance_ontology.owl.axioms import Axiom, Import
 from surveillance_ontology.owl.vocabulary import local_name
 
-_NTRIPLES = re.compile(rb'<[^\s<>]*>\s+[<_]')
-_ENDINGS = ('.owl', '.rdf', '.ttl', '.ofn', '.owx', '.xml', '.nt')
+_BOMS = {
+    codecs.BOM_UTF32_LE: 'utf-32',
+    codecs.BOM_UTF32_BE: 'utf-32',
+    codecs.BOM_UTF16_LE: 'utf-16',
+    codecs.BOM_UTF16_BE: 'utf-16',
+    b'<\0': 'utf-16-le',
+    b'\0<': 'utf-16-be',
+}
+_DECLARED = re.compile(rb'<\?xml[^>]*?\sencoding\s*=\s*["\']([\w.:-]+)')
+_COMMENTS = re.compile(rb'(?:\s+|#[^\n]*)*')
+_XML = re.compile(rb'<(?:[?!]|[A-Za-z_][\w.-]*(?::[A-Za-z_][\w.-]*)?(?:[\s/>]|\Z))')
+_JSON = re.compile(rb'\{\s*["}]|\[\s*\{')
+_TRIPLE = re.compile(
+    rb'(?:<[^\s<>]*>|_:[^\s<]+)\s*<[^\s<>]*>[^\n]*\.[ \t\r]*(?:#.*)?$', re.MULTILINE
+)
+_TURTLE = re.compile(rb'@(?:prefix|base)\b|(?:prefix|base)\s|<|_:|\[|\(', re.IGNORECASE)
+FORMATS = 'RDF/XML, OWL/XML, Turtle, N-Triples, JSON-LD or OWL functional syntax'
+_ENDINGS = ('.owl', '.rdf', '.ttl', '.ofn', '.owx', '.xml', '.nt', '.jsonld')
 DEFAULT_SIZE_LIMIT = 256 * 1024 * 1024
 
 
@@ -28,7 +47,7 @@ class OntologyDocument:
     Attributes:
         axioms: In document order, without repeats.
         unsupported: One sentence for each statement that was not understood.
-        format: 'rdfxml', 'ntriples', 'owlxml', 'turtle' or 'functional'.
+        format: 'rdfxml', 'ntriples', 'owlxml', 'turtle', 'jsonld' or 'functional'.
         iri: The IRI in the document's owl:Ontology header, '' without one.
         prefixes: Namespace prefixes declared by the document.
     """
@@ -45,10 +64,10 @@ def read_ontology(
 ) -> OntologyDocument:
     """Read a document and the documents beside it that it imports.
 
-    Its format is told by how it begins: RDF/XML, OWL/XML, Turtle, N-Triples, or OWL functional
-    syntax. An import is followed where a file of its name (with any ending) lies in the folder of
-    the document, or where it is a file IRI; its axioms then take the place of the import. Any other
-    import is reported.
+    Its format is told by how it begins: RDF/XML, OWL/XML, Turtle, N-Triples, JSON-LD, or OWL
+    functional syntax. An import is followed where a file of its name (with any ending) lies in the
+    folder of the document, or where it is a file IRI; its axioms then take the place of the import.
+    Any other import is reported.
 
     Args:
         source: A path, or the document itself as bytes.
@@ -108,44 +127,69 @@ def _read(source: str | Path | bytes, iri: str, size_limit: int) -> OntologyDocu
             raise OntologyFileError(error.strerror or str(error), path=name) from None
     if len(data) > size_limit:
         raise OntologyFileError(f'larger than the limit of {size_limit} bytes', path=name)
-    start = data.lstrip(b'\xef\xbb\xbf \t\r\n')
-    if is_functional(start):
-        return _functional(name, data)
     try:
         with uncollected():
-            graph, form = _parsed(data, start, iri)
-            mapping = Mapping(graph)
+            return _parsed(_utf8(data), iri)
     except OntologyFileError as error:
         error.path = name
         raise
     except RecursionError:
         raise OntologyFileError('class expressions nest too deeply', path=name) from None
+
+
+def _utf8(data: bytes) -> bytes:
+    """Return a document in UTF-8, without a byte order mark."""
+    coding = next((_BOMS[mark] for mark in _BOMS if data.startswith(mark)), None)
+    if coding is None:
+        data = data.removeprefix(codecs.BOM_UTF8)
+        declared = _DECLARED.match(data)
+        coding = declared[1].decode() if declared else 'utf-8'
+        if coding.lower() in ('utf-8', 'us-ascii'):
+            return data
+    try:
+        return data.decode(coding).removeprefix('\ufeff').encode()
+    except (LookupError, ValueError) as error:
+        raise OntologyFileError(f'its encoding cannot be read: {error}', 1, 1) from None
+
+
+def _parsed(data: bytes, iri: str) -> OntologyDocument:
+    """Read a document in UTF-8 by the format that it begins with."""
+    begin = _COMMENTS.match(data)
+    place = begin.end() if begin else 0
+    if place == len(data):
+        raise OntologyFileError('the document is empty', 1, 1)
+    if is_functional(data):
+        return _stated(parse_functional(_text(data)), 'functional')
+    if _TRIPLE.match(data, place):
+        return _mapped(parse_ntriples(data), 'ntriples')
+    if _XML.match(data, place):
+        if is_owl_xml(data):
+            return _stated(parse_owl_xml(data, iri), 'owlxml')
+        return _mapped(parse_rdf_xml(data, iri), 'rdfxml')
+    if _JSON.match(data, place):
+        return _mapped(parse_by_library(data, iri, 'json-ld'), 'jsonld')
+    if _TURTLE.match(data, place):
+        return _mapped(parse_by_library(data, iri, 'turtle'), 'turtle')
+    shown = data[place : place + 40].decode('latin-1')
+    raise OntologyFileError(
+        f'expected {FORMATS}, got {shown!r}', data.count(b'\n', 0, place) + 1, 1
+    )
+
+
+def _text(data: bytes) -> str:
+    try:
+        return data.decode()
+    except UnicodeDecodeError as error:
+        line = data.count(b'\n', 0, error.start) + 1
+        raise OntologyFileError(f'not UTF-8: {error.reason}', line, 1) from None
+
+
+def _stated(read: Axioms, form: str) -> OntologyDocument:
+    return OntologyDocument(list(read.axioms), read.unsupported, form, read.iri, read.prefixes)
+
+
+def _mapped(graph: Graph, form: str) -> OntologyDocument:
+    mapping = Mapping(graph)
     return OntologyDocument(
         list(mapping.axioms), mapping.unsupported, form, mapping.iri, graph.prefixes
     )
-
-
-def _functional(name: str, data: bytes) -> OntologyDocument:
-    try:
-        read = FunctionalSyntax(data.decode('utf-8-sig'))
-    except OntologyFileError as error:
-        error.path = name
-        raise
-    except UnicodeDecodeError as error:
-        raise OntologyFileError(f'its encoding cannot be read: {error}', path=name) from None
-    return OntologyDocument(
-        list(read.axioms), read.unsupported, 'functional', read.iri, read.prefixes
-    )
-
-
-def _parsed(data: bytes, start: bytes, iri: str) -> tuple[Graph, str]:
-    """Return the document as triples, and its format."""
-    if not start:
-        raise OntologyFileError('the document is empty', 1, 1)
-    if foreign_formats.is_owl_xml(start):
-        return parse_ntriples(foreign_formats.owl_xml_to_ntriples(data, iri)), 'owlxml'
-    if start[:1] != b'<' and foreign_formats.is_turtle(start):
-        return parse_ntriples(foreign_formats.turtle_to_ntriples(data, iri)), 'turtle'
-    if not _NTRIPLES.match(start) and start[:1] in (b'<', b'\xff', b'\xfe'):
-        return parse_rdf_xml(data, iri), 'rdfxml'
-    return parse_ntriples(data), 'ntriples'

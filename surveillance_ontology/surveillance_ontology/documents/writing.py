@@ -9,8 +9,9 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from xml.sax.saxutils import escape, quoteattr
 
-from surveillance_ontology.documents.rdf_xml import Node, OntologyFileError, Triple
+from surveillance_ontology.documents.rdf_xml import Node, Triple
 from surveillance_ontology.documents.triples import triples_of
+from surveillance_ontology.documents.xml_reading import OntologyFileError
 from surveillance_ontology.owl.axioms import (
     Axiom,
     ClassAssertion,

@@ -31,14 +31,19 @@ from surveillance_ontology.armor.reference import (
 )
 from surveillance_ontology.armor.rendering import parse_entity, shown
 from surveillance_ontology.armor.session import Session
-from surveillance_ontology.documents.rdf_xml import OntologyFileError
 from surveillance_ontology.documents.reading import read_ontology
+from surveillance_ontology.documents.xml_reading import OntologyFileError
 from surveillance_ontology.knowledge_base import KnowledgeBase
 from surveillance_ontology.owl.axioms import Axiom
 from surveillance_ontology.reasoner.java_reasoning import JavaKnowledgeBase, JavaReasonerError
 
 RELEASE_AFTER = 0.2
-WRITTEN = {'turtle': 'ntriples', 'owlxml': 'rdfxml', 'functional': 'rdfxml'}
+WRITTEN = {
+    'turtle': 'ntriples',
+    'jsonld': 'ntriples',
+    'owlxml': 'rdfxml',
+    'functional': 'rdfxml',
+}
 """What SAVE writes for formats that are only read: N-Triples is Turtle as well."""
 WEB_TIMEOUT = 20.0
 FIRST = 10
@@ -205,8 +210,8 @@ def _release(session: Session, ref: Reference) -> None:
     differs='Without a path it is refused unless the parameter overwrite_loaded is set: ARMOR '
     'writes over the file that was loaded. Refused with 102 while another client is mounted. '
     'Written beside the file and renamed, so that a crash leaves the old file whole. '
-    'Turtle is written as N-Triples, OWL/XML and functional syntax as RDF/XML; a path that ends '
-    'in .nt gets N-Triples, which hold names that RDF/XML cannot.',
+    'Turtle and JSON-LD are written as N-Triples, OWL/XML and functional syntax as RDF/XML; a path '
+    'that ends in .nt gets N-Triples, which hold names that RDF/XML cannot.',
     slow=True,
 )
 @memory.uncollected()

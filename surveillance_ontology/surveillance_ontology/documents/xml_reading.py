@@ -1,0 +1,161 @@
+"""XML as ontology documents use it: the place of every error, and nothing that expands itself.
+
+Document type declarations may define short plain-text entities (Protégé writes namespaces that
+way); entities inside entities, external ones and parameter entities are refused.
+"""
+
+from __future__ import annotations
+
+import re
+from urllib.parse import urljoin
+from xml.parsers import expat
+
+_ABSOLUTE = re.compile(r'[A-Za-z][A-Za-z0-9+.\-]*:')
+_FORBIDDEN = re.compile(r'[\x00-\x20<>"{}|\\^`]')
+_REFERENCE = re.compile(rb'&([A-Za-z_][\w.-]*);')
+_MAX_ENTITY = 512
+_MAX_DEPTH = 20_000
+XML = 'http://www.w3.org/XML/1998/namespace'
+
+
+class OntologyFileError(ValueError):
+    """A document that cannot be read, or an ontology that cannot be written.
+
+    Its text is one line: path, line and column where they are known, and what was expected.
+
+    Attributes:
+        message: What was wrong.
+        line, column: From 1; 0 when not known.
+        path: The document; '' when not known.
+    """
+
+    def __init__(self, message: str, line: int = 0, column: int = 0, path: str = '') -> None:
+        super().__init__(message)
+        self.message = ' '.join(message.split())
+        self.line, self.column, self.path = line, column, path
+
+    def __str__(self) -> str:
+        place = f':{self.line}:{self.column}' if self.line else ''
+        return f'{self.path}{place}: {self.message}' if self.path else self.message
+
+
+def resolve(base: str, reference: str) -> str:
+    """Return an IRI reference against a base IRI (RFC 3986).
+
+    Raises:
+        OntologyFileError: It has a forbidden character.
+    """
+    found = _FORBIDDEN.search(reference)
+    if found:
+        raise OntologyFileError(f'IRI {reference!r} contains {found.group()!r}')
+    if _ABSOLUTE.match(reference):
+        return reference
+    stem = base.partition('#')[0]
+    if not reference:
+        return stem
+    if reference[0] == '#':
+        return stem + reference
+    try:
+        return urljoin(stem, reference)
+    except ValueError as error:
+        raise OntologyFileError(f'IRI {reference!r} with base {stem!r}: {error}') from None
+
+
+class XmlReader:
+    """Goes through a document; `start`, `end` and `characters` are told what it holds.
+
+    Names are namespace and local name in one.
+
+    Args:
+        data: The document, UTF-8 whatever it declares.
+    """
+
+    def __init__(self, data: bytes) -> None:
+        self.data = data
+        self.depth = 0
+        self._entities = {b'amp', b'lt', b'gt', b'quot', b'apos'}
+        parser = expat.ParserCreate('UTF-8', namespace_separator='')
+        parser.buffer_text = True
+        parser.namespace_prefixes = False
+        parser.StartElementHandler = self._start
+        parser.EndElementHandler = self._end
+        parser.CharacterDataHandler = self.characters
+        parser.StartNamespaceDeclHandler = self.namespace
+        parser.EntityDeclHandler = self._entity
+        parser.ExternalEntityRefHandler = self._external
+        parser.StartDoctypeDeclHandler = self._doctype
+        parser.EndDoctypeDeclHandler = self._end_doctype
+        self._has_external = False
+        self.parser = parser
+
+    def read(self) -> None:
+        """Go through the document.
+
+        Raises:
+            OntologyFileError: With line and column.
+        """
+        try:
+            self.parser.Parse(self.data, True)
+        except expat.ExpatError as error:
+            reason = expat.ErrorString(error.code)
+            place = error.lineno, error.offset + 1
+            raise OntologyFileError(f'not well-formed XML: {reason}', *place) from None
+
+    def start(self, name: str, attributes: dict[str, str]) -> None:
+        """Take in the start of an element."""
+        raise NotImplementedError
+
+    def end(self, name: str) -> None:
+        """Take in the end of an element."""
+        raise NotImplementedError
+
+    def characters(self, text: str) -> None:
+        """Take in text."""
+        raise NotImplementedError
+
+    def namespace(self, prefix: str | None, iri: str | None) -> None:
+        """Take in the declaration of a namespace."""
+
+    def fail(self, message: str) -> OntologyFileError:
+        """Return an error with the place that is being read."""
+        parser = self.parser
+        return OntologyFileError(message, parser.CurrentLineNumber, parser.CurrentColumnNumber + 1)
+
+    def resolve(self, base: str, reference: str) -> str:
+        """Return an IRI reference against a base IRI."""
+        try:
+            return resolve(base, reference)
+        except OntologyFileError as error:
+            raise self.fail(error.message) from None
+
+    def _start(self, name: str, attributes: dict[str, str]) -> None:
+        self.depth += 1
+        if self.depth > _MAX_DEPTH:
+            raise self.fail(f'elements nest deeper than {_MAX_DEPTH}')
+        self.start(name, attributes)
+
+    def _end(self, name: str) -> None:
+        self.depth -= 1
+        self.end(name)
+
+    def _external(self, *_: object) -> int:
+        raise self.fail('external entities are refused')
+
+    def _entity(self, name: str, is_parameter: bool, value: str | None, *_: object) -> None:
+        if is_parameter or value is None:
+            raise self.fail(f'entity {name!r} is refused: only plain text may stand in an entity')
+        if '&' in value or '<' in value or len(value) > _MAX_ENTITY:
+            expected = f'plain text of at most {_MAX_ENTITY} characters'
+            raise self.fail(f'entity {name!r} is refused: expected {expected}')
+        self._entities.add(name.encode())
+
+    def _doctype(self, _name: str, system: str | None, *_: object) -> None:
+        self._has_external = system is not None
+
+    def _end_doctype(self) -> None:
+        # Without an external subset the parser refuses them itself; with one it leaves them out.
+        for found in _REFERENCE.finditer(self.data) if self._has_external else ():
+            if found[1] not in self._entities:
+                line = self.data.count(b'\n', 0, found.start()) + 1
+                name = found[1].decode()
+                raise OntologyFileError(f'entity {name!r} is not declared here', line, 1)
