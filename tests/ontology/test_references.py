@@ -226,10 +226,18 @@ UNSUPPORTED = """<?xml version="1.0"?>
 <rdf:RDF xmlns="http://example.org/u#" xml:base="http://example.org/u"
      xmlns:owl="http://www.w3.org/2002/07/owl#" xmlns:rdfs="http://www.w3.org/2000/01/rdf-schema#"
      xmlns:rdf="http://www.w3.org/1999/02/22-rdf-syntax-ns#">
-  <owl:ObjectProperty rdf:about="http://www.w3.org/2002/07/owl#topObjectProperty">
-    <rdfs:subPropertyOf rdf:resource="#p"/>
-  </owl:ObjectProperty>
-  <owl:ObjectProperty rdf:about="#p"/>
+  <swrl:Imp xmlns:swrl="http://www.w3.org/2003/11/swrl#">
+    <swrl:body rdf:parseType="Collection">
+      <swrl:BuiltinAtom><swrl:builtin rdf:resource="#unknown"/>
+        <swrl:arguments rdf:parseType="Collection"><swrl:Variable rdf:about="#x"/></swrl:arguments>
+      </swrl:BuiltinAtom>
+    </swrl:body>
+    <swrl:head rdf:parseType="Collection">
+      <swrl:ClassAtom>
+        <swrl:classPredicate rdf:resource="#A"/><swrl:argument1 rdf:resource="#x"/>
+      </swrl:ClassAtom>
+    </swrl:head>
+  </swrl:Imp>
 </rdf:RDF>
 """
 
