@@ -204,7 +204,13 @@ class ArmorServer(PatrolNode):
         self._publish()
 
     def _publish(self) -> None:
-        changes = [*self._untold, *self._feed.take()]
+        came = self._feed.take()
+        for change in came:
+            if change.is_consistent or not change.sequence:
+                self.health.clear(change.reference_name)
+            else:
+                self.health.error(change.reference_name, f'{change.reference_name} is inconsistent')
+        changes = [*self._untold, *came]
         if not self._subscribers:
             self._untold = changes[-1:]
             return

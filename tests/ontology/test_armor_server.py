@@ -41,6 +41,18 @@ def test_directives_travel_both_ways(graph: Any, tmp_path: Path) -> None:
         armor.utils.save('/saved.owl')
 
 
+def test_an_inconsistent_ontology_is_told_to_whoever_looks_at_health(graph: Any) -> None:
+    server = graph.add(ArmorServer)
+    armor = ArmorClient(graph.node, 'test', 'map')
+    build_seven_rooms(armor, True, False)
+    armor.manipulation.add_ind_to_class('D1', 'ROOM')
+    armor.utils.sync_buffered_reasoner()
+    graph.until(lambda: [text for _, text in server.health.findings()] == ['map is inconsistent'])
+    armor.manipulation.remove_ind_from_class('D1', 'ROOM')
+    armor.utils.sync_buffered_reasoner()
+    graph.until(lambda: not server.health.findings())
+
+
 def test_a_callback_awaits_the_same_methods(graph: Any) -> None:
     graph.add(ArmorServer)
     armor = ArmorClient(graph.node, 'test', 'map')
