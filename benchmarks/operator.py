@@ -346,9 +346,7 @@ def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--quick', action='store_true')
-    parser.add_argument(
-        '--minutes', type=float, default=10.0, help='how long to watch memory; 0: not at all'
-    )
+    parser.add_argument('--minutes', type=float, default=10.0, help='to watch memory; 0: not')
     options = parser.parse_args()
     size = sum(path.stat().st_size for path in PAGE_FILES.iterdir())
     rows: list[Row] = [('page, all files', f'{size / 1000:.0f} kB', '150 kB')]

@@ -45,6 +45,7 @@ def _rest(name: str, expected: str) -> Argument:
     return Argument(name, expected, str.split, takes_rest=True)
 
 
+_DOOR = _word('DOOR', 'a door like D1')
 _PLACE = _word('ROOM', 'the name of a place like R3')
 _X, _Y = number('X', -LIMIT, LIMIT, 'metres'), number('Y', -LIMIT, LIMIT, 'metres')
 
@@ -67,80 +68,63 @@ def _known(actions: MissionActions, place: str) -> str:
     return '\n'.join(lines) or f'nothing is known of {place}'
 
 
-_COMMANDS: tuple[tuple[Command, Do], ...] = (
-    (
-        Command(('door', 'open'), (_word('DOOR', 'a door like D1'),), 'Open a door.'),
-        lambda actions, door: actions.set_door(door, True),
+def _command(words: str, text: str, do: Do, *arguments: Argument) -> tuple[Command, Do]:
+    return Command(tuple(words.split()), arguments, text), do
+
+
+_COMMANDS = (
+    _command('door open', 'Open a door.', lambda a, door: a.set_door(door, True), _DOOR),
+    _command('door close', 'Close a door.', lambda a, door: a.set_door(door, False), _DOOR),
+    _command(
+        'obstacle place',
+        'Put a cylinder in the way.',
+        lambda a, *at: a.place_obstacle(*at),
+        *(_word('NAME', 'a name'), _X, _Y, number('RADIUS', 0.01, 10.0, 'metres')),
     ),
-    (
-        Command(('door', 'close'), (_word('DOOR', 'a door like D1'),), 'Close a door.'),
-        lambda actions, door: actions.set_door(door, False),
+    _command(
+        'obstacle remove',
+        'Take it away.',
+        lambda a, name: a.remove_obstacle(name),
+        _word('NAME', 'its name'),
     ),
-    (
-        Command(
-            ('obstacle', 'place'),
-            (_word('NAME', 'a name'), _X, _Y, number('RADIUS', 0.01, 10.0, 'metres')),
-            'Put a cylinder in the way.',
-        ),
-        lambda actions, *at: actions.place_obstacle(*at),
+    _command(
+        'room add',
+        'Add a place to the map and the ontology.',
+        lambda a, *room: a.add_room(*room),
+        *(_word('ROOM', 'a new name'), _X, _Y, _rest('DOOR...', 'one door or more')),
     ),
-    (
-        Command(('obstacle', 'remove'), (_word('NAME', 'its name'),), 'Take it away.'),
-        lambda actions, name: actions.remove_obstacle(name),
+    _command('room remove', 'Remove a place.', lambda a, place: a.remove_room(place), _PLACE),
+    _command(
+        'battery drain',
+        'Take charge out of the simulated battery.',
+        lambda a, percent: a.drain_battery(percent),
+        number('PERCENT', 0.0, 100.0, 'percent'),
     ),
-    (
-        Command(
-            ('room', 'add'),
-            (_word('ROOM', 'a new name'), _X, _Y, _rest('DOOR...', 'one door or more')),
-            'Add a place to the map and the ontology.',
-        ),
-        lambda actions, *room: actions.add_room(*room),
+    _command(
+        'arm',
+        'Move the camera arm.',
+        lambda a, pose: a.move_arm(pose),
+        _word('POSE', 'left, home, right, back or stop'),
     ),
-    (
-        Command(('room', 'remove'), (_PLACE,), 'Remove a place.'),
-        lambda actions, place: actions.remove_room(place),
+    _command(
+        'policy',
+        'Set how places are chosen.',
+        lambda a, policy: a.set_policy(policy),
+        _word('POLICY', 'a policy like tour'),
     ),
-    (
-        Command(
-            ('battery', 'drain'),
-            (number('PERCENT', 0.0, 100.0, 'percent'),),
-            'Take charge out of the simulated battery.',
-        ),
-        lambda actions, percent: actions.drain_battery(percent),
+    _command(
+        'threshold',
+        'Set after how long a place is URGENT.',
+        lambda a, seconds: a.set_threshold(seconds),
+        number('SECONDS', 0.0, 1e9, 'seconds'),
     ),
-    (
-        Command(
-            ('arm',), (_word('POSE', 'left, home, right, back or stop'),), 'Move the camera arm.'
-        ),
-        lambda actions, pose: actions.move_arm(pose),
-    ),
-    (
-        Command(
-            ('policy',), (_word('POLICY', 'a policy like tour'),), 'Set how places are chosen.'
-        ),
-        lambda actions, policy: actions.set_policy(policy),
-    ),
-    (
-        Command(
-            ('threshold',),
-            (number('SECONDS', 0.0, 1e9, 'seconds'),),
-            'Set after how long a place is URGENT.',
-        ),
-        lambda actions, seconds: actions.set_threshold(seconds),
-    ),
-    (Command(('go',), (_PLACE,), 'Send the robot there next.'), lambda a, place: a.go_to(place)),
-    (Command(('home',), (), 'Call the robot home.'), lambda actions: actions.go_to('')),
-    (Command(('pause',), (), 'Enter no further state.'), lambda a: a.machine('pause')),
-    (Command(('step',), (), 'Enter one state, then pause.'), lambda a: a.machine('step')),
-    (Command(('resume',), (), 'Go on.'), lambda a: a.machine('resume')),
-    (
-        Command(('why', 'not'), (_PLACE,), 'Say why the robot does not go there now.'),
-        _why_not,
-    ),
-    (
-        Command(('known',), (_PLACE,), 'Show what is known of a place, with its proofs.'),
-        _known,
-    ),
+    _command('go', 'Send the robot there next.', lambda a, place: a.go_to(place), _PLACE),
+    _command('home', 'Call the robot home.', lambda a: a.go_to('')),
+    _command('pause', 'Enter no further state.', lambda a: a.machine('pause')),
+    _command('step', 'Enter one state, then pause.', lambda a: a.machine('step')),
+    _command('resume', 'Go on.', lambda a: a.machine('resume')),
+    _command('why not', 'Say why the robot does not go there now.', _why_not, _PLACE),
+    _command('known', 'Show what is known of a place, with its proofs.', _known, _PLACE),
 )
 WHY = Command(('why',), (), 'Say why the robot goes where it goes.')
 EXIT_NODE = 'exit NODE'

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from PIL import Image
 from sensor_msgs.msg import CompressedImage, JointState, LaserScan, PointCloud2
 from sensor_msgs.msg import Image as ImageMessage
+from std_msgs.msg import UInt8
 from visualization_msgs.msg import MarkerArray
 
 from surveillance_interfaces.msg import (
@@ -98,15 +99,15 @@ def point_from(message: Any) -> tuple[float, float]:
     return message.x, message.y
 
 
-def percent_from(value: float) -> float:
+def percent_from(message: UInt8) -> float:
     """Return a battery level.
 
     Raises:
         ValueError: It is not from 0 to 100.
     """
-    if not 0.0 <= value <= 100.0:
-        raise ValueError(f'a level of {value:g} %: expected 0 to 100')
-    return float(value)
+    if not 0 <= message.data <= 100:
+        raise ValueError(f'a level of {message.data} %: expected 0 to 100')
+    return float(message.data)
 
 
 def grid_from(message: OccupancyGrid) -> Grid:

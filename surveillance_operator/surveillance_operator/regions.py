@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from surveillance_operator.snapshot import Box, Grid
 
 OCCUPIED = 65
-"""From this on a cell is a wall, percent."""
+"""From this on a cell is a wall, as nav2's map_server has it by default, percent."""
 MOST_CELLS = 200_000
 """Of a larger map several cells are taken together."""
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import sys
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from html import escape
 from itertools import groupby, pairwise
 from pathlib import Path
@@ -51,21 +52,15 @@ def write_report(folder: Path) -> Path:
     Raises:
         RecordingError: The run has no record, or it cannot be read.
     """
-    try:
-        events = mission_log.read(folder / RECORD)
+    with _one_line(folder):
+        events, plan, run = _material(folder)
         if not any(event.name == 'visit' for event in events):
             raise RecordingError(f'{folder / RECORD}: no visit was recorded')
-        plan = _plan(folder)
-        run = run_of(events, plan.place, str(folder / RECORD)) if plan is not None else None
         drawn = _map(plan, run) if plan is not None and run is not None else ''
         speed = _fastest(events)
         bound = graph_over_doors(plan).tour.bound / speed if plan is not None and speed else None
         path = folder / NAME
         path.write_text(_page(folder, events, drawn, bound), encoding='utf-8')
-    except (mission_log.MissionLogError, YamlFileError) as error:
-        raise RecordingError(str(error)) from None
-    except OSError as error:
-        raise RecordingError(f'{folder}: {error.strerror or error}') from None
     return path
 
 
@@ -75,23 +70,35 @@ def draw_picture(folder: Path) -> Path | None:
     Raises:
         RecordingError: As for `write_report`.
     """
-    try:
-        plan = _plan(folder)
+    with _one_line(folder):
+        _, plan, run = _material(folder)
         if plan is None:
             return None
-        run = run_of(mission_log.read(folder / RECORD), plan.place, str(folder / RECORD))
         path = folder / PICTURE
         draw_place(plan, 'The way driven', facts(plan), run).save(path)
+    return path
+
+
+@contextlib.contextmanager
+def _one_line(folder: Path) -> Iterator[None]:
+    """Say what goes wrong in one line."""
+    try:
+        yield
     except (mission_log.MissionLogError, YamlFileError) as error:
         raise RecordingError(str(error)) from None
     except OSError as error:
         raise RecordingError(f'{folder}: {error.strerror or error}') from None
-    return path
 
 
-def _plan(folder: Path) -> FloorPlan | None:
+def _material(folder: Path) -> tuple[Sequence[Event], FloorPlan | None, Run | None]:
+    """Return what happened in a run, its place, and what it did there; no place: none of that."""
+    events = mission_log.read(folder / RECORD)
     file = folder / PLACE
-    return read_place_file(file, walls=True).plan if file.exists() else None
+    if not file.exists() or not events:
+        return events, None, None
+    plan = read_place_file(file, walls=True).plan
+    assert plan is not None  # as walls were asked for
+    return events, plan, run_of(events, plan.place, str(folder / RECORD))
 
 
 def _map(plan: FloorPlan, run: Run) -> str:

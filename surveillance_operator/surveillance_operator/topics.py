@@ -61,6 +61,7 @@ _QUEUE = QoSProfile(
     depth=200, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
 )
 _STREAM = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+_NEWEST = QoSProfile(depth=1)
 _MANY = QoSProfile(depth=200, reliability=ReliabilityPolicy.RELIABLE)
 
 Fields = dict[str, Any]
@@ -239,25 +240,20 @@ def _on_request(controller: str) -> Callable[[String, Snapshot], Fields]:
     return lambda message, old: {'requests': {**old.requests, controller: message.data}}
 
 
+def _sets(name: str, value: Callable[[Any], Any]) -> Callable[[Any, Snapshot], Fields]:
+    """Return how a message sets one field."""
+    return lambda message, _: {name: value(message)}
+
+
 TOPICS: tuple[Topic, ...] = (
-    Topic(
-        'mission_status',
-        MissionStatus,
-        STATE_QOS,
-        lambda m, _: {'status': conversions.status_from(m)},
-    ),
+    Topic('mission_status', MissionStatus, STATE_QOS, _sets('status', conversions.status_from)),
     Topic(
         'decision',
         Decision,
         STATE_QOS,
         lambda m, _: {'decision': decision_from(m), 'number': m.sequence},
     ),
-    Topic(
-        'battery_level',
-        UInt8,
-        STATE_QOS,
-        lambda m, _: {'battery': conversions.percent_from(m.data)},
-    ),
+    Topic('battery_level', UInt8, STATE_QOS, _sets('battery', conversions.percent_from)),
     Topic('state/battery_low', Bool, STATE_QOS, lambda m, _: {'battery_low': m.data}),
     Topic(
         'map',
@@ -265,43 +261,36 @@ TOPICS: tuple[Topic, ...] = (
         STATE_QOS,
         lambda m, _: {'grid': conversions.grid_from(m), 'trail': NO_POINTS},
     ),
-    Topic('door_states', DoorStates, STATE_QOS, lambda m, _: {'doors': conversions.doors_from(m)}),
-    Topic(
-        'obstacles', PointCloud2, STATE_QOS, lambda m, _: {'obstacles': conversions.cloud_from(m)}
-    ),
+    Topic('door_states', DoorStates, STATE_QOS, _sets('doors', conversions.doors_from)),
+    Topic('obstacles', PointCloud2, STATE_QOS, _sets('obstacles', conversions.cloud_from)),
     Topic(POSE_TOPIC, PoseWithCovarianceStamped, STATE_QOS, _on_pose),
-    Topic('plan', PathMessage, STATE_QOS, lambda m, _: {'plan': conversions.path_from(m)}),
+    Topic('plan', PathMessage, STATE_QOS, _sets('plan', conversions.path_from)),
     Topic('scan', LaserScan, _STREAM, _on_scan, stream=True, beside=POSE_TOPIC),
     Topic(
         'follow_path/_action/feedback',
         FollowPath.Impl.FeedbackMessage,
-        QoSProfile(depth=1),
+        _NEWEST,
         lambda m, old: _fed_back(m.feedback.position, old),
     ),
     Topic(
         'motion/controller/_action/feedback',
         Control.Impl.FeedbackMessage,
-        QoSProfile(depth=1),
+        _NEWEST,
         lambda m, old: _fed_back(m.feedback.reached_point, old),
     ),
     Topic(
         'scan_surroundings/_action/feedback',
         ScanSurroundings.Impl.FeedbackMessage,
-        QoSProfile(depth=1),
+        _NEWEST,
         lambda m, _: {'scan_progress': (m.feedback.view, m.feedback.views)},
     ),
-    Topic(
-        DETECTIONS_TOPIC,
-        MarkerDetectionArray,
-        QoSProfile(depth=1),
-        _on_detections,
-    ),
+    Topic(DETECTIONS_TOPIC, MarkerDetectionArray, _NEWEST, _on_detections),
     Topic('joint_states', JointState, _STREAM, _on_joints, beside=DETECTIONS_TOPIC),
     Topic(
         f'{BEHAVIOUR}/fsm/structure',
         FsmStructure,
         STATE_QOS,
-        lambda m, _: {'containers': conversions.containers_from(m)},
+        _sets('containers', conversions.containers_from),
     ),
     Topic(
         f'{BEHAVIOUR}/fsm/status',
@@ -311,13 +300,7 @@ TOPICS: tuple[Topic, ...] = (
     ),
     Topic(f'{BEHAVIOUR}/fsm/transition', FsmTransition, _QUEUE, _on_transition),
     *(Topic(f'{name}/announcement', String, STATE_QOS, _on_request(name)) for name in CONTROLLERS),
-    Topic(
-        '/diagnostics',
-        DiagnosticArray,
-        _MANY,
-        _on_diagnostics,
-        period=1.0,
-    ),
+    Topic('/diagnostics', DiagnosticArray, _MANY, _on_diagnostics, period=1.0),
     Topic('/parameter_events', ParameterEvent, _MANY, _on_parameters),
 )
 """All that a snapshot takes from, with how."""

@@ -83,7 +83,7 @@ class Conversion:
         self._begun, self._stopped = threading.Event(), threading.Event()
         self._thread = threading.Thread(target=self._run, name='conversion', daemon=True)
         self._clock: float | None = None
-        prefix = prefix_of(self._messages.first_types())
+        prefix = prefix_of(self._messages.types)
         self._snapshot = Snapshot(where='a recording', namespace=prefix.strip('/'))
         self._topics = {
             each.name if each.name.startswith('/') else prefix + each.name: each

@@ -232,6 +232,9 @@ class Messages:
         self._files = sorted(
             (file for file in files if file.find_next()), key=lambda file: file.spans[0].start
         )
+        for file in self._files[:1]:
+            while len(file.spans) < FIRST_SPANS and file.find_next():
+                pass
         self._size = sum(file.size for file in self._files) or 1
         self._lock = threading.Lock()
         self._passed = 0
@@ -241,14 +244,6 @@ class Messages:
         """The types of the topics that are known so far, by name."""
         with self._lock:
             return {name: kind for file in self._files for name, kind in file.types.items()}
-
-    def first_types(self) -> dict[str, str]:
-        """Return the types of the topics that the recording begins with, by name."""
-        with self._lock:
-            for file in self._files[:1]:
-                while len(file.spans) < FIRST_SPANS and file.find_next():
-                    pass
-        return self.types
 
     @property
     def share(self) -> float:

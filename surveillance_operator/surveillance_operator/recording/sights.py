@@ -33,7 +33,7 @@ class RecordedSights:
 
     def __init__(self, recording: Path) -> None:
         self._messages = Messages(recording)
-        self._prefix = prefix_of(self._messages.first_types())
+        self._prefix = prefix_of(self._messages.types)
         self._images = [
             f'{self._prefix}{name}{end}' for name in IMAGES for end in ('', '/compressed')
         ]

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from rich.segment import Segment
 from rich.style import Style
 
+from surveillance_operator.regions import OCCUPIED
 from surveillance_operator.snapshot import Box, Grid, Pose
 
 UNKNOWN, FREE, WALL, LINK, OLD_TRAIL, TRAIL, OPEN_DOOR, CLOSED_DOOR, OBSTACLE = range(9)
@@ -31,9 +32,6 @@ COLOURS = (
 )
 WITHOUT_COLOURS = '  #.··=X*'
 """Characters for a terminal without colours; walls are drawn as blocks there, too."""
-
-OCCUPIED = 65
-"""From this on a cell is a wall, as nav2's map_server has it by default, percent."""
 
 ARROWS = '→↗↑↖←↙↓↘'
 
