@@ -106,6 +106,12 @@ def _portable(value: Any) -> Any:
     return value.removeprefix(f'{CHECKOUT}/') if isinstance(value, str) else value
 
 
+def _name_of(check: Any) -> str:
+    """Return where a function can be imported from, empty where it cannot."""
+    name = getattr(check, '__qualname__', '')
+    return f'{check.__module__}:{name}' if name.isidentifier() else ''
+
+
 class _Record:
     def __init__(self) -> None:
         self._declared: dict[str, Any] = {}
@@ -125,6 +131,8 @@ class _Record:
             value = getattr(spec, name)
             if value is not None:
                 row[name] = value
+        if check := _name_of(spec.check):
+            row['check'] = check
         if spec.choices:
             row['choices'] = list(spec.choices)
         if changeable:

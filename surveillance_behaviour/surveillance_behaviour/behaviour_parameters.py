@@ -9,12 +9,18 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from surveillance_behaviour.decision import DEFAULT_RULES, DecisionSettings, Rules
+from surveillance_behaviour.decision import (
+    DEFAULT_RULES,
+    DecisionSettings,
+    Rules,
+    rules_expected,
+)
 from surveillance_behaviour.mission.mission import MissionSettings
 from surveillance_behaviour.mission.recovery import RecoveryLimits
 from surveillance_behaviour.peers.ros_ports import Deadlines
 from surveillance_behaviour.policy.battery_reserve import BatteryLimits
 from surveillance_behaviour.policy.policies import POLICIES
+from surveillance_runtime import parameter_checks
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import Described, ParameterError, declare_fields
 
@@ -33,7 +39,7 @@ _CHOICE = {
     'recharge_rooms': Described(
         'Places with a charging station.',
         of=str,
-        check=lambda names: None if names else 'at least one place',
+        check=parameter_checks.not_empty,
     ),
 }
 _RECOVERY = {
@@ -101,7 +107,7 @@ def choice_settings(node: PatrolNode, *, explores: bool = True) -> DecisionSetti
                 list(DEFAULT_RULES),
                 'Classes of places by falling priority; empty: any place within reach.',
                 of=str,
-                check=_rules_expected,
+                check=rules_expected,
                 on_change=lambda names: setattr(settings, 'rules', Rules(tuple(names))),
             )
         )
@@ -195,11 +201,3 @@ def record_path(node: PatrolNode) -> str:
         read_only=True,
     )
     return path
-
-
-def _rules_expected(names: Sequence[str]) -> str | None:
-    try:
-        Rules(tuple(names))
-    except ValueError as error:
-        return f'names of classes of places, each once ({error})'
-    return None

@@ -73,6 +73,15 @@ class Rules:
         return ANY, tuple(sorted(open_places))
 
 
+def rules_expected(names: Sequence[str]) -> str | None:
+    """Ask for classes of places that the rules know, each once."""
+    try:
+        Rules(tuple(names))
+    except ValueError as error:
+        return f'names of classes of places, each once ({error})'
+    return None
+
+
 @dataclass
 class DecisionSettings:
     """What a decision depends on beside the world and the battery; may be changed in between.

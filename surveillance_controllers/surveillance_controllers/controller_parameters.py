@@ -7,6 +7,7 @@ from dataclasses import astuple, dataclass, field, replace
 
 from surveillance_controllers.battery.model import BatteryParameters
 from surveillance_controllers.geometry import Points, Pose
+from surveillance_runtime import parameter_checks
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import Described, declare_fields
 
@@ -25,20 +26,6 @@ def execution_mode(node: PatrolNode) -> str:
     return mode
 
 
-def _pose(values: Sequence[float]) -> str | None:
-    return None if len(values) == 3 else 'three numbers: x, y, yaw'
-
-
-def _interval(values: Sequence[float]) -> str | None:
-    good = len(values) == 2 and 0 < values[0] <= values[1]
-    return None if good else 'two numbers above 0, the shortest and the longest time'
-
-
-def _limits(values: Sequence[float]) -> str | None:
-    good = len(values) == 4 and values[0] < values[1] and values[2] < values[3]
-    return None if good else 'four numbers [x_min, x_max, y_min, y_max], each pair rising'
-
-
 _RANDOM_SEED = Described(
     'Makes a RANDOM run repeatable; -1 takes another course each time.', minimum=-1
 )
@@ -46,7 +33,8 @@ _CONSOLE = Described(
     'In MANUAL mode, read commands from standard input; they always come by ~/command too.'
 )
 _STATION = Described(
-    'Where the charging station is: x, y in metres, yaw in radians, world frame.', check=_pose
+    'Where the charging station is: x, y in metres, yaw in radians, world frame.',
+    check=parameter_checks.pose,
 )
 _STATE_FILE = Described(
     'File that keeps what the node models over a restart of its process; empty: nothing is kept.'
@@ -79,7 +67,8 @@ _BATTERY = {
     ),
     'random_seed': _RANDOM_SEED,
     'random_battery_time': Described(
-        'RANDOM: shortest and longest time between two changes of the battery, s.', check=_interval
+        'RANDOM: shortest and longest time between two changes of the battery, s.',
+        check=parameter_checks.times,
     ),
     'recharge_seconds': Described(
         'MANUAL and RANDOM: time in which recharge fills an empty battery, s.', 0.0, 86_400.0
@@ -196,7 +185,7 @@ def planner_settings(node: PatrolNode) -> PlannerSettings:
         'environment_size',
         list(astuple(settings.environment)),
         'Limits of the place: [x_min, x_max, y_min, y_max], metres, world frame.',
-        check=_limits,
+        check=parameter_checks.rectangle,
         read_only=True,
     )
     return replace(settings, environment=Environment(*limits))

@@ -8,6 +8,7 @@ from pathlib import Path
 from surveillance_ontology.armor.access import DATA, Settings, state_folder
 from surveillance_ontology.armor.service import ArmorService
 from surveillance_ontology.armor.store import JournalError, Store
+from surveillance_runtime import parameter_checks
 from surveillance_runtime.node import PatrolNode, StartError
 from surveillance_runtime.parameters import Described, declare_fields
 
@@ -18,7 +19,7 @@ _SERVICE = {
     ),
     'directories': Described(
         'Directories in which LOAD may read as well.',
-        check=lambda value: None if value and all(value) else 'names of directories',
+        check=parameter_checks.not_empty,
     ),
     'history': Described(
         'Axioms of past changes that are kept for QUERY AT, for each reference.', 0, 10_000_000

@@ -37,7 +37,7 @@ class MarkerServer(PatrolNode):
             'markers_file',
             '',
             "What markers stand for; empty: the project's config/markers.yaml.",
-            check=_problem_in,
+            check=registry_expected,
             on_change=self._read,
         )
         self._markers: dict[int, MarkedPlace] = {}
@@ -89,7 +89,8 @@ def _file(path: str) -> Path:
     return _INSTALLED if _INSTALLED.exists() else _IN_CHECKOUT
 
 
-def _problem_in(path: str) -> str | None:
+def registry_expected(path: str) -> str | None:
+    """Ask for a file of markers."""
     try:
         read_registry(_file(path))
     except YamlFileError as error:

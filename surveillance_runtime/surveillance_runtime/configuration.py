@@ -17,13 +17,14 @@ import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, partial
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import yaml
 
-from surveillance_runtime.parameters import ParameterError, ParameterSpec
+from surveillance_runtime.parameters import Check, ParameterError, ParameterSpec
 from surveillance_runtime.place.floor_plan import FloorPlan
 from surveillance_runtime.place.regions import Regions, check_passable
 from surveillance_runtime.place.rooms import (
@@ -162,6 +163,7 @@ def _node_schema(body: Mapping[str, Any]) -> NodeSchema:
             row.get('minimum'),
             row.get('maximum'),
             tuple(row.get('choices', ())),
+            partial(_checked_by, row['check']) if 'check' in row else None,
         )
     rows = body['parameters']
     return NodeSchema(
@@ -170,6 +172,13 @@ def _node_schema(body: Mapping[str, Any]) -> NodeSchema:
         tuple(body['prefixes']),
         frozenset(name for name in rows if rows[name].get('changeable')),
     )
+
+
+def _checked_by(name: str, value: Any) -> str | None:
+    """Look at a value with the node's own function, imported when there is a value to look at."""
+    module, _, function = name.partition(':')
+    check: Check = getattr(import_module(module), function)
+    return check(value)
 
 
 def file_layer(path: str | Path) -> Layer:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 import time
@@ -140,6 +141,23 @@ def test_a_wrong_argument_costs_one_line(words, problem):
     assert problem in str(caught.value)
     assert '\n' not in str(caught.value)
     assert len(str(caught.value)) < 400
+
+
+@pytest.mark.parametrize(
+    ('word', 'expected'),
+    [
+        ('recharge_rooms:=[]', 'at least one name'),
+        ('rooms_priority:=[URGENT, URGENT]', 'names of classes of places, each once'),
+        ('random_battery_time:=[5.0, 2.0]', 'two numbers above 0, the shortest and the longest'),
+        ('station:=[1.0]', 'three numbers: x, y, yaw'),
+        ('environment_size:=[1.0]', 'four numbers [x_min, x_max, y_min, y_max]'),
+        ('windows:=[4]', 'odd numbers from 3'),
+        ('markers_file:=/nowhere.yaml', 'a file of markers (/nowhere.yaml: No such file'),
+    ],
+)
+def test_what_only_a_node_can_tell_is_refused_before_the_node_starts(word, expected):
+    with pytest.raises(ParameterError, match=re.escape(expected)):
+        Configuration((argument_layer([word]),)).check()
 
 
 def test_remappings_are_left_to_ros_and_name_the_node():

@@ -9,6 +9,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from surveillance_controllers import conversions
 from surveillance_controllers.geometry import Pose, composed, relative
+from surveillance_runtime import parameter_checks
 from surveillance_runtime.node import PatrolNode
 
 try:
@@ -32,7 +33,7 @@ def lidar_mount(node: PatrolNode) -> Pose | None:
         'Where the lidar sits on the robot: x, y in metres, yaw in radians; empty: as '
         "tf_static says of the scan's frame.",
         of=float,
-        check=lambda values: None if len(values) in (0, 3) else 'three numbers: x, y, yaw',
+        check=parameter_checks.pose_or_nothing,
         read_only=True,
     )
     return (given[0], given[1], given[2]) if given else None

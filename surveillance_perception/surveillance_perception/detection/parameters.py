@@ -9,6 +9,7 @@ from typing import Any
 
 from surveillance_perception.detection.detector import DetectorSettings, MarkerDetector
 from surveillance_perception.detection.marker_stream import StreamSettings, sizes_from
+from surveillance_runtime import parameter_checks
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import Described, declare_fields
 
@@ -22,7 +23,8 @@ class ImageSettings:
     only_at_rest: bool = True
 
 
-def _check_sizes(entries: list[str]) -> str | None:
+def sizes_expected(entries: list[str]) -> str | None:
+    """Ask for sizes of markers."""
     try:
         sizes_from(entries)
     except ValueError as error:
@@ -30,14 +32,10 @@ def _check_sizes(entries: list[str]) -> str | None:
     return None
 
 
-def _check_windows(windows: list[int]) -> str | None:
-    if windows and all(each >= 3 and each % 2 for each in windows):
-        return None
-    return 'odd numbers from 3'
-
-
 _DETECTOR = {
-    'windows': Described('Neighbourhoods of a border, odd, pixels.', check=_check_windows),
+    'windows': Described(
+        'Neighbourhoods of a border, odd, pixels.', check=parameter_checks.odd_numbers
+    ),
     'bridges': Described('Gaps to close in a border, pixels.', 2, 99, of=int),
     'contrast': Described('Grey levels by which a border is darker than around it.', 1.0, 100.0),
     'min_length': Described('Longer side of the smallest marker, pixels.', 4.0, 1000.0),
@@ -109,7 +107,7 @@ class DetectorParameters:
             [],
             "Sizes of ids that differ, like '14:0.3'.",
             of=str,
-            check=_check_sizes,
+            check=sizes_expected,
             on_change=lambda entries: self._set_watch('sizes', sizes_from(entries)),
         )
         self._watch = replace(self._watch, sizes=sizes_from(sizes))

@@ -1,0 +1,38 @@
+"""What lists have to hold to be a parameter, for nodes and for whoever reads parameter files."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+
+def not_empty(values: Sequence[str]) -> str | None:
+    """Ask for one entry at least, and for none that is empty."""
+    return None if values and all(values) else 'at least one name'
+
+
+def pose(values: Sequence[float]) -> str | None:
+    """Ask for a place and a direction."""
+    return None if len(values) == 3 else 'three numbers: x, y, yaw'
+
+
+def pose_or_nothing(values: Sequence[float]) -> str | None:
+    """Ask for a place and a direction, if for anything."""
+    return pose(values) if values else None
+
+
+def times(values: Sequence[float]) -> str | None:
+    """Ask for a shortest and a longest time."""
+    good = len(values) == 2 and 0 < values[0] <= values[1]
+    return None if good else 'two numbers above 0, the shortest and the longest time'
+
+
+def rectangle(values: Sequence[float]) -> str | None:
+    """Ask for the sides of an upright rectangle."""
+    good = len(values) == 4 and values[0] < values[1] and values[2] < values[3]
+    return None if good else 'four numbers [x_min, x_max, y_min, y_max], each pair rising'
+
+
+def odd_numbers(values: Sequence[int]) -> str | None:
+    """Ask for the sides of neighbourhoods around a pixel."""
+    good = values and all(each >= 3 and each % 2 for each in values)
+    return None if good else 'odd numbers from 3'
