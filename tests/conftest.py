@@ -8,12 +8,23 @@ import time
 from collections.abc import Callable, Iterator
 from typing import Any, TypeVar
 
+import hypothesis
 import pytest
 
 from launcher.run_processes import LOCAL_ROS
 from surveillance_runtime.testing import claim_domain
 
 T = TypeVar('T')
+
+# Each run draws the same examples, and none fails because the machine is busy.
+# `--hypothesis-profile explore` draws others.
+hypothesis.settings.register_profile(
+    'explore', deadline=None, suppress_health_check=[hypothesis.HealthCheck.too_slow]
+)
+hypothesis.settings.register_profile(
+    'suite', hypothesis.settings.get_profile('explore'), derandomize=True
+)
+hypothesis.settings.load_profile('suite')
 
 _domain = claim_domain()
 os.environ['ROS_DOMAIN_ID'] = str(_domain)

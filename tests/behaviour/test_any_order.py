@@ -201,8 +201,6 @@ def search(machine: str) -> None:
         settings=settings(
             max_examples=20,
             stateful_step_count=25,
-            deadline=None,
-            derandomize=True,
             suppress_health_check=list(HealthCheck),
         ),
     )

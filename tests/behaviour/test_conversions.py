@@ -18,13 +18,13 @@ numbers = st.floats(allow_nan=False, allow_infinity=False)
 names = st.text('ABCR0123456789_', min_size=1, max_size=6)
 
 
-@settings(max_examples=50, deadline=None, derandomize=True)
+@settings(max_examples=50)
 @given(st.lists(st.tuples(numbers, numbers, numbers), max_size=5))
 def test_paths_come_back(path: list[tuple[float, float, float]]) -> None:
     assert conversions.points_from(conversions.point_messages(path)) == path
 
 
-@settings(max_examples=50, deadline=None, derandomize=True)
+@settings(max_examples=50)
 @given(names, names, names, names, st.text(max_size=40), st.dictionaries(names, numbers))
 def test_decisions_come_back(
     here: str, place: str, target: str, rule: str, reason: str, scores: dict[str, float]

@@ -231,7 +231,7 @@ def test_an_empty_record_says_so(path: Path) -> None:
     assert str(summarize(read(path))) == 'Mission: nothing was recorded.'
 
 
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=60)
 @given(
     legs=st.lists(st.tuples(st.floats(0.0, 1e4), st.sampled_from('ABCD')), max_size=30),
     cut=st.integers(0, 200),

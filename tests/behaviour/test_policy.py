@@ -65,7 +65,7 @@ def test_graphs_that_do_not_fit_together_are_named() -> None:
         PatrolGraph({'A': {}, 'B': {}}).route('A', 'B')
 
 
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=60)
 @given(graphs(most=7))
 def test_the_tour_of_a_small_map_is_the_shortest(graph: PatrolGraph) -> None:
     first, *others = range(len(graph.places))
@@ -82,7 +82,7 @@ def test_the_tour_of_a_small_map_is_the_shortest(graph: PatrolGraph) -> None:
     assert set(graph.walk) == set(graph.places)
 
 
-@settings(max_examples=30, deadline=None, derandomize=True)
+@settings(max_examples=30)
 @given(graphs())
 def test_the_shortest_ways_are_the_same_with_and_without_scipy(graph: PatrolGraph) -> None:
     with pytest.MonkeyPatch.context() as patch:
@@ -95,7 +95,7 @@ def test_the_shortest_ways_are_the_same_with_and_without_scipy(graph: PatrolGrap
         assert seconds == pytest.approx(graph.seconds(start, goal))
 
 
-@settings(max_examples=10, deadline=None, derandomize=True)
+@settings(max_examples=10)
 @given(st.integers(13, 40), st.integers(0, 10**6))
 def test_a_good_tour_lies_between_the_bound_and_a_random_one(count: int, seed: int) -> None:
     points = np.random.default_rng(seed).uniform(0.0, 100.0, (count, 2))
@@ -107,7 +107,7 @@ def test_a_good_tour_lies_between_the_bound_and_a_random_one(count: int, seed: i
     assert tour.length <= 1.1 * tour.bound
 
 
-@settings(max_examples=40, deadline=None, derandomize=True)
+@settings(max_examples=40)
 @given(graphs(), st.sampled_from(sorted(POLICIES)), st.integers(0, 200), st.integers(0, 10**6))
 def test_no_decision_breaks_the_rules(
     graph: PatrolGraph, policy: str, threshold: int, seed: int
@@ -129,7 +129,7 @@ def test_no_decision_breaks_the_rules(
         assert decision.place in (urgent or corridors or set(before.reachable))
 
 
-@settings(max_examples=30, deadline=None, derandomize=True)
+@settings(max_examples=30)
 @given(graphs(), st.floats(0.01, 0.6), st.sampled_from(['tour', 'seed', 'oldest']))
 def test_the_reserve_never_strands(graph: PatrolGraph, draw: float, policy: str) -> None:
     station = graph.places[0]

@@ -35,7 +35,7 @@ def test_the_shortest_lawful_round_of_a_grid_is_found() -> None:
     assert search.best.length == pytest.approx(1.2 * graph.tour.length)
 
 
-@settings(max_examples=30, deadline=None, derandomize=True)
+@settings(max_examples=30)
 @given(graphs(), st.floats(0.1, 2.0))
 def test_a_round_visits_every_place_in_its_length(graph: PatrolGraph, factor: float) -> None:
     rules = rules_of(graph, factor * graph.tour.length)
@@ -73,7 +73,7 @@ def test_a_plan_keeps_what_it_promises(factor: float) -> None:
     assert patrol.run.settled <= promised + 1e-6
 
 
-@settings(max_examples=25, deadline=None, derandomize=True)
+@settings(max_examples=25)
 @given(graphs(), st.floats(0.05, 3.0), st.sampled_from(['tour', 'oldest', 'lookahead']))
 def test_nobody_goes_below_the_bound_that_knows_the_rules(
     graph: PatrolGraph, factor: float, policy: str

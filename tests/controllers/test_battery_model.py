@@ -38,7 +38,7 @@ def test_percent_says_100_only_when_full_and_0_in_the_last_percent() -> None:
 
 
 @given(level=LEVELS, seconds=TIMES, metres=st.floats(0, 1e5), radians=st.floats(0, 1e5))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_a_battery_never_gives_more_than_it_holds(
     level: float, seconds: float, metres: float, radians: float
 ) -> None:
@@ -50,7 +50,7 @@ def test_a_battery_never_gives_more_than_it_holds(
 
 
 @given(level=LEVELS, first=TIMES, second=TIMES)
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_charging_in_two_steps_is_charging_in_one(
     level: float, first: float, second: float
 ) -> None:

@@ -91,7 +91,7 @@ def test_bad_lines_name_the_word_and_what_was_expected(line: str, text: str) -> 
 
 
 @given(st.text(max_size=60) | st.text('[]0123456789.,- eE+planset', max_size=60))
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 def test_any_text_is_a_command_or_one_line_of_complaint(text: str) -> None:
     for line in (text, 'plan set ' + text, 'battery set ' + text, 'move ' + text):
         complaint = ''
@@ -104,14 +104,14 @@ def test_any_text_is_a_command_or_one_line_of_complaint(text: str) -> None:
 
 
 @given(st.lists(st.tuples(COORDINATE, COORDINATE, COORDINATE), max_size=8))
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 def test_a_plan_survives_being_printed_and_read(points: list[tuple[float, float, float]]) -> None:
     parsed = ALL.parse(f'plan set {[list(p) for p in points]}')
     assert parsed == ParsedCommand('plan set', (tuple(points),))
 
 
 @given(st.integers(-100, 100))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_whole_numbers_survive_being_printed_and_read(value: int) -> None:
     assert ALL.parse(f'battery offset {value:+d}') == ParsedCommand('battery offset', (value,))
 

@@ -24,7 +24,7 @@ YAW = st.floats(-3.1, 3.1)
 
 
 @given(st.lists(st.tuples(NUMBER, NUMBER, NUMBER), max_size=6))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_points_come_back(points: list[tuple[float, float, float]]) -> None:
     messages = conversions.points_from_array(np.array(points).reshape(-1, 3))
     assert conversions.array_from_points(messages).tolist() == [list(p) for p in points]
@@ -36,7 +36,7 @@ def test_a_point_in_the_plane_has_no_height() -> None:
 
 
 @given(NUMBER, NUMBER, YAW)
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_poses_come_back(x: float, y: float, yaw: float) -> None:
     pose = conversions.pose_from(conversions.pose_message((x, y, yaw)))
     assert pose == pytest.approx((x, y, yaw))
@@ -47,7 +47,7 @@ def test_poses_come_back(x: float, y: float, yaw: float) -> None:
 
 
 @given(st.lists(st.tuples(st.floats(-99, 99), st.floats(-99, 99)), max_size=6))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_clouds_come_back(points: list[tuple[float, float]]) -> None:
     array = np.array(points).reshape(-1, 2)
     cloud = cloud_from_points(array)

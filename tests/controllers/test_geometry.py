@@ -13,7 +13,7 @@ PATHS = st.lists(st.tuples(*[st.floats(-50, 50)] * 3), min_size=1, max_size=12)
 
 
 @given(PATHS, st.floats(0.2, 30))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_spaced_points_keep_the_ends_and_the_spacing(
     path: list[tuple[float, float, float]], spacing: float
 ) -> None:
@@ -41,7 +41,7 @@ def test_a_path_without_points_is_refused() -> None:
 
 
 @given(PATHS, st.floats(0, 1))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_a_point_of_a_path_is_found_on_it(
     path: list[tuple[float, float, float]], share: float
 ) -> None:

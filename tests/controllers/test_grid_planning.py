@@ -117,7 +117,7 @@ def test_a_robot_pushed_against_a_wall_finds_its_way_out() -> None:
 
 
 @given(st.integers(0, 10_000))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_in_any_clutter_a_path_is_free_and_not_longer_than_the_grid_s(seed: int) -> None:
     draw = np.random.default_rng(seed)
     cells = np.zeros((60, 60), np.int8)
@@ -147,7 +147,7 @@ def test_in_any_clutter_a_path_is_free_and_not_longer_than_the_grid_s(seed: int)
 
 
 @given(st.tuples(*[st.floats(-3, 12)] * 2), st.tuples(*[st.floats(-3, 12)] * 2))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_any_two_points_give_a_free_path_or_a_reason(
     start: tuple[float, float], goal: tuple[float, float]
 ) -> None:

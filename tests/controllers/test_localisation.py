@@ -23,7 +23,7 @@ def error(localiser: Localiser, true: tuple[float, float, float]) -> tuple[float
 
 
 @given(POSES, POSES)
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_a_step_between_two_poses_leads_from_one_to_the_other(
     first: tuple[float, float, float], second: tuple[float, float, float]
 ) -> None:
@@ -51,9 +51,7 @@ def test_a_drive_with_drifting_odometry_is_tracked(flat: Any) -> None:
 
 
 @given(st.floats(-0.8, 0.8), st.floats(-0.6, 0.6), st.floats(-3.1, 3.1))
-@settings(
-    max_examples=8, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+@settings(max_examples=8, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_a_pushed_robot_finds_itself(flat: Any, dx: float, dy: float, dyaw: float) -> None:
     localiser = Localiser(flat.grid, (2.2, 1.4, 0.3))
     true = (2.2 + dx, 1.4 + dy, 0.3 + dyaw)

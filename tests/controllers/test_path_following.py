@@ -62,7 +62,7 @@ def paths(draw: st.DrawFn) -> np.ndarray:
 
 
 @given(paths(), st.floats(-3.1, 3.1))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_any_path_is_followed_to_its_end_within_its_corridor(path: np.ndarray, yaw: float) -> None:
     poses, velocities, arrived = follow(path, (float(path[0, 0]), float(path[0, 1]), yaw))
     assert arrived

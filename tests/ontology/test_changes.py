@@ -158,7 +158,7 @@ STEPS = st.one_of(
 PATTERNS = ('URGENT(?)', 'canReach(Robot1, ?)', 'visitedAt(?, ?)', 'ROOM(?)', 'owl:sameAs(?, ?)')
 
 
-@settings(max_examples=40, deadline=None, derandomize=True)
+@settings(max_examples=40)
 @given(st.lists(STEPS, max_size=14))
 def test_followed_facts_are_those_that_the_server_has(
     steps: list[tuple[str, tuple[str, ...]]],

@@ -311,8 +311,6 @@ def test_random_directives_do_what_the_model_does() -> None:
         settings=settings(
             max_examples=20,
             stateful_step_count=30,
-            deadline=None,
-            derandomize=True,
             suppress_health_check=list(HealthCheck),
         ),
     )
@@ -326,7 +324,7 @@ def test_random_directives_for_longer() -> None:
         settings=settings(
             max_examples=2000,
             stateful_step_count=60,
-            deadline=None,
+            derandomize=False,
             suppress_health_check=list(HealthCheck),
         ),
     )
@@ -339,7 +337,7 @@ TEXTS = st.one_of(
 )
 
 
-@settings(max_examples=300, deadline=None, derandomize=True)
+@settings(max_examples=300)
 @given(
     st.lists(
         st.tuples(

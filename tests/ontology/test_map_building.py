@@ -58,7 +58,7 @@ EDITS = st.one_of(
 )
 
 
-@settings(max_examples=25, deadline=None, derandomize=True)
+@settings(max_examples=25)
 @given(st.lists(EDITS, max_size=8))
 def test_connections_are_those_of_the_place_after_any_edits(edits: list[Edit]) -> None:
     service = ArmorService(warn=lambda _: None)
@@ -85,7 +85,7 @@ def test_connections_are_those_of_the_place_after_any_edits(edits: list[Edit]) -
 
 
 @given(st.sets(st.sampled_from(sorted(seven().doors))))
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=60)
 def test_closed_doors_are_recognised_again(closed: set[str]) -> None:
     place = seven()
     for door in closed:

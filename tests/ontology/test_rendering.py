@@ -109,7 +109,7 @@ def test_wrong_values_are_named(type_word: str, text: str, words: str) -> None:
         parse_literal(type_word, text)
 
 
-@settings(max_examples=100, deadline=None, derandomize=True)
+@settings(max_examples=100)
 @given(st.text(), st.sampled_from([XSD + 'string', XSD + 'long', 'http://example.org/t']))
 def test_rendered_literals_read_back(text: str, datatype: str) -> None:
     literal = Literal(text, datatype)

@@ -25,7 +25,7 @@ from surveillance_perception.arm.trajectory import (
 from surveillance_runtime.robot_arm import ARM, Arm, Joint
 
 HOME = np.array(ARM.home)
-LIMITED = settings(max_examples=60, derandomize=True, deadline=None)
+LIMITED = settings(max_examples=60)
 joint_positions = st.tuples(*(st.floats(joint.lower, joint.upper) for joint in ARM.joints)).map(
     np.array
 )

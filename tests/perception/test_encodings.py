@@ -107,7 +107,7 @@ def test_unknown_encoding_is_quoted_in_one_line():
     assert printable('plain') == "'plain'"
 
 
-@settings(max_examples=300, derandomize=True, deadline=None)
+@settings(max_examples=300)
 @given(
     st.one_of(st.sampled_from(ENCODING_NAMES), st.text(max_size=12)),
     st.integers(0, 40),

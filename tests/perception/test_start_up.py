@@ -67,30 +67,30 @@ def test_start_from_pixels_to_ontology_with_one_marker_covered_until_later(graph
     ids = robot(graph)
     marker = ServiceCaller(graph.node, SetMarker, 'simulation/set_marker')
     covered = SetMarker.Request(name='m13', state=SetMarker.Request.COVERED)
-    assert marker.call(covered, 10.0).success
+    assert marker.call(covered, 60.0).success
     done = started(graph)
     graph.until(lambda: len(ids) == 6, timeout=90.0)
     assert not done.done()
 
     setter = ServiceCaller(graph.node, SetParameters, 'initial_state/set_parameters')
     deadline = Parameter('deadline', value=0.0).to_parameter_msg()
-    assert setter.call(SetParameters.Request(parameters=[deadline]), 10.0).results[0].successful
+    assert setter.call(SetParameters.Request(parameters=[deadline]), 60.0).results[0].successful
     graph.until(done.done, timeout=60.0)
     reference = ServiceCaller(graph.node, ReferenceName, 'ontology_map/reference_name')
-    name = reference.call(ReferenceName.Request(), 10.0).name
-    armor = ArmorClient(graph.node, 'test', name, timeout=5.0)
+    name = reference.call(ReferenceName.Request(), 60.0).name
+    armor = ArmorClient(graph.node, 'test', name, timeout=60.0)
     assert set(armor.query.ind_b2_class('LOCATION')) == {'E', 'C1', 'R1', 'R2'}
     assert maps[-1].robot_room == 'E'
 
     in_view = SetMarker.Request(
         name='m13', state=SetMarker.Request.MOVED, id=13, x=5.93, y=7.6, z=1.1, yaw=3.1416
     )
-    assert marker.call(in_view, 10.0).success
+    assert marker.call(in_view, 60.0).success
     graph.until(lambda: len(maps) > 1, timeout=60.0)
     assert {each.name for each in maps[-1].places} == {'E', 'C1', 'C2', 'R1', 'R2', 'R3', 'R4'}
-    graph.until(lambda: set(armor.query.ind_b2_class('CORRIDOR')) == {'C1', 'C2', 'E'}, 20.0)
+    graph.until(lambda: set(armor.query.ind_b2_class('CORRIDOR')) == {'C1', 'C2', 'E'}, 60.0)
     assert set(armor.query.objectprop_b2_ind('hasDoor', 'C1')) == {'D1', 'D2', 'D5', 'D7'}
     assert maps[-1].robot_room == '', 'where the robot is by now is told by who knows it'
     position = ServiceCaller(graph.node, RoomPosition, 'ontology_map/room_position')
-    answer = position.call(RoomPosition.Request(room_name='R4'), 5.0)
+    answer = position.call(RoomPosition.Request(room_name='R4'), 60.0)
     assert (answer.position.x, answer.position.y) == (9.0, -4.0)

@@ -14,7 +14,7 @@ from surveillance_perception.arm.view_coverage import View, coverage, views_cove
 WHOLE = (-math.pi / 2, math.pi / 2)
 
 
-@settings(max_examples=40, derandomize=True, deadline=None)
+@settings(max_examples=40)
 @given(
     horizontal=st.floats(0.5, 2.0),
     vertical=st.floats(0.4, 1.6),

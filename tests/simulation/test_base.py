@@ -144,7 +144,7 @@ def seven_rooms() -> World:
     return world
 
 
-@settings(max_examples=25, deadline=None, derandomize=True)
+@settings(max_examples=25)
 @given(
     st.lists(st.tuples(st.floats(-0.6, 0.6), st.floats(-1.5, 1.5), st.integers(1, 60)), max_size=12)
 )

@@ -23,7 +23,7 @@ from .places import two_rooms
 STAMP = Time(sec=3, nanosec=5)
 
 
-@settings(max_examples=50, derandomize=True)
+@settings(max_examples=50)
 @given(st.floats(-1e3, 1e3), st.floats(-1e3, 1e3), st.floats(-math.pi, math.pi))
 def test_a_pose_comes_back(x: float, y: float, yaw: float) -> None:
     back = conversions.pose_from_ros(conversions.pose_to_ros((x, y, yaw)))
@@ -31,7 +31,7 @@ def test_a_pose_comes_back(x: float, y: float, yaw: float) -> None:
     assert math.cos(back[2] - yaw) == pytest.approx(1.0)
 
 
-@settings(max_examples=50, derandomize=True)
+@settings(max_examples=50)
 @given(st.integers(0, 2**31 * 1000 - 1))
 def test_a_time_comes_back_to_the_millisecond(milliseconds: int) -> None:
     message = conversions.time_to_ros(milliseconds / 1000)

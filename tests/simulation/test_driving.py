@@ -37,7 +37,7 @@ def planner() -> GridPlanner:
     return GridPlanner(GridMap(drawn.cells, drawn.resolution, drawn.origin))
 
 
-@settings(max_examples=40, deadline=None, derandomize=True)
+@settings(max_examples=40)
 @given(start=points, goal=points, closed=st.sets(st.sampled_from(DOORS), max_size=4))
 def test_a_path_never_touches_a_wall_or_a_closed_door(
     planner: GridPlanner,

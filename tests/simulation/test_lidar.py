@@ -64,7 +64,7 @@ def furnished() -> World:
     return world
 
 
-@settings(max_examples=40, deadline=None, derandomize=True)
+@settings(max_examples=40)
 @given(x=st.floats(7.3, 17.7), y=st.floats(6.8, 9.7), angle=st.integers(0, 359))
 def test_a_ray_ends_where_walking_along_it_meets_something(
     furnished: World, x: float, y: float, angle: int

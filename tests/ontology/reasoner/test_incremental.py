@@ -135,7 +135,7 @@ def walk(seed: int) -> None:
         assert (kb.explain_inconsistency() is None) == kb.consistent
 
 
-@settings(max_examples=50, deadline=None, derandomize=True, database=None)
+@settings(max_examples=50, database=None)
 @given(st.integers(min_value=0, max_value=2**32))
 def test_random_ontologies(seed: int) -> None:
     walk(seed)
@@ -148,7 +148,7 @@ def test_random_ontologies_for_long() -> None:
         walk(seed)
 
 
-@settings(max_examples=12, deadline=None, derandomize=True, database=None)
+@settings(max_examples=12, database=None)
 @given(st.integers(min_value=0, max_value=2**32))
 def test_random_changes_of_the_patrol_map(seed: int) -> None:
     rng = random.Random(seed)

@@ -95,7 +95,7 @@ def walk(seed: int) -> None:
             assert explanation.tree()
 
 
-@settings(max_examples=60, deadline=None, derandomize=True, database=None)
+@settings(max_examples=60, database=None)
 @given(st.integers(min_value=0, max_value=2**32))
 def test_random_changes_of_the_schema(seed: int) -> None:
     walk(seed)
