@@ -228,3 +228,38 @@ def answered() -> Iterator[None]:
         yield
     except (CallError, ArmorServiceCallError, ArmorServiceInternalError) as error:
         raise OntologyNotReadyError(str(error)) from error
+
+
+def keep_up(
+    node: PatrolNode, name: str, catch_up: Callable[[], float | None], retry: float
+) -> Interrupt:
+    """Have a worker thread catch up with what the map's peers say, as long as the node lives.
+
+    Args:
+        node: The node.
+        name: Of the thread.
+        catch_up: Does what is to be done; returns after how many seconds to look again, None: when
+            there is news. May raise `OntologyNotReadyError` or `CallError`.
+        retry: Pause after such an error, seconds.
+
+    Returns:
+        To be set when there is news.
+    """
+    news = Interrupt()
+
+    def work() -> None:
+        while not node.stopping.is_set():
+            news.clear()
+            if node.stopping.is_set():
+                return
+            try:
+                wait = catch_up()
+            except (OntologyNotReadyError, CallError) as error:
+                node.get_logger().debug(f'{name}: {error}')
+                node.stopping.wait(retry)
+            else:
+                news.wait(wait)
+
+    node.stopping.subscribe(news.set)
+    node.spawn(work, name=name)
+    return news

@@ -78,16 +78,7 @@ class MotionController(PatrolNode):
         else:
             robot = robot_settings(self, settings)
             motion = NavigationMotion(self, robot, self._knowledge, self._recorder)
-        if settings.docking == 'none':
-            return motion
-        return DockingMotion(
-            self,
-            motion,
-            settings.station,
-            settings.dock_reach,
-            settings.dock_type,
-            settings.peer_timeout,
-        )
+        return motion if settings.docking == 'none' else DockingMotion(self, motion, settings)
 
     def _announce(self, text: str) -> None:
         self._console.announce(text)

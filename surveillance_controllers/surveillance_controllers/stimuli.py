@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable, Sequence
-from typing import Protocol
 
 import numpy as np
 
 from surveillance_controllers import geometry
 from surveillance_controllers.geometry import Points
 from surveillance_controllers.manual.commands import Point3
+from surveillance_fsm.ros import GoalRun
 
 VIA_POINTS = (0, 4)
 """Fewest and most random points between a path's start and its goal."""
@@ -52,21 +52,11 @@ def reached(draw: random.Random, goal: Sequence[float], delta: float) -> np.ndar
     return np.array([axis + draw.uniform(-size, size) for axis in goal])
 
 
-class Pace(Protocol):
-    """Time as a goal's run gives it: `surveillance_fsm.ros.GoalRun` is one."""
-
-    def now(self) -> float:
-        """Return the time in seconds."""
-
-    def sleep(self, seconds: float) -> bool:
-        """Let time pass; return False when the motion shall end at once."""
-
-
 def glide(
     path: Points,
     seconds: float,
     end: Points,
-    pace: Pace,
+    pace: GoalRun,
     on_position: Callable[[Points], None],
     period: float,
 ) -> Points:

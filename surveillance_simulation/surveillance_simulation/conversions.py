@@ -40,13 +40,6 @@ def pose_to_ros(pose: PlanePose) -> Pose:
     return message
 
 
-def pose_from_ros(message: Pose) -> PlanePose:
-    """Convert a pose message to the pose in the plane (metres, rad) that it projects to."""
-    turn = message.orientation
-    yaw = math.atan2(2.0 * (turn.w * turn.z + turn.x * turn.y), 1.0 - 2.0 * (turn.y**2 + turn.z**2))
-    return message.position.x, message.position.y, yaw
-
-
 def stamped_pose_to_ros(pose: PlanePose, frame: str, stamp: Time) -> PoseStamped:
     """Convert a pose in the plane to a stamped pose message."""
     message = PoseStamped(pose=pose_to_ros(pose))
@@ -105,11 +98,6 @@ def scan_to_ros(
     return message
 
 
-def scan_from_ros(message: LaserScan) -> npt.NDArray[np.float32]:
-    """Convert a message to its distances (rays,) in metres."""
-    return np.array(message.ranges, dtype=np.float32)
-
-
 def grid_to_ros(grid: Grid, frame: str, stamp: Time) -> OccupancyGrid:
     """Convert a map to a message."""
     message = OccupancyGrid()
@@ -120,13 +108,6 @@ def grid_to_ros(grid: Grid, frame: str, stamp: Time) -> OccupancyGrid:
     message.info.origin = pose_to_ros((*grid.origin, 0.0))
     message.data.frombytes(grid.cells.tobytes())
     return message
-
-
-def grid_from_ros(message: OccupancyGrid) -> Grid:
-    """Convert a message to a map; its origin's turn is not looked at."""
-    info = message.info
-    cells = np.array(message.data, dtype=np.int8).reshape(info.height, info.width)
-    return Grid(cells, float(info.resolution), (info.origin.position.x, info.origin.position.y))
 
 
 def joints_to_ros(

@@ -63,7 +63,6 @@ class Simulator(PatrolNode):
             world = World.from_parameters(simulator_parameters.place(self))
         except PlaceError as error:
             raise StartError(f'simulator: {error}') from None
-        world.wall_brightness = simulator_parameters.wall_brightness(self)
         model = simulator_parameters.people(self)
         self.robot = Robot(
             world,

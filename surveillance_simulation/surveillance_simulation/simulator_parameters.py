@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import Described, declare_fields
 from surveillance_simulation.camera.lighting import LIGHTINGS
-from surveillance_simulation.camera.model import Camera, Conditions
+from surveillance_simulation.camera.model import Conditions
 from surveillance_simulation.clock_rate import ClockRateModel
 from surveillance_simulation.robot.base import BaseModel
 from surveillance_simulation.robot.lidar import LidarModel
@@ -65,6 +65,25 @@ _PEOPLE = {
     'shortest_rest': Described('Least time a person stays in a room, s.', 0.0, 86_400.0),
     'longest_rest': Described('Greatest time a person stays in a room, s.', 0.0, 86_400.0),
 }
+_PUBLISHED = {
+    'map_resolution': Described('Side of a cell of the map, metres.', 0.01, 0.5),
+    'announce_pose': Described(
+        'Tell each new subscriber of initialpose, such as AMCL, where the robot is.'
+    ),
+}
+_CAMERA = {
+    'width': Described('Columns of a picture.', 16, 4096),
+    'height': Described('Rows of a picture.', 16, 4096),
+    'field_of_view': Described('Horizontal field of view, degrees.', 5.0, 150.0),
+    'renderer': Described(
+        'What draws the pictures; mujoco adds shadows and needs the package mujoco.',
+        choices=('opencv', 'mujoco'),
+    ),
+    'rate': Described('Pictures per second at most.', 0.1, 100.0),
+    'wall_brightness': Described(
+        'Brightness of the walls: 1 white plaster, 0.2 dark paint.', 0.0, 1.0
+    ),
+}
 _CONDITIONS = {
     'light': Described(
         "Brightness of the camera's pictures: 1 a lit room, 0.1 a dark one.", 0.0, 100.0
@@ -75,6 +94,28 @@ _CONDITIONS = {
     'motion_angle': Described('Direction of that streak, rad.', -math.pi, math.pi),
     'lighting': Described('How evenly the light falls on what the camera sees.', choices=LIGHTINGS),
 }
+
+
+@dataclass(frozen=True)
+class PublishedOptions:
+    """How the place is published; units as declared."""
+
+    map_resolution: float = 0.05
+    announce_pose: bool = False
+
+
+@dataclass(frozen=True)
+class CameraOptions:
+    """The camera that does not change; units as declared."""
+
+    width: int = 640
+    height: int = 480
+    field_of_view: float = 60.0
+    renderer: str = 'opencv'
+    rate: float = 10.0
+    wall_brightness: float = 1.0
+
+
 _PLACE_TABLES = ('map', 'room_positions', 'walls', 'doors', 'markers')
 
 
@@ -118,28 +159,9 @@ def clock_rate(node: PatrolNode) -> ClockRateModel:
     return declare_fields(node, ClockRateModel(), _CLOCK_RATE)
 
 
-def map_resolution(node: PatrolNode) -> float:
-    """Declare the size of the map's cells."""
-    resolution: float = node.parameter(
-        'map_resolution',
-        0.05,
-        'Side of a cell of the map, metres.',
-        minimum=0.01,
-        maximum=0.5,
-        read_only=True,
-    )
-    return resolution
-
-
-def announces_pose(node: PatrolNode) -> bool:
-    """Declare whether the start is told to a localisation that asks for it."""
-    announces: bool = node.parameter(
-        'announce_pose',
-        False,
-        'Tell each new subscriber of initialpose, such as AMCL, where the robot is.',
-        read_only=True,
-    )
-    return announces
+def published(node: PatrolNode) -> PublishedOptions:
+    """Declare how the place is published."""
+    return declare_fields(node, PublishedOptions(), _PUBLISHED)
 
 
 def base(node: PatrolNode) -> BaseModel:
@@ -157,64 +179,9 @@ def people(node: PatrolNode) -> PeopleModel:
     return declare_fields(node, PeopleModel(), _PEOPLE, prefix='people.')
 
 
-def camera(node: PatrolNode) -> Camera:
-    """Declare the camera's lens and picture."""
-    return Camera.from_field_of_view(
-        node.parameter(
-            'camera.width', 640, 'Columns of a picture.', minimum=16, maximum=4096, read_only=True
-        ),
-        node.parameter(
-            'camera.height', 480, 'Rows of a picture.', minimum=16, maximum=4096, read_only=True
-        ),
-        math.radians(
-            node.parameter(
-                'camera.field_of_view',
-                60.0,
-                'Horizontal field of view, degrees.',
-                minimum=5.0,
-                maximum=150.0,
-                read_only=True,
-            )
-        ),
-    )
-
-
-def renderer(node: PatrolNode) -> str:
-    """Declare what draws the camera's pictures."""
-    kind: str = node.parameter(
-        'camera.renderer',
-        'opencv',
-        'What draws the pictures; mujoco adds shadows and needs the package mujoco.',
-        choices=('opencv', 'mujoco'),
-        read_only=True,
-    )
-    return kind
-
-
-def wall_brightness(node: PatrolNode) -> float:
-    """Declare how dark the walls behind the markers are."""
-    brightness: float = node.parameter(
-        'camera.wall_brightness',
-        1.0,
-        'Brightness of the walls: 1 white plaster, 0.2 dark paint.',
-        minimum=0.0,
-        maximum=1.0,
-        read_only=True,
-    )
-    return brightness
-
-
-def camera_rate(node: PatrolNode) -> float:
-    """Declare how often a picture is taken."""
-    rate: float = node.parameter(
-        'camera.rate',
-        10.0,
-        'Pictures per second at most.',
-        minimum=0.1,
-        maximum=100.0,
-        read_only=True,
-    )
-    return rate
+def camera(node: PatrolNode) -> CameraOptions:
+    """Declare the camera's lens and picture, and what draws it."""
+    return declare_fields(node, CameraOptions(), _CAMERA, prefix='camera.')
 
 
 def conditions(node: PatrolNode, on_change: Callable[[Conditions], None]) -> Conditions:

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from geometry_msgs.msg import PoseWithCovarianceStamped
 
+from surveillance_controllers.controller_parameters import MotionSettings
 from surveillance_controllers.motion import docking
 from surveillance_controllers.motion import nav2 as nav2_motion
 from surveillance_controllers.motion.arrival import MotionFailedError
@@ -148,7 +149,8 @@ def test_what_nav2_cannot_do_fails_with_the_reason(
 
 
 def docked(graph: Any, station: tuple[float, float, float]) -> docking.DockingMotion:
-    return docking.DockingMotion(graph.node, nav2(graph), station, 0.5, 'charger', 1.0)
+    settings = MotionSettings(station=station, dock_type='charger', peer_timeout=1.0)
+    return docking.DockingMotion(graph.node, nav2(graph), settings)
 
 
 def test_a_way_to_the_station_ends_in_the_dock_and_the_next_one_begins_by_undocking(

@@ -17,6 +17,7 @@ from sensor_msgs.msg import CameraInfo, Image, JointState, LaserScan
 from std_msgs.msg import Float32, UInt32
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
+from surveillance_controllers import conversions as received
 from surveillance_interfaces.msg import DoorStates
 from surveillance_interfaces.srv import (
     DrainBattery,
@@ -30,7 +31,6 @@ from surveillance_interfaces.srv import (
 from surveillance_runtime.node import StartError
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
-from surveillance_simulation import conversions
 from surveillance_simulation.simulator_node import Simulator
 
 from .places import TWO_ROOMS, changed
@@ -100,12 +100,12 @@ def test_it_publishes_map_doors_clock_and_odometry(graph: Any) -> None:
     odometry = graph.listen(Odometry, 'odom', SENSOR_QOS)
     simulator(graph)
     graph.until(lambda: maps and doors and len(clocks) > 3 and odometry)
-    grid = conversions.grid_from_ros(maps[0])
-    assert grid.cells[grid.cell_of(1.0, 1.0)] == 0
+    grid = received.grid_from(maps[0])
+    assert grid.cells[tuple(grid.cells_of(np.array((1.0, 1.0)))[0])] == 0
     assert list(doors[0].open) == ['D']
     times = [clock.clock.sec + clock.clock.nanosec / 1e9 for clock in clocks]
     assert np.diff(times) == pytest.approx(0.1)
-    assert conversions.pose_from_ros(odometry[0].pose.pose) == (1.0, 1.0, 0.0)
+    assert received.pose_from(odometry[0].pose.pose) == (1.0, 1.0, 0.0)
 
 
 def test_it_drives_on_command_and_stops_at_the_wall(graph: Any) -> None:
@@ -147,7 +147,7 @@ def test_a_scan_is_measured_while_somebody_listens(graph: Any) -> None:
     simulator(graph)
     scans = graph.listen(LaserScan, 'scan', SENSOR_QOS)
     graph.until(lambda: scans)
-    assert conversions.scan_from_ros(scans[0])[0] == pytest.approx(0.95, abs=0.06)
+    assert received.scan_from(scans[0]).ranges[0] == pytest.approx(0.95, abs=0.06)
 
 
 def test_the_camera_sees_and_the_arm_turns_it(graph: Any) -> None:
@@ -261,7 +261,7 @@ def test_it_tells_a_localisation_where_it_starts(graph: Any) -> None:
     poses = graph.listen(PoseWithCovarianceStamped, 'initialpose', 10)
     simulator(graph, announce_pose=True)
     graph.until(lambda: poses)
-    assert conversions.pose_from_ros(poses[0].pose.pose) == (1.0, 1.0, 0.0)
+    assert received.pose_from(poses[0].pose.pose) == (1.0, 1.0, 0.0)
 
 
 def test_light_can_be_changed_while_it_runs(graph: Any) -> None:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Generic, Protocol, TextIO, TypeVar
+from typing import Any, Generic, TextIO, TypeVar
 
 from std_msgs.msg import String
 
@@ -26,25 +26,13 @@ from surveillance_controllers.manual.commands import (
     ParsedCommand,
 )
 from surveillance_controllers.manual.prompt import Console
+from surveillance_fsm import Interrupt
 from surveillance_interfaces.srv import ConsoleCommand
 from surveillance_runtime.logging import print_lines
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import STATE_QOS
 
 Answer = TypeVar('Answer')
-
-
-class Interruption(Protocol):
-    """A flag that calls back when it is raised, as `surveillance_runtime.waiting.Interrupt`
-    does."""
-
-    def is_set(self) -> bool:
-        """Tell whether the flag is raised."""
-
-    def subscribe(self, callback: Callable[[], None]) -> Callable[[], None]:
-        """Have `callback` called when the flag is raised (at once if it is); return what undoes
-        that.
-        """
 
 
 @dataclass(eq=False)
@@ -73,7 +61,7 @@ class RequestQueue(Generic[Answer]):
             waiting = [request.description for request in self._waiting]
         return '\n'.join(waiting) if waiting else 'No request is waiting.'
 
-    def ask(self, description: str, interruption: Interruption) -> Answer | None:
+    def ask(self, description: str, interruption: Interrupt) -> Answer | None:
         """Wait until the operator answers.
 
         Args:

@@ -12,7 +12,8 @@ from typing import Any, Protocol
 from geometry_msgs.msg import PoseStamped
 
 from surveillance_controllers import conversions
-from surveillance_controllers.geometry import Points, Pose
+from surveillance_controllers.controller_parameters import MotionSettings
+from surveillance_controllers.geometry import Points
 from surveillance_controllers.motion.arrival import MotionFailedError
 from surveillance_fsm.ros import CallError, GoalCaller, GoalRun
 from surveillance_runtime.node import PatrolNode, StartError
@@ -56,30 +57,17 @@ class DockingMotion:
     Args:
         node: The motion controller's node.
         inner: Drives the robot.
-        station: Where the dock is.
-        reach: A way that ends within this distance of the station ends in the dock, metres.
-        dock_type: The dock's type, as the docking server knows it.
-        peer_timeout: How long the server may take to appear and accept a goal, seconds.
+        settings: The station, how near to it a way must end, the dock's type, and how long the
+            server may take to appear and accept a goal.
 
     Raises:
         StartError: opennav_docking_msgs is not installed.
     """
 
-    def __init__(
-        self,
-        node: PatrolNode,
-        inner: Motion,
-        station: Pose,
-        reach: float,
-        dock_type: str,
-        peer_timeout: float,
-    ) -> None:
+    def __init__(self, node: PatrolNode, inner: Motion, settings: MotionSettings) -> None:
         self._node = node
         self._inner = inner
-        self._station = station
-        self._reach = reach
-        self._dock_type = dock_type
-        self._timeout = peer_timeout
+        self._settings = settings
         self._dock, self._undock = docking_actions()
         self._docker = GoalCaller(node, self._dock, 'dock_robot')
         self._undocker = GoalCaller(node, self._undock, 'undock_robot')
@@ -93,19 +81,22 @@ class DockingMotion:
         """
         if self._docked:
             self._docked = False
-            goal = self._undock.Goal(dock_type=self._dock_type)
+            goal = self._undock.Goal(dock_type=self._settings.dock_type)
             self._carry_out(self._undocker, goal, 'undocking', path[0], run)
         end = self._inner.follow(path, run, report)
-        if math.dist(end[:2], self._station[:2]) > self._reach or run.interrupt.is_set():
+        if (
+            math.dist(end[:2], self._settings.station[:2]) > self._settings.dock_reach
+            or run.interrupt.is_set()
+        ):
             return end
         pose = PoseStamped()
         pose.header.frame_id = 'map'
         pose.header.stamp = self._node.get_clock().now().to_msg()
-        pose.pose = conversions.pose_message(self._station)
+        pose.pose = conversions.pose_message(self._settings.station)
         goal = self._dock.Goal(
             use_dock_id=False,
             dock_pose=pose,
-            dock_type=self._dock_type,
+            dock_type=self._settings.dock_type,
             navigate_to_staging_pose=False,
         )
         self._carry_out(self._docker, goal, 'docking', end, run)
@@ -125,7 +116,9 @@ class DockingMotion:
         self, caller: GoalCaller, goal: Any, what: str, at: Points, run: GoalRun
     ) -> None:
         try:
-            end = caller.run(goal, accept_timeout=self._timeout, interrupt=run.interrupt)
+            end = caller.run(
+                goal, accept_timeout=self._settings.peer_timeout, interrupt=run.interrupt
+            )
         except CallError as error:
             raise MotionFailedError(f'{what}: {error}', at) from error
         if end.status != 'succeeded' or not end.result.success:

@@ -9,7 +9,7 @@ import numpy as np
 
 from surveillance_controllers import conversions
 from surveillance_controllers.geometry import Points, Pose, point_of
-from surveillance_controllers.map_knowledge import MapKnowledge
+from surveillance_controllers.map_knowledge import MapKnowledge, keep_up
 from surveillance_controllers.motion.arrival import MotionFailedError
 from surveillance_controllers.motion.base_interface import RobotBase
 from surveillance_controllers.motion.driving import Drive, Spin, State
@@ -17,10 +17,8 @@ from surveillance_controllers.motion.navigator import Navigator
 from surveillance_controllers.motion.place_recording import RETRY_PERIOD, PlaceRecorder
 from surveillance_controllers.motion.robot_parameters import RobotSettings
 from surveillance_controllers.planning.grid_planning import NoPathError
-from surveillance_fsm import Interrupt
 from surveillance_fsm.ros import CallError, GoalCaller, GoalRun
 from surveillance_interfaces.action import ComputePath
-from surveillance_ontology.patrol_ontology import OntologyNotReadyError
 from surveillance_runtime.node import PatrolNode
 
 
@@ -59,9 +57,8 @@ class NavigationMotion:
         )
         self._base.set_positions(settings.positions)
         knowledge.assume(settings.positions)
-        self._news = Interrupt()
-        node.stopping.subscribe(self._news.set)
-        node.spawn(self._follow_map, name='map follower')
+        self._watches_doors = False
+        self._news = keep_up(node, 'map follower', self._follow_map, RETRY_PERIOD)
 
     def follow(self, path: Points, run: GoalRun, report: Callable[[Points], None]) -> Points:
         """Drive along a path of shape (n, 3).
@@ -121,21 +118,11 @@ class NavigationMotion:
 
     def _follow_map(self) -> None:
         """Take the places that come and go: they change what the robot's place can be."""
-        stopping, watched = self._node.stopping, False
-        while not stopping.is_set():
-            self._news.clear()
-            if stopping.is_set():
-                return
-            try:
-                if not watched:
-                    self._knowledge.watch_doors(stopping, self._news.set)
-                    watched = True
-                self._base.set_positions(self._knowledge.places(stopping))
-            except OntologyNotReadyError as error:
-                self._node.get_logger().debug(f'places as they were: {error}')
-                stopping.wait(RETRY_PERIOD)
-            else:
-                self._news.wait()
+        stopping = self._node.stopping
+        if not self._watches_doors:
+            self._knowledge.watch_doors(stopping, lambda: self._news.set())
+            self._watches_doors = True
+        self._base.set_positions(self._knowledge.places(stopping))
 
     def _ask_planner(self, start: Points, goal: Points, run: GoalRun) -> Points:
         request = ComputePath.Goal(

@@ -10,12 +10,10 @@ from builtin_interfaces.msg import Time
 from std_msgs.msg import Header
 
 from surveillance_controllers.geometry import Points
-from surveillance_controllers.map_knowledge import MapKnowledge, answered
+from surveillance_controllers.map_knowledge import MapKnowledge, answered, keep_up
 from surveillance_controllers.motion.arrival import nearest_place
-from surveillance_fsm import Interrupt
 from surveillance_interfaces.msg import OntologyMap, RobotPlace
 from surveillance_ontology.armor_client import FactSubscription
-from surveillance_ontology.patrol_ontology import OntologyNotReadyError
 from surveillance_runtime.conversions import nanoseconds_of
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import STATE_QOS
@@ -64,15 +62,13 @@ class PlaceRecorder:
         self._written: RobotPlace | None = None
         self._written_at = 0.0
         self._facts: FactSubscription | None = None
-        self._news = Interrupt()
         self._topic = node.create_publisher(RobotPlace, 'robot_place', STATE_QOS)
         self._done = node.create_publisher(Time, 'robot_place_written', STATE_QOS)
-        node.stopping.subscribe(self._news.set)
+        self._news = keep_up(node, 'place recorder', self._catch_up, RETRY_PERIOD)
         if start == '':
             node.create_subscription(
                 OntologyMap, 'ontology_map/build_map', self._on_build_map, STATE_QOS
             )
-        node.spawn(self._work, name='place recorder')
 
     def tell(self, place: str | None, stamp: Time | None = None) -> None:
         """Take where the robot is; from any thread, without waiting.
@@ -109,20 +105,6 @@ class PlaceRecorder:
             self._start = message.robot_room
             self._news.set()
 
-    def _work(self) -> None:
-        stopping = self._node.stopping
-        while not stopping.is_set():
-            self._news.clear()
-            if stopping.is_set():
-                return
-            try:
-                wait = self._catch_up()
-            except OntologyNotReadyError as error:
-                self._node.get_logger().debug(f'where the robot is was not written: {error}')
-                stopping.wait(RETRY_PERIOD)
-            else:
-                self._news.wait(wait)
-
     def _catch_up(self) -> float | None:
         """Write what is to be written.
 
@@ -134,7 +116,7 @@ class PlaceRecorder:
         """
         stopping = self._node.stopping
         if self._facts is None:
-            self._facts = self._knowledge.watch_robot_place(stopping, self._news.set)
+            self._facts = self._knowledge.watch_robot_place(stopping, lambda: self._news.set())
         self._find_place()
         if self._told is None and self._start is not None:
             self._begin()

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from surveillance_controllers.map_knowledge import MapKnowledge
+from surveillance_controllers.map_knowledge import MapKnowledge, keep_up
 from surveillance_controllers.motion.place_regions import Segment
 from surveillance_fsm import Interrupt
-from surveillance_fsm.ros import CallError, ServiceCaller
+from surveillance_fsm.ros import ServiceCaller
 from surveillance_interfaces.msg import DoorStates
 from surveillance_interfaces.srv import SetDoor
 from surveillance_ontology.patrol_ontology import OntologyNotReadyError
@@ -47,11 +47,9 @@ class DoorWatch:
         self._contacts: frozenset[str] = frozenset()
         self._told: frozenset[str] = frozenset()
         self._sides: dict[str, set[str]] = {}
-        self._news = Interrupt()
         self._set_door = ServiceCaller(node, SetDoor, 'ontology_map/set_door')
+        self._news = keep_up(node, 'door watch', self._catch_up, RETRY_PERIOD)
         node.create_subscription(DoorStates, 'door_states', self._on_states, STATE_QOS)
-        node.stopping.subscribe(self._news.set)
-        node.spawn(self._work, name='door watch')
 
     def rooms_of(self, interrupt: Interrupt) -> dict[str, set[str]]:
         """Return the places that each door leads into; empty while the ontology does not say.
@@ -92,28 +90,11 @@ class DoorWatch:
         self._contacts = frozenset(message.closed)
         self._news.set()
 
-    def _work(self) -> None:
-        stopping = self._node.stopping
-        while not stopping.is_set():
-            self._news.clear()
-            if stopping.is_set():
-                return
-            if self._catch_up():
-                self._news.wait()
-            else:
-                stopping.wait(RETRY_PERIOD)
-
-    def _catch_up(self) -> bool:
-        """Subscribe to the ontology's doors and tell it of the contacts; return whether all went
-        well.
-        """
-        try:
-            self._knowledge.connect(self._node.stopping)
-            for door in sorted(self._contacts ^ self._told):
-                self._tell(door, is_open=door not in self._contacts)
-        except (OntologyNotReadyError, CallError):
-            return False
-        return True
+    def _catch_up(self) -> None:
+        """Subscribe to the ontology's doors and tell it of the contacts."""
+        self._knowledge.connect(self._node.stopping)
+        for door in sorted(self._contacts ^ self._told):
+            self._tell(door, is_open=door not in self._contacts)
 
     def _tell(self, door: str, *, is_open: bool) -> None:
         request = SetDoor.Request(door=door, open=is_open)

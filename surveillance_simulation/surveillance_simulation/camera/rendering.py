@@ -33,7 +33,6 @@ class Renderer:
         """
         self._world = world
         self._camera = camera
-        self._factor = supersampling
         matrix = camera.matrix
         matrix[:2] *= supersampling
         # The centre of pixel 0 stays the centre of the block of fine pixels that it is made of.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Callable
 from typing import Any
@@ -12,7 +13,7 @@ from sensor_msgs.msg import CameraInfo, Image
 
 from surveillance_runtime.node import PatrolNode
 from surveillance_simulation import conversions, simulator_parameters
-from surveillance_simulation.camera.model import Conditions, expose
+from surveillance_simulation.camera.model import Camera, Conditions, expose
 from surveillance_simulation.camera.mujoco_rendering import MujocoRenderer
 from surveillance_simulation.camera.rendering import Renderer
 from surveillance_simulation.feeds.sensor_feed import SENSOR_DEPTH
@@ -51,11 +52,14 @@ class CameraFeed:
         """
         self.conditions = simulator_parameters.conditions(node, self._take_conditions)
         self._robot = robot
-        self._camera = simulator_parameters.camera(node)
-        kind = simulator_parameters.renderer(node)
-        take = MujocoRenderer if kind == 'mujoco' else Renderer
+        options = simulator_parameters.camera(node)
+        self._camera = Camera.from_field_of_view(
+            options.width, options.height, math.radians(options.field_of_view)
+        )
+        robot.world.wall_brightness = options.wall_brightness
+        take = MujocoRenderer if options.renderer == 'mujoco' else Renderer
         self._renderer: Renderer | MujocoRenderer = take(robot.world, self._camera)
-        self._period = 1.0 / simulator_parameters.camera_rate(node)
+        self._period = 1.0 / options.rate
         self._next = 0.0
         self._rng = np.random.default_rng(seed)
         self._changing = changing

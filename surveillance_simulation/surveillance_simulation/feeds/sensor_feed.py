@@ -43,11 +43,11 @@ class SensorFeed:
         self._map = node.create_publisher(OccupancyGrid, 'map', STATE_QOS)
         self._tf = None if TFMessage is None else node.create_publisher(TFMessage, 'tf', 10)
         self._told_collisions = -1
-        resolution = simulator_parameters.map_resolution(node)
-        grid = occupancy_grid.draw(robot.world.plan, resolution)
+        options = simulator_parameters.published(node)
+        grid = occupancy_grid.draw(robot.world.plan, options.map_resolution)
         self._map.publish(conversions.grid_to_ros(grid, 'map', Time()))
         self.tell_doors()
-        if simulator_parameters.announces_pose(node):
+        if options.announce_pose:
             self._announce_pose(node)
 
     def tell_doors(self) -> None:
