@@ -29,6 +29,7 @@ from surveillance_ontology.owl.axioms import (  # noqa: E402
     Axiom,
     Declaration,
     Import,
+    SameIndividual,
     SubClassOf,
 )
 from surveillance_ontology.owl.entities import entities_of  # noqa: E402
@@ -78,7 +79,8 @@ def derived(kb: KnowledgeBase, most: int, draw: random.Random) -> list[Axiom]:
     classes = sorted({iri for a in kb.axioms() for kind, iri in entities_of(a) if kind == 'class'})
     below = [SubClassOf(one, sup) for one in classes for sup in kb.superclasses(one)]
     facts = [*kb.derived_facts(), *(a for a in below if a.sup != THING and a not in kb)]
-    return draw.sample(sorted(facts, key=repr), min(most, len(facts)))
+    asked = [a for a in facts if not isinstance(a, SameIndividual) or len(a.individuals) == 2]
+    return draw.sample(sorted(asked, key=repr), min(most, len(asked)))
 
 
 def judged(axioms: Iterable[Axiom], judge: Judge, most: int, counts: Counter[str]) -> Iterator[str]:

@@ -255,41 +255,43 @@ class CaseReasoner:
             return
         named = self.names_individuals
         search = self._search if named else CaseSearch(self._rules, self._left)
-        base = self._base if named else search.mark()
         models = _ClassModels(self._rules, search)
-
-        def asked(questions: Iterable[tuple[str, ...]]) -> Iterator[tuple[str, ...]]:
-            """Yield the classes, alone or without another, that can have no members.
-
-            What contradicts one model of the individuals is asked for again without it.
-            """
-            again: list[tuple[str, ...]] = []
-            for model in (True, False):
-                if model and self._is_possible(lambda: None, search):
-                    search.hold()
-                start = search.mark()
-                for question in questions if model else again:
-                    if self.stopped:
-                        return
-                    if not models.may_be(*question):
-                        continue
-                    if self._is_possible(partial(models.state, *question), search):
-                        models.look(*question)
-                    elif search.depends:
-                        again.append(question)
-                    else:
-                        yield question
-                    search.undo(start)
-                search.undo(base)
-
         wanted = [(cls,) for cls in classes if not known(cls, NOTHING)]
-        for cls, *_ in asked(wanted):
+        for cls, *_ in self._impossible(wanted, models, search):
             yield cls, NOTHING
         for cls, sup in models.certain:
             if not known(cls, sup):
                 yield cls, sup
-        for cls, *rest in asked([pair for pair in models.possible() if not known(*pair)]):
+        pairs = [pair for pair in models.possible() if not known(*pair)]
+        for cls, *rest in self._impossible(pairs, models, search):
             yield cls, rest[0]
+
+    def _impossible(
+        self, questions: Iterable[tuple[str, ...]], models: _ClassModels, search: CaseSearch
+    ) -> Iterator[tuple[str, ...]]:
+        """Yield the classes, alone or without another, that can have no members.
+
+        What contradicts one model of the individuals is asked for again without it.
+        """
+        base = self._base if search is self._search else 0
+        again: list[tuple[str, ...]] = []
+        for model in (True, False):
+            if model and self._is_possible(lambda: None, search):
+                search.hold()
+            start = search.mark()
+            for question in questions if model else again:
+                if self.stopped:
+                    return
+                if not models.may_be(*question):
+                    continue
+                if self._is_possible(partial(models.state, *question), search):
+                    models.look(*question)
+                elif search.depends:
+                    again.append(question)
+                else:
+                    yield question
+                search.undo(start)
+            search.undo(base)
 
 
 class _ClassModels:

@@ -25,6 +25,7 @@ from surveillance_ontology.owl.axioms import Axiom
 from surveillance_ontology.reasoner.clauses import (
     AtLeast,
     AtMost,
+    BodyAtom,
     Clause,
     Constant,
     HeadAtom,
@@ -33,6 +34,7 @@ from surveillance_ontology.reasoner.clauses import (
     Program,
     RangeAtom,
     SameAtom,
+    Term,
     closure,
     turned,
 )
@@ -117,6 +119,59 @@ class Context:
         self.done: set[object] = set()
 
 
+class _Body:
+    """What a clause's body says of each term, and of each pair of terms.
+
+    Attributes:
+        tokens: What an individual is.
+        roles: How one is related to another, each pair in one direction.
+        datas: Whose value a value is, and by which properties.
+        values: The set that a value is in, where there is one.
+    """
+
+    def __init__(self) -> None:
+        self.tokens: dict[Any, set[Token]] = {}
+        self.roles: dict[tuple[Any, Any], set[Role]] = {}
+        self.datas: dict[Any, tuple[Any, set[Predicate]]] = {}
+        self.values: dict[Any, ValueSet] = {}
+
+    def takes(self, atom: BodyAtom) -> bool:
+        """Add an atom; return False for one that no context can use."""
+        if isinstance(atom, PredicateAtom):
+            return self._takes_fact(atom.predicate, atom.terms)
+        if isinstance(atom, SameAtom):
+            one, other = map(_key, atom.terms)
+            if isinstance(one, tuple):
+                one, other = other, one
+            self.tokens.setdefault(one, set()).add(other)
+            return isinstance(other, tuple)
+        if isinstance(atom, RangeAtom):
+            (v,) = atom.terms
+            self.values[v] = self.values.get(v, EVERY) & atom.values
+            return True
+        return False
+
+    def _takes_fact(self, predicate: Predicate, terms: tuple[Term, ...]) -> bool:
+        if predicate.kind == 'class':
+            self.tokens.setdefault(_key(terms[0]), set()).add(predicate)
+        elif predicate.kind == 'data':
+            x, v = terms
+            self.datas.setdefault(v, (x, set()))[1].add(predicate)
+            if isinstance(v, Constant):
+                self.values[v] = point(v.value)
+        elif predicate.kind == 'object':
+            one, other = map(_key, terms)
+            if one == other:
+                self.tokens.setdefault(one, set()).add(('self', predicate))
+            elif (other, one) in self.roles:
+                self.roles[other, one].add((predicate, True))
+            else:
+                self.roles.setdefault((one, other), set()).add((predicate, False))
+        else:
+            return False
+        return True
+
+
 class Contexts:
     """Completes contexts of one program; rules of SWRL take no part."""
 
@@ -148,67 +203,43 @@ class Contexts:
     # --- rules ---
 
     def _take(self, clause: Clause) -> None:
-        """Index a clause about one individual, or one and what it is directly related to."""
-        tokens: dict[Any, set[Token]] = {}
-        roles: dict[tuple[Any, Any], set[Role]] = {}
-        datas: dict[Any, tuple[Any, set[Predicate]]] = {}
-        values: dict[Any, ValueSet] = {}
-        for atom in clause.body:
-            if isinstance(atom, PredicateAtom):
-                predicate, terms = atom.predicate, atom.terms
-                if predicate.kind == 'class':
-                    held = tokens.setdefault(_key(terms[0]), set())
-                    if predicate is not self._program.thing:
-                        held.add(predicate)
-                elif predicate.kind == 'data':
-                    x, v = terms
-                    _, props = datas.setdefault(v, (x, set()))
-                    props.add(predicate)
-                    if isinstance(v, Constant):
-                        values[v] = point(v.value)
-                elif predicate.kind == 'object':
-                    one, other = _key(terms[0]), _key(terms[1])
-                    if one == other:
-                        tokens.setdefault(one, set()).add(('self', predicate))
-                    elif (other, one) in roles:
-                        roles[other, one].add((predicate, True))
-                    else:
-                        roles.setdefault((one, other), set()).add((predicate, False))
-                else:
-                    return
-            elif isinstance(atom, SameAtom):
-                one, other = map(_key, atom.terms)
-                if isinstance(one, tuple):
-                    one, other = other, one
-                if not isinstance(other, tuple):
-                    return
-                tokens.setdefault(one, set()).add(other)
-            elif isinstance(atom, RangeAtom):
-                (v,) = atom.terms
-                values[v] = values.get(v, EVERY) & atom.values
-            else:
-                return
-        if datas:
-            self._take_values(clause, tokens, datas, values)
-        elif not roles:
-            self._take_class(clause, tokens)
-        elif len(roles) == 1:
-            ((pair, found),) = roles.items()
-            for x, y, directed in (
-                (*pair, frozenset(found)),
-                (pair[1], pair[0], frozenset(map(turned, found))),
-            ):
-                if isinstance(x, tuple):
-                    continue
-                xs, ys = frozenset(tokens.get(x, ())), set(tokens.get(y, ()))
-                if isinstance(y, tuple):
-                    ys.add(y)
-                head = self._edge_head(clause, x, y)
-                if head is not None:
-                    rule = _EdgeRule(directed, xs, frozenset(ys), head, clause.origin)
-                    for role in directed:
-                        self.edge_rules.setdefault(role, []).append(rule)
-        # Chains of properties are spelt out as steps by `classification`.
+        """Index a clause about one individual, or one and what it is directly related to.
+
+        Chains of properties are spelt out as steps by `classification`.
+        """
+        body = _Body()
+        if not all(map(body.takes, clause.body)):
+            return
+        for tokens in body.tokens.values():
+            tokens.discard(self._program.thing)
+        if body.datas:
+            self._take_values(clause, body.tokens, body.datas, body.values)
+        elif not body.roles:
+            self._take_class(clause, body.tokens)
+        elif len(body.roles) == 1:
+            (((one, other), roles),) = body.roles.items()
+            self._take_edge(clause, one, other, frozenset(roles), body.tokens)
+            self._take_edge(clause, other, one, frozenset(map(turned, roles)), body.tokens)
+
+    def _take_edge(
+        self,
+        clause: Clause,
+        x: Any,
+        y: Any,
+        roles: frozenset[Role],
+        tokens: dict[Any, set[Token]],
+    ) -> None:
+        """Index a clause as a rule about x and the y that it is related to."""
+        if isinstance(x, tuple):
+            return
+        xs, ys = frozenset(tokens.get(x, ())), set(tokens.get(y, ()))
+        if isinstance(y, tuple):
+            ys.add(y)
+        head = self._edge_head(clause, x, y)
+        if head is not None:
+            rule = _EdgeRule(roles, xs, frozenset(ys), head, clause.origin)
+            for role in roles:
+                self.edge_rules.setdefault(role, []).append(rule)
 
     def _edge_head(self, clause: Clause, x: Any, y: Any) -> tuple[Any, ...] | None:
         head = clause.head

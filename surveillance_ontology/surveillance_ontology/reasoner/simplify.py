@@ -8,8 +8,9 @@ LOCATION is the domain of visitedAt.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from typing import TypeVar
 
 from surveillance_ontology.reasoner.clauses import (
     AtLeast,
@@ -19,8 +20,10 @@ from surveillance_ontology.reasoner.clauses import (
     Predicate,
     PredicateAtom,
     Program,
-    Term,
+    closure,
 )
+
+Condition = TypeVar('Condition', AtLeast, AtMost)
 
 
 def simplify(program: Program, asserted: Iterable[Predicate]) -> None:
@@ -155,63 +158,53 @@ def _prune(program: Program, kept: set[Predicate]) -> None:
             return
 
 
+class _Implications:
+    """The facts that clauses with one atom as body derive from others."""
+
+    def __init__(self, clauses: Iterable[Clause]) -> None:
+        self._clauses: dict[Predicate, list[tuple[PredicateAtom, PredicateAtom]]] = {}
+        for clause in clauses:
+            if len(clause.body) != 1 or clause.named_only:
+                continue
+            body, head = clause.body[0], clause.head
+            if isinstance(body, PredicateAtom) and isinstance(head, PredicateAtom):
+                terms = body.terms
+                if all(isinstance(term, int) for term in terms) and len(set(terms)) == len(terms):
+                    self._clauses.setdefault(body.predicate, []).append((body, head))
+
+    def imply(self, atoms: Iterable[BodyAtom], wanted: BodyAtom) -> bool:
+        """Tell whether one of the atoms alone has the wanted one as consequence."""
+        facts = (atom for atom in atoms if isinstance(atom, PredicateAtom))
+        return any(wanted in closure(atom, self._following) for atom in facts)
+
+    def _following(self, atom: PredicateAtom) -> Iterator[PredicateAtom]:
+        for body, head in self._clauses.get(atom.predicate, ()):
+            binding = dict(zip(body.terms, atom.terms, strict=True))
+            terms = tuple(binding.get(term, term) for term in head.terms)
+            yield PredicateAtom(head.predicate, terms)
+
+
 def drop_implied_atoms(program: Program) -> None:
     """Leave out of each body what its other atoms imply."""
-    simple: dict[Predicate, list[Clause]] = {}
-    for clause in program.clauses:
-        facts = [atom for atom in clause.body if isinstance(atom, PredicateAtom)]
-        is_simple = len(facts) == len(clause.body) == 1 and not clause.named_only
-        if is_simple and isinstance(clause.head, PredicateAtom):
-            simple.setdefault(facts[0].predicate, []).append(clause)
-
-    def implied(atoms: list[PredicateAtom]) -> set[PredicateAtom]:
-        found = set(atoms)
-        pending = list(atoms)
-        while pending:
-            atom = pending.pop()
-            for clause in simple.get(atom.predicate, ()):
-                pattern = clause.body[0].terms
-                if not all(isinstance(term, int) for term in pattern):
-                    continue
-                if len(set(pattern)) != len(pattern):
-                    continue
-                binding: dict[Term, Term] = dict(zip(pattern, atom.terms, strict=True))
-                head = clause.head
-                assert isinstance(head, PredicateAtom)
-                result = PredicateAtom(
-                    head.predicate, tuple(binding.get(term, term) for term in head.terms)
-                )
-                if result not in found:
-                    found.add(result)
-                    pending.append(result)
-        return found
-
+    implications = _Implications(program.clauses)
     clauses = []
     for clause in program.clauses:
         body = list(clause.body)
         for atom in clause.body:
             if isinstance(atom, PredicateAtom) and atom.predicate.kind == 'class' and len(body) > 1:
                 rest = [other for other in body if other is not atom]
-                if atom in implied([a for a in rest if isinstance(a, PredicateAtom)]):
+                if implications.imply(rest, atom):
                     body = rest
-        if len(body) == 1 and clause.head == body[0]:
-            continue
-        clauses.append(replace(clause, body=tuple(body)))
+        if len(body) > 1 or clause.head not in body:
+            clauses.append(replace(clause, body=tuple(body)))
     program.clauses = clauses
 
-    def needless(condition: AtLeast | AtMost) -> bool:
-        if not isinstance(condition.filler, Predicate) or condition.prop.kind != 'object':
-            return False
-        terms = (1, 0) if condition.inverse else (0, 1)
-        return PredicateAtom(condition.filler, (1,)) in implied(
-            [PredicateAtom(condition.prop, terms)]
-        )
+    def without_filler(condition: Condition) -> Condition:
+        if isinstance(condition.filler, Predicate) and condition.prop.kind == 'object':
+            link = PredicateAtom(condition.prop, (1, 0) if condition.inverse else (0, 1))
+            if implications.imply([link], PredicateAtom(condition.filler, (1,))):
+                return replace(condition, filler=None)
+        return condition
 
-    program.at_least = [
-        replace(condition, filler=None) if needless(condition) else condition
-        for condition in program.at_least
-    ]
-    program.at_most = [
-        replace(condition, filler=None) if needless(condition) else condition
-        for condition in program.at_most
-    ]
+    program.at_least = list(map(without_filler, program.at_least))
+    program.at_most = list(map(without_filler, program.at_most))
