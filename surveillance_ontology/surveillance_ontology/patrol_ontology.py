@@ -6,8 +6,8 @@ and the robot's name. Everything is told as one batch, which the server carries 
     ontology = PatrolOntology(ArmorClient('me', 'surveillance', transport))
     ontology.build(place, path, uri)                # rooms and doors
     ontology.record_place('C1', stamp)              # by the one node that knows where the robot is
-    ontology.record_visits({'C1': 120.0}, 120.0)    # by the one node that decides
-    ontology.snapshot(130.0, ['URGENT'])            # what follows, all of one moment
+    # By the one node that decides: when it visited what, and what follows, all of one moment.
+    ontology.snapshot(130.0, ['URGENT'], visits={'C1': 120.0})
 
 A fact is replaced by ``SET``, so the robot cannot be told to be in two places, whoever tells it.
 Every method blocks while the server answers and belongs on a worker thread; one thread at a time
@@ -281,25 +281,6 @@ class PatrolOntology:
             [
                 self._request('SET OBJECTPROP IND', 'isIn', self._robot, place),
                 self._set_value('seenAt', self._robot, stamp),
-                self._request('REASON'),
-            ]
-        )
-
-    def record_visits(self, visits: Mapping[str, float], now: float) -> None:
-        """Tell when the robot visited places, and its time.
-
-        Args:
-            visits: Time of visit by place, seconds; the ontology keeps whole ones.
-            now: The robot's time, seconds.
-
-        Raises:
-            ArmorServiceCallError: The server does not answer.
-            ArmorServiceInternalError: It refuses.
-        """
-        self._carry_out(
-            [
-                *(self._set_value('visitedAt', place, int(at)) for place, at in visits.items()),
-                self._set_value('now', self._robot, int(now)),
                 self._request('REASON'),
             ]
         )

@@ -51,6 +51,8 @@ CHUNK = 100
 """Axioms in one record of a snapshot."""
 COMPACT_FROM = 1 << 20
 """Bytes of journal from which on a snapshot is written, if the last one is not larger."""
+CLOSING = 1.0
+"""Seconds for which a store that is closed waits for the snapshot that is being written."""
 _NAME = re.compile(r'(journal|snapshot)-(\d+)\.log\Z')
 
 
@@ -520,9 +522,15 @@ class Store:
             self._snapshot.start()
 
     def close(self) -> None:
-        """Finish a snapshot that is being written, and let another process open the store."""
+        """Let another process open the store.
+
+        A snapshot that is being written has `CLOSING` seconds to end; after that the store stays
+        this process's until that dies, and its journal says all.
+        """
         if self._snapshot is not None:
-            self._snapshot.join()
+            self._snapshot.join(CLOSING)
+            if self._snapshot.is_alive():
+                return
         with self._lock:
             self._journal.close()
 

@@ -10,8 +10,8 @@ from urllib.parse import unquote, urlsplit
 
 from surveillance_ontology.documents.functional_syntax import is_functional, parse_functional
 from surveillance_ontology.documents.mapping import Mapping
-from surveillance_ontology.documents.ntriples import parse_by_library, parse_ntriples
 from surveillance_ontology.documents.owl_xml import is_owl_xml, parse_owl_xml
+from surveillance_ontology.documents.rdf_text import parse_rdf_text
 from surveillance_ontology.documents.rdf_xml import Graph, parse_rdf_xml
 from surveillance_ontology.documents.structural import Axioms
 from surveillance_ontology.documents.xml_reading import OntologyFileError
@@ -161,15 +161,15 @@ def _parsed(data: bytes, iri: str) -> OntologyDocument:
     if is_functional(data):
         return _stated(parse_functional(_text(data)), 'functional')
     if _TRIPLE.match(data, place):
-        return _mapped(parse_ntriples(data), 'ntriples')
+        return _mapped(parse_rdf_text(data, iri, 'ntriples'), 'ntriples')
     if _XML.match(data, place):
         if is_owl_xml(data):
             return _stated(parse_owl_xml(data, iri), 'owlxml')
         return _mapped(parse_rdf_xml(data, iri), 'rdfxml')
     if _JSON.match(data, place):
-        return _mapped(parse_by_library(data, iri, 'json-ld'), 'jsonld')
+        return _mapped(parse_rdf_text(data, iri, 'jsonld'), 'jsonld')
     if _TURTLE.match(data, place):
-        return _mapped(parse_by_library(data, iri, 'turtle'), 'turtle')
+        return _mapped(parse_rdf_text(data, iri, 'turtle'), 'turtle')
     shown = data[place : place + 40].decode('latin-1')
     raise OntologyFileError(
         f'expected {FORMATS}, got {shown!r}', data.count(b'\n', 0, place) + 1, 1

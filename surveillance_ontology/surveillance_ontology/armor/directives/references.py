@@ -101,43 +101,29 @@ def _load(
     reasoner: str,
     lazy: bool,
 ) -> DirectiveResponse:
-    response = _loaded(session, request, source, iri, buffered, reasoner, lazy)
+    name = request.reference_name
+    notes = [f'{name} is loaded already']
+    if not _rebuffer(session, request, buffered):
+        with session.loading:
+            if name not in session.references:
+                with memory.uncollected():
+                    web = request.primary.upper() == 'WEB'
+                    ref, notes = _read_document(
+                        name, source, iri, reasoner, session.paths, session.settings, web=web
+                    )
+                    memory.settle(len(ref.kb))
+                ref.buffered_manipulation, ref.buffered_reasoner = buffered, lazy
+                ref.history = History(session.clock(), session.settings.history)
+                if session.store:
+                    session.store.loaded(ref)
+                session.register(ref)
+                for note in notes:
+                    session.warn(f'{name}: {note}')
+            else:
+                _rebuffer(session, request, buffered)
     if request.secondary:
         _mount(session, request)
-    return response
-
-
-def _loaded(
-    session: Session,
-    request: DirectiveRequest,
-    source: str,
-    iri: str,
-    buffered: bool,
-    reasoner: str,
-    lazy: bool,
-) -> DirectiveResponse:
-    name = request.reference_name
-    again = DirectiveResponse(error_description=f'{name} is loaded already')
-    if _rebuffer(session, request, buffered):
-        return again
-    with session.loading:
-        if name not in session.references:
-            with memory.uncollected():
-                web = request.primary.upper() == 'WEB'
-                ref, notes = _read_document(
-                    name, source, iri, reasoner, session.paths, session.settings, web=web
-                )
-                memory.settle(len(ref.kb))
-            ref.buffered_manipulation, ref.buffered_reasoner = buffered, lazy
-            ref.history = History(session.clock(), session.settings.history)
-            if session.store:
-                session.store.loaded(ref)
-            session.register(ref)
-            for note in notes:
-                session.warn(f'{name}: {note}')
-            return DirectiveResponse(error_description='; '.join(notes))
-    _rebuffer(session, request, buffered)
-    return again
+    return DirectiveResponse(error_description='; '.join(notes))
 
 
 def _rebuffer(session: Session, request: DirectiveRequest, buffered: bool) -> bool:
