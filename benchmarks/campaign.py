@@ -54,7 +54,7 @@ from rclpy.node import Node  # noqa: E402
 from rclpy.qos import qos_profile_sensor_data  # noqa: E402
 from std_msgs.msg import UInt32  # noqa: E402
 
-from benchmarks.link_campaign import LinkCampaign  # noqa: E402
+from benchmarks.link_campaign import LinkCampaign, LinkResults  # noqa: E402
 from benchmarks.machine_faults import SmallDisk, SteppedClock  # noqa: E402
 from surveillance_fsm.ros import ServiceCaller  # noqa: E402
 from surveillance_interfaces.srv import ArmorDirective  # noqa: E402
@@ -258,6 +258,33 @@ class Results:
     restarted: int = 0
     left_behind: list[str] = field(default_factory=list)
     usage: dict[int, Usage] = field(default_factory=dict)
+    seen: dict[tuple[float, str], None] = field(default_factory=dict)
+    collisions: int = 0
+
+    def passed(self) -> bool:
+        """Tell whether nothing was lost, invented, away or left behind."""
+        return not (self.away or self.lost or self.invented or self.left_behind)
+
+    def rows(self) -> list[tuple[str, str]]:
+        """Return the table to print."""
+        outages = [outage.seconds for outage in self.outages]
+        longest = max(self.resumes, default=math.nan)
+        median, late = _quantile(outages, 0.5), _quantile(outages, 0.99)
+        return [
+            ('hits', ', '.join(f'{kind} {count}' for kind, count in sorted(self.hits.items()))),
+            ('nodes that stayed away', _named(self.away)),
+            ('outage, median and p99', f'{median:.1f} s, {late:.1f} s'),
+            *_steps(self.outages),
+            ('start again after everything was killed, longest', f'{longest:.1f} s'),
+            ('visits seen in the record', str(len(self.seen))),
+            ('lost', _named(self.lost)),
+            ('invented', _named(self.invented)),
+            ('collisions', str(self.collisions)),
+            ('next visit after the machine was hit', _times(self.machine)),
+            ('restarts by that', str(self.restarted)),
+            ('growth of processes', _growth(self.usage.values())),
+            ('processes left behind', _named(self.left_behind)),
+        ]
 
 
 def records(folder: Path) -> list[Path]:
@@ -313,7 +340,6 @@ class Campaign:
         self._began: dict[int, float] = {}
         self.watcher = Watcher(self._domain)
         self.results = Results()
-        self._seen: dict[tuple[float, str], None] = {}
         described = read_place_file(ROOT / 'config' / PLACES[chosen.behaviour])
         positions = described.place.positions
         self._positions = {name: (at[0], at[1]) for name, at in positions.items()}
@@ -471,14 +497,14 @@ class Campaign:
 
     def _read_record(self) -> None:
         for visit in visits(self._folder):
-            self._seen.setdefault(visit)
+            self.results.seen.setdefault(visit)
 
     def _compare(self) -> None:
         self._read_record()
         written = visits(self._folder)
         self.results.lost += [
             f'{place} at {at:.0f} s is gone from the record'
-            for at, place in self._seen
+            for at, place in self.results.seen
             if (at, place) not in set(written)
         ]
         for at, place in written:
@@ -516,6 +542,7 @@ class Campaign:
     def close(self) -> None:
         """Stop the mission, look for what is left of it, and leave."""
         self.launcher.end()
+        self.results.collisions = self.watcher.collisions
         self.watcher.close()
         self.results.left_behind = list(_processes_of(self._folder))
 
@@ -589,40 +616,25 @@ def main(words: Sequence[str] | None = None) -> int:
     chosen.keep.mkdir(parents=True, exist_ok=True)
     scratch = chosen.keep / time.strftime('campaign-%Y%m%d-%H%M%S')
     scratch.mkdir()
+    results: Results | LinkResults
     if chosen.network:
-        return run_on_two_hosts(chosen, scratch)
-    campaign = Campaign(chosen, scratch)
-    try:
-        campaign.run(chosen.hours * 3600.0)
-    finally:
-        campaign.close()
-    results = campaign.results
-    outages = [outage.seconds for outage in results.outages]
-    longest = max(results.resumes, default=math.nan)
-    median, late = _quantile(outages, 0.5), _quantile(outages, 0.99)
-    rows = [
-        ('hits', ', '.join(f'{kind} {count}' for kind, count in sorted(results.hits.items()))),
-        ('nodes that stayed away', _named(results.away)),
-        ('outage, median and p99', f'{median:.1f} s, {late:.1f} s'),
-        *_steps(results.outages),
-        ('start again after everything was killed, longest', f'{longest:.1f} s'),
-        ('visits seen in the record', str(len(campaign._seen))),
-        ('lost', _named(results.lost)),
-        ('invented', _named(results.invented)),
-        ('collisions', str(campaign.watcher.collisions)),
-        ('next visit after the machine was hit', _times(results.machine)),
-        ('restarts by that', str(results.restarted)),
-        ('growth of processes', _growth(results.usage.values())),
-        ('processes left behind', _named(results.left_behind)),
-        ('log', str(scratch)),
-    ]  # fmt: skip
-    show(rows)
-    wrong = results.away or results.lost or results.invented or results.left_behind
-    return 1 if wrong else 0
+        results = run_on_two_hosts(chosen, scratch)
+    else:
+        campaign = Campaign(chosen, scratch)
+        results = campaign.results
+        try:
+            campaign.run(chosen.hours * 3600.0)
+        finally:
+            campaign.close()
+    rows = [*results.rows(), ('log', str(scratch))]
+    width = max(len(title) for title, _ in rows)
+    for title, figure in rows:
+        print(f'{title:{width}}  {figure}')
+    return 0 if results.passed() else 1
 
 
-def run_on_two_hosts(chosen: argparse.Namespace, scratch: Path) -> int:
-    """Run the campaign on a failing link, print its table, return the exit code."""
+def run_on_two_hosts(chosen: argparse.Namespace, scratch: Path) -> LinkResults:
+    """Run the campaign on a failing link."""
     seconds, cuts, cut_seconds = (20.0, 0, 0.0) if chosen.quick else (120.0, chosen.cuts, 120.0)
     campaign = LinkCampaign(
         scratch,
@@ -630,18 +642,9 @@ def run_on_two_hosts(chosen: argparse.Namespace, scratch: Path) -> int:
         lambda folder: [event for path in records(folder) for event in _events(path)],
     )
     try:
-        results = campaign.run(seconds, cuts, cut_seconds)
+        return campaign.run(seconds, cuts, cut_seconds)
     finally:
         campaign.close()
-    show([*results.rows(), ('log', str(scratch))])
-    return 0 if results.passed() else 1
-
-
-def show(rows: Sequence[tuple[str, str]]) -> None:
-    """Print a table of two columns."""
-    width = max(len(title) for title, _ in rows)
-    for title, figure in rows:
-        print(f'{title:{width}}  {figure}')
 
 
 def _times(what: Sequence[tuple[str, float]]) -> str:

@@ -75,6 +75,8 @@ WINDOW = 60.0
 """Seconds over which the log lines of a node are counted."""
 FEW = 20
 """How many different values a long array has."""
+STARTED_WITHIN = 120.0
+"""Seconds that a node may take to start, on a busy machine."""
 PATIENCE = 10.0
 """Seconds that a node may take to answer."""
 PACE, ROUNDS = 50, 5
@@ -409,7 +411,7 @@ def fuzz(name: str, count: int, seed: int, most: int, folder: Path, place: Path)
         while report.sent < count and len(report.deaths) < 20:
             process = NodeProcess(name, domain, folder, place)
             try:
-                deadline = time.monotonic() + 20.0
+                deadline = time.monotonic() + STARTED_WITHIN
                 while name not in fuzzer.node.get_node_names():
                     if process.process.poll() is not None or time.monotonic() > deadline:
                         report.deaths.append(f'does not start: {process.tail()}')
