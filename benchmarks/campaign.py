@@ -60,10 +60,13 @@ from surveillance_fsm.ros import ServiceCaller  # noqa: E402
 from surveillance_interfaces.srv import ArmorDirective  # noqa: E402
 from surveillance_runtime.place import read_place_file  # noqa: E402
 from surveillance_runtime.place.regions import Regions  # noqa: E402
+from surveillance_runtime.process import prefer_quick_discovery  # noqa: E402
 from surveillance_runtime.qos import STATE_QOS  # noqa: E402
 from surveillance_runtime.testing import claim_domain  # noqa: E402
 
 PLACES = {'surveillance': 'seven_rooms.yaml', 'patrol': 'patrol_world.yaml'}
+ENVIRON = dict(os.environ)
+"""Of whoever began the campaign: the watcher chooses its own way of discovery later."""
 STARTED = re.compile(r'started (\w+) \(process (\d+)\)')
 STEPS = {
     'noticed': re.compile(r'\| (?:WARN: )?(\w+) died'),
@@ -96,7 +99,7 @@ class Launcher:
     def __init__(
         self, words: Sequence[str], domain: int, log: Path, more: Mapping[str, str]
     ) -> None:
-        environ = {**os.environ, **more, 'ROS_DOMAIN_ID': str(domain)}
+        environ = {**ENVIRON, **more, 'ROS_DOMAIN_ID': str(domain)}
         self.processes: dict[str, int] = {}
         self.steps: defaultdict[str, dict[str, float]] = defaultdict(dict)
         self.folder: Path | None = None
@@ -148,6 +151,7 @@ class Watcher:
     """
 
     def __init__(self, domain: int) -> None:
+        prefer_quick_discovery()
         self.context = rclpy.Context()
         rclpy.init(
             args=['--ros-args', '--log-level', 'fatal'], context=self.context, domain_id=domain
