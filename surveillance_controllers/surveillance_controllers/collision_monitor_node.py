@@ -52,6 +52,15 @@ class MonitorSettings:
     deceleration: float = ROBOT_DECELERATION
     longest_silence: float = STANDSTILL
 
+    @property
+    def reach(self) -> float:
+        """What is kept free around the robot's centre, metres."""
+        return self.radius + self.margin
+
+    def way_to_stand(self, speed: float) -> float:
+        """Return how far the robot goes until it stands, from a speed in m/s; metres."""
+        return abs(speed) * LATENCY + speed**2 / (2.0 * self.deceleration)
+
 
 _SETTINGS = {
     'radius': Described('Radius of the robot, m.', 0.01, 20.0, name='robot_radius'),
@@ -84,14 +93,14 @@ def allowed(wanted: Velocity, seen: Points, settings: MonitorSettings) -> Veloci
     if wanted.speed < 0.0:
         # Seen from behind the robot drives forwards, and turns to the same side.
         curvature = -curvature
-    a, wanted_speed = settings.deceleration, abs(wanted.speed)
-    to_stand = wanted_speed * LATENCY + wanted_speed**2 / (2.0 * a)
-    room = room_ahead(ahead, curvature, settings.radius + settings.margin, to_stand)
-    if room >= to_stand:
+    way = settings.way_to_stand(wanted.speed)
+    room = room_ahead(ahead, curvature, settings.reach, way)
+    if room >= way:
         return wanted
     # Braking begins after the latency.
+    a = settings.deceleration
     speed = math.sqrt((a * LATENCY) ** 2 + 2.0 * a * room) - a * LATENCY
-    share = min(1.0, speed / wanted_speed)
+    share = min(1.0, speed / abs(wanted.speed))
     return Velocity(wanted.speed * share, wanted.turn * share)
 
 
@@ -143,7 +152,11 @@ class CollisionMonitor(PatrolNode):
     def _allowed(self) -> Velocity:
         if self._scan is None:
             return self._wanted  # Nothing was seen yet, so the publisher lets nothing through.
-        velocity = allowed(self._wanted, self._scan.points, self._settings)
+        velocity = self._wanted
+        nearest = float(self._scan.ranges.min()) - math.hypot(*self._scan.mount[:2])
+        # Most of the time nothing is so near that the arc must be looked at.
+        if nearest <= self._settings.reach + self._settings.way_to_stand(velocity.speed):
+            velocity = allowed(velocity, self._scan.points, self._settings)
         held_back = abs(velocity.speed) < 0.5 * abs(self._wanted.speed)
         if held_back and not self._is_held_back:
             self.get_logger().warn('something is in the way: the robot is held back')
