@@ -1,13 +1,13 @@
-"""The part of the manual that follows from the table of directives: ``docs/armor.md``.
+#!/usr/bin/env python3
+"""Write what docs/armor.md says of each directive, between its two marks.
 
-    python -m surveillance_ontology.armor.documentation docs/armor.md
+    .venv/bin/python docs/armor_directives.py
 
-rewrites what stands between the two marks of that file.
+It is made of the table of directives; a test holds that the page is current.
 """
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -15,8 +15,9 @@ from surveillance_ontology.armor.directives import TABLE, Kind
 from surveillance_ontology.armor.protocol import ExitCode
 from surveillance_ontology.armor.rendering import TYPES
 
-BEGIN = '<!-- begin: written by surveillance_ontology.armor.documentation -->'
+BEGIN = '<!-- begin: written by docs/armor_directives.py -->'
 END = '<!-- end -->'
+PAGE = Path(__file__).with_name('armor.md')
 _TITLES = {
     Kind.MANIPULATION: 'Manipulations',
     Kind.CONTROL: 'Applying and reasoning',
@@ -80,9 +81,8 @@ def _table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
 
 
 def main() -> None:
-    """Rewrite the manual that the command line names."""
-    path = Path(sys.argv[1])
-    path.write_text(updated(path.read_text(encoding='utf-8')), encoding='utf-8')
+    """Rewrite the page."""
+    PAGE.write_text(updated(PAGE.read_text(encoding='utf-8')), encoding='utf-8')
 
 
 if __name__ == '__main__':
