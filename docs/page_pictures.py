@@ -21,6 +21,9 @@ from surveillance_runtime.testing import claim_domain  # noqa: E402
 from tests.launcher.conftest import Started  # noqa: E402
 from tests.operator.browser import DESK, PHONE, Viewer  # noqa: E402
 
+WAIT = 600.0
+"""Longest wait for anything to be seen, on a busy machine, seconds."""
+
 
 @contextlib.contextmanager
 def page(behaviour: str, speed: float) -> Iterator[Viewer]:
@@ -31,7 +34,7 @@ def page(behaviour: str, speed: float) -> Iterator[Viewer]:
         words += ['--web-address', '127.0.0.1:0', '-p', 'use_sim_time:=true']
         started = Started([*words, '-p', f'simulator:speed:={speed}'])
         try:
-            viewer = Viewer(started.until(r'the mission is shown at (\S+)', timeout=90)[1])
+            viewer = Viewer(started.until(r'the mission is shown at (\S+)', timeout=WAIT)[1])
             try:
                 yield viewer
             finally:
@@ -44,19 +47,21 @@ def main() -> None:
     """Draw all pictures."""
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / 'docs/images'
     with page('patrol', 1.0) as viewer:
-        viewer.until(lambda: viewer.count('[data-marker]'), 180)
+        viewer.until(lambda: viewer.count('[data-marker]'), WAIT)
         viewer.js("document.querySelector('#camera-section').scrollIntoView()")
-        viewer.until(lambda: viewer.js("return document.querySelector('#camera').naturalWidth"), 60)
+        viewer.until(
+            lambda: viewer.js("return document.querySelector('#camera').naturalWidth"), WAIT
+        )
         viewer.picture(folder / 'page_scan.png', *DESK)
     with page('surveillance', 10.0) as viewer:
-        viewer.until(lambda: viewer.count('[data-place]') == 7, 60)
-        viewer.until(lambda: viewer.text('#decision-line').startswith('decision 20'), 240)
+        viewer.until(lambda: viewer.count('[data-place]') == 7, WAIT)
+        viewer.until(lambda: viewer.text('#decision-line').startswith('decision 20'), WAIT)
         viewer.js("document.querySelector('[data-place=R3]').dispatchEvent(new Event('click'))")
-        viewer.until(lambda: viewer.count('[data-fact]'))
+        viewer.until(lambda: viewer.count('[data-fact]'), WAIT)
         viewer.click('[data-fact] summary')
-        viewer.until(lambda: viewer.count('.proof li'))
+        viewer.until(lambda: viewer.count('.proof li'), WAIT)
         viewer.click('#why-not')
-        viewer.until(lambda: viewer.text('#answer'))
+        viewer.until(lambda: viewer.text('#answer'), WAIT)
         for name, size in (('phone', PHONE), ('desk', DESK)):
             for dark in (False, True):
                 file = folder / f'page_{name}{"_dark" if dark else ""}.png'

@@ -63,33 +63,17 @@ def _decision(snapshot: Snapshot) -> Any:
     decision = snapshot.decision
     if decision is None:
         return None
-    return {
-        'number': snapshot.number,
-        'time': decision.time,
-        'from': decision.from_place,
-        'place': decision.place,
-        'target': decision.target,
-        'rule': decision.rule,
-        'policy': decision.policy,
-        'reason': decision.reason,
-        'scores': [[name, round(value, 3)] for name, value in decision.scores.items()],
-    }
+    scores = [[name, round(value, 3)] for name, value in decision.scores.items()]
+    more = {'number': snapshot.number, 'from': decision.from_place, 'scores': scores}
+    return {**vars(decision), **more}
 
 
 def _status(snapshot: Snapshot) -> Any:
     status = snapshot.status
     if status is None:
         return None
-    return {
-        'machine': status.machine,
-        'state': status.state,
-        'since': status.since,
-        'place': status.place,
-        'whereabouts': status.whereabouts,
-        'help': status.waiting_for_help,
-        'text': status.text,
-        'avoided': list(status.avoided),
-    }
+    more = {'whereabouts': status.whereabouts, 'help': status.waiting_for_help}
+    return {**vars(status), **more}
 
 
 def _places(snapshot: Snapshot) -> Any:
