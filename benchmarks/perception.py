@@ -1,14 +1,16 @@
 """How many markers are found, how exactly and how fast, beside OpenCV's detectors and AprilTag 3.
 
-    python benchmarks/perception.py [--quick] [--photos FOLDER] [--fuzz N] [--picture FILE]
+    python benchmarks/perception.py [--quick] [--photos FOLDER] [--picture FILE]
+    python benchmarks/perception.py --fuzz N | --node N
 
 All detectors get the same images: rendered ones of 640x480 pixels, 60 degrees field of view,
 markers of 0.20 m from DICT_5X5_100, a lens blur of 0.8 pixels and a noise of 2 grey levels, under
 lights from even to hard shadows; natural images without any marker; and real photographs where
-there are
-some (`--photos`, or the environment variable MARKER_PHOTOS: a folder with `markers.json`). Seven
-ids are on the known list; what others find is held against the same list. Times are processor time
-of one thread. `--fuzz` sends that many damaged messages through the conversions and the detector.
+there are some (`--photos`, or the environment variable MARKER_PHOTOS: a folder with
+`markers.json`). Seven ids are on the known list; what others find is held against the same list.
+Times are processor time of one thread. `--fuzz` sends that many damaged messages through the
+conversions and the detector. `--node N` sends N images to the node in a process of its own and
+times its answers.
 `--picture` draws recall over distance and angle.
 """
 
@@ -20,6 +22,7 @@ import json
 import math
 import os
 import resource
+import subprocess
 import sys
 import time
 from collections import defaultdict
@@ -71,6 +74,9 @@ DEGRADED = {
     'noise 20': replace(SHARP, noise=20.0),
     'noise 30': replace(SHARP, noise=30.0),
 }
+TEXTURES = ('clouds', 'bricks', 'boxes', 'letters', 'leaves', 'boards')
+IMAGE_TOPIC, DETECTIONS_TOPIC = 'camera/rgb/image_raw', 'aruco_detector/detections'
+WARM_UP = 10
 DECOYS = ('DICT_4X4_50', 'DICT_6X6_250', 'DICT_APRILTAG_36h11')
 
 Found = list[tuple[int, npt.NDArray[np.float64]]]
@@ -394,6 +400,117 @@ def print_natural(count: int) -> None:
     )
 
 
+def print_times(count: int) -> None:
+    """Processor time of small images, and of large ones in front of textures."""
+    rows = []
+    for title, camera, offset in (
+        ('640x480, indoors', CAMERA, 120),
+        ('1920x1080, textured', CameraModel.from_field_of_view(1920, 1080, 1.2), 400),
+    ):
+        detectors = {'OpenCV': opencv_defaults(), 'here': this_project()}
+        seconds: dict[str, list[float]] = {name: [] for name in detectors}
+        found, shown = dict.fromkeys(detectors, 0), 0
+        for index in range(count):
+            generator = np.random.default_rng([9, index])
+            kind = TEXTURES[index % len(TEXTURES)] if camera is not CAMERA else indoors(generator)
+            ids = generator.choice(sorted(KNOWN), 3, replace=False).tolist()
+            panels = [
+                Panel(
+                    marker_id,
+                    float(generator.uniform(2, 8)),
+                    float(generator.uniform(-1, 1)),
+                    offset=(offset * (place - 1.0), float(generator.uniform(-100, 100))),
+                )
+                for place, marker_id in enumerate(ids)
+            ]
+            ground = backdrop_of(kind, camera, generator)
+            image = image_of(panels, camera, DICTIONARY, ground, SHARP, generator)
+            shown += len(panels)
+            for name, detect in detectors.items():
+                start = time.thread_time()
+                seen = detect(image)
+                seconds[name].append(time.thread_time() - start)
+                found[name] += len({each for each, _ in seen} & set(ids))
+        for name, times in seconds.items():
+            milliseconds = [1e3 * each for each in (np.median(times), np.mean(times))]
+            rows.append(
+                [
+                    title,
+                    name,
+                    f'{found[name]} of {shown}',
+                    *(f'{each:.1f}' for each in milliseconds),
+                ]
+            )
+    print_table(['processor time of an image', '', 'found', 'median ms', 'mean ms'], rows)
+
+
+def processor_time(pid: int) -> float:
+    """Return the processor time of a process so far, seconds."""
+    fields = Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf('SC_CLK_TCK')
+
+
+def print_node(count: int) -> None:
+    """Time from the publication of an image of 640x480 to the message of what it shows."""
+    from surveillance_runtime.testing import claim_domain
+
+    os.environ['ROS_DOMAIN_ID'] = str(claim_domain())
+    import rclpy
+    from rclpy.executors import SingleThreadedExecutor
+    from std_msgs.msg import Header
+
+    from surveillance_interfaces.msg import MarkerDetectionArray
+    from surveillance_perception.conversions import image_to_ros
+
+    generator = np.random.default_rng(8)
+    images = [
+        scene([panel(generator.uniform(2, 9), 30, generator)], indoors(generator), SHARP, generator)
+        for _ in range(20)
+    ]
+    rclpy.init()
+    node = rclpy.create_node('camera')
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    answered: dict[int, float] = {}
+    node.create_subscription(
+        MarkerDetectionArray,
+        DETECTIONS_TOPIC,
+        lambda message: answered.setdefault(message.header.stamp.nanosec, time.perf_counter()),
+        10,
+    )
+    publisher = node.create_publisher(type(image_to_ros(images[0], Header())), IMAGE_TOPIC, 2)
+    command = [sys.executable, '-m', 'surveillance_perception.aruco_detector_node']
+    process = subprocess.Popen([*command, '--ros-args', '-p', 'only_at_rest:=false'])
+    seconds, busy = [], 0.0
+    try:
+        while not publisher.get_subscription_count() or not node.count_publishers(DETECTIONS_TOPIC):
+            executor.spin_once(timeout_sec=0.1)
+        for index in range(count + WARM_UP):
+            message = image_to_ros(images[index % len(images)], Header())
+            message.header.stamp.nanosec = index
+            start = time.perf_counter()
+            publisher.publish(message)
+            while index not in answered and time.perf_counter() < start + 1.0:
+                executor.spin_once(timeout_sec=0.1)
+            if index == WARM_UP - 1:
+                busy = -processor_time(process.pid)
+            if index >= WARM_UP:
+                seconds.append(answered.get(index, math.inf) - start)
+            time.sleep(0.05)
+        busy += processor_time(process.pid)
+    finally:
+        process.terminate()
+        process.wait()
+        executor.shutdown()
+        node.destroy_node()
+        rclpy.try_shutdown()
+    quantiles = np.quantile(seconds, (0.5, 0.95, 0.99), method='higher')
+    figures = [f'{1e3 * each:.1f}' for each in (*quantiles, busy / count)]
+    lost = sum(map(math.isinf, seconds))
+    head = ['image to message, 640x480', 'images', 'lost', 'median ms', '95 %', '99 %', 'CPU ms']
+    print_table(head, [['aruco_detector', str(count), str(lost), *figures]])
+
+
 def print_fuzz(count: int) -> None:
     """Send damaged messages through conversions and detector; whatever escapes ends the program."""
     from surveillance_perception.testing.damaged_messages import damaged, taken
@@ -499,15 +616,20 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument('--picture', type=Path, help='draw recall over distance and angle')
     parser.add_argument('--photos', type=Path, default=os.environ.get('MARKER_PHOTOS'))
     parser.add_argument('--fuzz', type=int, metavar='N', help='damaged messages, and nothing else')
+    parser.add_argument('--node', type=int, metavar='N', help='images to the node, nothing else')
     options = parser.parse_args(argv)
     cv2.setNumThreads(1)
     if options.fuzz is not None:
         print_fuzz(options.fuzz)
         return 0
+    if options.node is not None:
+        print_node(options.node)
+        return 0
     detectors = {'OpenCV': opencv_defaults(), 'here': this_project()}
     samples, degraded_samples, empty = (1, 1, 45) if options.quick else (12, 5, 10_000)
     print(f'OpenCV {cv2.__version__}, {samples} images a cell\n')
 
+    print_times(12 if options.quick else 60)
     print_lights(3 if options.quick else 60)
     print_photos(options.photos)
     print_natural(40 if options.quick else 1500)

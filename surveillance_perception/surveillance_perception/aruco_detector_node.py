@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -111,7 +112,7 @@ class ArucoDetector(PatrolNode):
                 self._stale = False
                 self._adopt()
             try:
-                if self._options.only_at_rest and not self._taken_at_rest(message):
+                if self._options.images.only_at_rest and not self._taken_at_rest(message):
                     self.skipped += 1
                     continue
                 self._look(message)
@@ -139,7 +140,7 @@ class ArucoDetector(PatrolNode):
         return since is not None and Time.from_msg(message.header.stamp) >= since
 
     def _look(self, message: Any) -> None:
-        image = image_from_any(message, self._options.max_pixels)
+        image = image_from_any(message, self._options.images.max_pixels)
         height, width = image.shape[:2]
         sightings, new = self._watch.look(image, self._camera_of(width, height))
         if self._watch.left_out and not self._said_left_out:
@@ -162,7 +163,8 @@ class ArucoDetector(PatrolNode):
     def _camera_of(self, width: int, height: int) -> CameraModel | None:
         """Return the camera that took an image of this size; None when it is not known."""
         if self._undescribed:
-            return CameraModel.from_field_of_view(width, height, self._options.field_of_view)
+            field_of_view = math.radians(self._options.images.field_of_view)
+            return CameraModel.from_field_of_view(width, height, field_of_view)
         if self._described is None:
             return None
         camera = self._described.scaled_to(width, height)

@@ -5,9 +5,11 @@ The way from an image to markers:
 1. `prepare` stretches a dark image and smooths a noisy one.
 2. `dark_masks` and `quads_around` propose quadrilaterals, `BorderCheck` keeps those with a white
    margin, a black border and something inside; `EdgeFit` moves their sides onto the border.
-3. `TemplateFit` compares each with every code of the dictionary through the camera's blur, aligns
-   the likely ones with the image, and tries stronger blur where the fit is poor.
-4. A reading is accepted by its correlation and by its lead over the second best code: a lower lead
+3. `CellDifferences` reads those whose cells are wide enough to show their code, under any light;
+   what such a reading may be wrong is computed.
+4. `TemplateFit` compares what is left with every code of the dictionary through the camera's blur,
+   aligns the likely ones with the image, and tries stronger blur where the fit is poor. Such a
+   reading is accepted by its correlation and by its lead over the second best code: a lower lead
    is enough for an id on the known list than for any other.
 """
 
@@ -41,7 +43,6 @@ from surveillance_perception.detection.preprocessing import PreparedImage, prepa
 from surveillance_perception.detection.template_fit import Indices
 
 _SAME_QUAD = 2.0
-_SAME_MARKER = 0.5
 _LARGE_CELL = 8.0
 _BATCH = 64
 _CAREFUL = 400
@@ -69,7 +70,8 @@ class DetectorSettings:
         bridges: Gaps in pixels that are closed for markers seen at a flat angle.
         contrast: Grey levels by which a border must be darker than its neighbourhood.
         min_length: Longer side in pixels of the smallest marker.
-        max_outlines: Dark outlines after which no further neighbourhood or bridge is tried.
+        max_outlines: Dark outlines after which only those near quadrilaterals are looked at, and
+            no further neighbourhood or bridge is tried.
         max_candidates: Bound of an image's work: quadrilaterals that are read, the likeliest first.
         blur: Standard deviation in pixels of the lens's blur.
         least_correlation: Correlation with the image that a reading needs, 0 to 1.
@@ -276,19 +278,11 @@ class MarkerDetector:
 
 def _best(found: Sequence[Detection]) -> list[Detection]:
     """Return the surest of detections that lie on each other."""
-    if len(found) < 2:
-        return list(found)
-    order = sorted(found, key=lambda detection: -detection.confidence)
-    outlines = np.array([each.corners for each in order])
-    middles = outlines.mean(axis=1)
-    reach = np.linalg.norm(outlines - middles[:, None], axis=2).mean(axis=1)
-    apart = np.linalg.norm(middles[:, None] - middles[None], axis=2)
-    same = apart < _SAME_MARKER * np.minimum(reach[:, None], reach[None])
-    kept: list[int] = []
-    for index in range(len(order)):
-        if not same[index, kept].any():
-            kept.append(index)
-    return [order[index] for index in kept]
+    kept: list[Detection] = []
+    for each in sorted(found, key=lambda detection: -detection.confidence):
+        if not _covered(each.corners[None], kept).any():
+            kept.append(each)
+    return kept
 
 
 def _covered(quads: Quads, found: Sequence[Detection]) -> npt.NDArray[np.bool_]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -16,7 +15,13 @@ from surveillance_runtime.parameters import Described, declare_fields
 
 @dataclass(frozen=True)
 class ImageSettings:
-    """Which images are looked at, and through which lens."""
+    """Which images are looked at, and through which lens.
+
+    Attributes:
+        field_of_view: Horizontal, degrees, of a camera that tells nothing of itself.
+        max_pixels: The largest image that is looked at.
+        only_at_rest: Whether images taken while the arm moves are left out.
+    """
 
     field_of_view: float = 60.0
     max_pixels: int = 20_000_000
@@ -47,7 +52,9 @@ _DETECTOR = {
     'known_lead': Described('Lead over the second best code, known ids.', 1.0, 100.0),
     'unknown_lead': Described('Lead over the second best code, other ids.', 1.0, 100.0),
     'max_outlines': Described(
-        'Dark outlines after which no further neighbourhood or bridge is tried.', 1, 100_000
+        'Outlines after which only near quadrilaterals are looked at, in no further mask.',
+        1,
+        100_000,
     ),
     'max_candidates': Described("Bound of an image's work: outlines that are read.", 1, 100_000),
 }
@@ -76,6 +83,9 @@ class DetectorParameters:
         node: The node.
         changed: Called after each change.
 
+    Attributes:
+        images: Which images are looked at.
+
     Raises:
         ParameterError: A value given at the start is not allowed.
     """
@@ -84,7 +94,7 @@ class DetectorParameters:
         self._changed = changed
         self._detector = DetectorSettings()
         self._watch = StreamSettings()
-        self._images = ImageSettings()
+        self.images = ImageSettings()
         dictionary = node.parameter(
             'marker_dictionary',
             self._detector.dictionary,
@@ -115,26 +125,11 @@ class DetectorParameters:
             node, self._detector, _DETECTOR, on_change=self._set_detector
         )
         self._watch = declare_fields(node, self._watch, _WATCH, on_change=self._set_watch)
-        self._images = declare_fields(node, self._images, _PICTURES, on_change=self._set_images)
+        self.images = declare_fields(node, self.images, _PICTURES, on_change=self._set_images)
 
     def settings(self) -> StreamSettings:
         """Return the settings that the present values make."""
         return replace(self._watch, detector=self._detector)
-
-    @property
-    def field_of_view(self) -> float:
-        """Horizontal field of view of a camera that tells nothing of itself, rad."""
-        return math.radians(self._images.field_of_view)
-
-    @property
-    def max_pixels(self) -> int:
-        """The largest image that is looked at."""
-        return self._images.max_pixels
-
-    @property
-    def only_at_rest(self) -> bool:
-        """Whether images taken while the arm moves are left out."""
-        return self._images.only_at_rest
 
     def _set_detector(self, field: str, value: Any) -> None:
         self._detector = replace(self._detector, **{field: value})
@@ -145,7 +140,7 @@ class DetectorParameters:
         self._changed()
 
     def _set_images(self, field: str, value: Any) -> None:
-        self._images = replace(self._images, **{field: value})
+        self.images = replace(self.images, **{field: value})
         self._changed()
 
     def _problem(self, **changed: Any) -> str | None:

@@ -143,14 +143,6 @@ class TemplateFit:
         order = np.argsort(-correlation, axis=1)
         return listed[rows, order], correlation[rows, order]
 
-    def correlation(self, patches: Patches, entries: Indices, footprint: Footprint) -> Patches:
-        """Correlation (m,) of patches with one code each."""
-        drawn = self._render(entries, footprint)
-        drawn = drawn - drawn.mean(axis=1, keepdims=True)
-        seen = patches - patches.mean(axis=1, keepdims=True)
-        energy = np.square(drawn).sum(axis=1) * np.square(seen).sum(axis=1)
-        return np.asarray((drawn * seen).sum(axis=1) / np.sqrt(np.maximum(energy, 1e-6)))
-
     def inner_correlations(
         self, patches: Patches, entries: Indices, footprint: Footprint
     ) -> Patches:
