@@ -12,7 +12,7 @@ from surveillance_ontology.owl.expressions import Literal
 from surveillance_ontology.owl.vocabulary import OWL, RDF
 
 _ROOT = re.compile(
-    rb'(?:\s|<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^\[>]*(?:\[.*?\]\s*)?>)*'
+    rb'(?>\s|<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^\[>]*(?:\[.*?\]\s*)?>)*+'
     rb'<(?:[\w.-]+:)?Ontology\s[^>]*=\s*["\']http://www\.w3\.org/2002/07/owl#["\'][^>]*>',
     re.DOTALL,
 )

@@ -1,4 +1,8 @@
-"""Reading an ontology document into axioms, with exact datatypes and the place of every error."""
+"""Reading an ontology document into axioms, with exact datatypes and the place of every error.
+
+pyoxigraph reads Turtle, N-Triples and JSON-LD. What XML and the functional syntax say is read by
+this package, so that errors name their place also where the syntax is good and the OWL is not.
+"""
 
 from __future__ import annotations
 
@@ -11,13 +15,13 @@ from urllib.parse import unquote, urlsplit
 from surveillance_ontology.documents.functional_syntax import is_functional, parse_functional
 from surveillance_ontology.documents.mapping import Mapping
 from surveillance_ontology.documents.owl_xml import is_owl_xml, parse_owl_xml
-from surveillance_ontology.documents.rdf_text import parse_rdf_text
-from surveillance_ontology.documents.rdf_xml import Graph, parse_rdf_xml
+from surveillance_ontology.documents.rdf_xml import Graph, Node, parse_rdf_xml
 from surveillance_ontology.documents.structural import Axioms
 from surveillance_ontology.documents.xml_reading import OntologyFileError
 from surveillance_ontology.memory import uncollected
 from surveillance_ontology.owl.axioms import Axiom, Import
-from surveillance_ontology.owl.vocabulary import local_name
+from surveillance_ontology.owl.expressions import Literal
+from surveillance_ontology.owl.vocabulary import RDF, local_name
 
 _BOMS = {
     codecs.BOM_UTF32_LE: 'utf-32',
@@ -35,6 +39,8 @@ _TRIPLE = re.compile(
     rb'(?:<[^\s<>]*>|_:[^\s<]+)\s*<[^\s<>]*>[^\n]*\.[ \t\r]*(?:#.*)?$', re.MULTILINE
 )
 _TURTLE = re.compile(rb'@(?:prefix|base)\b|(?:prefix|base)\s|<|_:|\[|\(', re.IGNORECASE)
+_PARSER_PLACE = re.compile(r'Parser error (?:at|between) line [\w ]*: ')
+_NAMES = {'turtle': 'Turtle', 'ntriples': 'N-Triples', 'jsonld': 'JSON-LD'}
 FORMATS = 'RDF/XML, OWL/XML, Turtle, N-Triples, JSON-LD or OWL functional syntax'
 _ENDINGS = ('.owl', '.rdf', '.ttl', '.ofn', '.owx', '.xml', '.nt', '.jsonld')
 DEFAULT_SIZE_LIMIT = 256 * 1024 * 1024
@@ -161,15 +167,15 @@ def _parsed(data: bytes, iri: str) -> OntologyDocument:
     if is_functional(data):
         return _stated(parse_functional(_text(data)), 'functional')
     if _TRIPLE.match(data, place):
-        return _mapped(parse_rdf_text(data, iri, 'ntriples'), 'ntriples')
+        return _mapped(_rdf_text(data, iri, 'ntriples'), 'ntriples')
     if _XML.match(data, place):
         if is_owl_xml(data):
             return _stated(parse_owl_xml(data, iri), 'owlxml')
         return _mapped(parse_rdf_xml(data, iri), 'rdfxml')
     if _JSON.match(data, place):
-        return _mapped(parse_rdf_text(data, iri, 'jsonld'), 'jsonld')
+        return _mapped(_rdf_text(data, iri, 'jsonld'), 'jsonld')
     if _TURTLE.match(data, place):
-        return _mapped(parse_rdf_text(data, iri, 'turtle'), 'turtle')
+        return _mapped(_rdf_text(data, iri, 'turtle'), 'turtle')
     shown = data[place : place + 40].decode('latin-1')
     raise OntologyFileError(
         f'expected {FORMATS}, got {shown!r}', data.count(b'\n', 0, place) + 1, 1
@@ -193,3 +199,55 @@ def _mapped(graph: Graph, form: str) -> OntologyDocument:
     return OntologyDocument(
         list(mapping.axioms), mapping.unsupported, form, mapping.iri, graph.prefixes
     )
+
+
+def _rdf_text(data: bytes, iri: str, form: str) -> Graph:
+    """Parse a document; the graph knows no places.
+
+    Args:
+        data: The document.
+        iri: Base for relative IRIs where the document gives none.
+        form: 'turtle', 'ntriples' or 'jsonld'.
+
+    Raises:
+        OntologyFileError: Not of that format, or with statements that are no plain triples.
+    """
+    # Late: a server that starts again is to be back at once.
+    import pyoxigraph
+
+    source = {
+        'turtle': pyoxigraph.RdfFormat.TURTLE,
+        'ntriples': pyoxigraph.RdfFormat.N_TRIPLES,
+        'jsonld': pyoxigraph.RdfFormat.JSON_LD,
+    }[form]
+    graph = Graph()
+    try:
+        # N-Triples hold what SAVE writes: names that are no IRIs, too.
+        lenient = form == 'ntriples'
+        base = None if lenient else iri
+        for quad in pyoxigraph.parse(data, format=source, base_iri=base, lenient=lenient):
+            if quad.graph_name != pyoxigraph.DefaultGraph():
+                raise OntologyFileError('named graphs are not read')
+            node = quad.object
+            if isinstance(node, pyoxigraph.Triple):
+                raise OntologyFileError('triples about triples (RDF 1.2) are not read')
+            value: Node
+            if not isinstance(node, pyoxigraph.Literal):
+                value = _name(node)
+            elif node.language:
+                value = Literal(node.value, RDF + 'langString', node.language.lower())
+            else:
+                value = Literal(node.value, node.datatype.value)
+            graph.triples.append((_name(quad.subject), quad.predicate.value, value))
+    except SyntaxError as error:
+        message = _PARSER_PLACE.sub('', str(error.msg), count=1)
+        place = error.lineno or 0, error.offset or 0
+        raise OntologyFileError(f'not {_NAMES[form]}: {message}', *place) from None
+    if not graph.triples:
+        raise OntologyFileError(f'not {_NAMES[form]}: it states nothing')
+    return graph
+
+
+def _name(node: object) -> str:
+    text = str(node)
+    return text if text.startswith('_:') else text[1:-1]
