@@ -85,6 +85,11 @@ class JavaReasoner:
             raise JavaReasonerError(answer.removeprefix('error ') or 'the JVM ended')
         return answer
 
+    def cpu_seconds(self) -> float:
+        """Return the processor time that the JVM took so far (Linux)."""
+        fields = Path(f'/proc/{self._process.pid}/stat').read_text().rpartition(')')[2].split()
+        return (int(fields[11]) + int(fields[12])) / os.sysconf('SC_CLK_TCK')
+
     def close(self) -> None:
         """End the JVM."""
         self._process.kill()
