@@ -18,7 +18,7 @@ from collections import deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeGuard
 
 from surveillance_ontology.owl.axiom_text import axiom_text
 from surveillance_ontology.owl.axioms import Axiom
@@ -98,13 +98,15 @@ class Context:
         tokens: All tokens, the core included.
         clash: Whether there can be no such individual.
         edges, values: What it must be related to.
+        names: The individuals that it is.
+        unclosed, unrelated: Tokens whose consequences are not drawn yet.
         derived: Tokens found by rules, whether the core had them already or not.
         users: Contexts with an edge to this one, or that wait for its clash.
     """
 
     __slots__ = (
-        *('bare', 'clash', 'core', 'derived', 'done'),
-        *('edges', 'loops', 'tokens', 'users', 'values'),
+        *('bare', 'clash', 'core', 'derived', 'done', 'edges', 'loops', 'names'),
+        *('tokens', 'unclosed', 'unrelated', 'users', 'values'),
     )
 
     def __init__(self, core: Tokens, bare: bool) -> None:
@@ -117,6 +119,9 @@ class Context:
         self.loops: set[Role] = set()
         self.users: dict[Context, None] = {}
         self.done: set[object] = set()
+        self.names = [token[1] for token in core if _is_name(token)]
+        self.unclosed: list[Token] = list(core)
+        self.unrelated: list[Token] = list(core)
 
 
 class _Body:
@@ -404,7 +409,7 @@ class Contexts:
                 for prop in held.props:
                     yield PredicateAtom(prop, (0, Constant(value, True)))
         for edge in context.edges:
-            for name in _names(edge.target):
+            for name in edge.target.names:
                 for predicate, backwards in edge.roles:
                     terms = (Constant(name), 0) if backwards else (0, Constant(name))
                     yield PredicateAtom(predicate, terms)
@@ -413,12 +418,12 @@ class Contexts:
     def _about_named(self, context: Context) -> Iterator[HeadAtom]:
         """Yield what named individuals are because of individuals that must exist."""
         for one in closure(context, lambda one: [edge.target for edge in one.edges]):
-            for name in _names(one):
+            for name in one.names:
                 for token in one.tokens:
                     if isinstance(token, Predicate):
                         yield PredicateAtom(token, (Constant(name),))
                 for edge in one.edges:
-                    for other in _names(edge.target):
+                    for other in edge.target.names:
                         for predicate, backwards in edge.roles:
                             pair = Constant(name), Constant(other)
                             yield PredicateAtom(predicate, pair[::-1] if backwards else pair)
@@ -470,6 +475,10 @@ class Contexts:
         context.derived.add(token)
         if token not in context.tokens:
             context.tokens.add(token)
+            context.unclosed.append(token)
+            context.unrelated.append(token)
+            if _is_name(token):
+                context.names.append(token[1])
             self._changed = True
 
     def _close(self, context: Context) -> None:
@@ -482,24 +491,19 @@ class Contexts:
                 self._clash(context)
             elif token not in tokens:
                 self._add(context, token)
-        pending = [token for token in tokens if ('closed', token) not in context.done]
-        while pending:
-            one = pending.pop()
-            context.done.add(('closed', one))
+        while context.unclosed:
+            one = context.unclosed.pop()
             for body, token in self._class_rules.get(one, ()):
                 if (token is None or token not in tokens) and body <= tokens:
                     if token is None:
                         self._clash(context)
                         return
                     self._add(context, token)
-                    pending.append(token)
 
     def _relate(self, context: Context) -> None:
         """Add the edges and values that the tokens require."""
-        for token in tuple(context.tokens):
-            if ('related', token) in context.done:
-                continue
-            context.done.add(('related', token))
+        while context.unrelated:
+            token = context.unrelated.pop()
             if isinstance(token, Predicate):
                 for existential in self._existentials.get(token, ()):
                     filler = existential.filler
@@ -545,7 +549,7 @@ class Contexts:
                 if rule.xs <= tokens and rule.ys <= edge.target.tokens:
                     if rule.roles <= edge.roles:
                         self._fire(context, edge, rule)
-                elif rule.xs <= tokens and _names(edge.target):
+                elif rule.xs <= tokens and edge.target.names:
                     self._gap(context, rule.origin, _NOMINALS)
         self._join_parent(context, edge)
 
@@ -566,10 +570,10 @@ class Contexts:
     def _join_parent(self, context: Context, edge: _Edge) -> None:
         """Where the other end may have one such neighbour only, and this is it."""
         target = edge.target
-        if not target.edges and not _names(target):
+        if not target.edges and not target.names:
             return
         back = {turned(role) for role in edge.roles}
-        named = bool(_names(target))
+        named = bool(target.names)
         for condition in self._at_most:
             role = (condition.prop, condition.inverse)
             if role not in back:
@@ -633,11 +637,11 @@ class Contexts:
                     self._unite(context, counted[0], other)
                 if any(edge.count > 1 for edge in counted):
                     self._clash(context)
-        named = [edge for edge in context.edges if _names(edge.target)]
+        named = [edge for edge in context.edges if edge.target.names]
         if any(edge.count > 1 for edge in named):
             self._clash(context)
         for one, other in combinations(named, 2):
-            shared = set(_names(one.target)) & set(_names(other.target))
+            shared = set(one.target.names) & set(other.target.names)
             if shared and one in context.edges and other in context.edges:
                 self._unite(context, one, other)
 
@@ -821,8 +825,8 @@ def _holds(token: Any, tokens: set[Token]) -> bool:
     return token is None or token in tokens
 
 
-def _names(context: Context) -> list[str]:
-    return [token[1] for token in context.tokens if isinstance(token, tuple) and token[0] == 'is']
+def _is_name(token: Token) -> TypeGuard[tuple[Any, ...]]:
+    return isinstance(token, tuple) and token[0] == 'is'
 
 
 def _is_redundant(edge: _Edge, others: list[_Edge]) -> bool:
