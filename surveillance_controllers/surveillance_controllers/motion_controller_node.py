@@ -46,7 +46,9 @@ class MotionController(PatrolNode):
         self._settings = motion_settings(self)
         self._draw = stimuli.generator(self._settings.random_seed)
         self._knowledge = MapKnowledge(self, self._settings.peer_timeout)
-        self._requests: RequestQueue[tuple[float, float]] = RequestQueue(self._announce)
+        self._requests: RequestQueue[tuple[float, float]] = RequestQueue(
+            lambda text: self._console.announce(text)
+        )
         self._console = CommandConsole(self, MOTION, self._carry_out, lambda: self._requests.status)
         localises = self._mode == 'SIMULATED' and self._settings.navigator == 'own'
         start = None if localises else self._settings.robot_room
@@ -79,9 +81,6 @@ class MotionController(PatrolNode):
             robot = robot_settings(self, settings)
             motion = NavigationMotion(self, robot, self._knowledge, self._recorder)
         return motion if settings.docking == 'none' else DockingMotion(self, motion, settings)
-
-    def _announce(self, text: str) -> None:
-        self._console.announce(text)
 
     def _carry_out(self, command: ParsedCommand) -> str:
         seconds, delta = command.values

@@ -45,7 +45,9 @@ class PlannerController(PatrolNode):
         self._settings = planner_settings(self)
         self._draw = stimuli.generator(self._settings.random_seed)
         self._knowledge = MapKnowledge(self, self._settings.peer_timeout)
-        self._requests: RequestQueue[tuple[Point3, ...]] = RequestQueue(self._announce)
+        self._requests: RequestQueue[tuple[Point3, ...]] = RequestQueue(
+            lambda text: self._console.announce(text)
+        )
         self._console = CommandConsole(
             self, PLANNER, self._carry_out, lambda: self._requests.status
         )
@@ -62,9 +64,6 @@ class PlannerController(PatrolNode):
         self.get_logger().info(f'{self._mode} mode')
         if self._mode == 'MANUAL' and self._settings.console:
             self._console.open(console_source)
-
-    def _announce(self, text: str) -> None:
-        self._console.announce(text)
 
     def _carry_out(self, command: ParsedCommand) -> str:
         (points,) = command.values

@@ -35,6 +35,9 @@ class MapPlanner:
         node: The planner's node.
         parameters: The robot's size, margins and costs.
         doors: Which doors there are, and which are closed.
+
+    Attributes:
+        pose: Where the robot is, as the motion controller says; None until it does.
     """
 
     def __init__(self, node: PatrolNode, parameters: PlanningParameters, doors: DoorWatch) -> None:
@@ -45,15 +48,10 @@ class MapPlanner:
         self._has_map = Interrupt()
         self._planner: GridPlanner | None = None
         self._obstacles: Points = np.zeros((0, 2))
-        self._pose: Pose | None = None
+        self.pose: Pose | None = None
         node.create_subscription(OccupancyGrid, 'map', self._on_map, STATE_QOS)
         node.create_subscription(PointCloud2, 'obstacles', self._on_obstacles, STATE_QOS)
         node.create_subscription(PoseWithCovarianceStamped, 'amcl_pose', self._on_pose, STATE_QOS)
-
-    @property
-    def pose(self) -> Pose | None:
-        """Where the robot is, as the motion controller says; None until it does."""
-        return self._pose
 
     def plan(self, start: Points, goal: Points, timeout: float, interrupt: Interrupt) -> Points:
         """Find the path between two points, shape (3,) each, metres.
@@ -102,7 +100,7 @@ class MapPlanner:
 
     def _on_pose(self, message: PoseWithCovarianceStamped) -> None:
         try:
-            self._pose = conversions.pose_from(message.pose.pose)
+            self.pose = conversions.pose_from(message.pose.pose)
         except ValueError as error:
             self._node.get_logger().error(f'amcl_pose: {error}')
 
