@@ -5,13 +5,13 @@ The rules hold the robot to URGENT places while there are any within reach, and 
 may be entered only when it is URGENT waits for the threshold and the leg to it. It need not be
 reachable.
 
-`rule_bound` searches through all ways on, on maps of up to `TABLE_UP_TO` places: can a robot that
-obeys go on for ever with no wait above a limit? A depth-first search answers that. A state is a
-place, and how long ago each place was visited. A state is dead when the places that are due cannot
-all be reached in time, or when all that follow from it are dead; one that comes back to itself goes
-on for ever. What is due in time is known exactly: a table has the shortest way through each set of
-places. The search begins anywhere, with any past: until a place was visited it may be URGENT or
-not. The limit is raised as long as that is proven impossible.
+`rule_bound` searches through all ways on, on maps whose core has at most `CORE_UP_TO` places (the
+core is what is left when dead ends are cut off until there are none): can a robot that obeys go on
+for ever with no wait above a limit? A depth-first search answers that. A state is a place, and how
+long ago each place was visited. A state is dead when the places that are due cannot all be reached
+in time (see `Covers`), or when all that follow from it are dead; one that comes back to itself goes
+on for ever. The search begins anywhere, with any past: until a place was visited it may be URGENT
+or not. The limit is raised as long as that is proven impossible.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ from numpy.typing import NDArray
 from surveillance_behaviour.policy.graph import PatrolGraph
 from surveillance_behaviour.policy.rollout import RuleMap
 
-TABLE_UP_TO = 20
-"""The largest map that is searched, in places: its table takes 84 MB and 4 s."""
+CORE_UP_TO = 20
+"""The largest core of a map that is searched, in places: its table takes 84 MB and 4 s."""
 STATES = 100_000
 """How many states the search may visit in all; about 50 microseconds each."""
 TICKS = 1000
@@ -84,9 +84,10 @@ def rule_bound(
         states: How many states may be visited in all.
     """
     low, high = simple_bound(graph, threshold, ranks), math.inf
-    if len(graph.places) > TABLE_UP_TO:
+    covers = covers_of(graph)
+    if len(covers.core) > CORE_UP_TO:
         return RuleBound(low)
-    search = _Search(RuleMap(graph, threshold, ranks or default_ranks(graph), 0), states)
+    search = _Search(RuleMap(graph, threshold, ranks or default_ranks(graph), 0), covers, states)
     step = 0.9 * precision
     while high > low * (1.0 + precision):
         limit = min(low * (1.0 + step), (low + high) / 2.0)
@@ -105,17 +106,18 @@ class _Search:
 
     Args:
         rules: The map.
+        covers: What is due in time there.
         states: How many states may be visited, over all questions.
     """
 
-    def __init__(self, rules: RuleMap, states: int) -> None:
+    def __init__(self, rules: RuleMap, covers: Covers, states: int) -> None:
         self._rules, self._left = rules, states
         self._legs = [
             [(other, round(TICKS * seconds)) for other, seconds in ways.items()]
             for ways in rules.legs
         ]
         self._threshold = round(TICKS * rules.threshold)
-        self._cover = _shortest_covers(rules.graph)
+        self._covers = covers
 
     def goes_on(self, limit: float) -> bool | None:
         """Return whether it can; None: the states did not suffice to find out."""
@@ -138,7 +140,7 @@ class _Search:
             following = _after(state, place, ticks)
             if following in on_path and following[1] == everywhere:
                 return True
-            if following in dead or not self._in_time(following, longest):
+            if following in dead or not self._covers.in_time(following, longest):
                 continue
             self._left -= 1
             if self._left < 0:
@@ -161,16 +163,6 @@ class _Search:
         moves = [(other, ticks) for best, other, ticks in allowed if best <= least]
         return sorted(moves, key=lambda move: ages[move[0]])
 
-    def _in_time(self, state: State, longest: int) -> bool:
-        """Whether the places that are due before any moment can be visited by then."""
-        place, _, ages = state
-        covers, due = self._cover[place], 0
-        for age, other in sorted(zip(ages, range(len(ages)), strict=True), reverse=True):
-            due |= 1 << other
-            if covers[due] > longest - age:
-                return False
-        return True
-
 
 def _after(state: State, place: int, ticks: int) -> State:
     """Return the state after a leg to a place."""
@@ -180,15 +172,83 @@ def _after(state: State, place: int, ticks: int) -> State:
     return place, met | 1 << place, tuple(now)
 
 
+class Covers:
+    """How long a robot needs at least to visit a set of places.
+
+    The ways in the core are known exactly, from a table of the shortest way from each place of it
+    through each set. What hangs on the core are trees: each leg of theirs that leads to a place of
+    the set is driven in both directions, but for those on the way from where the robot is, and on
+    the way back from where it ends; of the latter the longest is taken off, so that it stays a
+    lower bound.
+
+    Args:
+        graph: The map.
+
+    Attributes:
+        core: The places of the core, as indices of the graph's.
+    """
+
+    def __init__(self, graph: PatrolGraph) -> None:
+        ticks = np.maximum(np.floor(TICKS * graph.distances).astype(np.int32) - 1, 0)
+        ways = {place: set(graph.legs[place]) for place in graph.places}
+        removed = []
+        while ends := [place for place, others in ways.items() if len(others) == 1]:
+            place = ends[0]
+            (parent,) = ways.pop(place)
+            ways[parent].discard(place)
+            removed.append((graph.index[place], graph.index[parent]))
+        self.core = [graph.index[place] for place in ways]
+        count = len(graph.places)
+        self._bits = [0] * count
+        self._rows = [0] * count
+        for row, place in enumerate(self.core):
+            self._bits[place], self._rows[place] = 1 << row, row
+        # For each place, the way up to the core: the places whose legs towards it are driven.
+        self._up: list[tuple[int, ...]] = [()] * count
+        self._there, self._back, self._ends = [0] * count, [0] * count, [0] * count
+        for place, parent in reversed(removed):
+            self._bits[place], self._rows[place] = self._bits[parent], self._rows[parent]
+            self._up[place] = (place, *self._up[parent])
+            self._there[place] = int(ticks[parent, place])
+            self._back[place] = int(ticks[place, parent])
+            self._ends[place] = self._ends[parent] + self._back[place]
+        if len(self.core) <= CORE_UP_TO:
+            self._table = _shortest_covers(ticks[np.ix_(self.core, self.core)])
+
+    def in_time(self, state: State, longest: int) -> bool:
+        """Return whether the places that are due before any moment can be visited by then."""
+        place, _, ages = state
+        table, here = self._table[self._rows[place]], set(self._up[place])
+        due, hanging, saved = 0, sum(self._back[leg] for leg in here), 0
+        driven: set[int] = set()
+        for age, other in sorted(zip(ages, range(len(ages)), strict=True), reverse=True):
+            due |= self._bits[other]
+            saved = max(saved, self._ends[other])
+            for leg in self._up[other]:
+                if leg in driven:
+                    break
+                driven.add(leg)
+                hanging += 0 if leg in here else self._there[leg] + self._back[leg]
+            if int(table[due]) + hanging - saved > longest - age:
+                return False
+        return True
+
+
 @lru_cache(maxsize=1)
-def _shortest_covers(graph: PatrolGraph) -> NDArray[np.int32]:
+def covers_of(graph: PatrolGraph) -> Covers:
+    """Return the covers of a map, which serve for all thresholds."""
+    return Covers(graph)
+
+
+def _shortest_covers(ticks: NDArray[np.int32]) -> NDArray[np.int32]:
     """Return the ticks of the shortest way from each place through each set, shape (n, 2 ** n).
 
-    Sets are bit masks. Held and Karp's dynamic programme over the size of the set; rounded down,
-    so that a bound stays one.
+    Sets are bit masks. Held and Karp's dynamic programme over the size of the set.
+
+    Args:
+        ticks: From each place to each other, shape (n, n).
     """
-    count = len(graph.places)
-    ticks = np.maximum(np.floor(TICKS * graph.distances).astype(np.int32) - 1, 0)
+    count = len(ticks)
     sets = np.arange(1 << count)
     sizes = np.array([(sets >> place) & 1 for place in range(count)]).sum(axis=0)
     cover = np.full((count, 1 << count), np.iinfo(np.int32).max, np.int32)

@@ -29,7 +29,7 @@ def at_start(graph: PatrolGraph) -> State:
 
 def test_the_shortest_lawful_round_of_a_grid_is_found() -> None:
     graph = grid(3, 3)
-    search = RoundSearch(rules_of(graph, 0.1 * graph.tour.length), [graph.tour.order])
+    search = RoundSearch(rules_of(graph, 0.1 * graph.tour.length), [[graph.tour.order]])
     search.improve(200_000.0)
     assert not search.best.breaches
     assert search.best.length == pytest.approx(1.2 * graph.tour.length)
@@ -39,7 +39,7 @@ def test_the_shortest_lawful_round_of_a_grid_is_found() -> None:
 @given(graphs(), st.floats(0.1, 2.0))
 def test_a_round_visits_every_place_in_its_length(graph: PatrolGraph, factor: float) -> None:
     rules = rules_of(graph, factor * graph.tour.length)
-    search = RoundSearch(rules, [graph.tour.order])
+    search = RoundSearch(rules, [[graph.tour.order]])
     search.improve(5_000.0)
     assert set(search.best.targets) == set(range(len(graph.places)))
     walked = rules.length(search.best.targets)

@@ -19,7 +19,7 @@ from __future__ import annotations
 import math
 import random
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from copy import copy
 from dataclasses import dataclass, replace
 
@@ -40,10 +40,12 @@ from surveillance_behaviour.policy.world import World
 
 FIRST_WORK, MORE_WORK, ALL_WORK = 360_000.0, 2_000.0, 20e6
 """Work before the first choice of a plan, at each later one, in all: about microseconds."""
-FULL_UP_TO = 150.0
+FULL_UP_TO = 100.0
 """Larger maps, in places, have less work before the first choice: knowing them takes its time."""
 FIRST_SECONDS, MORE_SECONDS = 0.4, 0.004
 """Time of the processor for the first two at most."""
+MOST_WORK = 6_000.0
+"""Work of simulations at one later choice at most; larger maps keep the first course."""
 WARM_WORK = 50_000.0
 """Work before the first choice of a plan that takes the place of another."""
 SLICE_WORK = 500.0
@@ -58,8 +60,6 @@ GOOD_ENOUGH = 1.004
 """A longest wait of so many bounds is not improved any further."""
 ACCEPTED = 1.04
 """A wait from visit to visit of so many bounds is accepted for shorter first waits."""
-SKIPS = (0.0, 0.3, 0.6)
-"""Targets visited more lately than this may be skipped, in lengths of the round."""
 SIMPLE: tuple[Choice, ...] = (oldest, lookahead)
 """The simple policies that a plan is never worse than."""
 SIMPLE_UP_TO = 200
@@ -138,7 +138,7 @@ class Plan:
         self._key = world.threshold, world.rules
         self._rules = rules = rule_map(world)
         self._draw = random.Random(0)
-        self._work, self._sent = 0.0, -1
+        self._work, self._spared, self._sent = 0.0, 0.0, -1
         met = before._state.met if before else [False] * rules.count
         self._state = State(world.graph.index[world.place], world.now, [], met)
         self._observe(world)
@@ -222,26 +222,36 @@ class Plan:
         simple = SIMPLE if rules.count <= SIMPLE_UP_TO else ()
         walks = [roll_out(rules, choose, self._state, self._horizon) for choose in simple]
         self._simple = min((walk.settled for walk in walks), default=math.inf)
-        laps = [lap for walk in walks for lap in rules.laps(walk.walk)]
-        self._search = RoundSearch(rules, [tour, tour[::-1], *laps])
+        starts = [[tour, tour[::-1]]]
+        if rules.length(tour) > rules.least_period:  # Else they wait by walking more.
+            starts += filter(None, ([*rules.laps(walk.walk)] for walk in walks))
+        self._search = RoundSearch(rules, starts)
         self._search_on(work / 2.0, began + FIRST_SECONDS / 2.0)
         self._course = self._entered(self._phases()[0])
         self._outcome = self._followed(self._course, math.inf)
-        self._climb(self._first_courses(walks), work / 2.0, began + FIRST_SECONDS)
+        work -= self._search.work
+        phases = [*self._phases(), *range(len(self._search.best.targets))]
+        self._climb(map(self._entered, phases), work, began + FIRST_SECONDS)
+        for walk in walks:
+            if (back := walk.repeated_from(rules.count)) is not None:
+                self._try(Course(tuple(walk.walk), back, patience=math.inf))
 
     def _think(self) -> None:
         """Go on with the search from where the robot is."""
-        deadline = time.thread_time() + MORE_SECONDS
         if self._state.place == self._sent and self._finished():
             return
-        if 3.0 * MOVE_WORK * len(self._outcome.walk) > MORE_WORK:
-            return  # A simulation does not fit into one choice.
+        deadline = time.thread_time() + MORE_SECONDS
         self._search_on(MORE_WORK / 2.0, deadline - MORE_SECONDS / 2.0)
+        # The present course and two others are simulated, as soon as there was the time for that.
+        self._spared += MORE_WORK / 2.0
+        needed = 3.0 * MOVE_WORK * len(self._outcome.walk)
+        if needed > min(self._spared, MOST_WORK):
+            return
         self._course = self._course.seen_from(self._state.position)
         self._state.position = 0
         self._outcome = self._followed(self._course, math.inf)
-        entries = (self._entered(phase) for phase in self._phases())
-        self._climb(entries, MORE_WORK / 2.0, deadline)
+        self._climb(map(self._entered, self._phases()), self._spared, deadline)
+        self._spared = 0.0
 
     def _finished(self) -> bool:
         """Return whether no better course is looked for."""
@@ -263,10 +273,14 @@ class Plan:
             if course is None:
                 self._work += MOVE_WORK
                 continue
-            outcome = self._followed(course, 1.01 * self._outcome.settled)
-            if self._grade(outcome) < self._grade(self._outcome):
-                self._course, self._outcome = course, outcome
-                self._state.position = 0
+            self._try(course)
+
+    def _try(self, course: Course) -> None:
+        """Take a course if it is better from here."""
+        outcome = self._followed(course, 1.01 * self._outcome.settled)
+        if self._grade(outcome) < self._grade(self._outcome):
+            self._course, self._outcome = course, outcome
+            self._state.position = 0
 
     def _followed(self, course: Course, stop: float) -> Outcome:
         """Return what a course comes to from here."""
@@ -299,26 +313,6 @@ class Plan:
         phases = [k for k in range(len(targets)) if targets[k - 1] == self._state.place]
         return [*phases, targets.index(min(range(len(seen)), key=seen.__getitem__))]
 
-    def _first_courses(self, walks: Sequence[Outcome]) -> Iterator[Course]:
-        """Yield the courses to begin with."""
-        for phase in self._phases():
-            yield self._entered(phase)
-        for walk in walks:
-            if (back := walk.back_or_last_lap(self._rules.count)) is not None:
-                yield Course(tuple(walk.walk), back, patience=math.inf)
-        best = self._course
-        for skip in SKIPS:
-            for patience in (0.0, best.patience, math.inf):
-                yield replace(best, skip=skip * self._bound, patience=patience)
-        for walk in walks:
-            if walk.covered:
-                way = tuple(walk.walk[: walk.covered])
-                for phase in range(len(self._search.best.targets)):
-                    entered = self._entered(phase)
-                    yield replace(entered, targets=way + entered.targets, back=len(way))
-        for phase in range(len(self._search.best.targets)):
-            yield self._entered(phase)
-
     def _neighbour(self) -> Course | None:
         """Return the course with one to three random changes; None: it would become too long."""
         course: Course | None = self._course
@@ -336,13 +330,6 @@ class Plan:
         if choice < 0.2:
             return replace(course, patience=draw.random() ** 2 * self._bound)
         way, targets = course.targets[: course.back], course.targets[course.back :]
-        if way and choice < 0.6:
-            start = draw.randrange(len(way))
-            way, moved = way[:start] + way[start + 1 :], way[start]
-            if draw.random() < 0.5:
-                where = draw.randint(0, len(way))
-                way = (*way[:where], moved, *way[where:])
-            return replace(course, targets=way + targets, back=len(way))
         limit = 1.1 * min(self._outcome.settled, 1.5 * self._bound)
         changed = RoundChanges(self._rules, Round(targets, 0.0), draw).one(limit)
         return replace(course, targets=way + changed) if changed else None

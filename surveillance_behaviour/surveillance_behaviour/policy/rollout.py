@@ -134,15 +134,13 @@ class RuleMap:
 
     def laps(self, walk: Sequence[int]) -> Iterator[tuple[int, ...]]:
         """Yield the stretches at the end of a walk that visit every place, as targets."""
-        last: dict[int, int] = {}
-        begun = -1
-        for step, place in enumerate(walk[-4 * self.count :]):
+        end, last, begun = walk[-4 * self.count :], dict[int, int](), -1
+        for step, place in enumerate(end):
             last[place] = step
             start = min(last.values())
             if len(last) == self.count and start > begun:
                 begun = start
-                lap = walk[-4 * self.count :][start : step + 1]
-                yield tuple(lap)
+                yield tuple(end[start : step + 1])
 
     def allowed(self, state: State) -> list[int]:
         """Return the neighbours that the rules allow; empty: there are none at all."""
@@ -214,21 +212,19 @@ class Outcome:
         first: The longest wait, that before a place's first visit included, seconds.
         walk: The places that were entered.
         back: From where on the walk repeats itself; None: that was not found.
-        covered: How many moves it took until every place was visited; None: never.
     """
 
     settled: float
     first: float
     walk: Sequence[int] = field(default=(), compare=False)
     back: int | None = field(default=None, compare=False)
-    covered: int | None = field(default=None, compare=False)
 
-    def back_or_last_lap(self, count: int) -> int | None:
+    def repeated_from(self, count: int) -> int | None:
         """Return from where on the walk may be repeated; None: it does not visit all places."""
-        if self.back is not None:
-            return self.back
         last = {place: step for step, place in enumerate(self.walk)}
-        return min(last.values()) if len(last) == count else None
+        if self.back is not None or len(last) < count:
+            return self.back
+        return min(last.values())
 
 
 def roll_out(
@@ -254,8 +250,6 @@ def roll_out(
     end = at.now + horizon
     settled = first = 0.0
     walk: list[int] = []
-    unmet = rules.count - sum(met)
-    covered = None if unmet else 0
     anchor = min(range(rules.count), key=lambda place: len(legs[place]))
     states: dict[tuple[float, ...], int] = {}
     back = None
@@ -272,9 +266,6 @@ def roll_out(
         else:
             met[place] = True
             first = max(first, wait)
-            unmet -= 1
-            if not unmet:
-                covered = len(walk)
         if place == anchor:
             key = (at.position, *(round(at.now - last, 3) for last in seen))
             if key in states:
@@ -283,7 +274,7 @@ def roll_out(
             states[key] = len(walk)
     else:
         settled = max(settled, at.now - min(seen))
-    return Outcome(settled, max(first, settled), walk, back, covered)
+    return Outcome(settled, max(first, settled), walk, back)
 
 
 def oldest(rules: RuleMap, state: State) -> int:

@@ -64,21 +64,22 @@ class RoundSearch:
 
     Args:
         rules: The map.
-        starts: Rounds, of which the best is begun with.
+        starts: Groups of rounds; the first annealings begin with the best of each group.
 
     Attributes:
         best: The best round so far.
         work: Work done so far.
     """
 
-    def __init__(self, rules: RuleMap, starts: Iterable[tuple[int, ...]]) -> None:
+    def __init__(self, rules: RuleMap, starts: Iterable[Iterable[tuple[int, ...]]]) -> None:
         self._rules = rules
         self._draw = random.Random(0)
         self._penalty = PENALTY * rules.mean_leg
         self.work = 0.0
-        self._take(min((self.judged(targets) for targets in starts), key=self.cost))
-        self.best, self._best_cost = self._round, self._cost
-        self._cycle = self._cycle_end = FIRST_CYCLE
+        rounds = [min(map(self.judged, group), key=self.cost) for group in starts]
+        rounds.sort(key=lambda found: (self.cost(found), len(found.targets)))
+        self.best, self._starts = rounds[0], rounds
+        self._cycle, self._cycle_end = FIRST_CYCLE / 2.0, 0.0
 
     def cost(self, found: Round) -> float:
         """Return the length of a round with the penalties for what the rules forbid, seconds."""
@@ -155,15 +156,16 @@ class RoundSearch:
             return True
         return not best.breaches and best.length <= self._rules.least_round + 1e-6
 
-    def improve(self, work: float) -> bool:
-        """Search on; whether the best round became better."""
-        end, before = self.work + work, self._best_cost
+    def improve(self, work: float) -> None:
+        """Search on."""
+        end = self.work + work
         while self.work < end and not self.finished:
             self.work += TRY_WORK
             if self.work > self._cycle_end:
-                self._cycle *= 2
+                if not self._starts:
+                    self._cycle *= 2.0
                 self._cycle_end = self.work + self._cycle
-                self._take(self.best)
+                self._take(self._starts.pop(0) if self._starts else self.best)
             cooling = (self._cycle_end - self.work) / self._cycle
             heat = HEAT * self._penalty * max(0.0, cooling)
             limit = self._cost + 6.0 * heat
@@ -175,9 +177,8 @@ class RoundSearch:
             rise = cost - self._cost
             if rise <= 0.0 or (heat > 0.0 and self._draw.random() < math.exp(-rise / heat)):
                 self._take(found)
-                if cost < self._best_cost - 1e-9:
-                    self.best, self._best_cost = found, cost
-        return self._best_cost < before - 1e-9
+                if cost < self.cost(self.best) - 1e-9:
+                    self.best = found
 
     def _take(self, found: Round) -> None:
         """Make a round the one that is changed."""
