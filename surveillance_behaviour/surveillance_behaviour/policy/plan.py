@@ -38,13 +38,13 @@ from surveillance_behaviour.policy.rollout import (
 from surveillance_behaviour.policy.rounds import Round, RoundChanges, RoundSearch
 from surveillance_behaviour.policy.world import World
 
-FIRST_WORK, MORE_WORK, ALL_WORK = 360_000.0, 2_000.0, 20e6
+FIRST_WORK, MORE_WORK, ALL_WORK = 360_000.0, 1_500.0, 20e6
 """Work before the first choice of a plan, at each later one, in all: about microseconds."""
 FULL_UP_TO = 100.0
 """Larger maps, in places, have less work before the first choice: knowing them takes its time."""
 FIRST_SECONDS, MORE_SECONDS = 0.4, 0.004
 """Time of the processor for the first two at most."""
-MOST_WORK = 6_000.0
+MOST_WORK = 3_000.0
 """Work of simulations at one later choice at most; larger maps keep the first course."""
 WARM_WORK = 50_000.0
 """Work before the first choice of a plan that takes the place of another."""
@@ -229,9 +229,8 @@ class Plan:
         self._search_on(work / 2.0, began + FIRST_SECONDS / 2.0)
         self._course = self._entered(self._phases()[0])
         self._outcome = self._followed(self._course, math.inf)
-        work -= self._search.work
         phases = [*self._phases(), *range(len(self._search.best.targets))]
-        self._climb(map(self._entered, phases), work, began + FIRST_SECONDS)
+        self._climb(map(self._entered, phases), work / 2.0, began + FIRST_SECONDS)
         for walk in walks:
             if (back := walk.repeated_from(rules.count)) is not None:
                 self._try(Course(tuple(walk.walk), back, patience=math.inf))
