@@ -60,6 +60,8 @@ GOOD_ENOUGH = 1.004
 """A longest wait of so many bounds is not improved any further."""
 ACCEPTED = 1.04
 """A wait from visit to visit of so many bounds is accepted for shorter first waits."""
+SKIPS = (0.0, 0.3, 0.6)
+"""Targets visited more lately than this may be skipped, in lengths of the round."""
 SIMPLE: tuple[Choice, ...] = (oldest, lookahead)
 """The simple policies that a plan is never worse than."""
 SIMPLE_UP_TO = 200
@@ -230,7 +232,13 @@ class Plan:
         self._course = self._entered(self._phases()[0])
         self._outcome = self._followed(self._course, math.inf)
         phases = [*self._phases(), *range(len(self._search.best.targets))]
-        self._climb(map(self._entered, phases), work / 2.0, began + FIRST_SECONDS)
+        courses = [self._entered(phase) for phase in phases]
+        courses[2:2] = [
+            replace(courses[0], skip=skip * self._bound, patience=patience)
+            for skip in SKIPS
+            for patience in (0.0, courses[0].patience, math.inf)
+        ]
+        self._climb(iter(courses), work / 2.0, began + FIRST_SECONDS)
         for walk in walks:
             if (back := walk.repeated_from(rules.count)) is not None:
                 self._try(Course(tuple(walk.walk), back, patience=math.inf))
@@ -330,7 +338,8 @@ class Plan:
             return replace(course, patience=draw.random() ** 2 * self._bound)
         way, targets = course.targets[: course.back], course.targets[course.back :]
         limit = 1.1 * min(self._outcome.settled, 1.5 * self._bound)
-        changed = RoundChanges(self._rules, Round(targets, 0.0), draw).one(limit)
+        changes = RoundChanges(self._rules, Round(targets, 0.0), draw)
+        changed = changes.doubled(limit) if choice < 0.4 else changes.one(limit)
         return replace(course, targets=way + changed) if changed else None
 
 

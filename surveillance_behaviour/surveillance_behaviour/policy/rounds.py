@@ -241,6 +241,19 @@ class RoundChanges:
         position -= old < position
         return (*rest[:position], place, *rest[position:])
 
+    def doubled(self, limit: float) -> tuple[int, ...] | None:
+        """Return the targets with one more visit of a place that is near the round there."""
+        targets, away = self._targets, self._rules.away
+        position = self._draw.randrange(len(targets))
+        before, after = targets[position - 1], targets[position]
+        if not self._rules.near[after]:
+            return None
+        place = self._draw.choice(self._rules.near[after])
+        added = away[before][place] + away[place][after] - away[before][after]
+        if self._length + added > limit:
+            return None
+        return (*targets[:position], place, *targets[position:])
+
     def _without_double(self) -> tuple[int, ...] | None:
         """Leave out one of the targets that stand twice."""
         targets = self._targets
