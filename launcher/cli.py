@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from launcher import package_commands, system
+from launcher import interrupt, package_commands, system
 from launcher.environment import CHECKOUT, Environment, clean_environ
 from launcher.instance_lock import claim
 from launcher.options import Parser, make_parser, shared_options
@@ -50,8 +50,7 @@ def main(argv: Sequence[str]) -> int:
     # A set-up that is told to end has to take its compilers along.
     _make_streams_safe()
     try:
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-            signal.signal(number, signal.default_int_handler)
+        interrupt.raise_at_stop_signals()
         return _dispatch(list(argv))
     except ValueError as error:
         print(f'launch.py: {error}', file=sys.stderr)
@@ -113,6 +112,7 @@ def _run(argv: list[str]) -> int:
     if options.resume is not None:
         usual = wanted_run(make_parser().parse_args([]))
         run, folder = resumed(run, usual, RUNS, options.resume)
+    interrupt.raise_if_lost()
     return run_mission(run, CONFIG, RUNS, folder)
 
 
@@ -167,7 +167,7 @@ def _node(argv: list[str]) -> int:
         for descriptor in claim([node], run_processes.ros_domain(run), run.namespace):
             os.set_inheritable(descriptor, True)
     words = run_processes.command([node], arguments, 0)
-    _hold_stop_signals_back()
+    interrupt.hold_back()
     os.execve(words[0], words, run_processes.node_environ(run))
 
 
@@ -283,7 +283,9 @@ def _package_command(name: str, argv: list[str]) -> int:
         print(said, end='')
         return 0
     _enter([name, *argv])
-    return package_commands.main_of(name)(argv)
+    carry_out = package_commands.main_of(name)
+    interrupt.raise_if_lost()
+    return carry_out(argv)
 
 
 def _environment(extras: Sequence[str]) -> Environment | None:
@@ -310,13 +312,8 @@ def _enter(argv: list[str], extras: Sequence[str] = ()) -> None:
         print(f'launch.py: {line}', file=sys.stderr)
     if not environment.active():
         words = [str(environment.python), str(CHECKOUT / 'launch.py'), *argv]
-        _hold_stop_signals_back()
+        interrupt.hold_back()
         os.execve(words[0], words, clean_environ())
-
-
-def _hold_stop_signals_back() -> None:
-    """Keep Ctrl-C until the next program can take it: Python itself would print a traceback."""
-    signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
 
 
 def _exec(words: list[str]) -> None:

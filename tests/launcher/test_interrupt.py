@@ -39,3 +39,24 @@ def test_ctrl_c_leaves_no_traceback(command, moment, tmp_path):
     assert early or 'Traceback' not in output, output
     assert 'never awaited' not in output
     assert gone([process.pid], 0)
+
+
+def test_a_ctrl_c_that_python_drops_is_raised_before_the_next_step():
+    program = (
+        'import os, signal\n'
+        'from launcher import interrupt\n'
+        'class Dropping:\n'
+        '    def __del__(self):\n'
+        '        signal.raise_signal(signal.SIGINT)\n'
+        'interrupt.raise_at_stop_signals()\n'
+        'Dropping()\n'
+        'print("dropped")\n'
+        'try:\n'
+        '    interrupt.hold_back()\n'
+        'except KeyboardInterrupt:\n'
+        '    print("raised")\n'
+    )
+    done = subprocess.run(
+        [sys.executable, '-c', program], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    assert done.stdout == 'dropped\nraised\n'
