@@ -329,15 +329,20 @@ class Classification:
             if prop not in known and self._excludes(('self', prop)):
                 program.irreflexive.append(prop)
         pairs = set(program.disjoint_properties)
+        contradictions = self._contexts.contradictions()
+        above = {
+            (prop, backwards): self._contexts.roles_above((prop, backwards))
+            for prop in props
+            for backwards in (False, True)
+        }
         for place, prop in enumerate(props):
-            above = self._contexts.roles_above((prop, False))
             for other in props[place:]:
                 for backwards in (False, True):
                     pair = (prop, False, other, backwards)
                     if pair in pairs or (prop is other and not backwards):
                         continue
-                    roles = above | self._contexts.roles_above((other, backwards))
-                    if self._contexts.contradictory(roles):
+                    roles = above[prop, False] | above[other, backwards]
+                    if any(contradiction <= roles for contradiction in contradictions):
                         program.disjoint_properties.append(pair)
 
     def _excludes(self, token: Token) -> bool:

@@ -14,7 +14,6 @@ A token is a class predicate, ('is', individual), ('has', property, turned, indi
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import combinations
@@ -76,10 +75,12 @@ class _ValueRule:
 class _Edge:
     """`count` individuals that the owner is related to by all roles and that are in the core."""
 
-    __slots__ = ('core', 'count', 'roles', 'target')
+    __slots__ = ('core', 'count', 'roles', 'seen', 'target')
 
     def __init__(self, roles: set[Role], core: set[Token], count: int, target: Context) -> None:
         self.roles, self.core, self.count, self.target = roles, core, count, target
+        self.seen: object = None
+        """What both ends and the roles were when the rules were last applied."""
 
 
 class _Values:
@@ -100,23 +101,26 @@ class Context:
         edges, values: What it must be related to.
         names: The individuals that it is.
         unclosed, unrelated: Tokens whose consequences are not drawn yet.
+        looped: How much was known when the rules were last applied to its loops.
+        begun: Whether what its tokens imply was drawn once.
         derived: Tokens found by rules, whether the core had them already or not.
         users: Contexts with an edge to this one, or that wait for its clash.
     """
 
     __slots__ = (
-        *('bare', 'clash', 'core', 'derived', 'done', 'edges', 'loops', 'names'),
-        *('tokens', 'unclosed', 'unrelated', 'users', 'values'),
+        *('bare', 'begun', 'clash', 'core', 'derived', 'done', 'edges', 'looped', 'loops'),
+        *('names', 'tokens', 'unclosed', 'unrelated', 'users', 'values'),
     )
 
     def __init__(self, core: Tokens, bare: bool) -> None:
         self.core, self.bare = core, bare
         self.tokens: set[Token] = set(core)
-        self.clash = False
+        self.clash = self.begun = False
         self.derived: set[Token] = set()
         self.edges: list[_Edge] = []
         self.values: list[_Values] = []
         self.loops: set[Role] = set()
+        self.looped = (0, 0)
         self.users: dict[Context, None] = {}
         self.done: set[object] = set()
         self.names = [token[1] for token in core if _is_name(token)]
@@ -184,8 +188,8 @@ class Contexts:
         self._program = program
         self._gaps: dict[Context, dict[str, AtLeast | AtMost | None]] = {}
         self._known: dict[tuple[Tokens, bool], Context] = {}
-        self._queue: deque[Context] = deque()
-        self._queued: set[Context] = set()
+        self._opened: list[Context] = []
+        self._waiting: dict[Context, None] = {}
         self._heads: dict[Tokens, frozenset[HeadAtom] | None] = {}
         self._always: list[tuple[Token | None, Axiom | None]] = []
         self._class_rules: dict[Token, list[tuple[Tokens, Token | None]]] = {}
@@ -337,10 +341,9 @@ class Contexts:
     def context(self, core: Iterable[Token], bare: bool = False) -> Context:
         """Return the completed context of a core; `bare`: without what classes alone imply."""
         found = self._open(frozenset(core), bare)
-        while self._queue:
-            context = self._queue.popleft()
-            self._queued.discard(context)
-            self._complete(context)
+        while self._opened or self._waiting:
+            # What an individual is by itself comes before what its neighbours make of it.
+            self._complete(self._opened.pop() if self._opened else self._waiting.popitem()[0])
         return found
 
     def gaps(self, cores: Iterable[Tokens]) -> dict[str, None]:
@@ -375,13 +378,15 @@ class Contexts:
         heads = [r.head[1] for r in self.edge_rules.get(role, ()) if r.head[0] == 'role']
         return [*heads, *map(turned, heads)]
 
-    def contradictory(self, roles: frozenset[Role]) -> bool:
-        """Tell whether one individual cannot be related to another by all roles."""
-        return any(
-            rule.head[0] == 'clash' and not (rule.xs or rule.ys) and rule.roles <= roles
-            for role in roles
-            for rule in self.edge_rules.get(role, ())
-        )
+    def contradictions(self) -> list[frozenset[Role]]:
+        """Return sets of roles by all of which one individual cannot be related to another."""
+        found = {
+            rule.roles: None
+            for rules in self.edge_rules.values()
+            for rule in rules
+            if rule.head[0] == 'clash' and not (rule.xs or rule.ys)
+        }
+        return list(found)
 
     def heads(self, core: Tokens) -> frozenset[HeadAtom] | None:
         """Return what an individual 0 with all tokens is, as heads of clauses; None: there is
@@ -435,16 +440,11 @@ class Contexts:
         if found is None:
             found = self._known[core, bare] = Context(core, bare)
             found.clash = self._program.nothing in core
-            self._enqueue(found)
+            self._opened.append(found)
         return found
 
-    def _enqueue(self, context: Context) -> None:
-        if context not in self._queued:
-            self._queued.add(context)
-            self._queue.append(context)
-
     def _complete(self, context: Context) -> None:
-        known = len(context.tokens)
+        known = len(context.tokens) if context.begun else -1
         self._changed = True
         while self._changed and not context.clash:
             self._changed = False
@@ -457,6 +457,7 @@ class Contexts:
             self._merge(context)
             self._count(context)
             self._evaluate(context)
+        context.begun = True
         if context.clash or len(context.tokens) > known or context.edges:
             for user in context.users:
                 self._enqueue_if_news(user, context)
@@ -466,7 +467,7 @@ class Contexts:
         news = (context, len(context.tokens), context.clash, len(context.edges), size)
         if news not in user.done:
             user.done.add(news)
-            self._enqueue(user)
+            self._waiting[user] = None
 
     def _clash(self, context: Context) -> None:
         context.clash = self._changed = True
@@ -540,18 +541,25 @@ class Contexts:
 
     def _along(self, context: Context, edge: _Edge) -> None:
         """Apply the rules that speak of both ends of an edge."""
-        if edge.target.clash:
+        target = edge.target
+        if target.clash:
             self._clash(context)
-            return
-        tokens = context.tokens
-        for role in tuple(edge.roles):
-            for rule in self.edge_rules.get(role, ()):
-                if rule.xs <= tokens and rule.ys <= edge.target.tokens:
-                    if rule.roles <= edge.roles:
-                        self._fire(context, edge, rule)
-                elif rule.xs <= tokens and edge.target.names:
-                    self._gap(context, rule.origin, _NOMINALS)
-        self._join_parent(context, edge)
+        elif target.begun:
+            tokens = context.tokens
+            seen = target, len(tokens), len(target.tokens), len(edge.roles)
+            if seen != edge.seen:
+                edge.seen = seen
+                size = len(edge.core)
+                for role in tuple(edge.roles):
+                    for rule in self.edge_rules.get(role, ()):
+                        if rule.xs <= tokens and rule.ys <= target.tokens:
+                            if rule.roles <= edge.roles:
+                                self._fire(context, edge, rule)
+                        elif rule.xs <= tokens and target.names:
+                            self._gap(context, rule.origin, _NOMINALS)
+                if len(edge.core) > size:
+                    self._retarget(context, edge)
+            self._join_parent(context, edge)
 
     def _fire(self, context: Context, edge: _Edge, rule: _EdgeRule) -> None:
         head = rule.head
@@ -565,7 +573,6 @@ class Contexts:
                 self._changed = True
         elif head[1] not in edge.target.tokens:
             edge.core.add(head[1])
-            self._retarget(context, edge)
 
     def _join_parent(self, context: Context, edge: _Edge) -> None:
         """Where the other end may have one such neighbour only, and this is it."""
@@ -602,8 +609,10 @@ class Contexts:
 
     def _loops(self, context: Context) -> None:
         """Apply the rules to what relates an individual to itself."""
-        if not context.loops:
+        looped = len(context.loops), len(context.tokens)
+        if not context.loops or looped == context.looped:
             return
+        context.looped = looped
         for role in tuple(context.loops):
             for rule in self.edge_rules.get(role, ()):
                 if rule.roles <= context.loops and rule.xs | rule.ys <= context.tokens:

@@ -163,6 +163,7 @@ class _Implications:
 
     def __init__(self, clauses: Iterable[Clause]) -> None:
         self._clauses: dict[Predicate, list[tuple[PredicateAtom, PredicateAtom]]] = {}
+        self._consequences: dict[PredicateAtom, dict[PredicateAtom, None]] = {}
         for clause in clauses:
             if len(clause.body) != 1 or clause.named_only:
                 continue
@@ -175,7 +176,12 @@ class _Implications:
     def imply(self, atoms: Iterable[BodyAtom], wanted: BodyAtom) -> bool:
         """Tell whether one of the atoms alone has the wanted one as consequence."""
         facts = (atom for atom in atoms if isinstance(atom, PredicateAtom))
-        return any(wanted in closure(atom, self._following) for atom in facts)
+        return any(wanted in self._of(atom) for atom in facts)
+
+    def _of(self, atom: PredicateAtom) -> dict[PredicateAtom, None]:
+        if atom not in self._consequences:
+            self._consequences[atom] = closure(atom, self._following)
+        return self._consequences[atom]
 
     def _following(self, atom: PredicateAtom) -> Iterator[PredicateAtom]:
         for body, head in self._clauses.get(atom.predicate, ()):
