@@ -249,7 +249,7 @@ def caught() -> Iterator[None]:
 
     with (
         mock.patch.object(cli, '_enter'),
-        mock.patch.object(cli, '_hold_stop_signals_back'),
+        mock.patch('launcher.interrupt.hold_back'),
         mock.patch.object(cli, 'claim', return_value=[]),
         mock.patch.object(os, 'execve', take),
     ):

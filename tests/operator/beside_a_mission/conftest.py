@@ -14,13 +14,13 @@ from tests.launcher.conftest import ROOT, Started
 LAUNCH = [str(ROOT / '.venv/bin/python'), str(ROOT / 'launch.py')]
 
 
-@pytest.fixture(scope='package')
+@pytest.fixture(scope='module')
 def mission_domain() -> int:
     """Provide a ROS domain that no test in this process uses."""
     return claim_domain()
 
 
-@pytest.fixture(scope='package')
+@pytest.fixture(scope='module')
 def mission(mission_domain: int, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Started]:
     """Provide a patrol that is ten times as fast as real time, with a page that may control it."""
     with socket.socket() as free:
