@@ -59,12 +59,12 @@ SEED = 1
 URGENCY = 7.0
 """Threshold of the seeds' ontology, seconds."""
 LARGE = 60
-"""Thresholds and batteries are compared on maps of up to so many places."""
+"""Rules and batteries are compared on maps of up to so many places."""
 RULED = ('tour', 'lookahead', 'oldest', 'seed')
 """Policies run within the seeds' rules; the literature's run without any."""
 SIZES = (5, 8, 12, 20, 35, 60, 100, 150)
 """Places of the random maps, in turn."""
-TABLES = ('compare', 'thresholds', 'battery', 'rules', 'choice', 'configured')
+TABLES = ('compare', 'battery', 'rules', 'choice', 'configured')
 FREE = ('random', 'CR', 'HCR', 'HPCC', 'cycle')
 
 
@@ -203,24 +203,6 @@ def compare(place: Map, hours: float) -> dict[str, PatrolRun]:
         )
     print(table(rows), flush=True)
     return runs
-
-
-def thresholds(place: Map, hours: float) -> None:
-    """How late the ruled policies are when the threshold is near the tour, once it has settled."""
-    length = place.graph.tour.length
-    print(
-        f'\n{place.name}: longest time from visit to visit beyond max(threshold, tour), s, '
-        'by threshold / tour'
-    )
-    factors = (0.25, 0.5, 0.75, 0.9, 1.0, 1.25, 1.5, 2.0)
-    rows = [['policy', *(f'{factor:g}' for factor in factors)]]
-    for policy in RULED:
-        late = []
-        for factor in factors:
-            run = patrol(place, policy, hours, factor * length)
-            late.append(f'{run.settled - max(1.0, factor) * length:.1f}')
-        rows.append([policy, *late])
-    print(table(rows), flush=True)
 
 
 def random_graph(count: int, seed: int, uneven: bool = False) -> Map:
@@ -462,9 +444,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if 'compare' in options.table:
         for place in chosen:
             results[place.name] = (place.graph.tour.bound, compare(place, hours))
-    if 'thresholds' in options.table:
-        for place in small:
-            thresholds(place, min(hours, 6.0))
     if 'battery' in options.table:
         for place in small:
             strandings(place, hours)

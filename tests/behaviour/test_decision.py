@@ -184,3 +184,13 @@ def test_a_question_changes_no_decision(policy: str) -> None:
         return taken
 
     assert decisions(asked=True) == decisions(asked=False)
+
+
+def test_questions_before_the_first_choice_share_one_plan() -> None:
+    graph, memory = seven_rooms(), PolicyMemory()
+    here = world(place='C1', now=1.0, reachable=tuple(graph.legs['C1']), graph=graph, memory=memory)
+    why_not('R1', here, Battery(), DecisionSettings())
+    planned = memory.for_a_question().plan
+    assert planned is not None
+    assert memory.plan is None
+    assert planned.fits(here)

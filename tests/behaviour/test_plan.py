@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 from functools import cache
 
 import pytest
@@ -36,6 +37,15 @@ def chain(count: int) -> PatrolGraph:
     for number in range(count - 1):
         legs[f'P{number}'][f'P{number + 1}'] = legs[f'P{number + 1}'][f'P{number}'] = 5.0
     return PatrolGraph(legs, 2.0)
+
+
+def ring(count: int, draw: random.Random, noise: float) -> PatrolGraph:
+    legs: dict[str, dict[str, float]] = {f'P{number}': {} for number in range(count)}
+    for number in range(count):
+        here, after = f'P{number}', f'P{(number + 1) % count}'
+        legs[here][after] = 10.0 * draw.uniform(1.0 - noise, 1.0 + noise)
+        legs[after][here] = 10.0 * draw.uniform(1.0 - noise, 1.0 + noise)
+    return PatrolGraph(legs)
 
 
 def settled(graph: PatrolGraph, policy: str, threshold: float) -> float:
@@ -98,6 +108,16 @@ def test_the_plan_comes_within_a_twentieth_of_the_bound_that_knows_the_rules(
     assert bound.low <= (least + 1e-3) * graph.tour.length
     assert bound.high == pytest.approx(least * graph.tour.length, rel=0.01)
     assert settled_on(name, 'tour', factor) <= 1.05 * bound.low
+
+
+@pytest.mark.parametrize('seed', [2, 3])
+def test_leg_times_that_are_learned_do_not_turn_the_round(seed: int) -> None:
+    draw = random.Random(seed)
+    patrol = Patrol(ring(8, draw, 0.0), Rules(), 'tour', 7.0, 'P0')
+    for _ in range(32):
+        patrol.graph = ring(8, draw, 0.2)
+        patrol.step()
+    assert patrol.run.longest <= 1.2 * 80.0
 
 
 def test_places_that_the_ontology_calls_urgent_at_the_start_are_visited_first() -> None:

@@ -11,7 +11,10 @@ search has three steps.
 
 The first choice takes all three steps. Each later one goes on for a few milliseconds, from where
 the robot is then. Work is counted in steps and not in time, so that the same world gives the same
-mission; on a machine that is too slow for that, the time is bounded, too.
+mission on a slow machine, too.
+
+When times of legs, the threshold or the rules change, a new plan takes over the course as it
+stands, and changes it only for one that leaves less waiting from where the robot is.
 """
 
 from __future__ import annotations
@@ -42,8 +45,8 @@ FIRST_WORK, MORE_WORK, ALL_WORK = 360_000.0, 1_500.0, 20e6
 """Work before the first choice of a plan, at each later one, in all: about microseconds."""
 FULL_UP_TO = 100.0
 """Larger maps, in places, have less work before the first choice: knowing them takes its time."""
-FIRST_SECONDS, MORE_SECONDS = 0.4, 0.004
-"""Time of the processor for the first two at most."""
+MOST_SECONDS = 2.0
+"""Time of the processor for one choice at most; only a machine that is very slow comes to it."""
 MOST_WORK = 3_000.0
 """Work of simulations at one later choice at most; larger maps keep the first course."""
 WARM_WORK = 50_000.0
@@ -131,7 +134,7 @@ class Plan:
 
     Args:
         world: Where it begins.
-        before: A plan for the same places that this one takes the place of.
+        before: The plan that this one takes the place of, if there is one.
     """
 
     _state: State
@@ -141,12 +144,18 @@ class Plan:
         self._rules = rules = rule_map(world)
         self._draw = random.Random(0)
         self._work, self._spared, self._sent = 0.0, 0.0, -1
-        met = before._state.met if before else [False] * rules.count
+        self._deadline = time.thread_time() + MOST_SECONDS
+        # Waits that began under the plan before count like all others: else each new plan might
+        # turn on the round once, and the places behind would wait for two rounds.
+        met = [before is not None] * rules.count
         self._state = State(world.graph.index[world.place], world.now, [], met)
         self._observe(world)
-        tour = before.targets if before else world.graph.tour.order
         work = FIRST_WORK * min(1.0, FULL_UP_TO / rules.count)
-        self._begin(tour, min(work, WARM_WORK) if before else work)
+        if before and before.places == self.places:
+            self._begin([before.targets], min(work, WARM_WORK), before.course)
+        else:
+            tour = world.graph.tour.order
+            self._begin([tour, tour[::-1]], work)
 
     def fits(self, world: World) -> bool:
         """Return whether the plan is for this map, threshold and rules.
@@ -177,6 +186,7 @@ class Plan:
     def advance(self, world: World) -> tuple[int, int]:
         """Think on, and return the place to go to and the target that it leads to, as indices."""
         self._observe(world)
+        self._deadline = time.thread_time() + MOST_SECONDS
         if self._work + self._search.work < ALL_WORK:
             self._think()
         self._sent = self._course.choose(self._rules, self._state)
@@ -191,6 +201,11 @@ class Plan:
     def targets(self) -> tuple[int, ...]:
         """The best round that was found."""
         return self._search.best.targets
+
+    @property
+    def course(self) -> Course:
+        """What is left of the course from where the robot is on it."""
+        return self._course.seen_from(self._state.position)
 
     @property
     def longest(self) -> float:
@@ -217,28 +232,31 @@ class Plan:
         avoided = frozenset(graph.index[name] for name in world.avoided if name in graph.index)
         self._state = State(here, world.now, seen, met, avoided, self._state.position)
 
-    def _begin(self, tour: tuple[int, ...], work: float) -> None:
-        """Find the first course, from a tour and the walks of the simple policies."""
-        rules, began = self._rules, time.thread_time()
-        self._horizon = HORIZON * max(rules.length(tour), rules.threshold)
+    def _begin(
+        self, rounds: list[tuple[int, ...]], work: float, course: Course | None = None
+    ) -> None:
+        """Find the first course, from one that is, rounds, and walks of the simple policies."""
+        rules, length = self._rules, self._rules.length(rounds[0])
+        self._horizon = HORIZON * max(length, rules.threshold)
         simple = SIMPLE if rules.count <= SIMPLE_UP_TO else ()
         walks = [roll_out(rules, choose, self._state, self._horizon) for choose in simple]
         self._simple = min((walk.settled for walk in walks), default=math.inf)
-        starts = [[tour, tour[::-1]]]
-        if rules.length(tour) > rules.least_period:  # Else they wait by walking more.
+        starts = [rounds]
+        if length > rules.least_period:  # Else they wait by walking more.
             starts += filter(None, ([*rules.laps(walk.walk)] for walk in walks))
         self._search = RoundSearch(rules, starts)
-        self._search_on(work / 2.0, began + FIRST_SECONDS / 2.0)
-        self._course = self._entered(self._phases()[0])
+        self._search_on(work / 2.0)
+        self._course = course or self._entered(self._phases()[0])
         self._outcome = self._followed(self._course, math.inf)
         phases = [*self._phases(), *range(len(self._search.best.targets))]
         courses = [self._entered(phase) for phase in phases]
-        courses[2:2] = [
+        courses[2:2] = [replace(course, targets=course.targets[::-1]) for course in courses[:2]]
+        courses[4:4] = [
             replace(courses[0], skip=skip * self._bound, patience=patience)
             for skip in SKIPS
             for patience in (0.0, courses[0].patience, math.inf)
         ]
-        self._climb(iter(courses), work / 2.0, began + FIRST_SECONDS)
+        self._climb(iter(courses), work / 2.0)
         for walk in walks:
             if (back := walk.repeated_from(rules.count)) is not None:
                 self._try(Course(tuple(walk.walk), back, patience=math.inf))
@@ -247,35 +265,34 @@ class Plan:
         """Go on with the search from where the robot is."""
         if self._state.place == self._sent and self._finished():
             return
-        deadline = time.thread_time() + MORE_SECONDS
-        self._search_on(MORE_WORK / 2.0, deadline - MORE_SECONDS / 2.0)
-        # The present course and two others are simulated, as soon as there was the time for that.
-        self._spared += MORE_WORK / 2.0
-        needed = 3.0 * MOVE_WORK * len(self._outcome.walk)
-        if needed > min(self._spared, MOST_WORK):
+        self._search_on(MORE_WORK / 2.0)
+        # The present course and two others are simulated, as soon as there was the work for that.
+        self._spared = min(self._spared + MORE_WORK / 2.0, MOST_WORK)
+        if 3.0 * MOVE_WORK * len(self._outcome.walk) > self._spared:
             return
-        self._course = self._course.seen_from(self._state.position)
-        self._state.position = 0
+        self._course, self._state.position = self.course, 0
         self._outcome = self._followed(self._course, math.inf)
-        self._climb(map(self._entered, self._phases()), self._spared, deadline)
+        self._climb(map(self._entered, self._phases()), self._spared)
         self._spared = 0.0
 
     def _finished(self) -> bool:
         """Return whether no better course is looked for."""
         return self._search.finished and self._outcome.first <= GOOD_ENOUGH * self._bound
 
-    def _search_on(self, work: float, deadline: float) -> None:
+    def _search_on(self, work: float) -> None:
         """Go on looking for a better round."""
-        end = self._search.work + work
-        while self._search.work < end and not self._search.finished:
-            self._search.improve(SLICE_WORK)
-            if time.thread_time() > deadline:
-                break
+        search, end = self._search, self._search.work + work
+        while search.work < end and not search.finished and not self._late():
+            search.improve(SLICE_WORK)
 
-    def _climb(self, courses: Iterator[Course], work: float, deadline: float) -> None:
+    def _late(self) -> bool:
+        """Return whether the choice has taken all the time that there is."""
+        return time.thread_time() > self._deadline
+
+    def _climb(self, courses: Iterator[Course], work: float) -> None:
         """Try courses, and then random changes of the best one."""
         end = self._work + work
-        while self._work < end and not self._finished() and time.thread_time() < deadline:
+        while self._work < end and not self._finished() and not self._late():
             course = next(courses, None) or self._neighbour()
             if course is None:
                 self._work += MOVE_WORK
@@ -344,9 +361,8 @@ class Plan:
 
 
 def plan_of(world: World) -> Plan:
-    """Return the plan that the policy remembers, or a new one."""
+    """Return the plan that the policy remembers, or a new one that takes over its course."""
     plan = world.memory.plan
     if not isinstance(plan, Plan) or not plan.fits(world):
-        same = isinstance(plan, Plan) and plan.places == world.graph.places
-        plan = world.memory.plan = Plan(world, plan if same else None)
+        plan = world.memory.plan = Plan(world, plan)
     return plan

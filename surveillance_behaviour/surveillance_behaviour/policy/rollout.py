@@ -233,7 +233,6 @@ def roll_out(
     state: State,
     horizon: float,
     stop: float = math.inf,
-    moves: float = math.inf,
 ) -> Outcome:
     """Simulate a patrol until the state comes back, the horizon, or a wait that is too long.
 
@@ -243,7 +242,6 @@ def roll_out(
         state: Where to begin; it is not changed.
         horizon: Seconds at most.
         stop: A wait from visit to visit that is too long, seconds.
-        moves: How many at most.
     """
     at = state.fresh()
     seen, met, legs = at.seen, at.met, rules.legs
@@ -253,7 +251,7 @@ def roll_out(
     anchor = min(range(rules.count), key=lambda place: len(legs[place]))
     states: dict[tuple[float, ...], int] = {}
     back = None
-    while at.now < end and settled <= stop and len(walk) < moves:
+    while at.now < end and settled <= stop:
         place = choose(rules, at)
         if place == at.place:
             break

@@ -28,11 +28,17 @@ class PolicyMemory:
     generator: random.Random = field(default_factory=random.Random)
     plan: Any = None
     passes: dict[tuple[str, ...], int] = field(default_factory=dict)
+    _asked: PolicyMemory | None = field(default=None, init=False, repr=False)
 
     def for_a_question(self) -> PolicyMemory:
-        """Return a copy to answer a question with, which changes nothing of the next choice."""
-        plan = self.plan.for_a_question() if self.plan is not None else None
-        return PolicyMemory(copy(self.generator), plan, self.passes.copy())
+        """Return a copy to answer a question with, which changes nothing of the next choice.
+
+        Before the first choice, what one question has planned serves the next questions.
+        """
+        plan = self.plan or (self._asked and self._asked.plan)
+        plan = plan and plan.for_a_question()
+        self._asked = PolicyMemory(copy(self.generator), plan, self.passes.copy())
+        return self._asked
 
 
 @dataclass(frozen=True, eq=False)
