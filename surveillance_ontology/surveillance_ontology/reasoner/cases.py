@@ -85,21 +85,26 @@ class CaseReasoner:
             search.somebody()
         concepts = dict(self._stated)
         for axiom in self._assertions:
-            if axiom in concepts:
-                name = axiom.individual if isinstance(axiom, ax.ClassAssertion) else axiom.subject  # type: ignore[attr-defined]
-                search.concept(search.individual(name), concepts[axiom], 0)
-            elif isinstance(axiom, ax.ObjectPropertyAssertion):
-                pair = search.individual(axiom.subject), search.individual(axiom.object)
-                search.relate(pair[0], self._rules.role(axiom.prop), pair[1], 0)
-            elif isinstance(axiom, ax.DataPropertyAssertion):
-                value = value_of(axiom.literal)
-                search.state_value(search.individual(axiom.subject), axiom.prop, value)
-            elif isinstance(axiom, ax.SameIndividual):
-                first, *others = sorted(axiom.individuals)
-                for other in others:
-                    search.same(search.individual(first), search.individual(other))
-            elif isinstance(axiom, ax.DifferentIndividuals):
-                search.differ([search.individual(name) for name in sorted(axiom.individuals)])
+            self._state_one(axiom, concepts.get(axiom))
+
+    def _state_one(self, axiom: Axiom, concept: int | None = None) -> None:
+        """State an assertion; `concept` is what it says of its individual, where it has one."""
+        search = self._search
+        if concept is not None:
+            name = axiom.individual if isinstance(axiom, ax.ClassAssertion) else axiom.subject  # type: ignore[attr-defined]
+            search.concept(search.individual(name), concept, 0)
+        elif isinstance(axiom, ax.ObjectPropertyAssertion):
+            pair = search.individual(axiom.subject), search.individual(axiom.object)
+            search.relate(pair[0], self._rules.role(axiom.prop), pair[1], 0)
+        elif isinstance(axiom, ax.DataPropertyAssertion):
+            value = value_of(axiom.literal)
+            search.state_value(search.individual(axiom.subject), axiom.prop, value)
+        elif isinstance(axiom, ax.SameIndividual):
+            first, *others = sorted(axiom.individuals)
+            for other in others:
+                search.same(search.individual(first), search.individual(other))
+        elif isinstance(axiom, ax.DifferentIndividuals):
+            search.differ([search.individual(name) for name in sorted(axiom.individuals)])
 
     # --- questions ---
 
@@ -165,9 +170,21 @@ class CaseReasoner:
             if self._is_possible(state):
                 held = {other for other, _ in self._held()}
                 candidates = {other: None for other in candidates if other in held}
+                search.undo(self._base)
             else:
                 yield fact
-            search.undo(self._base)
+                search.undo(self._base)
+                self._keep(fact)
+
+    def _keep(self, fact: Axiom) -> None:
+        """Let further searches begin with a fact that follows."""
+        concept = self._concept(fact.cls) if isinstance(fact, ax.ClassAssertion) else None
+        try:
+            self._search.attempt(lambda: self._state_one(fact, concept))
+            self._search.settle()
+        except StoppedError:
+            self.stopped = True
+        self._base = self._search.mark()
 
     def _held(self) -> Iterator[tuple[Axiom, int]]:
         """Return the facts of the last model, with the choices they depend on."""
