@@ -174,13 +174,13 @@ class CaseReasoner:
             else:
                 yield fact
                 search.undo(self._base)
-                if not isinstance(fact, ax.ClassAssertion):  # A class would bring new choices.
-                    self._keep(fact)
+                self._keep(fact)
 
     def _keep(self, fact: Axiom) -> None:
         """Let further searches begin with a fact that follows."""
+        concept = self._concept(fact.cls) if isinstance(fact, ax.ClassAssertion) else None
         try:
-            self._search.attempt(lambda: self._state_one(fact))
+            self._search.attempt(lambda: self._state_one(fact, concept))
             self._search.settle()
         except StoppedError:
             self.stopped = True
