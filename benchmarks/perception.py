@@ -26,7 +26,7 @@ import subprocess
 import sys
 import time
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -522,11 +522,11 @@ def print_fuzz(count: int) -> None:
     print(f'{count} damaged messages: {good} taken, the others refused; peak {peak:.0f} MB\n')
 
 
-def without_markers(count: int) -> Iterator[tuple[str, ImageArray]]:
+def without_markers(indices: Iterable[int]) -> Iterator[tuple[str, ImageArray]]:
     """Images without a marker of the dictionary: textures, and markers of other dictionaries."""
     kinds = [*BACKDROPS, 'other dictionaries']
     conditions = [SHARP, *DEGRADED.values()]
-    for index in range(count):
+    for index in indices:
         generator = np.random.default_rng([3, index])
         kind = kinds[index % len(kinds)]
         degradation = SHARP if index % 2 else conditions[(index // 2) % len(conditions)]
@@ -660,7 +660,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     print_recall('2-5 m, to 60 deg', {**conditions, 'all degraded': whole})
 
     kinds: defaultdict[str, Tallies] = defaultdict(lambda: {name: Tally() for name in detectors})
-    for kind, image in without_markers(empty):
+    for kind, image in without_markers(range(empty)):
         for name, detect in detectors.items():
             kinds[kind][name].look(detect, image, [])
     total = {name: summed([each[name] for each in kinds.values()]) for name in detectors}

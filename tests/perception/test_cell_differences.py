@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from benchmarks.perception import without_markers
 from surveillance_perception.detection.cell_differences import CellDifferences
+from surveillance_perception.detection.detector import DetectorSettings, MarkerDetector
 from surveillance_perception.detection.dictionaries import MarkerCodes, dictionary_named
 
 CODES = MarkerCodes.of(dictionary_named('DICT_5X5_100'))
@@ -66,3 +68,10 @@ def test_cells_of_the_other_colour_are_counted():
     cells[0, 0, 2] = 225.0
     inner, border = DIFFERENCES.wrong(cells, entries)
     assert (inner.item(), border.item()) == (1, 1)
+
+
+def test_markers_of_another_dictionary_are_not_read_as_ids():
+    detector = MarkerDetector(DetectorSettings('DICT_5X5_100', None))
+    for kind, image in without_markers((458, 539, 557, 728)):  # each was read as an id once
+        assert kind == 'other dictionaries'
+        assert detector.detect(image) == []

@@ -236,15 +236,16 @@ class MarkerDetector:
         # where nearly all cells are the code's, they alone may speak for a short lead
         agreed = (readings.wrong <= _AGREED * codes.bits**2) & (spare >= _FEW_SPARE_BITS)
         joint_lead = np.sqrt(readings.lead * np.maximum(readings.inner_lead, readings.lead))
+        shown = readings.inner > settings.least_inner_correlation
         correlated = (
             (readings.correlation > settings.least_correlation)
-            & (readings.inner > settings.least_inner_correlation)
+            & shown
             & (np.where(agreed, joint_lead, readings.lead) > lead)
         )
         clear = readings.lead > np.where(listed, _CLEAR_KNOWN, _CLEAR) * lead
         # cells a pixel wide show little, but nearly all of them are not wrong by chance
         clear &= readings.wrong_border <= _CONTRADICTED * 4 * (codes.side - 1)
-        accepted = correlated & (plausible | clear) | (readings.error < _LARGEST_ERROR)
+        accepted = correlated & (plausible | clear) | shown & (readings.error < _LARGEST_ERROR)
         confidence = readings.correlation * (1.0 - 1.0 / np.maximum(readings.lead, 1.0))
         return self._detections(
             readings.homographies[accepted],
