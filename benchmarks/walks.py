@@ -5,7 +5,8 @@
 
 The armor server, the map builder and the reasoner run in this process, with a threshold that is no
 other number. A file is on the walk when one of its functions holds the number: in an argument, a
-variable or a result, alone or in a message, an axiom or a list. The walk ends with the decision.
+variable or a result, alone or in a message, an axiom or a list. The walk ends with the decision, by
+a policy that plans nothing: a plan calls functions for minutes while each call is looked at.
 """
 
 from __future__ import annotations
@@ -118,7 +119,9 @@ def walked() -> dict[str, str]:
     walk = Walk()
     with tempfile.TemporaryDirectory() as folder:
         own = Path(folder) / 'threshold.yaml'
-        own.write_text(f'/**:\n  ros__parameters:\n    urgency_threshold: {THRESHOLD}\n')
+        own.write_text(
+            f'/**:\n  ros__parameters:\n    urgency_threshold: {THRESHOLD}\n    policy: oldest\n'
+        )
         words = ['--ros-args']
         for file in (CHECKOUT / 'config' / 'seven_rooms.yaml', own):
             words += ['--params-file', str(file)]
