@@ -40,6 +40,7 @@ def test_manual_commands_set_the_level_and_the_low_state(
     graph.until(lambda: values(levels)[-1:] == [10])
     operator.type('battery offset 95')
     graph.until(lambda: values(levels)[-1:] == [100] and values(lows) == [False, True, False])
+    node.stop()  # what is still printed while capfd reads would be written over what it reads
     shown = capfd.readouterr().out
     assert "battery set: VALUE is 'hundred': expected a whole number from 0 to 100" in shown
     assert node.failure is None

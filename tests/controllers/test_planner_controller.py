@@ -32,7 +32,8 @@ def compute(graph: Any, **options: Any) -> Any:
 def test_manual_requests_wait_for_the_operator(
     graph: Any, in_background: Any, operator: Any, capfd: Any
 ) -> None:
-    graph.add(PlannerController, {'execution_mode': 'MANUAL'}, console_source=operator.source)
+    settings = {'execution_mode': 'MANUAL'}
+    node = graph.add(PlannerController, settings, console_source=operator.source)
     told = graph.listen(String, 'planner_controller/announcement', STATE_QOS)
     end = in_background(lambda: compute(graph))
     graph.until(lambda: told)
@@ -46,6 +47,7 @@ def test_manual_requests_wait_for_the_operator(
     end = end()
     assert end.status == 'succeeded'
     assert coordinates(end.result.path) == [(5, 10, 0), (6, 8, 0), (8.5, 6, 0), (10, 5, 0)]
+    node.stop()
     shown = capfd.readouterr().out
     assert "(']' in point 1, where ',' belongs)" in shown
     assert "'put' after 'plan' is no command: expected 'set'" in shown

@@ -115,6 +115,7 @@ def test_one_console_addresses_every_controller(graph: Any, operator: Any, capfd
     operator.type('exit')
     assert node.ended.wait(60.0)
     assert node.failure is None
+    node.stop()
     shown = capfd.readouterr().out
     assert '[battery_controller] The battery is at 42 %.' in shown
     assert 'no request is waiting: expected one before this command' in shown
@@ -128,7 +129,7 @@ def test_a_request_is_announced_once_with_its_controller_before_each_line(
     graph: Any, operator: Any, capfd: Any
 ) -> None:
     graph.add(PlannerController, {'execution_mode': 'MANUAL', 'console': False})
-    graph.add(ConsoleNode, console_source=operator.source)
+    console = graph.add(ConsoleNode, console_source=operator.source)
     caller = GoalCaller(graph.node, ComputePath, 'compute_path')
     ends: list[str] = []
     goal = ComputePath.Goal(goal=Point(x=1.0))
@@ -141,6 +142,7 @@ def test_a_request_is_announced_once_with_its_controller_before_each_line(
     operator.type('plan set [[1, 2, 0]]')
     thread.join(60.0)
     assert ends == ['succeeded']
+    console.stop()
     shown = [line for line in capfd.readouterr().out.splitlines() if 'Answer with' in line]
     assert len(shown) == 1
     assert shown[0].startswith('[planner_controller] ')
