@@ -6,7 +6,7 @@ itself alone and is reported with its line (https://www.w3.org/TR/owl2-syntax/, 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -124,25 +124,24 @@ def _prop(value: Any) -> ex.PropertyExpression:
     return _iri(value)
 
 
-def _cls(value: Any) -> ex.ClassExpression:
+def _made(value: Any, makers: Mapping[str, Callable[[Any], Any]], what: str) -> Any:
+    """Return what a name stands for, or a call of one of the makers."""
     if isinstance(value, str):
         return value
-    call = _need(value, Call, 'a class')
-    make = _CLASSES.get(call.name)
+    call = _need(value, Call, f'a {what}')
+    make = makers.get(call.name)
     if make is None:
-        raise IllFormedError(f'{call.name} is no class')
-    made: ex.ClassExpression = make(call.parts)
+        raise IllFormedError(f'{call.name} is no {what}')
+    return make(call.parts)
+
+
+def _cls(value: Any) -> ex.ClassExpression:
+    made: ex.ClassExpression = _made(value, _CLASSES, 'class')
     return made
 
 
 def _range(value: Any) -> ex.DataRange:
-    if isinstance(value, str):
-        return value
-    call = _need(value, Call, 'a data range')
-    make = _RANGES.get(call.name)
-    if make is None:
-        raise IllFormedError(f'{call.name} is no data range')
-    made: ex.DataRange = make(call.parts)
+    made: ex.DataRange = _made(value, _RANGES, 'data range')
     return made
 
 
