@@ -10,7 +10,6 @@ reachable member decides: its members are the candidates, and the policy chooses
 
 from __future__ import annotations
 
-import difflib
 import math
 import re
 from collections.abc import Mapping, Sequence
@@ -19,6 +18,7 @@ from dataclasses import dataclass, field, replace
 from surveillance_behaviour.policy.battery_reserve import Battery, BatteryLimits, reserve
 from surveillance_behaviour.policy.policies import DEFAULT_POLICY, Scores, make_policy
 from surveillance_behaviour.policy.world import Decision, World
+from surveillance_runtime.suggestions import nearest
 
 RECHARGE = 'recharge'
 """The rule of a decision to go charging."""
@@ -263,9 +263,7 @@ def known_place(place: str, places: Sequence[str]) -> str:
     """
     if place in places:
         return place
-    near = difflib.get_close_matches(place, places, 1, 0.0)
-    hint = f', the nearest name is {near[0]}' if near else ''
-    raise ValueError(f'there is no place {place!r} on the map{hint}')
+    raise ValueError(f'there is no place {place!r} on the map, expected {nearest(place, places)}')
 
 
 def why_not(place: str, world: World, battery: Battery, settings: DecisionSettings) -> WhyNot:

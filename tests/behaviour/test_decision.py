@@ -148,7 +148,7 @@ def test_why_not_says_rule_figures_and_premises(
 def test_why_not_says_what_comes_before_the_rules() -> None:
     told = why_not('R2', world(), Battery(low=True), DecisionSettings())
     assert told.sentence.startswith('it goes to E [recharge]: the battery is low')
-    with pytest.raises(ValueError, match="no place 'R22' on the map, the nearest"):
+    with pytest.raises(ValueError, match="no place 'R22' on the map, expected"):
         why_not('R22', world(), Battery(), DecisionSettings())
 
 

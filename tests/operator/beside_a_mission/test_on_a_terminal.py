@@ -40,7 +40,7 @@ def test_the_console_answers_completes_remembers_and_ends(mission: Started, term
     console.type('why n\t')  # completion
     console.until('console> why not')
     console.type(' R77\r')
-    console.until("'R77'", 'nearest name is')
+    console.until("no place 'R77'", 'expected')
     console.type('door close D4\r')
     console.until('D4 is closed')
     console.type('\x1b[A\x1b[A\x7f\x7f\x7fR4\r')  # history: the line before the last, changed
