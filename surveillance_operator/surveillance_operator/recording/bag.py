@@ -14,8 +14,8 @@ import json
 import os
 import shutil
 import time
-from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, field
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from io import BufferedWriter
 from pathlib import Path
 from typing import Any
@@ -66,23 +66,26 @@ class TopicType:
     type_hash: str = ''
 
 
-@dataclass
+@dataclass(frozen=True)
 class _Segment:
-    """What the metadata says of one file."""
+    """What the summary of a whole file says.
 
-    path: str
-    start: int = 0
-    end: int = 0
-    counts: dict[str, int] = field(default_factory=dict)
+    Attributes:
+        name: Of the file.
+        start, end: Of its messages, nanoseconds since 1970.
+        counts: Messages by topic.
+        topics: What they carry, by name.
+    """
+
+    name: str
+    start: int
+    end: int
+    counts: Mapping[str, int]
+    topics: Mapping[str, TopicType]
 
     @property
     def count(self) -> int:
         return sum(self.counts.values())
-
-    def add(self, topic: str, at: int) -> None:
-        self.start = min(self.start, at) if self.counts else at
-        self.end = max(self.end, at)
-        self.counts[topic] = self.counts.get(topic, 0) + 1
 
 
 class BagWriter:
@@ -106,9 +109,8 @@ class BagWriter:
         self.folder = folder
         self._segment_bytes, self._segment_seconds = segment_bytes, segment_seconds
         self._topics: dict[str, TopicType] = {}
-        self._closed: list[_Segment] = []
+        self._closed: list[_Segment] | None = None
         self._file: BufferedWriter | None = None
-        self._knows_folder = False
 
     def add_topic(self, topic: TopicType) -> None:
         """Announce a topic before its first message."""
@@ -127,7 +129,6 @@ class BagWriter:
             if channel is None:
                 channel = self._channels[topic] = _register(self._writer, self._topics[topic])
             self._writer.add_message(channel, received, data, published)
-            self._segment.add(topic, received)
 
     def seal(self) -> None:
         """Give all that came to the operating system; end the segment if it is time."""
@@ -136,7 +137,7 @@ class BagWriter:
             self._writer._Writer__finalize_chunk()  # type: ignore[attr-defined]
             file.flush()
             aged = time.monotonic() - self._opened > self._segment_seconds
-            if self._segment.counts and (aged or file.tell() > self._segment_bytes):
+            if aged or file.tell() > self._segment_bytes:
                 self._finish(file)
 
     def close(self) -> None:
@@ -156,20 +157,19 @@ class BagWriter:
             if self._file is not None:
                 with contextlib.suppress(OSError):
                     self._file.close()
-            self._file, self._knows_folder = None, False
+            self._file = self._closed = None
             full = error.errno in (errno.ENOSPC, errno.EDQUOT)
             kind = DiskFullError if full else RecordingError
             raise kind(f'{self.folder}: cannot be written: {error.strerror}') from None
 
     def _begin_segment(self) -> BufferedWriter:
-        if not self._knows_folder:
+        if self._closed is None:
             self.folder.mkdir(parents=True, exist_ok=True)
-            _, self._closed, topics = _take_up(self.folder)
-            self._topics = {**topics, **self._topics}
-            self._knows_folder = True
+            repair(self.folder)
+            self._closed = _whole_segments(self.folder)
         numbers = [int(path.stem.rsplit('_', 1)[1]) for path in segments(self.folder)]
-        self._segment = _Segment(f'{self.folder.name}_{max(numbers, default=-1) + 1}.mcap')
-        file = open(self.folder / self._segment.path, 'wb')  # noqa: SIM115 - kept open
+        path = self.folder / f'{self.folder.name}_{max(numbers, default=-1) + 1}.mcap'
+        file = open(path, 'wb')  # noqa: SIM115 - kept open
         # Held for as long as it is written: nobody repairs or deletes it meanwhile.
         fcntl.flock(file, fcntl.LOCK_EX)
         self._writer = _writer(file)
@@ -181,13 +181,10 @@ class BagWriter:
         self._writer.finish()  # type: ignore[no-untyped-call]
         file.close()
         self._file = None
-        if self._segment.counts:
-            self._closed.append(self._segment)
-        else:
-            (self.folder / self._segment.path).unlink()
         # `prune` may have taken old segments away.
-        self._closed = [each for each in self._closed if (self.folder / each.path).exists()]
-        write_metadata(self.folder, self._closed, self._topics)
+        known = [each for each in self._closed or () if (self.folder / each.name).exists()]
+        self._closed = [*known, *_scanned([Path(file.name)])]
+        write_metadata(self.folder, self._closed)
 
 
 def segments(folder: Path) -> list[Path]:
@@ -203,35 +200,20 @@ def repair(folder: Path) -> list[str]:
     Returns:
         What was repaired, a line each; nothing for a recording that is whole or being written.
     """
-    return _take_up(folder)[0]
-
-
-def _take_up(folder: Path) -> tuple[list[str], list[_Segment], dict[str, TopicType]]:
-    """Repair a recording; return what was repaired, its segments, and its topics by name."""
     done: list[str] = []
-    found: list[_Segment] = []
-    topics: dict[str, TopicType] = {}
     for path in segments(folder):
         with open(path, 'rb+') as file:
             try:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError:
-                return done, found, topics
+                return done
             if not _is_whole(path):
-                segment = _rewritten(path)
-                done.append(f'{path}: {segment.count} messages saved')
-        try:
-            segment, known = _scan(path)
-        except (McapError, OSError):
-            continue
-        if segment.counts:
-            found.append(segment)
-            topics.update(known)
-        else:
-            path.unlink()
-    if found and (done or not (folder / METADATA).exists()):
-        write_metadata(folder, found, topics)
-    return done, found, topics
+                _rewrite(path)
+                saved = sum(each.count for each in _scanned([path]))
+                done.append(f'{path}: {saved} messages saved')
+    if done or not (folder / METADATA).exists():
+        write_metadata(folder, _whole_segments(folder))
+    return done
 
 
 def prune(runs: Path, keep_bytes: float) -> list[Path]:
@@ -260,18 +242,18 @@ def prune(runs: Path, keep_bytes: float) -> list[Path]:
         total -= size
     for folder in {path.parent for path in deleted}:
         if segments(folder):
-            scanned = [_scan(path) for path in segments(folder) if _is_whole(path)]
-            known = {name: topic for _, topics in scanned for name, topic in topics.items()}
-            write_metadata(folder, [segment for segment, _ in scanned], known)
+            write_metadata(folder, _whole_segments(folder))
         else:
             shutil.rmtree(folder, ignore_errors=True)
     return deleted
 
 
-def write_metadata(folder: Path, closed: Sequence[_Segment], topics: dict[str, TopicType]) -> None:
-    """Write `metadata.yaml` as rosbag2 of Jazzy does (version 9)."""
-    start = min((each.start for each in closed), default=0)
-    end = max((each.end for each in closed), default=start)
+def write_metadata(folder: Path, closed: Sequence[_Segment]) -> None:
+    """Write `metadata.yaml` as rosbag2 of Jazzy does (version 9); none without a message."""
+    if not closed:
+        return
+    start, end = min(each.start for each in closed), max(each.end for each in closed)
+    topics = {name: topic for each in closed for name, topic in each.topics.items()}
     counts = {name: sum(each.counts.get(name, 0) for each in closed) for name in topics}
     content = {
         'rosbag2_bagfile_information': {
@@ -292,14 +274,13 @@ def write_metadata(folder: Path, closed: Sequence[_Segment], topics: dict[str, T
                     'message_count': counts[name],
                 }
                 for name, topic in sorted(topics.items())
-                if counts[name]
             ],
             'compression_format': '',
             'compression_mode': '',
-            'relative_file_paths': [each.path for each in closed],
+            'relative_file_paths': [each.name for each in closed],
             'files': [
                 {
-                    'path': each.path,
+                    'path': each.name,
                     'starting_time': {'nanoseconds_since_epoch': each.start},
                     'duration': {'nanoseconds': each.end - each.start},
                     'message_count': each.count,
@@ -352,19 +333,34 @@ def _topic_of(schema: Schema, channel: Channel) -> TopicType:
         return TopicType(channel.topic, schema.name, schema.data.decode(errors='replace'))
 
 
-def _scan(path: Path) -> tuple[_Segment, dict[str, TopicType]]:
-    """Return what the summary of a whole file says."""
-    segment, topics = _Segment(path.name), {}
-    with open(path, 'rb') as file:
-        summary = make_reader(file).get_summary()
-    if summary is not None and summary.statistics is not None:
-        segment.start = summary.statistics.message_start_time
-        segment.end = summary.statistics.message_end_time
-        for number, count in summary.statistics.channel_message_counts.items():
+def _whole_segments(folder: Path) -> list[_Segment]:
+    """Return what the summaries of a recording's files say, without those that are not whole."""
+    return _scanned(path for path in segments(folder) if _is_whole(path))
+
+
+def _scanned(paths: Iterable[Path]) -> list[_Segment]:
+    """Return what the summaries of files say; a file without messages is deleted."""
+    found = []
+    for path in paths:
+        try:
+            with open(path, 'rb') as file:
+                summary = make_reader(file).get_summary()
+        except (McapError, OSError):
+            continue
+        if summary is None or summary.statistics is None:
+            continue
+        said = summary.statistics
+        if not said.message_count:
+            path.unlink()
+            continue
+        counts, topics = {}, {}
+        for number, count in said.channel_message_counts.items():
             channel = summary.channels[number]
-            segment.counts[channel.topic] = count
+            counts[channel.topic] = count
             topics[channel.topic] = _topic_of(summary.schemas[channel.schema_id], channel)
-    return segment, topics
+        times = said.message_start_time, said.message_end_time
+        found.append(_Segment(path.name, *times, counts, topics))
+    return found
 
 
 def _is_whole(path: Path) -> bool:
@@ -378,12 +374,11 @@ def _is_whole(path: Path) -> bool:
         return file.read() == magic
 
 
-def _rewritten(path: Path) -> _Segment:
+def _rewrite(path: Path) -> None:
     """Write what can be read of a torn file anew, in its place."""
     temporary = path.with_suffix('.tmp')
-    segment = _Segment(path.name)
     schemas: dict[int, Schema] = {}
-    channels: dict[int, tuple[str, int]] = {}
+    channels: dict[int, int] = {}
     with open(path, 'rb') as file, open(temporary, 'wb') as output:
         writer = _writer(output)
         try:
@@ -392,13 +387,12 @@ def _rewritten(path: Path) -> _Segment:
                     schemas[record.id] = record
                 elif isinstance(record, Channel):
                     topic = _topic_of(schemas[record.schema_id], record)
-                    channels[record.id] = topic.name, _register(writer, topic)
+                    channels[record.id] = _register(writer, topic)
                 elif isinstance(record, Message):
-                    name, number = channels[record.channel_id]
+                    number = channels[record.channel_id]
                     writer.add_message(
                         number, record.log_time, record.data, record.publish_time, record.sequence
                     )
-                    segment.add(name, record.log_time)
         except OSError:  # the disk is full: the torn file stays
             temporary.unlink()
             raise
@@ -406,4 +400,3 @@ def _rewritten(path: Path) -> _Segment:
             pass
         writer.finish()  # type: ignore[no-untyped-call]
     temporary.replace(path)
-    return segment
