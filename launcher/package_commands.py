@@ -18,7 +18,7 @@ from pathlib import Path
 COMMANDS = {
     'watch': ('surveillance_operator.watch_command', 'show a running mission in this terminal'),
     'console': (
-        'surveillance_operator.console_command',
+        'surveillance_operator.watch_command:console',
         'one prompt for a running mission: answers, doors, rooms, why, go',
     ),
     'replay': ('surveillance_operator.replay', 'show a recorded mission in a browser'),
@@ -30,7 +30,7 @@ COMMANDS = {
         'check the state machines and draw them',
     ),
 }
-"""Module, whose `main` takes the arguments and returns the exit code, and purpose; by name."""
+"""Module and function (`main` unless named), which takes the arguments, and purpose; by name."""
 HELP = Path(__file__).with_name('package_help.json')
 
 
@@ -39,10 +39,11 @@ def main_of(name: str) -> Callable[[list[str]], int]:
     # A Ctrl-C waits: in the middle of an import a library may make an error of its own of it.
     signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
     try:
-        module = importlib.import_module(COMMANDS[name][0])
+        where, _, function = COMMANDS[name][0].partition(':')
+        command = getattr(importlib.import_module(where), function or 'main')
     finally:
         signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])
-    return lambda argv: int(module.main(argv) or 0)
+    return lambda argv: int(command(argv) or 0)
 
 
 def help_of(name: str) -> str:

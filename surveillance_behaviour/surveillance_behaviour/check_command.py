@@ -6,11 +6,9 @@ is, 2 when a machine cannot be built.
 
 from __future__ import annotations
 
-import argparse
 import importlib
 import sys
 from collections.abc import Callable, Sequence
-from typing import NoReturn
 
 from surveillance_behaviour.charging import BatteryMonitor
 from surveillance_behaviour.machines import MACHINES
@@ -20,6 +18,7 @@ from surveillance_fsm import Container
 from surveillance_fsm.clock import WALL_CLOCK
 from surveillance_fsm.export import to_ascii, to_graphviz, to_mermaid
 from surveillance_fsm.verify import Finding, verify
+from surveillance_runtime.command_line import CommandParser
 
 DRAWINGS: dict[str, Callable[[Container], str]] = {
     'mermaid': to_mermaid,
@@ -78,14 +77,9 @@ def report(name: str, findings: Sequence[Finding]) -> str:
     return '\n'.join([f'{name}: {verdict}', *(f'  {finding}' for finding in findings)])
 
 
-class _Parser(argparse.ArgumentParser):
-    def error(self, message: str) -> NoReturn:
-        self.exit(2, f'check-behaviour: {message} (see {self.prog} --help)\n')
-
-
 def main(args: Sequence[str] | None = None) -> int:
     """Check machines; returns the exit code."""
-    parser = _Parser(
+    parser = CommandParser(
         prog='launch.py check-behaviour', description='Check state machines without running them.'
     )
     parser.add_argument(

@@ -8,27 +8,19 @@ import sys
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NoReturn
 
 from surveillance_behaviour.mission import mission_log
 from surveillance_behaviour.policy.graph import PatrolGraph
 from surveillance_operator.recording.bag import RecordingError
+from surveillance_runtime.command_line import EXIT_BAD_INPUT, CommandParser
 from surveillance_runtime.place import Place, read_place_file
 from surveillance_runtime.place.drawing import Run, draw_place
 from surveillance_runtime.place.floor_plan import FloorPlan
 from surveillance_simulation.world.textures import marker_panel
 
-EXIT_BAD_INPUT = 2
 Spot = tuple[float, float]
 Way = list[Spot]
 _SUFFIXES = ('.png', '.jpg', '.jpeg', '.webp')
-
-
-class _Parser(argparse.ArgumentParser):
-    """Raises where argparse would end the process."""
-
-    def error(self, message: str) -> NoReturn:
-        raise ValueError(f'{message} (see {self.prog} --help)')
 
 
 def graph_over_doors(plan: FloorPlan) -> PatrolGraph:
@@ -139,8 +131,10 @@ def _count(number: int, word: str) -> str:
     return f'{number} {word}{"" if number == 1 else "s"}'
 
 
-def _parse(argv: Sequence[str]) -> argparse.Namespace:
-    parser = _Parser(prog='launch.py map', description='Checks a place and draws it as a picture.')
+def _parse(argv: Sequence[str] | None) -> argparse.Namespace:
+    parser = CommandParser(
+        prog='launch.py map', description='Checks a place and draws it as a picture.'
+    )
     parser.add_argument('place', type=Path, metavar='FILE', help='the place, a file of config/')
     parser.add_argument(
         '--record', type=Path, metavar='RUN.jsonl', help='draw this run through the place'
@@ -176,8 +170,9 @@ def _draw(options: argparse.Namespace) -> list[str]:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Check a place, draw it, and say what was found; the exit code is 2 for bad input."""
+    options = _parse(argv)
     try:
-        lines = _draw(_parse(sys.argv[1:] if argv is None else argv))
+        lines = _draw(options)
     except ValueError as error:
         print(f'map: {error}', file=sys.stderr)
         return EXIT_BAD_INPUT

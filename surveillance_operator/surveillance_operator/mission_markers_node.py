@@ -7,6 +7,7 @@ there themselves. The planned path is on `plan`, by planner_controller.
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Sequence
 from typing import Any
@@ -19,12 +20,12 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from surveillance_operator.conversions import URGENT_MARK
 from surveillance_operator.mission_feed import MissionFeed
-from surveillance_operator.robot_description import urdf
 from surveillance_operator.snapshot import STALE, Snapshot
 from surveillance_runtime.diagnostics import TOPIC
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
+from surveillance_runtime.robot_arm import ARM, Arm
 
 PERIOD = 1.0
 """Seconds between two messages."""
@@ -32,6 +33,8 @@ PATH_PERIOD = 5.0
 """Seconds between two of the way driven, which is long."""
 FRESH, LATE = (0.81, 0.89, 0.97), (0.88, 0.48, 0.12)
 """Colours of a place that was just visited, and of one over its threshold."""
+RADIUS, HEIGHT = 0.2, 0.25
+"""Of the base, metres."""
 
 try:
     from tf2_msgs.msg import TFMessage
@@ -139,6 +142,49 @@ def _marker(
     red, green, blue = map(float, colour)
     marker.color = ColorRGBA(r=red, g=green, b=blue, a=0.9)
     return marker
+
+
+def urdf(arm: Arm = ARM) -> str:
+    """Return the robot's description; the arm's joints are those of joint_states."""
+    parts = [
+        _link('base_link', f'<cylinder radius="{RADIUS}" length="{HEIGHT}"/>', HEIGHT / 2),
+        _link('base_scan', '<cylinder radius="0.05" length="0.05"/>', 0.0),
+        _fixed('lidar', 'base_link', 'base_scan', (0.0, 0.0, HEIGHT)),
+    ]
+    parent = 'base_link'
+    offsets = [*(joint.offset for joint in arm.joints[1:]), arm.camera_offset]
+    for joint, after in zip(arm.joints, offsets, strict=True):
+        link = f'{joint.name}_link'
+        length = max(0.02, math.hypot(*after))
+        parts.append(_link(link, f'<cylinder radius="0.025" length="{length:.3f}"/>', length / 2))
+        parts.append(
+            f'<joint name="{joint.name}" type="revolute"><parent link="{parent}"/>'
+            f'<child link="{link}"/><origin xyz="{_xyz(joint.offset)}"/>'
+            f'<axis xyz="{_xyz(joint.axis)}"/><limit lower="{joint.lower:.4f}" '
+            f'upper="{joint.upper:.4f}" velocity="{joint.speed:.3f}" effort="10"/></joint>'
+        )
+        parent = link
+    parts.append(_link('camera_link', '<box size="0.03 0.06 0.04"/>', 0.0))
+    parts.append(_fixed('camera', parent, 'camera_link', arm.camera_offset))
+    return f'<?xml version="1.0"?><robot name="surveillance">{"".join(parts)}</robot>'
+
+
+def _link(name: str, shape: str, z: float) -> str:
+    return (
+        f'<link name="{name}"><visual><origin xyz="0 0 {z:.3f}"/>'
+        f'<geometry>{shape}</geometry></visual></link>'
+    )
+
+
+def _fixed(name: str, parent: str, child: str, offset: tuple[float, float, float]) -> str:
+    return (
+        f'<joint name="{name}" type="fixed"><parent link="{parent}"/><child link="{child}"/>'
+        f'<origin xyz="{_xyz(offset)}"/></joint>'
+    )
+
+
+def _xyz(values: tuple[float, float, float]) -> str:
+    return ' '.join(f'{value:g}' for value in values)
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -22,11 +22,11 @@ from surveillance_operator.recording import timeline
 from surveillance_operator.recording.bag import RecordingError
 from surveillance_operator.recording.runs import Recording, find_recording, run_parser
 from surveillance_operator.recording.timeline import MARKS, Timeline
+from surveillance_runtime.command_line import EXIT_BAD_INPUT
 
 if TYPE_CHECKING:
-    from surveillance_operator.recording.sights import RecordedSights
+    from surveillance_operator.recording.stored import RecordedSights
 
-EXIT_BAD_INPUT = 2
 
 SPEEDS = 0.1, 100.0
 PERIOD = 0.05
@@ -227,7 +227,7 @@ def open_player(recording: Recording, hub: Hub, stack: contextlib.ExitStack) -> 
     if not recording.is_whole:
         assert recording.messages is not None  # one of the two was found
         # Only here: a recording with a time line is replayed where no ROS is installed.
-        from surveillance_operator.recording.conversion import Conversion
+        from surveillance_operator.recording.stored import Conversion
 
         folder = stack.enter_context(tempfile.TemporaryDirectory(prefix='replay-'))
         path = Path(folder) / timeline.NAME
@@ -244,7 +244,7 @@ def _sights(recording: Recording, stack: contextlib.ExitStack) -> RecordedSights
     if recording.messages is None:
         return None
     try:
-        from surveillance_operator.recording.sights import RecordedSights
+        from surveillance_operator.recording.stored import RecordedSights
     except ImportError:  # no ROS: lidar and camera stay dark
         return None
     sights = RecordedSights(recording.messages)

@@ -18,12 +18,12 @@ from surveillance_operator.recording import bag, timeline
 from surveillance_operator.recording.bag import RecordingError
 from surveillance_operator.recording.runs import PLACE, RECORD, find_run, run_parser
 from surveillance_operator.recording.timeline import Timeline
+from surveillance_runtime.command_line import EXIT_BAD_INPUT
 from surveillance_runtime.place import read_place_file
 from surveillance_runtime.place.drawing import Run, draw_place
 from surveillance_runtime.place.floor_plan import FloorPlan
 from surveillance_runtime.yaml_file import YamlFileError
 
-EXIT_BAD_INPUT = 2
 NAME, PICTURE = 'report.html', 'report.png'
 MOST_LINES = 2000
 _STYLE = """

@@ -1,6 +1,6 @@
 """What each topic tells of a mission: from its messages to the fields of a snapshot.
 
-A running mission (`mission_feed`) and a recording (`recording.conversion`) are read by the same
+A running mission (`mission_feed`) and a recording (`recording.stored`) are read by the same
 table.
 """
 

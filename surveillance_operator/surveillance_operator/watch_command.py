@@ -1,4 +1,4 @@
-"""The `watch` command: shows a running mission in this terminal."""
+"""The commands `watch` and `console`: a running mission in this terminal."""
 
 from __future__ import annotations
 
@@ -6,26 +6,18 @@ import argparse
 import os
 import sys
 from collections.abc import Sequence
-from typing import NoReturn
 
 from rclpy.exceptions import InvalidNamespaceException
 from rclpy.validate_namespace import validate_namespace
 
-from surveillance_operator import mission_view_node
+from surveillance_operator import console_node, mission_view_node
+from surveillance_runtime.command_line import CommandParser
 from surveillance_runtime.testing import LAST_DOMAIN
 
-EXIT_BAD_INPUT = 2
 
-
-class _Parser(argparse.ArgumentParser):
-    def error(self, message: str) -> NoReturn:
-        name = self.prog.split()[-1]
-        self.exit(EXIT_BAD_INPUT, f'{name}: {message} (see {self.prog} --help)\n')
-
-
-def mission_parser(name: str, description: str) -> argparse.ArgumentParser:
-    """Return the parser of a command about a running mission; its errors are one line."""
-    parser = _Parser(prog=f'launch.py {name}', description=description)
+def _mission_parser(name: str, description: str) -> CommandParser:
+    """Return the parser of a command about a running mission."""
+    parser = CommandParser(prog=f'launch.py {name}', description=description)
     parser.add_argument('--namespace', default='', metavar='NAME', help="the robot's namespace")
     parser.add_argument(
         '--domain',
@@ -36,7 +28,7 @@ def mission_parser(name: str, description: str) -> argparse.ArgumentParser:
     return parser
 
 
-def ros_arguments(parser: argparse.ArgumentParser, options: argparse.Namespace) -> list[str]:
+def _ros_arguments(parser: CommandParser, options: argparse.Namespace) -> list[str]:
     """Return the ROS arguments of a node that looks at a mission, and set its domain."""
     if options.domain is not None and not 0 <= options.domain <= LAST_DOMAIN:
         parser.error(f'--domain {options.domain}: expected a number from 0 to {LAST_DOMAIN}')
@@ -56,7 +48,7 @@ def ros_arguments(parser: argparse.ArgumentParser, options: argparse.Namespace) 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Watch until Ctrl-C; with --once the exit code is 1 when there was no mission to be seen."""
-    parser = mission_parser(
+    parser = _mission_parser(
         'watch',
         'Shows a running mission, simulated or real, until q or Ctrl-C: the map with robot, doors '
         'and obstacles, what the robot does and why. Keys: p holds the picture, d shows the '
@@ -74,9 +66,19 @@ def main(argv: Sequence[str] | None = None) -> int:
     options = parser.parse_args(argv)
     if not 0.1 <= options.timeout < 1e9:
         parser.error(f'--timeout {options.timeout:g}: expected 0.1 seconds or more')
-    arguments = ros_arguments(parser, options)
+    arguments = _ros_arguments(parser, options)
     arguments += ['-p', f'once:={str(options.once).lower()}', '-p', f'timeout:={options.timeout}']
     return mission_view_node.main(arguments)
+
+
+def console(argv: Sequence[str] | None = None) -> int:
+    """Read commands until `exit` or the end of the input."""
+    parser = _mission_parser(
+        'console',
+        'One prompt for a running mission: answers in mode MANUAL, doors, rooms, obstacles, '
+        'policy, why, go, pause. `help` lists the commands.',
+    )
+    return console_node.main(_ros_arguments(parser, parser.parse_args(argv)))
 
 
 if __name__ == '__main__':

@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NoReturn
 
 import cv2
 
 from surveillance_perception.detection.annotation import annotated
 from surveillance_perception.detection.detector import DetectorSettings, MarkerDetector
 from surveillance_perception.stream.image_files import read_image
-
-
-class _Parser(argparse.ArgumentParser):
-    def error(self, message: str) -> NoReturn:
-        self.exit(2, f'detect: {message} (see {self.prog} --help)\n')
+from surveillance_runtime.command_line import CommandParser
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -26,7 +20,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns:
         0 when every image could be read, 1 when one could not, 2 for a wrong command line.
     """
-    parser = _Parser(
+    parser = CommandParser(
         prog='launch.py detect',
         description='Find ArUco markers in images; nothing is written without --out.',
     )

@@ -28,11 +28,10 @@ from surveillance_interfaces.msg import Decision, FactChange, FactChanges, Missi
 from surveillance_interfaces.msg import Fact as FactMessage
 from surveillance_operator.mission_markers_node import markers_of
 from surveillance_operator.recording.bag import RecordingError
-from surveillance_operator.recording.conversion import Conversion, prefix_of
 from surveillance_operator.recording.reading import Messages
 from surveillance_operator.recording.runs import find_recording
 from surveillance_operator.recording.schemas import definition
-from surveillance_operator.recording.sights import RecordedSights
+from surveillance_operator.recording.stored import Conversion, RecordedSights, prefix_of
 from surveillance_operator.recording.timeline import Timeline
 from surveillance_operator.snapshot import Snapshot
 

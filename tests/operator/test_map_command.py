@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -126,7 +127,9 @@ def test_bad_input_is_one_line_and_exit_code_2(
         'broken': broken,
         'marker': marker,
     }
-    assert map_command.main([each.format(**names) for each in arguments]) == 2
+    with pytest.raises(SystemExit) as ended:
+        sys.exit(map_command.main([each.format(**names) for each in arguments]))
+    assert ended.value.code == 2
     error = capsys.readouterr().err
     assert message in error
     assert error.startswith('map: ')

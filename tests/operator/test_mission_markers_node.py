@@ -21,8 +21,8 @@ from surveillance_operator.mission_markers_node import (
     MissionMarkers,
     markers_of,
     path_of,
+    urdf,
 )
-from surveillance_operator.robot_description import urdf
 from surveillance_operator.snapshot import Snapshot
 from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.robot_arm import ARM

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import argparse
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NoReturn
 
 from surveillance_operator.recording import timeline
 from surveillance_operator.recording.bag import NAME, RecordingError
 from surveillance_operator.recording.reading import SUFFIX, files_of
+from surveillance_runtime.command_line import CommandParser
 
-EXIT_BAD_INPUT = 2
 LAST = 'last'
 RECORD = 'mission.jsonl'
 PLACE = 'place.yaml'
@@ -87,14 +85,9 @@ def is_run(folder: Path) -> bool:
     return any((folder / file).is_file() for file in (timeline.NAME, RECORD))
 
 
-class _Parser(argparse.ArgumentParser):
-    def error(self, message: str) -> NoReturn:
-        self.exit(EXIT_BAD_INPUT, f'{self.prog.split()[-1]}: {message} (see {self.prog} --help)\n')
-
-
-def run_parser(name: str, description: str) -> argparse.ArgumentParser:
-    """Return the parser of a command about a run; its errors are one line."""
-    parser = _Parser(prog=f'launch.py {name}', description=description)
+def run_parser(name: str, description: str) -> CommandParser:
+    """Return the parser of a command about a run."""
+    parser = CommandParser(prog=f'launch.py {name}', description=description)
     parser.add_argument(
         'run', nargs='?', default=LAST, metavar='RUN', help='its folder; default: the last one'
     )

@@ -1,6 +1,7 @@
-"""Makes the time line of a recording that has none, such as one by `ros2 bag record`.
+"""What recorded messages tell: the time line of a recording that has none, lidar and camera.
 
-The recorded messages go through the same table of topics as those of a running mission. What a
+The messages of a recording, such as one by `ros2 bag record`, go through the same table of topics
+as those of a running mission. What a
 running mission is asked for, a recording cannot answer: places and doors come from `place_markers`,
 visits and URGENT from `fact_changes`, the nodes from `/diagnostics`.
 """
@@ -17,9 +18,11 @@ from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message
 from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import CompressedImage, Image
 from visualization_msgs.msg import MarkerArray
 
 from surveillance_interfaces.msg import FactChanges
@@ -29,11 +32,24 @@ from surveillance_operator.recording.bag import RecordingError
 from surveillance_operator.recording.reading import Messages
 from surveillance_operator.recording.timeline import TimelineWriter
 from surveillance_operator.snapshot import STALE, Snapshot, follow
-from surveillance_operator.topics import BEHAVIOUR, TOPICS, Fields, Topic, read_message, with_fact
+from surveillance_operator.topics import (
+    BEHAVIOUR,
+    POSE_TOPIC,
+    TOPICS,
+    Fields,
+    Topic,
+    read_message,
+    with_fact,
+)
 
 CLOCK = '/clock'
 WINDOW = 0.4
 """Seconds of the recording that make one snapshot."""
+RECENT = 2.5
+"""What was seen longer ago is not shown, seconds."""
+IMAGES = ('aruco_detector/annotated', 'camera/rgb/image_raw')
+SCAN_TOPIC = 'scan'
+KINDS = {'sensor_msgs/msg/Image': Image, 'sensor_msgs/msg/CompressedImage': CompressedImage}
 
 
 def _on_fact_changes(message: FactChanges, old: Snapshot) -> Fields:
@@ -172,3 +188,54 @@ def read_stored(snapshot: Snapshot, topic: Topic, data: bytes) -> Snapshot:
     except Exception as error:  # whatever rmw finds: the bytes may be anything
         return replace(snapshot, silent={**snapshot.silent, topic.name: str(error)})
     return read_message(snapshot, topic, message)
+
+
+class RecordedSights:
+    """Reads what was seen.
+
+    Args:
+        recording: Its folder, or its only file.
+
+    Raises:
+        RecordingError: It cannot be read.
+    """
+
+    def __init__(self, recording: Path) -> None:
+        self._messages = Messages(recording)
+        self._prefix = prefix_of(self._messages.types)
+        self._images = [
+            f'{self._prefix}{name}{end}' for name in IMAGES for end in ('', '/compressed')
+        ]
+        by_name = {topic.name: topic for topic in TOPICS}
+        self._pose, self._scan = by_name[POSE_TOPIC], by_name[SCAN_TOPIC]
+
+    def scan(self, at: float) -> list[list[float]]:
+        """Return the points that the lidar saw, metres, map frame; none where it was silent."""
+        poses = [
+            read_stored(Snapshot(), self._pose, data)
+            for _, _, data in self._messages.before([self._prefix + POSE_TOPIC], at, RECENT)
+        ]
+        for _, _, data in self._messages.before([self._prefix + SCAN_TOPIC], at, RECENT):
+            # A scan is shown from the pose of its moment.
+            for known in poses:
+                seen = read_stored(known, self._scan, data).scan
+                if len(seen):
+                    points: list[list[float]] = np.round(seen, 2).tolist()
+                    return points
+        return []
+
+    def jpeg(self, at: float) -> bytes | None:
+        """Return the image of the camera as JPEG, None where there is none."""
+        for topic, _, data in self._messages.before(self._images, at, RECENT, 1):
+            kind = KINDS.get(self._messages.types.get(topic, ''))
+            if kind is None:
+                continue
+            try:
+                return conversions.jpeg_from(deserialize_message(data, kind))
+            except Exception:  # whatever rmw finds: the bytes may be anything
+                return None
+        return None
+
+    def close(self) -> None:
+        """Close the files."""
+        self._messages.close()
