@@ -79,6 +79,9 @@ def run_of(events: Sequence[mission_log.Event], place: Place, source: str) -> Ru
             _count(sum(summary.failures.values()), 'failure'),
         )
     )
+    if events[0].name == 'snapshot':
+        listed = max(event.time for event in events) - events[0].time
+        line += f' · the ways of the last {listed / 3600.0:.1f} h'
     driven, planned, failures = _drives(events, place)
     thresholds = [event.fields.get('urgency_threshold') for event in events]
     numbers = [float(each) for each in thresholds if isinstance(each, int | float)]

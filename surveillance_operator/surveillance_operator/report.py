@@ -54,7 +54,7 @@ def write_report(folder: Path) -> Path:
     """
     with _one_line(folder):
         events, plan, run = _material(folder)
-        if not any(event.name == 'visit' for event in events):
+        if not any(mission_log.summarize(events).visits.values()):
             raise RecordingError(f'{folder / RECORD}: no visit was recorded')
         drawn = _map(plan, run) if plan is not None and run is not None else ''
         speed = _fastest(events)
@@ -165,28 +165,35 @@ def _threshold(folder: Path) -> float | None:
 def _page(folder: Path, events: Sequence[Event], drawn: str, bound: float | None) -> str:
     summary = mission_log.summarize(events)
     threshold = _threshold(folder)
-    start, end = events[0].time, max(event.time for event in events)
+    begin, end = events[0].time, max(event.time for event in events)
+    is_whole = events[0].name != 'snapshot'
+    start = begin if is_whole else end - summary.seconds
     body = [f'<h1>Mission {escape(folder.name)}</h1>']
     body += [f'<p>{escape(line)}</p>' for line in _overview(summary, threshold, bound)]
+    if not is_whole:
+        body.append(
+            f'<p>All figures are of the whole mission; map, strips and lists begin at '
+            f'{_clock(begin - start)}. What came before is in {RECORD}.*.gz.</p>'
+        )
     body.append(drawn)
     body.append('<h2>Idleness</h2>')
-    body.append(_idleness(events, summary, threshold, start, end))
-    for title, name, columns, is_open in (
-        ('Recharges', 'recharge', ('place', 'seconds'), True),
-        ('Failures', 'failure', ('what', 'reason'), True),
-        ('Decisions', 'decision', ('place', 'rule', 'reason'), False),
-        ('Visits', 'visit', ('place', 'distance'), False),
+    body.append(_idleness(events, summary, threshold, begin, end))
+    for title, name, number, columns, is_open in (
+        ('Recharges', 'recharge', summary.recharges, ('place', 'seconds'), True),
+        ('Failures', 'failure', summary.failures.total(), ('what', 'reason'), True),
+        ('Decisions', 'decision', summary.rules.total(), ('place', 'rule', 'reason'), False),
+        ('Visits', 'visit', summary.visits.total(), ('place', 'distance'), False),
     ):
         found = [event for event in events if event.name == name]
         if not found:
-            body.append(f'<h2>{title} (0)</h2>')
+            body.append(f'<h2>{title} ({number})</h2>')
             continue
         rows = _rows(found, columns, start)
         table = _table(['at', *columns], rows[:MOST_LINES])
         if len(rows) > MOST_LINES:
             table += f'<p>and {len(rows) - MOST_LINES} more: see {RECORD}.</p>'
         opened = ' open' if is_open else ''
-        head = f'<summary>{title} ({len(found)})</summary>'
+        head = f'<summary>{title} ({number})</summary>'
         body.append(f'<details{opened}>{head}{table}</details>')
     made = time.strftime('%Y-%m-%d %H:%M')
     return (

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import http.client
 import json
+import re
 import subprocess
 import sys
 import time
@@ -13,14 +14,16 @@ from typing import Any
 
 import pytest
 
-from surveillance_behaviour.mission.mission_log import MissionRecord
+from surveillance_behaviour.mission.mission_log import MissionRecord, read
 from surveillance_operator import replay, report
+from surveillance_operator.map_command import run_of
 from surveillance_operator.page.hub import Hub
 from surveillance_operator.page.server import Page
 from surveillance_operator.recording.runs import find_run
 from surveillance_operator.recording.timeline import Timeline
 from surveillance_operator.replay import Player
 from surveillance_operator.report import RecordingError, draw_picture, write_report
+from surveillance_runtime.place import read_place_file
 from tests.operator.test_timeline import record
 
 ROOT = Path(__file__).parents[2]
@@ -134,6 +137,26 @@ def test_what_failed_again_and_again_is_one_row_of_the_report(run: Path) -> None
     assert text.count('shut') == 1
     assert 'shut (100 times until 0:03:19)' in text
     assert 'Failures (101)' in text
+
+
+def test_the_report_of_a_long_mission_counts_all_and_says_what_it_lists(run: Path) -> None:
+    with MissionRecord(run / 'mission.jsonl', segment_bytes=4000) as mission:
+        for second in range(3600, 8000, 20):
+            mission.write('visit', float(second), place='C2', distance=5.0)
+            mission.write('recharge', float(second) + 10.0, place='E', seconds=5.0)
+        mission.write('failure', 8000.0, what='MOVE', reason='shut')
+    assert list(run.glob('mission.jsonl.*.gz'))
+    text = write_report(run).read_text()
+    assert 'Recharges (221)' in text
+    assert 'Visits (221)' in text
+    assert 'Failures (2)' in text
+    since = re.search(r'lists begin at (\d:\d\d:\d\d)', text)
+    assert since is not None
+    assert '1:00:00' < since[1] < '2:13:20'
+    assert '<td>2:13:20</td><td>MOVE</td><td>shut</td>' in text  # by the mission's own time
+    plan = read_place_file(run / 'place.yaml', walls=True).plan
+    assert plan is not None
+    assert 'the ways of the last 0.' in run_of(read(run / 'mission.jsonl'), plan.place, '').summary
 
 
 def test_the_commands_find_runs_and_say_what_is_wrong(
