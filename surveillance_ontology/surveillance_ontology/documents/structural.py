@@ -6,9 +6,10 @@ itself alone and is reported with its line (https://www.w3.org/TR/owl2-syntax/, 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import Any
+import re
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import MISSING, dataclass, fields
+from typing import Any, TypeAlias, get_args
 
 from surveillance_ontology.documents.nodes import IllFormedError
 from surveillance_ontology.owl import axioms as ax
@@ -17,6 +18,7 @@ from surveillance_ontology.owl.axioms import Axiom
 from surveillance_ontology.owl.expressions import Literal
 from surveillance_ontology.owl.vocabulary import OWL, RDF, RDFS, SWRL, SWRLB, XSD
 
+Make: TypeAlias = Callable[[Any], Any]
 DEEPEST = 200
 """How deep constructs may nest."""
 PREFIXES = {'owl': OWL, 'rdf': RDF, 'rdfs': RDFS, 'xsd': XSD, 'swrl': SWRL, 'swrlb': SWRLB}
@@ -107,24 +109,15 @@ def _need(value: Any, kind: type, what: str) -> Any:
     return value
 
 
-def _iri(value: Any) -> str:
-    iri: str = _need(value, str, 'an IRI')
-    return iri
-
-
-def _lit(value: Any) -> Literal:
-    literal: Literal = _need(value, Literal, 'a literal')
-    return literal
-
-
 def _prop(value: Any) -> ex.PropertyExpression:
     if isinstance(value, Call) and value.name == 'ObjectInverseOf' and len(value.parts) == 1:
         inner = _prop(value.parts[0])
         return inner.prop if isinstance(inner, ex.ObjectInverseOf) else ex.ObjectInverseOf(inner)
-    return _iri(value)
+    iri: str = _need(value, str, 'an IRI')
+    return iri
 
 
-def _made(value: Any, makers: Mapping[str, Callable[[Any], Any]], what: str) -> Any:
+def _made(value: Any, makers: Mapping[str, Make], what: str) -> Any:
     """Return what a name stands for, or a call of one of the makers."""
     if isinstance(value, str):
         return value
@@ -135,140 +128,128 @@ def _made(value: Any, makers: Mapping[str, Callable[[Any], Any]], what: str) -> 
     return make(call.parts)
 
 
-def _cls(value: Any) -> ex.ClassExpression:
-    made: ex.ClassExpression = _made(value, _CLASSES, 'class')
-    return made
+def _argument(value: Any) -> Any:
+    if isinstance(value, Call) and value.name == 'Variable' and len(value.parts) == 1:
+        return ex.Variable(_need(value.parts[0], str, 'an IRI'))
+    return _need(value, str | Literal, 'a variable, an individual or a literal')  # type: ignore[arg-type]
 
 
-def _range(value: Any) -> ex.DataRange:
-    made: ex.DataRange = _made(value, _RANGES, 'data range')
-    return made
+_READ: dict[str, Make] = {
+    'int': lambda value: _need(value, int, 'a number'),
+    'str': lambda value: _need(value, str, 'an IRI'),
+    'Literal': lambda value: _need(value, Literal, 'a literal'),
+    'str | Literal': lambda value: _need(value, str | Literal, 'an IRI or a literal'),  # type: ignore[arg-type]
+    'PropertyExpression': _prop,
+    'ClassExpression': lambda value: _made(value, _CLASSES, 'class'),
+    'DataRange': lambda value: _made(value, _RANGES, 'data range'),
+    'IndividualArgument': _argument,
+    'DataArgument': _argument,
+}
+"""How a part is read, by the type of the record's field that it is for."""
+_SEVERAL = re.compile(r'(?:tuple|frozenset)\[(\w+)')
 
 
-def _all(read: Callable[[Any], Any], values: Any, fewest: int = 2) -> tuple[Any, ...]:
-    if len(values) < fewest:
-        raise IllFormedError(f'expected at least {fewest} parts, got {len(values)}')
-    return tuple(map(read, values))
+def _maker(record: Any) -> Make:
+    """Return what makes a record of a construct: the parts are the fields, as both are OWL 2's.
 
+    The last field takes the rest of the parts if it holds several.
+    """
+    *_, last = entries = fields(record)
+    several = _SEVERAL.match(str(last.type))
+    singles = [_READ[str(entry.type)] for entry in (entries[:-1] if several else entries)]
+    optional = 0 if last.default is MISSING else 1
+    fewest = 1 if record.__name__.endswith('OneOf') else 2
 
-def _exactly(values: Any, *reads: Callable[[Any], Any]) -> list[Any]:
-    if len(values) != len(reads):
-        raise IllFormedError(f'expected {len(reads)} parts, got {len(values)}')
-    return [read(value) for read, value in zip(reads, values, strict=True)]
-
-
-def _of(record: Callable[..., Any], *reads: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    return lambda values: record(*_exactly(values, *reads))
-
-
-def _group(record: Callable[..., Any], read: Callable[[Any], Any], fewest: int = 2) -> Any:
-    return lambda values: record(_all(read, values, fewest))
-
-
-def _counted(record: Callable[..., Any], prop: Any, filler: Any) -> Callable[[Any], Any]:
     def make(values: Any) -> Any:
-        if len(values) not in (2, 3):
-            raise IllFormedError(f'expected 2 or 3 parts, got {len(values)}')
-        number = _need(values[0], int, 'a number')
-        rest = [filler(values[2])] if len(values) == 3 else []
-        return record(number, prop(values[1]), *rest)
+        count = len(singles)
+        own = values[:count] if several else values
+        if not count - optional <= len(own) <= count:
+            expected = f'{count - 1} or {count}' if optional else str(count)
+            raise IllFormedError(f'expected {expected} parts, got {len(own)}')
+        made = [read(value) for read, value in zip(singles, own, strict=False)]
+        if several:
+            rest = values[count:]
+            if len(rest) < fewest:
+                raise IllFormedError(f'expected at least {fewest} parts, got {len(rest)}')
+            kind = tuple if str(last.type).startswith('tuple') else frozenset
+            made.append(kind(map(_READ[several[1]], rest)))
+        return record(*made)
 
     return make
 
 
+def _makers(records: Iterable[Any]) -> dict[str, Make]:
+    """Return the makers of records by the construct's name."""
+    return {
+        record.__name__: _maker(record)
+        for record in records
+        if hasattr(record, '__dataclass_fields__') and record.__name__ not in _OWN_FORM
+    }
+
+
+def _exactly(values: Any, count: int) -> Any:
+    if len(values) != count:
+        raise IllFormedError(f'expected {count} parts, got {len(values)}')
+    return values
+
+
 def _facets(values: Any) -> ex.DatatypeRestriction:
-    names, bounds = values[1::2], values[2::2]
-    pairs = zip(map(_iri, names), map(_lit, bounds), strict=True)
-    return ex.DatatypeRestriction(_iri(values[0]), tuple(pairs))
+    names, bounds = map(_READ['str'], values[1::2]), map(_READ['Literal'], values[2::2])
+    return ex.DatatypeRestriction(_READ['str'](values[0]), tuple(zip(names, bounds, strict=True)))
 
 
-_CLASSES: dict[str, Callable[[Any], Any]] = {
-    'ObjectIntersectionOf': _group(ex.ObjectIntersectionOf, _cls),
-    'ObjectUnionOf': _group(ex.ObjectUnionOf, _cls),
-    'ObjectComplementOf': _of(ex.ObjectComplementOf, _cls),
-    'ObjectOneOf': _group(ex.ObjectOneOf, _iri, 1),
-    'ObjectSomeValuesFrom': _of(ex.ObjectSomeValuesFrom, _prop, _cls),
-    'ObjectAllValuesFrom': _of(ex.ObjectAllValuesFrom, _prop, _cls),
-    'ObjectHasValue': _of(ex.ObjectHasValue, _prop, _iri),
-    'ObjectHasSelf': _of(ex.ObjectHasSelf, _prop),
-    'ObjectMinCardinality': _counted(ex.ObjectMinCardinality, _prop, _cls),
-    'ObjectMaxCardinality': _counted(ex.ObjectMaxCardinality, _prop, _cls),
-    'ObjectExactCardinality': _counted(ex.ObjectExactCardinality, _prop, _cls),
-    'DataSomeValuesFrom': _of(ex.DataSomeValuesFrom, _iri, _range),
-    'DataAllValuesFrom': _of(ex.DataAllValuesFrom, _iri, _range),
-    'DataHasValue': _of(ex.DataHasValue, _iri, _lit),
-    'DataMinCardinality': _counted(ex.DataMinCardinality, _iri, _range),
-    'DataMaxCardinality': _counted(ex.DataMaxCardinality, _iri, _range),
-    'DataExactCardinality': _counted(ex.DataExactCardinality, _iri, _range),
-}
-_RANGES: dict[str, Callable[[Any], Any]] = {
-    'DataIntersectionOf': _group(ex.DataIntersectionOf, _range),
-    'DataUnionOf': _group(ex.DataUnionOf, _range),
-    'DataComplementOf': _of(ex.DataComplementOf, _range),
-    'DataOneOf': _group(ex.DataOneOf, _lit, 1),
-    'DatatypeRestriction': _facets,
-}
-
-
-def _argument(value: Any) -> Any:
-    if isinstance(value, Call) and value.name == 'Variable' and len(value.parts) == 1:
-        return ex.Variable(_iri(value.parts[0]))
-    return _need(value, str | Literal, 'a variable, an individual or a literal')  # type: ignore[arg-type]
-
-
-_ATOMS: dict[str, Callable[[Any], Any]] = {
-    'ClassAtom': _of(ex.ClassAtom, _cls, _argument),
-    'DataRangeAtom': _of(ex.DataRangeAtom, _range, _argument),
-    'ObjectPropertyAtom': _of(ex.ObjectPropertyAtom, _prop, _argument, _argument),
-    'DataPropertyAtom': _of(ex.DataPropertyAtom, _iri, _argument, _argument),
-    'SameIndividualAtom': _of(ex.SameIndividualAtom, _argument, _argument),
-    'DifferentIndividualsAtom': _of(ex.DifferentIndividualsAtom, _argument, _argument),
-    'BuiltInAtom': lambda values: ex.BuiltinAtom(
-        _iri(values[0]), tuple(map(_argument, values[1:]))
-    ),
-}
+def _builtin(values: Any) -> ex.BuiltinAtom:
+    return ex.BuiltinAtom(_READ['str'](values[0]), tuple(map(_argument, values[1:])))
 
 
 def _rule(values: Any) -> ax.Rule:
-    body, head = _exactly(values, *(lambda part: _need(part, Call, 'atoms') for _ in range(2)))
-    return ax.Rule(
-        tuple(_ATOMS[atom.name](atom.parts) for atom in body.parts),
-        tuple(_ATOMS[atom.name](atom.parts) for atom in head.parts),
-    )
+    parts = (_need(part, Call, 'atoms').parts for part in _exactly(values, 2))
+    atoms = ([_need(atom, Call, 'an atom') for atom in part] for part in parts)
+    return ax.Rule(*(tuple(_ATOMS[atom.name](atom.parts) for atom in part) for part in atoms))
 
 
 def _sub_property(values: Any) -> Axiom:
-    sub, sup = _exactly(values, lambda part: part, _prop)
-    if isinstance(sub, Call) and sub.name == 'ObjectPropertyChain':
-        return ax.SubPropertyChainOf(_all(_prop, sub.parts), sup)
-    return ax.SubObjectPropertyOf(_prop(sub), sup)
+    sub, sup = _exactly(values, 2)
+    if not isinstance(sub, Call) or sub.name != 'ObjectPropertyChain':
+        return ax.SubObjectPropertyOf(_prop(sub), _prop(sup))
+    if len(sub.parts) < 2:
+        raise IllFormedError(f'expected at least 2 parts, got {len(sub.parts)}')
+    return ax.SubPropertyChainOf(tuple(map(_prop, sub.parts)), _prop(sup))
 
 
 def _declaration(values: Any) -> Axiom:
-    (call,) = values
-    return ax.Declaration(_KINDS[call.name], _exactly(call.parts, _iri)[0])
+    call = _need(_exactly(values, 1)[0], Call, 'a kind of entity')
+    (iri,) = _exactly(call.parts, 1)
+    return ax.Declaration(_KINDS[call.name], _READ['str'](iri))
 
 
-def _individual_assertion(negative: bool) -> Callable[[Any], Axiom]:
+def _straight(
+    record: type[ax.ObjectPropertyAssertion | ax.NegativeObjectPropertyAssertion],
+) -> Make:
+    """Return what makes an assertion without an inverse property."""
+
     def make(values: Any) -> Axiom:
-        prop, subject, target = _exactly(values, _prop, _iri, _iri)
-        if isinstance(prop, ex.ObjectInverseOf):
-            prop, subject, target = prop.prop, target, subject
-        if negative:
-            return ax.NegativeObjectPropertyAssertion(prop, subject, target)
-        return ax.ObjectPropertyAssertion(prop, subject, target)
+        prop, subject, target = _exactly(values, 3)
+        subject, target = _READ['str'](subject), _READ['str'](target)
+        expression = _prop(prop)
+        if isinstance(expression, ex.ObjectInverseOf):
+            return record(expression.prop, target, subject)
+        return record(expression, subject, target)
 
     return make
 
 
 def _key(values: Any) -> Axiom:
-    cls, objects, datas = _exactly(values, _cls, tuple, tuple)
-    return ax.HasKey(cls, tuple(map(_prop, objects)), tuple(map(_iri, datas)))
+    cls, objects, datas = _exactly(values, 3)
+    data_props = tuple(map(_READ['str'], tuple(datas)))
+    return ax.HasKey(_READ['ClassExpression'](cls), tuple(map(_prop, objects)), data_props)
 
 
-def _about_property(name: str) -> Callable[[Any], Any]:
+def _about_property(name: str) -> Make:
     """Return an axiom of annotation properties, as an annotation of the property."""
-    return lambda values: ax.AnnotationAssertion(RDFS + name, *_exactly(values, _iri, _iri))
+    return lambda values: ax.AnnotationAssertion(
+        RDFS + name, *map(_READ['str'], _exactly(values, 2))
+    )
 
 
 _KINDS = {
@@ -279,49 +260,23 @@ _KINDS = {
     'AnnotationProperty': 'annotation_property',
     'Datatype': 'datatype',
 }
-_AXIOMS: dict[str, Callable[[Any], Axiom]] = {
+_OWN_FORM = {
+    *('SubPropertyChainOf', 'HasKey', 'AxiomAnnotation', 'Rule'),
+    *('ObjectInverseOf', 'DatatypeRestriction', 'BuiltinAtom'),
+}
+"""Records that are not made of a construct's parts one after the other."""
+_CLASSES: dict[str, Make] = _makers(get_args(ex.ClassExpression))
+_RANGES: dict[str, Make] = _makers(get_args(ex.DataRange)) | {'DatatypeRestriction': _facets}
+_ATOMS = _makers(get_args(ex.Atom)) | {'BuiltInAtom': _builtin}
+_AXIOMS: dict[str, Make] = {
+    **_makers(r for r in vars(ax).values() if isinstance(r, type) and issubclass(r, Axiom)),
     'Declaration': _declaration,
-    'Import': _of(ax.Import, _iri),
-    'SubClassOf': _of(ax.SubClassOf, _cls, _cls),
-    'EquivalentClasses': _group(ax.EquivalentClasses, _cls),
-    'DisjointClasses': _group(ax.DisjointClasses, _cls),
-    'DisjointUnion': lambda v: ax.DisjointUnion(_iri(v[0]), _all(_cls, v[1:])),
     'SubObjectPropertyOf': _sub_property,
-    'EquivalentObjectProperties': _group(ax.EquivalentObjectProperties, _prop),
-    'DisjointObjectProperties': _group(ax.DisjointObjectProperties, _prop),
-    'InverseObjectProperties': _of(ax.InverseObjectProperties, _prop, _prop),
-    'ObjectPropertyDomain': _of(ax.ObjectPropertyDomain, _prop, _cls),
-    'ObjectPropertyRange': _of(ax.ObjectPropertyRange, _prop, _cls),
-    'FunctionalObjectProperty': _of(ax.FunctionalObjectProperty, _prop),
-    'InverseFunctionalObjectProperty': _of(ax.InverseFunctionalObjectProperty, _prop),
-    'ReflexiveObjectProperty': _of(ax.ReflexiveObjectProperty, _prop),
-    'IrreflexiveObjectProperty': _of(ax.IrreflexiveObjectProperty, _prop),
-    'SymmetricObjectProperty': _of(ax.SymmetricObjectProperty, _prop),
-    'AsymmetricObjectProperty': _of(ax.AsymmetricObjectProperty, _prop),
-    'TransitiveObjectProperty': _of(ax.TransitiveObjectProperty, _prop),
-    'SubDataPropertyOf': _of(ax.SubDataPropertyOf, _iri, _iri),
-    'EquivalentDataProperties': _group(ax.EquivalentDataProperties, _iri),
-    'DisjointDataProperties': _group(ax.DisjointDataProperties, _iri),
-    'DataPropertyDomain': _of(ax.DataPropertyDomain, _iri, _cls),
-    'DataPropertyRange': _of(ax.DataPropertyRange, _iri, _range),
-    'FunctionalDataProperty': _of(ax.FunctionalDataProperty, _iri),
-    'DatatypeDefinition': _of(ax.DatatypeDefinition, _iri, _range),
     'HasKey': _key,
-    'SameIndividual': lambda v: ax.SameIndividual(frozenset(_all(_iri, v))),
-    'DifferentIndividuals': lambda v: ax.DifferentIndividuals(frozenset(_all(_iri, v))),
-    'ClassAssertion': _of(ax.ClassAssertion, _cls, _iri),
-    'ObjectPropertyAssertion': _individual_assertion(False),
-    'NegativeObjectPropertyAssertion': _individual_assertion(True),
-    'DataPropertyAssertion': _of(ax.DataPropertyAssertion, _iri, _iri, _lit),
-    'NegativeDataPropertyAssertion': _of(ax.NegativeDataPropertyAssertion, _iri, _iri, _lit),
-    'AnnotationAssertion': lambda v: ax.AnnotationAssertion(*_exactly(v, _iri, _iri, _value)),
+    'ObjectPropertyAssertion': _straight(ax.ObjectPropertyAssertion),
+    'NegativeObjectPropertyAssertion': _straight(ax.NegativeObjectPropertyAssertion),
     'SubAnnotationPropertyOf': _about_property('subPropertyOf'),
     'AnnotationPropertyDomain': _about_property('domain'),
     'AnnotationPropertyRange': _about_property('range'),
     'DLSafeRule': _rule,
 }
-
-
-def _value(value: Any) -> str | Literal:
-    found: str | Literal = _need(value, str | Literal, 'an IRI or a literal')  # type: ignore[arg-type]
-    return found
