@@ -37,7 +37,7 @@ ANNOTATIONS = {
     *(OWL + name for name in ('versionInfo', 'versionIRI', 'deprecated', 'priorVersion')),
     *(OWL + name for name in ('backwardCompatibleWith', 'incompatibleWith')),
 }
-_CARDINALITIES = (
+CARDINALITIES = (
     ('minCardinality', 'minQualifiedCardinality', ex.ObjectMinCardinality, ex.DataMinCardinality),
     ('maxCardinality', 'maxQualifiedCardinality', ex.ObjectMaxCardinality, ex.DataMaxCardinality),
     ('cardinality', 'qualifiedCardinality', ex.ObjectExactCardinality, ex.DataExactCardinality),
@@ -45,7 +45,7 @@ _CARDINALITIES = (
 _CONSTRUCTORS = ('intersectionOf', 'unionOf', 'complementOf', 'oneOf', 'onProperty')
 _RESTRICTIONS = (
     *('someValuesFrom', 'allValuesFrom', 'hasValue', 'hasSelf'),
-    *(name for row in _CARDINALITIES for name in row[:2]),
+    *(name for row in CARDINALITIES for name in row[:2]),
 )
 BUILT_IN = (OWL, RDF, RDFS, XSD, SWRL)
 
@@ -293,7 +293,7 @@ class NodeReader:
         on_class = self._one(node, OWL + 'onClass')
         on_range = self._one(node, OWL + 'onDataRange')
         counts_values = on_range is not None or (on_class is None and self._is_data(on))
-        for plain, qualified, of_objects, of_data in _CARDINALITIES:
+        for plain, qualified, of_objects, of_data in CARDINALITIES:
             number = self._number(node, OWL + plain)
             if number is None:
                 number = self._number(node, OWL + qualified)

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import count
+from typing import Any
 
+from surveillance_ontology.documents.nodes import CARDINALITIES
 from surveillance_ontology.documents.rdf_xml import Node, Triple
 from surveillance_ontology.owl import axioms as ax
 from surveillance_ontology.owl import expressions as ex
 from surveillance_ontology.owl.axioms import Axiom
 from surveillance_ontology.owl.entities import entities_of
 from surveillance_ontology.owl.expressions import Literal
-from surveillance_ontology.owl.vocabulary import OWL, RDF, RDFS, SWRL, THING, TOP_LITERAL, XSD
+from surveillance_ontology.owl.vocabulary import OWL, RDF, RDFS, SWRL, THING, XSD
 
 _TYPE = RDF + 'type'
 _KIND_TYPES = {
@@ -22,21 +24,99 @@ _KIND_TYPES = {
     'individual': OWL + 'NamedIndividual',
     'datatype': RDFS + 'Datatype',
 }
-_GROUPS = {
-    OWL + name
-    for name in (
-        'AllDifferent',
-        'AllDisjointClasses',
-        'AllDisjointProperties',
-        'NegativePropertyAssertion',
-    )
+_CLASS, _RESTRICTION, _DATATYPE = OWL + 'Class', OWL + 'Restriction', RDFS + 'Datatype'
+_ON = (OWL + 'onProperty', 'prop')
+_ONE, _TWO = (SWRL + 'argument1', 'first'), (SWRL + 'argument2', 'second')
+_NEGATIVE = (
+    OWL + 'NegativePropertyAssertion',
+    (OWL + 'sourceIndividual', 'subject'),
+    (OWL + 'assertionProperty', 'prop'),
+)
+_NODES: dict[type, tuple[Any, ...]] = {
+    ex.ObjectInverseOf: ('', (OWL + 'inverseOf', 'prop')),
+    ex.ObjectIntersectionOf: (_CLASS, (OWL + 'intersectionOf', 'operands')),
+    ex.ObjectUnionOf: (_CLASS, (OWL + 'unionOf', 'operands')),
+    ex.ObjectComplementOf: (_CLASS, (OWL + 'complementOf', 'operand')),
+    ex.ObjectOneOf: (_CLASS, (OWL + 'oneOf', 'individuals')),
+    ex.ObjectSomeValuesFrom: (_RESTRICTION, _ON, (OWL + 'someValuesFrom', 'filler')),
+    ex.ObjectAllValuesFrom: (_RESTRICTION, _ON, (OWL + 'allValuesFrom', 'filler')),
+    ex.ObjectHasValue: (_RESTRICTION, _ON, (OWL + 'hasValue', 'individual')),
+    ex.ObjectHasSelf: (_RESTRICTION, _ON),
+    ex.DataSomeValuesFrom: (_RESTRICTION, _ON, (OWL + 'someValuesFrom', 'range')),
+    ex.DataAllValuesFrom: (_RESTRICTION, _ON, (OWL + 'allValuesFrom', 'range')),
+    ex.DataHasValue: (_RESTRICTION, _ON, (OWL + 'hasValue', 'literal')),
+    **{record: (_RESTRICTION, _ON) for row in CARDINALITIES for record in row[2:]},
+    ex.DataIntersectionOf: (_DATATYPE, (OWL + 'intersectionOf', 'operands')),
+    ex.DataUnionOf: (_DATATYPE, (OWL + 'unionOf', 'operands')),
+    ex.DataComplementOf: (_DATATYPE, (OWL + 'datatypeComplementOf', 'operand')),
+    ex.DataOneOf: (_DATATYPE, (OWL + 'oneOf', 'literals')),
+    ex.DatatypeRestriction: (_DATATYPE, (OWL + 'onDatatype', 'datatype')),
+    ex.ClassAtom: (
+        SWRL + 'ClassAtom',
+        (SWRL + 'classPredicate', 'cls'),
+        (SWRL + 'argument1', 'argument'),
+    ),
+    ex.DataRangeAtom: (
+        SWRL + 'DataRangeAtom',
+        (SWRL + 'dataRange', 'range'),
+        (SWRL + 'argument1', 'argument'),
+    ),
+    ex.ObjectPropertyAtom: (
+        *(SWRL + 'IndividualPropertyAtom', (SWRL + 'propertyPredicate', 'prop')),
+        *(_ONE, _TWO),
+    ),
+    ex.DataPropertyAtom: (
+        *(SWRL + 'DatavaluedPropertyAtom', (SWRL + 'propertyPredicate', 'prop')),
+        *(_ONE, _TWO),
+    ),
+    ex.SameIndividualAtom: (SWRL + 'SameIndividualAtom', _ONE, _TWO),
+    ex.DifferentIndividualsAtom: (SWRL + 'DifferentIndividualsAtom', _ONE, _TWO),
+    ex.BuiltinAtom: (
+        *(SWRL + 'BuiltinAtom', (SWRL + 'builtin', 'builtin')),
+        (SWRL + 'arguments', 'arguments'),
+    ),
+    ax.NegativeObjectPropertyAssertion: (*_NEGATIVE, (OWL + 'targetIndividual', 'object')),
+    ax.NegativeDataPropertyAssertion: (*_NEGATIVE, (OWL + 'targetValue', 'literal')),
 }
+"""What has a node of its own: the node's type, then each predicate with the field behind it."""
+_PAIRS: dict[type, tuple[str, str, str]] = {
+    ax.ClassAssertion: ('individual', _TYPE, 'cls'),
+    ax.SubClassOf: ('sub', RDFS + 'subClassOf', 'sup'),
+    ax.SubObjectPropertyOf: ('sub', RDFS + 'subPropertyOf', 'sup'),
+    ax.SubDataPropertyOf: ('sub', RDFS + 'subPropertyOf', 'sup'),
+    ax.SubPropertyChainOf: ('sup', OWL + 'propertyChainAxiom', 'chain'),
+    ax.InverseObjectProperties: ('first', OWL + 'inverseOf', 'second'),
+    ax.ObjectPropertyDomain: ('prop', RDFS + 'domain', 'domain'),
+    ax.DataPropertyDomain: ('prop', RDFS + 'domain', 'domain'),
+    ax.ObjectPropertyRange: ('prop', RDFS + 'range', 'range'),
+    ax.DataPropertyRange: ('prop', RDFS + 'range', 'range'),
+    ax.DatatypeDefinition: ('datatype', OWL + 'equivalentClass', 'range'),
+    ax.DisjointUnion: ('cls', OWL + 'disjointUnionOf', 'classes'),
+}
+"""Axioms that are one triple: the field of its subject, its predicate, the field of its value."""
+_EQUALS: dict[type, tuple[str, str]] = {
+    ax.EquivalentClasses: ('classes', OWL + 'equivalentClass'),
+    ax.EquivalentObjectProperties: ('props', OWL + 'equivalentProperty'),
+    ax.EquivalentDataProperties: ('props', OWL + 'equivalentProperty'),
+    ax.SameIndividual: ('individuals', OWL + 'sameAs'),
+}
+"""Axioms that are a triple for each member but one."""
+_APART: dict[type, tuple[str, str, str]] = {
+    ax.DisjointClasses: ('classes', OWL + 'disjointWith', OWL + 'AllDisjointClasses'),
+    ax.DisjointObjectProperties: (
+        *('props', OWL + 'propertyDisjointWith'),
+        OWL + 'AllDisjointProperties',
+    ),
+    ax.DisjointDataProperties: (
+        *('props', OWL + 'propertyDisjointWith'),
+        OWL + 'AllDisjointProperties',
+    ),
+    ax.DifferentIndividuals: ('individuals', OWL + 'differentFrom', OWL + 'AllDifferent'),
+}
+"""Axioms that are a triple for two members, and a node for more."""
+_GROUPS = {_NEGATIVE[0], *(group for _, _, group in _APART.values())}
 """Types of the nodes that stand for one axiom."""
-_CARDINALITIES = {
-    'MinCardinality': ('minCardinality', 'minQualifiedCardinality'),
-    'MaxCardinality': ('maxCardinality', 'maxQualifiedCardinality'),
-    'ExactCardinality': ('cardinality', 'qualifiedCardinality'),
-}
+_COUNTED = {record: row[:2] for row in CARDINALITIES for record in row[2:]}
 
 
 class _Mapping:
@@ -46,19 +126,20 @@ class _Mapping:
         self._numbers = count(1)
         self._variables: dict[str, None] = {}
 
-    def blank(self, *types: str) -> str:
-        node = f'_:w{next(self._numbers)}'
-        for name in types:
-            self.add(node, _TYPE, name)
-        return node
-
-    def add(self, subject: str, predicate: str, value: Node) -> None:
+    def add(self, subject: Node, predicate: str, value: Node) -> None:
+        assert isinstance(subject, str)
         self.triples.append((subject, predicate, value))
+
+    def blank(self, kind: str = '') -> str:
+        node = f'_:w{next(self._numbers)}'
+        if kind:
+            self.add(node, _TYPE, kind)
+        return node
 
     def sequence(self, items: Sequence[Node], kind: str = '') -> str:
         head = RDF + 'nil'
         for item in reversed(items):
-            cell = self.blank(*([kind] if kind else []))
+            cell = self.blank(kind)
             self.add(cell, RDF + 'first', item)
             self.add(cell, RDF + 'rest', head)
             head = cell
@@ -66,202 +147,102 @@ class _Mapping:
 
     # --- parts ---
 
-    def prop(self, prop: ex.PropertyExpression) -> str:
-        if isinstance(prop, str):
-            return prop
-        node = self.blank()
-        self.add(node, OWL + 'inverseOf', prop.prop)
-        return node
-
-    def data_range(self, data_range: ex.DataRange) -> str:
-        if isinstance(data_range, str):
-            return data_range
-        node = self.blank(RDFS + 'Datatype')
-        if isinstance(data_range, ex.DataOneOf):
-            self.add(node, OWL + 'oneOf', self.sequence(data_range.literals))
-        elif isinstance(data_range, ex.DataComplementOf):
-            self.add(node, OWL + 'datatypeComplementOf', self.data_range(data_range.operand))
-        elif isinstance(data_range, ex.DatatypeRestriction):
-            self.add(node, OWL + 'onDatatype', data_range.datatype)
-            facets = []
-            for name, bound in data_range.facets:
-                facet = self.blank()
-                self.add(facet, name, bound)
-                facets.append(facet)
-            self.add(node, OWL + 'withRestrictions', self.sequence(facets))
-        else:
-            union = isinstance(data_range, ex.DataUnionOf)
-            operands = [self.data_range(operand) for operand in data_range.operands]
-            self.add(
-                node, OWL + ('unionOf' if union else 'intersectionOf'), self.sequence(operands)
-            )
-        return node
-
-    def cls(self, expression: ex.ClassExpression) -> str:
-        if isinstance(expression, str):
-            return expression
-        if isinstance(expression, (ex.ObjectIntersectionOf, ex.ObjectUnionOf)):
-            union = isinstance(expression, ex.ObjectUnionOf)
-            operands = [self.cls(operand) for operand in expression.operands]
-            node = self.blank(OWL + 'Class')
-            self.add(
-                node, OWL + ('unionOf' if union else 'intersectionOf'), self.sequence(operands)
-            )
-            return node
-        if isinstance(expression, ex.ObjectComplementOf):
-            node = self.blank(OWL + 'Class')
-            self.add(node, OWL + 'complementOf', self.cls(expression.operand))
-            return node
-        if isinstance(expression, ex.ObjectOneOf):
-            node = self.blank(OWL + 'Class')
-            self.add(node, OWL + 'oneOf', self.sequence(expression.individuals))
-            return node
-        node = self.blank(OWL + 'Restriction')
-        self.add(node, OWL + 'onProperty', self.prop(expression.prop))
-        if isinstance(expression, ex.ObjectHasValue):
-            self.add(node, OWL + 'hasValue', expression.individual)
-        elif isinstance(expression, ex.DataHasValue):
-            self.add(node, OWL + 'hasValue', expression.literal)
-        elif isinstance(expression, ex.ObjectHasSelf):
+    def part(self, part: Any) -> Node:
+        """Return the node of whatever a field holds."""
+        if isinstance(part, str | Literal):
+            return part
+        if isinstance(part, tuple):
+            return self.sequence([self.part(one) for one in part])
+        if isinstance(part, ex.Variable):
+            return self.variable(part)
+        kind, *statements = _NODES[type(part)]
+        node = self.blank(kind)
+        for predicate, field in statements:
+            self.add(node, predicate, self.part(getattr(part, field)))
+        if isinstance(part, ex.ObjectHasSelf):
             self.add(node, OWL + 'hasSelf', Literal('true', XSD + 'boolean'))
-        elif isinstance(expression, ex.ObjectSomeValuesFrom):
-            self.add(node, OWL + 'someValuesFrom', self.cls(expression.filler))
-        elif isinstance(expression, ex.ObjectAllValuesFrom):
-            self.add(node, OWL + 'allValuesFrom', self.cls(expression.filler))
-        elif isinstance(expression, ex.DataSomeValuesFrom):
-            self.add(node, OWL + 'someValuesFrom', self.data_range(expression.range))
-        elif isinstance(expression, ex.DataAllValuesFrom):
-            self.add(node, OWL + 'allValuesFrom', self.data_range(expression.range))
-        else:
-            self.cardinality(node, expression)
+        elif isinstance(part, ex.DatatypeRestriction):
+            facets = [self.blank() for _ in part.facets]
+            for facet, (name, bound) in zip(facets, part.facets, strict=True):
+                self.add(facet, name, bound)
+            self.add(node, OWL + 'withRestrictions', self.sequence(facets))
+        elif type(part) in _COUNTED:
+            self.count(node, part)
         return node
 
-    def cardinality(
-        self,
-        node: str,
-        expression: ex.ObjectMinCardinality
-        | ex.ObjectMaxCardinality
-        | ex.ObjectExactCardinality
-        | ex.DataMinCardinality
-        | ex.DataMaxCardinality
-        | ex.DataExactCardinality,
-    ) -> None:
-        name = type(expression).__name__
-        number = Literal(str(expression.n), XSD + 'nonNegativeInteger')
-        plain, qualified = _CARDINALITIES[name.removeprefix('Object').removeprefix('Data')]
-        if isinstance(
-            expression,
-            (ex.ObjectMinCardinality, ex.ObjectMaxCardinality, ex.ObjectExactCardinality),
-        ):
-            unqualified = expression.filler == THING
-            filler, on = expression.filler, OWL + 'onClass'
-            named = '' if unqualified else self.cls(filler)
-        else:
-            unqualified = expression.range == TOP_LITERAL
-            on = OWL + 'onDataRange'
-            named = self.data_range(expression.range)
-        self.add(node, OWL + (plain if unqualified and on.endswith('Class') else qualified), number)
-        if not (unqualified and on.endswith('Class')):
-            self.add(node, on, named)
+    def count(self, node: str, part: Any) -> None:
+        """Write a cardinality; an unqualified one only of objects, which OWL 1 knew."""
+        plain, qualified = _COUNTED[type(part)]
+        objects = hasattr(part, 'filler')
+        is_plain = objects and part.filler == THING
+        number = Literal(str(part.n), XSD + 'nonNegativeInteger')
+        self.add(node, OWL + (plain if is_plain else qualified), number)
+        if objects and not is_plain:
+            self.add(node, OWL + 'onClass', self.part(part.filler))
+        elif not objects:
+            self.add(node, OWL + 'onDataRange', self.part(part.range))
+
+    def variable(self, variable: ex.Variable) -> str:
+        name = variable.name if ':' in variable.name else f'urn:swrl:var#{variable.name}'
+        if name not in self._variables:
+            self._variables[name] = None
+            self.add(name, _TYPE, SWRL + 'Variable')
+        return name
 
     # --- axioms ---
 
     def axiom(self, axiom: Axiom) -> None:
-        add, cls, prop = self.add, self.cls, self.prop
+        kind: Any = type(axiom)
         if isinstance(axiom, ax.Declaration):
-            add(axiom.iri, _TYPE, _KIND_TYPES[axiom.kind])
+            self.add(axiom.iri, _TYPE, _KIND_TYPES[axiom.kind])
         elif isinstance(axiom, ax.Import):
-            add(self.iri, OWL + 'imports', axiom.iri)
+            self.add(self.iri, OWL + 'imports', axiom.iri)
         elif isinstance(axiom, ax.AnnotationAssertion):
-            add(axiom.subject, axiom.prop, axiom.value)
-        elif isinstance(axiom, ax.ClassAssertion):
-            add(axiom.individual, _TYPE, cls(axiom.cls))
+            self.add(axiom.subject, axiom.prop, axiom.value)
         elif isinstance(axiom, ax.ObjectPropertyAssertion):
-            add(axiom.subject, axiom.prop, axiom.object)
+            self.add(axiom.subject, axiom.prop, axiom.object)
         elif isinstance(axiom, ax.DataPropertyAssertion):
-            add(axiom.subject, axiom.prop, axiom.literal)
-        elif isinstance(axiom, ax.SubClassOf):
-            add(cls(axiom.sub), RDFS + 'subClassOf', cls(axiom.sup))
-        elif isinstance(axiom, ax.EquivalentClasses):
-            classes = sorted(axiom.classes, key=lambda part: not isinstance(part, str))
-            first, *others = [cls(part) for part in classes]
-            for other in others:
-                add(first, OWL + 'equivalentClass', other)
-        elif isinstance(axiom, (ax.SameIndividual, ax.DifferentIndividuals)):
-            self.individuals(axiom)
+            self.add(axiom.subject, axiom.prop, axiom.literal)
+        elif kind in _PAIRS:
+            subject, predicate, value = _PAIRS[kind]
+            node = self.part(getattr(axiom, subject))
+            self.add(node, predicate, self.part(getattr(axiom, value)))
+        elif kind in _EQUALS:
+            field, predicate = _EQUALS[kind]
+            members = sorted(self.members(axiom, field), key=lambda node: node[:2] == '_:')
+            for other in members[1:]:
+                self.add(members[0], predicate, other)
+        elif kind in _APART:
+            field, predicate, group = _APART[kind]
+            members = self.members(axiom, field)
+            if len(members) == 2:
+                self.add(members[0], predicate, members[1])
+            else:
+                self.add(self.blank(group), OWL + 'members', self.sequence(members))
+        elif kind in _NODES:
+            self.part(axiom)
+        elif isinstance(axiom, ax.HasKey):
+            keys = (*axiom.object_props, *axiom.data_props)
+            self.add(self.part(axiom.cls), OWL + 'hasKey', self.part(keys))
         elif isinstance(axiom, ax.Rule):
             self.rule(axiom)
-        elif isinstance(
-            axiom, (ax.NegativeObjectPropertyAssertion, ax.NegativeDataPropertyAssertion)
-        ):
-            node = self.blank(OWL + 'NegativePropertyAssertion')
-            add(node, OWL + 'sourceIndividual', axiom.subject)
-            add(node, OWL + 'assertionProperty', axiom.prop)
-            if isinstance(axiom, ax.NegativeObjectPropertyAssertion):
-                add(node, OWL + 'targetIndividual', axiom.object)
-            else:
-                add(node, OWL + 'targetValue', axiom.literal)
-        elif isinstance(axiom, ax.DisjointClasses):
-            self.disjoint(
-                [cls(part) for part in axiom.classes], 'disjointWith', 'AllDisjointClasses'
-            )
-        elif isinstance(axiom, ax.DisjointObjectProperties):
-            nodes = [prop(part) for part in axiom.props]
-            self.disjoint(nodes, 'propertyDisjointWith', 'AllDisjointProperties')
-        elif isinstance(axiom, ax.DisjointDataProperties):
-            self.disjoint(list(axiom.props), 'propertyDisjointWith', 'AllDisjointProperties')
-        elif isinstance(axiom, ax.DisjointUnion):
-            parts = self.sequence([cls(part) for part in axiom.classes])
-            add(axiom.cls, OWL + 'disjointUnionOf', parts)
-        elif isinstance(axiom, ax.DatatypeDefinition):
-            add(axiom.datatype, OWL + 'equivalentClass', self.data_range(axiom.range))
-        elif isinstance(axiom, ax.HasKey):
-            keys = [*map(prop, axiom.object_props), *axiom.data_props]
-            add(cls(axiom.cls), OWL + 'hasKey', self.sequence(keys))
         else:
-            self.property_axiom(axiom)
+            name = kind.__name__.replace('Object', '').replace('Data', '')
+            self.add(self.part(axiom.prop), _TYPE, OWL + name)  # type: ignore[attr-defined]
 
-    def property_axiom(self, axiom: Axiom) -> None:
-        add, prop = self.add, self.prop
-        if isinstance(axiom, (ax.SubObjectPropertyOf, ax.SubDataPropertyOf)):
-            add(prop(axiom.sub), RDFS + 'subPropertyOf', prop(axiom.sup))
-        elif isinstance(axiom, ax.SubPropertyChainOf):
-            chain = self.sequence([prop(part) for part in axiom.chain])
-            add(prop(axiom.sup), OWL + 'propertyChainAxiom', chain)
-        elif isinstance(axiom, (ax.EquivalentObjectProperties, ax.EquivalentDataProperties)):
-            first, *others = [prop(part) for part in axiom.props]
-            for other in others:
-                add(first, OWL + 'equivalentProperty', other)
-        elif isinstance(axiom, ax.InverseObjectProperties):
-            add(prop(axiom.first), OWL + 'inverseOf', prop(axiom.second))
-        elif isinstance(axiom, ax.ObjectPropertyDomain):
-            add(prop(axiom.prop), RDFS + 'domain', self.cls(axiom.domain))
-        elif isinstance(axiom, ax.DataPropertyDomain):
-            add(axiom.prop, RDFS + 'domain', self.cls(axiom.domain))
-        elif isinstance(axiom, ax.ObjectPropertyRange):
-            add(prop(axiom.prop), RDFS + 'range', self.cls(axiom.range))
-        elif isinstance(axiom, ax.DataPropertyRange):
-            add(axiom.prop, RDFS + 'range', self.data_range(axiom.range))
-        else:
-            name = type(axiom).__name__.replace('Object', '').replace('Data', '')
-            add(prop(axiom.prop), _TYPE, OWL + name)  # type: ignore[attr-defined]
+    def members(self, axiom: Axiom, field: str) -> list[str]:
+        """Return the nodes of what an axiom lists; those of a set in one order."""
+        listed = getattr(axiom, field)
+        parts = sorted(listed) if isinstance(listed, frozenset) else listed
+        return [str(self.part(one)) for one in parts]
 
-    def individuals(self, axiom: ax.SameIndividual | ax.DifferentIndividuals) -> None:
-        names = sorted(axiom.individuals)
-        if isinstance(axiom, ax.SameIndividual):
-            for other in names[1:]:
-                self.add(names[0], OWL + 'sameAs', other)
-        elif len(names) == 2:
-            self.add(names[0], OWL + 'differentFrom', names[1])
-        else:
-            node = self.blank(OWL + 'AllDifferent')
-            self.add(node, OWL + 'members', self.sequence(names))
-
-    def disjoint(self, nodes: list[str], pair: str, group: str) -> None:
-        if len(nodes) == 2:
-            self.add(nodes[0], OWL + pair, nodes[1])
-        else:
-            self.add(self.blank(OWL + group), OWL + 'members', self.sequence(nodes))
+    def rule(self, rule: ax.Rule) -> None:
+        node = self.blank(SWRL + 'Imp')
+        for predicate, value in rule.annotations:
+            self.add(node, predicate, value)
+        for predicate, atoms in ((SWRL + 'body', rule.body), (SWRL + 'head', rule.head)):
+            nodes = [self.part(atom) for atom in atoms]
+            self.add(node, predicate, self.sequence(nodes, SWRL + 'AtomList'))
 
     def annotated(self, axiom: Axiom, notes: Sequence[ax.AxiomAnnotation]) -> None:
         """Write an axiom with what is said of it: on its node, where it has one, else on its
@@ -287,56 +268,6 @@ class _Mapping:
         self.add(node, OWL + 'annotatedProperty', predicate)
         self.add(node, OWL + 'annotatedTarget', value)
         return node
-
-    # --- rules ---
-
-    def variable(self, variable: ex.Variable) -> str:
-        name = variable.name if ':' in variable.name else f'urn:swrl:var#{variable.name}'
-        if name not in self._variables:
-            self._variables[name] = None
-            self.add(name, _TYPE, SWRL + 'Variable')
-        return name
-
-    def argument(self, argument: str | ex.Variable | Literal) -> Node:
-        return self.variable(argument) if isinstance(argument, ex.Variable) else argument
-
-    def atom(self, atom: ex.Atom) -> str:
-        add = self.add
-        if isinstance(atom, ex.BuiltinAtom):
-            node = self.blank(SWRL + 'BuiltinAtom')
-            add(node, SWRL + 'builtin', atom.builtin)
-            arguments = [self.argument(argument) for argument in atom.arguments]
-            add(node, SWRL + 'arguments', self.sequence(arguments))
-            return node
-        if isinstance(atom, ex.ClassAtom):
-            node = self.blank(SWRL + 'ClassAtom')
-            add(node, SWRL + 'classPredicate', self.cls(atom.cls))
-            add(node, SWRL + 'argument1', self.argument(atom.argument))
-            return node
-        if isinstance(atom, ex.DataRangeAtom):
-            node = self.blank(SWRL + 'DataRangeAtom')
-            add(node, SWRL + 'dataRange', self.data_range(atom.range))
-            add(node, SWRL + 'argument1', self.argument(atom.argument))
-            return node
-        if isinstance(atom, ex.ObjectPropertyAtom):
-            node = self.blank(SWRL + 'IndividualPropertyAtom')
-            add(node, SWRL + 'propertyPredicate', self.prop(atom.prop))
-        elif isinstance(atom, ex.DataPropertyAtom):
-            node = self.blank(SWRL + 'DatavaluedPropertyAtom')
-            add(node, SWRL + 'propertyPredicate', atom.prop)
-        else:
-            node = self.blank(SWRL + type(atom).__name__)
-        add(node, SWRL + 'argument1', self.argument(atom.first))
-        add(node, SWRL + 'argument2', self.argument(atom.second))
-        return node
-
-    def rule(self, rule: ax.Rule) -> None:
-        node = self.blank(SWRL + 'Imp')
-        for predicate, value in rule.annotations:
-            self.add(node, predicate, value)
-        for predicate, atoms in ((SWRL + 'body', rule.body), (SWRL + 'head', rule.head)):
-            nodes = [self.atom(atom) for atom in atoms]
-            self.add(node, predicate, self.sequence(nodes, SWRL + 'AtomList'))
 
 
 def triples_of(axioms: Iterable[Axiom], iri: str) -> Iterator[Triple]:

@@ -144,3 +144,11 @@ def test_imports_of_files_beside_the_document_are_followed(tmp_path: Path) -> No
     kb = KnowledgeBase(IRI, document.axioms)
     kb.reason()
     assert kb.superclasses('http://x/#A') == {'http://x/#B', 'http://x/#C'}
+
+
+@pytest.mark.parametrize('axiom', ['Declaration(:A)', 'DLSafeRule(Body(:A) Head())'])
+def test_an_axiom_with_a_name_for_a_construct_costs_itself_alone(axiom: str) -> None:
+    text = f'Prefix(:=<http://x/#>)\nOntology(<http://x/>\n{axiom}\nSubClassOf(:A :B))'
+    document = read_ontology(text.encode(), IRI)
+    assert document.axioms == [ax.SubClassOf('http://x/#A', 'http://x/#B')]
+    assert ['line 3: ' in sentence for sentence in document.unsupported] == [True]
