@@ -8,10 +8,13 @@ from collections.abc import Iterator
 
 import pytest
 import rclpy
+from builtin_interfaces.msg import Time
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.task import Future
+from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Int32
 from std_srvs.srv import Trigger
 
@@ -170,3 +173,59 @@ def test_the_end_of_the_context_ends_the_spinning(spun: Spun) -> None:
     rclpy.try_shutdown(context=spun.context)
     with pytest.raises(ExternalShutdownException):
         spun.until(lambda: False)
+
+
+def test_nodes_share_the_clock_that_one_of_them_hears(spun: Spun) -> None:
+    """A time that is told is every node's, also of a node whose callback waits at the moment."""
+    simulated = Parameter('use_sim_time', value=True)
+    third = Node(
+        'third',
+        context=spun.context,
+        use_global_arguments=False,
+        parameter_overrides=[simulated],
+    )
+    spun.executor.add_node(third)
+    for node in spun.nodes:
+        node.set_parameters([simulated])
+    nodes = [*spun.nodes, third]
+    teller = spun.nodes[0].create_publisher(Clock, '/clock', 1)
+    spun.until(lambda: teller.get_subscription_count() == len(nodes))
+
+    def tell(seconds: int) -> None:
+        teller.publish(Clock(clock=Time(sec=seconds)))
+        spun.until(lambda: clocks() == [seconds] * len(nodes))
+
+    def clocks() -> list[int]:
+        return [node.get_clock().now().nanoseconds // 10**9 for node in nodes]
+
+    tell(5)
+    gate, begun = Future(), []
+
+    async def slow(message: Int32) -> None:
+        begun.append(message.data)
+        await gate
+
+    numbers = third.create_publisher(Int32, 'numbers', 1)
+    spun.nodes[0].create_subscription(Int32, 'numbers', slow, 1)
+    spun.until(lambda: numbers.get_subscription_count() == 1)
+    numbers.publish(Int32())
+    spun.until(lambda: begun)
+    tell(6)
+    gate.set_result(None)
+    spun.executor.wake()
+    spun.executor.remove_node(nodes.pop(0))
+    tell(7)
+    spun.nodes.append(third)
+
+
+def test_a_service_answers_while_messages_keep_the_executor_busy(spun: Spun) -> None:
+    server, client = spun.nodes
+    echo = server.create_publisher(Int32, 'numbers', 10)
+    server.create_subscription(Int32, 'numbers', echo.publish, 10)
+    spun.until(lambda: echo.get_subscription_count() == 1)
+    server.create_service(Trigger, 'ask', lambda _request, response: response)
+    caller = client.create_client(Trigger, 'ask')
+    spun.until(caller.service_is_ready)
+    echo.publish(Int32())
+    answer = caller.call_async(Trigger.Request())
+    spun.until(answer.done)
