@@ -197,7 +197,8 @@ def campaign(seed: int) -> Iterator[Campaign]:
     """Provide the clients on a domain of their own, and the server."""
     import rclpy
 
-    from surveillance_runtime.process import ExecutorThread, prefer_quick_discovery
+    from surveillance_runtime.discovery import prefer_quick_discovery
+    from surveillance_runtime.process import ExecutorThread
     from surveillance_runtime.testing import claim_domain
 
     os.environ['ROS_DOMAIN_ID'] = str(claim_domain())

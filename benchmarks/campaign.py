@@ -58,9 +58,9 @@ from benchmarks.link_campaign import LinkCampaign, LinkResults  # noqa: E402
 from benchmarks.machine_faults import SmallDisk, SteppedClock  # noqa: E402
 from surveillance_fsm.ros import ServiceCaller  # noqa: E402
 from surveillance_interfaces.srv import ArmorDirective  # noqa: E402
+from surveillance_runtime.discovery import prefer_quick_discovery  # noqa: E402
 from surveillance_runtime.place import read_place_file  # noqa: E402
 from surveillance_runtime.place.regions import Regions  # noqa: E402
-from surveillance_runtime.process import prefer_quick_discovery  # noqa: E402
 from surveillance_runtime.qos import STATE_QOS  # noqa: E402
 from surveillance_runtime.testing import claim_domain  # noqa: E402
 

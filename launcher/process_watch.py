@@ -21,6 +21,8 @@ BEAT = 'LAUNCH_HEARTBEAT'
 """The environment variable with the descriptor that a process writes its heartbeats to."""
 FINISHED = b'F'
 """Written instead of a heartbeat by a process that ends on purpose."""
+SLEPT = b'S'
+"""The same by one that did not run for so long that its peers may have forgotten it."""
 _PAGE = os.sysconf('SC_PAGE_SIZE')
 _LEAST_SHARE = 0.02
 

@@ -8,30 +8,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-import surveillance_runtime
 from launcher.log_merge import ROS_FORMAT
 from launcher.run import MARKERS, MAX_DOMAIN, PAGE, RECORDER, Run
 from launcher.supervisor import Program
 from launcher.system import LaunchError
 from surveillance_runtime import node_table
+from surveillance_runtime.discovery import launched_nodes
 from surveillance_runtime.run_parameters import BEHAVIOUR_NODE
 
 CHILD = Path(__file__).with_name('child.py')
-NETWORK_ROS = {
-    # Shared memory that a killed process leaves behind hides later nodes of the same domain.
-    'FASTDDS_BUILTIN_TRANSPORTS': 'UDPv4',
-    'FASTRTPS_DEFAULT_PROFILES_FILE': str(
-        Path(surveillance_runtime.__file__).with_name('discovery.xml')
-    ),
-    'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET',
-}
-"""How nodes of several machines find each other where the environment says nothing else."""
-LOCAL_ROS = {
-    'FASTRTPS_DEFAULT_PROFILES_FILE': str(Path(__file__).with_name('local_discovery.xml')),
-    # The profile says it: LOCALHOST would add shared memory, whatever else is said.
-    'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SYSTEM_DEFAULT',
-}
-"""The same for one machine, which is what a robot's nodes run on unless somebody says otherwise."""
 COMPOSED = 'composed'
 COMPOSED_SHARE = 3
 
@@ -78,10 +63,7 @@ def node_environ(run: Run, logs: Path | None = None) -> dict[str, str]:
     environ = dict(os.environ)
     if run.domain is not None:
         environ['ROS_DOMAIN_ID'] = str(run.domain)
-    for name, value in (NETWORK_ROS if run.network else _local_ros(environ)).items():
-        environ.setdefault(name, value)
-    if run.network:
-        environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'SUBNET'
+    environ |= launched_nodes(environ, network=run.network)
     for name in ('NOTIFY_SOCKET', 'WATCHDOG_USEC', 'WATCHDOG_PID'):
         environ.pop(name, None)  # of the launcher alone
     if logs is not None:
@@ -91,14 +73,6 @@ def node_environ(run: Run, logs: Path | None = None) -> dict[str, str]:
         environ['RCUTILS_COLORIZED_OUTPUT'] = '0'
         environ.setdefault('ROS_LOG_DIR', str(logs))
     return environ
-
-
-def _local_ros(environ: Mapping[str, str]) -> Mapping[str, str]:
-    """Return how nodes of one machine find each other with the middleware that is asked for."""
-    others = not environ.get('RMW_IMPLEMENTATION', 'rmw_fastrtps_cpp').startswith('rmw_fastrtps')
-    if others or 'FASTRTPS_DEFAULT_PROFILES_FILE' in environ:
-        return {**NETWORK_ROS, 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
-    return LOCAL_ROS
 
 
 def command(nodes: Sequence[node_table.Node], arguments: Sequence[str], parent: int) -> list[str]:

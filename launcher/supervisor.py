@@ -22,6 +22,7 @@ from launcher.process_watch import (
     BEAT,
     FINISHED,
     IDLE_AFTER,
+    SLEPT,
     Activity,
     Heartbeats,
     look_at,
@@ -280,6 +281,8 @@ class Supervisor:
             if chunk and child.heartbeats is heartbeats:
                 heartbeats.beat(time.monotonic())
                 child.finished = child.finished or FINISHED in chunk
+                if SLEPT in chunk:
+                    self._end(child, 'slept so long that its peers may have forgotten it')
 
         return beat
 
@@ -369,10 +372,15 @@ class Supervisor:
             if look is not None and most and look.memory > most:
                 held, allowed = look.memory >> 20, most >> 20
                 problem = f'holds {held} MB of memory, at most {allowed} MB are allowed'
-            if problem and not child.ended_for:
-                child.ended_for = problem
-                self._log.warn(f'{child.program.name} {problem}: ending it')
-                _kill_group(child.process.pid)
+            if problem:
+                self._end(child, problem)
+
+    def _end(self, child: Child, problem: str) -> None:
+        """End a process, to be started again as after a death."""
+        if child.process is not None and not child.ended_for and self._stopping_since is None:
+            child.ended_for = problem
+            self._log.warn(f'{child.program.name} {problem}: ending it')
+            _kill_group(child.process.pid)
 
     def _tell_to_stop(self, *, leaders_only: bool) -> None:
         for child in reversed(self.children.values()):

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 import hypothesis
 import pytest
 
-from launcher.run_processes import LOCAL_ROS
+from surveillance_runtime.discovery import launched_nodes
 from surveillance_runtime.testing import claim_domain
 
 T = TypeVar('T')
@@ -28,8 +28,10 @@ hypothesis.settings.load_profile('suite')
 
 _domain = claim_domain()
 os.environ['ROS_DOMAIN_ID'] = str(_domain)
-for _name, _value in LOCAL_ROS.items():  # a test machine's neighbours are no part of a test
-    os.environ.setdefault(_name, _value)
+USER_ENVIRON = dict(os.environ)
+"""What a user's shell gives to a command; tests of commands start them with it."""
+# A test machine's neighbours are no part of a test.
+os.environ |= launched_nodes(os.environ, network=False)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -13,7 +13,8 @@ from rclpy.signals import SignalHandlerOptions
 
 from surveillance_ontology.armor import client
 from surveillance_ontology.armor_client import RosTransport
-from surveillance_runtime.process import ExecutorThread, prefer_quick_discovery
+from surveillance_runtime.discovery import prefer_quick_discovery
+from surveillance_runtime.process import ExecutorThread
 
 __all__ = ['ArmorClient']
 

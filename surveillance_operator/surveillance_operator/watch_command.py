@@ -39,8 +39,6 @@ def _ros_arguments(parser: CommandParser, options: argparse.Namespace) -> list[s
         parser.error(f'--namespace {namespace}: expected letters, digits and _ like robot1')
     if options.domain is not None:
         os.environ['ROS_DOMAIN_ID'] = str(options.domain)
-    # As in the nodes' own processes: shared memory that a killed one left behind hides others.
-    os.environ.setdefault('FASTDDS_BUILTIN_TRANSPORTS', 'UDPv4')
     # What ROS logs would stand in the middle of what is shown.
     arguments = ['--ros-args', '--disable-stdout-logs']
     return [*arguments, '-r', f'__ns:={namespace}'] if namespace else arguments

@@ -15,7 +15,6 @@ import threading
 import traceback
 import warnings
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Any
 
 import rclpy
@@ -26,6 +25,7 @@ from threadpoolctl import threadpool_limits
 
 from surveillance_runtime.configuration import RosArguments, argument_layer, split_arguments
 from surveillance_runtime.diagnostics import DiagnosticsThread, Heartbeat
+from surveillance_runtime.discovery import prefer_quick_discovery
 from surveillance_runtime.executor import PatrolExecutor
 from surveillance_runtime.node import (
     JOIN_SECONDS,
@@ -37,7 +37,6 @@ from surveillance_runtime.node import (
 from surveillance_runtime.parameters import ParameterError
 
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM)
-DISCOVERY_PROFILE = Path(__file__).with_name('discovery.xml')
 EXIT_CANNOT_START = 2
 """The exit code of a node whose configuration does not let it start."""
 
@@ -128,19 +127,6 @@ def _run_nodes(factories: Sequence[Callable[[], PatrolNode]], args: Sequence[str
     if any(node.failure is not None for node in nodes):
         code = EXIT_CANNOT_START if all(n.unusable for n in nodes if n.failure) else 1
     return code
-
-
-def prefer_quick_discovery() -> None:
-    """Have the middleware find peers quickly, unless the environment names a profile.
-
-    On a busy machine announcements get lost. With the middleware's own times, a client's next
-    request reached a server that was started again up to 2.9 s after it was ready; with this
-    profile in both processes 0.3 s. Shared memory is left out: what a killed process leaves there
-    hides its successor.
-    """
-    if 'FASTRTPS_DEFAULT_PROFILES_FILE' not in os.environ:
-        os.environ['FASTRTPS_DEFAULT_PROFILES_FILE'] = str(DISCOVERY_PROFILE)
-        os.environ.setdefault('FASTDDS_BUILTIN_TRANSPORTS', 'UDPv4')
 
 
 def use_one_thread_for_matrices() -> None:

@@ -15,13 +15,20 @@ from pathlib import Path
 
 import pytest
 
+from surveillance_runtime import discovery
+
 ROOT = Path(__file__).resolve().parents[2]
+USER_ENVIRON = {
+    **{name: os.environ[name] for name in os.environ if name not in discovery.VARIABLES},
+    'PYTHONPATH': str(ROOT),
+}
+"""What a user's shell gives a command: it says nothing of how nodes find each other."""
 
 
 class Started:
     """A process in a session of its own, its output collected line by line."""
 
-    def __init__(self, command: Sequence[str], environ: Mapping[str, str] | None = None) -> None:
+    def __init__(self, command: Sequence[str], environ: Mapping[str, str] = USER_ENVIRON) -> None:
         self.process = subprocess.Popen(
             command,
             env=environ,
@@ -91,7 +98,7 @@ def start() -> Iterator[Callable[..., Started]]:
     """Start Python with the given arguments; what is left at the end of the test is killed."""
     started: list[Started] = []
 
-    def start_python(*arguments: str, environ: Mapping[str, str] | None = None) -> Started:
+    def start_python(*arguments: str, environ: Mapping[str, str] = USER_ENVIRON) -> Started:
         started.append(Started([sys.executable, *arguments], environ))
         return started[-1]
 

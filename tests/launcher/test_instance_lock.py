@@ -54,12 +54,12 @@ def test_a_domain_of_the_environment_that_is_none_is_named(monkeypatch, given):
 
 
 def test_a_second_launch_says_that_the_first_is_there(start, tmp_path, ros_domain):
-    from tests.launcher.test_launch import ENVIRON, PROCESS
+    from tests.launcher.test_launch import PROCESS
 
     options = (PROCESS, str(tmp_path), '--only', 'armor_server', '--domain', str(ros_domain))
-    first = start(*options, environ=ENVIRON)
+    first = start(*options)
     first.until('started armor_server')
-    second = start(*options, environ=ENVIRON)
+    second = start(*options)
     code, _ = second.end()
     assert code == 2
     (complaint,) = second.lines

@@ -15,10 +15,9 @@ from rclpy.time import Time
 from rosgraph_msgs.msg import Clock as ClockMessage
 
 from surveillance_runtime.node_table import select
-from tests.launcher.conftest import ROOT, Started, gone
+from tests.launcher.conftest import Started, gone
 
 PROCESS = str(Path(__file__).with_name('mission_process.py'))
-ENVIRON = {**os.environ, 'PYTHONPATH': str(ROOT), 'FASTDDS_BUILTIN_TRANSPORTS': 'UDPv4'}
 NODES = [node.name for node in select('RANDOM')]
 PARAMETERS = """
 /**:
@@ -50,7 +49,7 @@ def launch(start, tmp_path, ros_domain) -> Callable[..., Started]:
 
     def begin(*options: str) -> Started:
         shared = ('--params', str(parameters), '--domain', str(ros_domain))
-        return start(PROCESS, str(tmp_path / 'runs'), *shared, *options, environ=ENVIRON)
+        return start(PROCESS, str(tmp_path / 'runs'), *shared, *options)
 
     return begin
 

@@ -17,10 +17,9 @@ from launcher.process_watch import (
     Look,
     look_at,
 )
-from tests.launcher.conftest import ROOT, gone
+from tests.launcher.conftest import USER_ENVIRON, gone
 
 DRIVER = str(Path(__file__).with_name('supervised.py'))
-ENVIRON = {**os.environ, 'PYTHONPATH': str(ROOT)}
 BEATING = (
     'import os, time\n'
     'pipe = int(os.environ["LAUNCH_HEARTBEAT"])\n'
@@ -90,7 +89,7 @@ def test_the_kernel_knows_this_process_and_no_other_of_its_number():
 
 
 def test_a_stopped_child_comes_back(start):
-    launch = start(DRIVER, f'watched={BEATING}', environ=ENVIRON)
+    launch = start(DRIVER, f'watched={BEATING}')
     first = int(launch.until(r'started watched \(process (\d+)\)')[1])
     launch.until(r'watched +\| up')
     seen = len(launch.lines)
@@ -104,7 +103,7 @@ def test_a_stopped_child_comes_back(start):
 @pytest.mark.parametrize('number', [signal.SIGTERM, signal.SIGINT])
 def test_a_stop_from_elsewhere_is_no_stop(start, number):
     polite = f'import signal, sys; signal.signal({int(number)}, lambda *_: sys.exit(0))\n{BEATING}'
-    launch = start(DRIVER, f'watched={polite}', environ=ENVIRON)
+    launch = start(DRIVER, f'watched={polite}')
     first = int(launch.until(r'started watched \(process (\d+)\)')[1])
     launch.until(r'watched +\| up')
     seen = len(launch.lines)
@@ -115,15 +114,23 @@ def test_a_stop_from_elsewhere_is_no_stop(start, number):
 
 
 def test_a_child_that_dies_again_and_again_calls_somebody(start):
-    launch = start(DRIVER, f'watched={ENDING}', environ=ENVIRON)
+    launch = start(DRIVER, f'watched={ENDING}')
     launch.until(r'ERROR: watched died 5 times in a row, last: exit code 0: somebody should')
     launch.until(r'alarm: watched died 5 times in a row')
     assert launch.end(signal.SIGINT)[0] == 0
 
 
+def test_a_child_that_slept_for_long_is_started_again(start):
+    sleeper = 'import os; os.write(int(os.environ["LAUNCH_HEARTBEAT"]), b"S"); input()'
+    launch = start(DRIVER, f'watched={sleeper}')
+    launch.until(r'watched slept so long that its peers may have forgotten it: ending it')
+    launch.until(r'watched died \(slept so long .*\): starting it again')
+    assert launch.end(signal.SIGINT)[0] == 0
+
+
 def test_a_child_that_takes_all_memory_is_ended(start):
     greedy = f'kept = bytearray(80 * 2**20)\n{BEATING}'
-    environ = {**ENVIRON, 'MEMORY': str(50 * 2**20)}
+    environ = {**USER_ENVIRON, 'MEMORY': str(50 * 2**20)}
     launch = start(DRIVER, f'watched={greedy}', environ=environ)
     launch.until(r'watched holds \d+ MB of memory, at most 50 MB are allowed: ending it')
     assert launch.end(signal.SIGINT)[0] == 0

@@ -19,9 +19,10 @@ from launcher.run import MARKERS, PAGE, RECORDER, Run, options_of, resumed, run_
 from launcher.run_configuration import check_assignments, configuration, with_mode_of
 from launcher.run_folder import RunState, make_folder
 from launcher.run_mission import alarm_caller, summary, watch_command
-from launcher.run_processes import NETWORK_ROS, command, node_environ, ros_arguments
+from launcher.run_processes import command, node_environ, ros_arguments
 from launcher.system import LaunchError
 from surveillance_behaviour.mission.mission_log import MissionRecord
+from surveillance_runtime import discovery
 from surveillance_runtime.node_table import DEFAULT_MODE
 from surveillance_runtime.run_parameters import place_file, run_layers, write_parameters
 
@@ -213,7 +214,7 @@ def test_an_alarm_gets_one_line_as_its_last_argument(tmp_path):
 @pytest.mark.parametrize('network', [False, True])
 def test_no_node_uses_shared_memory(monkeypatch, network):
     """What a killed process leaves there hides its successor: it answers nobody."""
-    for name in NETWORK_ROS:
+    for name in discovery.VARIABLES:
         monkeypatch.delenv(name, raising=False)
     threads = (
         'import glob, rclpy; rclpy.init(); node = rclpy.create_node("looked_at");'

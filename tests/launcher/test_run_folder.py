@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import sys
 
@@ -18,7 +17,6 @@ from launcher.run_folder import (
     make_folder,
     prune,
 )
-from tests.launcher.conftest import ROOT
 
 HOLD = (
     'import sys, signal; from pathlib import Path; from launcher.run_folder import RunState\n'
@@ -55,7 +53,7 @@ def test_a_run_that_came_to_its_end_says_so(tmp_path):
 
 
 def test_a_killed_launcher_leaves_a_run_that_did_not_end(start, tmp_path):
-    launch = start('-c', HOLD, str(tmp_path), environ={**os.environ, 'PYTHONPATH': str(ROOT)})
+    launch = start('-c', HOLD, str(tmp_path))
     launch.until('held')
     found = look_into(tmp_path)
     assert found is not None

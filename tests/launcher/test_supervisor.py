@@ -10,10 +10,9 @@ from pathlib import Path
 import pytest
 
 from launcher.supervisor import STOP_AGAIN_AFTER, STOP_AT_MOST, STOP_WITHIN, describe_exit
-from tests.launcher.conftest import ROOT, gone
+from tests.launcher.conftest import ROOT, USER_ENVIRON, gone
 
 DRIVER = str(Path(__file__).with_name('supervised.py'))
-ENVIRON = {**os.environ, 'PYTHONPATH': str(ROOT)}
 WAIT = 'import signal; print("up", flush=True); signal.pause()'
 STUBBORN = (
     'import signal\n'
@@ -32,7 +31,7 @@ PARENT = (
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_stop_signal_ends_all_and_counts_as_wanted(start, number):
-    launch = start(DRIVER, f'one={WAIT}', f'two={WAIT}', environ=ENVIRON)
+    launch = start(DRIVER, f'one={WAIT}', f'two={WAIT}')
     pids = [int(launch.until(rf'started {n} \(process (\d+)\)')[1]) for n in ('one', 'two')]
     launch.until(r'one +\| up')
     launch.until(r'two +\| up')
@@ -44,7 +43,7 @@ def test_a_stop_signal_ends_all_and_counts_as_wanted(start, number):
 
 
 def test_a_child_that_heeds_no_signal_and_does_nothing_is_killed(start):
-    launch = start(DRIVER, f'deaf={STUBBORN}', f'grown={PARENT}', environ=ENVIRON)
+    launch = start(DRIVER, f'deaf={STUBBORN}', f'grown={PARENT}')
     deaf = int(launch.until(r'started deaf \(process (\d+)\)')[1])
     launch.until(r'deaf +\| up')
     grandchild = int(launch.until(r'grandchild (\d+)')[1])
@@ -70,7 +69,7 @@ def test_a_child_that_still_works_at_a_stop_is_waited_for(start):
         'while time.monotonic() < end: pass\n'
         'print("all is written", flush=True)'
     )
-    launch = start(DRIVER, f'slow={last_words}', environ=ENVIRON)
+    launch = start(DRIVER, f'slow={last_words}')
     launch.until(r'slow +\| up')
     assert launch.end(signal.SIGINT)[0] == 0
     assert 'all is written' in '\n'.join(launch.lines)
@@ -78,7 +77,7 @@ def test_a_child_that_still_works_at_a_stop_is_waited_for(start):
 
 
 def test_another_ctrl_c_ends_at_once_but_not_the_echo_of_the_first(start):
-    launch = start(DRIVER, f'deaf={WORKING}', environ=ENVIRON)
+    launch = start(DRIVER, f'deaf={WORKING}')
     launch.until(r'deaf +\| up')
     for _ in range(2):
         launch.process.send_signal(signal.SIGINT)
@@ -98,7 +97,7 @@ def test_what_uses_the_others_is_stopped_before_them(start):
         'print("up", flush=True)\n'
         'signal.pause()'
     )
-    launch = start(DRIVER, f'lead={polite}', f'last={polite}', environ=ENVIRON)
+    launch = start(DRIVER, f'lead={polite}', f'last={polite}')
     launch.until(r'lead +\| up')
     launch.until(r'last +\| up')
     assert launch.end(signal.SIGINT)[0] == 0
@@ -113,7 +112,7 @@ def test_no_more_processes_come_up_at_once_than_allowed(start):
         'os.close(int(os.environ["LAUNCH_UP"])); signal.pause()'
     )
     programs = (f'one={slow}', f'two={FINISHED}', f'three={WAIT}')
-    launch = start(DRIVER, *programs, environ={**ENVIRON, 'AT_ONCE': '1'})
+    launch = start(DRIVER, *programs, environ={**USER_ENVIRON, 'AT_ONCE': '1'})
     launch.until(r'one +\| coming')
     launch.write('one go')
     launch.until(r'three +\| up')
@@ -130,7 +129,7 @@ def test_no_more_processes_come_up_at_once_than_allowed(start):
 
 
 def test_a_child_that_dies_comes_back_and_the_rest_goes_on(start):
-    launch = start(DRIVER, f'one={WAIT}', f'two={WAIT}', environ=ENVIRON)
+    launch = start(DRIVER, f'one={WAIT}', f'two={WAIT}')
     first = int(launch.until(r'started one \(process (\d+)\)')[1])
     launch.until(r'one +\| up')
     seen = len(launch.lines)
@@ -144,7 +143,7 @@ def test_a_child_that_dies_comes_back_and_the_rest_goes_on(start):
 
 
 def test_pauses_grow_while_a_child_keeps_dying(start):
-    launch = start(DRIVER, 'one=import sys; sys.exit(3)', environ=ENVIRON)
+    launch = start(DRIVER, 'one=import sys; sys.exit(3)')
     launch.until(r'died \(exit code 3\): starting it again in 0.01 s')
     launch.until(r'starting it again in 0.02 s')
     assert launch.end(signal.SIGTERM)[0] == 0
@@ -152,7 +151,7 @@ def test_pauses_grow_while_a_child_keeps_dying(start):
 
 def test_a_child_that_cannot_be_configured_ends_the_launch(start):
     bad = 'print("cannot start: level is -1"); raise SystemExit(2)'
-    launch = start(DRIVER, f'one={WAIT}', f'two={bad}', environ=ENVIRON)
+    launch = start(DRIVER, f'one={WAIT}', f'two={bad}')
     assert launch.end()[0] == 2
     output = '\n'.join(launch.lines)
     assert 'cannot start: level is -1' in output
@@ -161,7 +160,7 @@ def test_a_child_that_cannot_be_configured_ends_the_launch(start):
 
 
 def test_a_child_that_says_it_has_finished_is_left_alone(start):
-    launch = start(DRIVER, f'one={FINISHED}; print("bye", end="")', environ=ENVIRON)
+    launch = start(DRIVER, f'one={FINISHED}; print("bye", end="")')
     assert launch.end()[0] == 0
     assert any(line.endswith('| bye') for line in launch.lines)
     assert sum('started one' in line for line in launch.lines) == 1
@@ -169,7 +168,7 @@ def test_a_child_that_says_it_has_finished_is_left_alone(start):
 
 def test_a_line_of_input_reaches_the_named_child(start):
     echo = 'import sys\nfor line in sys.stdin: print("got", line.strip(), flush=True)'
-    launch = start(DRIVER, f'one={echo}', f'two={echo}', environ=ENVIRON)
+    launch = start(DRIVER, f'one={echo}', f'two={echo}')
     launch.write('two battery set 15')
     launch.until(r'two +\| got battery set 15')
     launch.until('sent True')
@@ -179,7 +178,7 @@ def test_a_line_of_input_reaches_the_named_child(start):
 
 
 def test_the_time_to_run_ends_the_launch(start):
-    environ = {**ENVIRON, 'SECONDS_TO_RUN': '0.3'}
+    environ = {**USER_ENVIRON, 'SECONDS_TO_RUN': '0.3'}
     launch = start(DRIVER, f'one={WAIT}', environ=environ)
     assert launch.end()[0] == 0
     assert 'the time is over' in '\n'.join(launch.lines)
@@ -189,7 +188,7 @@ def test_a_reader_that_goes_away_ends_the_launch():
     chatty = 'while True: print("x" * 1000, flush=True)'
     with subprocess.Popen(
         [sys.executable, DRIVER, f'one={chatty}'],
-        env=ENVIRON,
+        env=USER_ENVIRON,
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
@@ -209,7 +208,7 @@ def test_children_end_with_a_launcher_that_is_killed(start):
         f'subprocess.run([sys.executable, "-P", {child!r}, str(os.getpid()), '
         '"x=tests.launcher.waiting_node:X", "--ros-args"])'
     )
-    launch = start('-c', script, environ=ENVIRON)
+    launch = start('-c', script)
     launch.until('up with --ros-args')
     children = Path(f'/proc/{launch.process.pid}/task/{launch.process.pid}/children')
     pids = [int(pid) for pid in children.read_text().split()]
@@ -222,7 +221,7 @@ def test_a_child_whose_launcher_is_gone_already_does_not_start():
     child = str(ROOT / 'launcher' / 'child.py')
     done = subprocess.run(
         [sys.executable, '-P', child, '1', 'x=tests.launcher.waiting_node:X'],
-        env=ENVIRON,
+        env=USER_ENVIRON,
         timeout=60.0,
         check=False,
     )

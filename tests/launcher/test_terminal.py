@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.launcher.conftest import ROOT
+from tests.launcher.conftest import USER_ENVIRON
 
 PROCESS = str(Path(__file__).with_name('mission_process.py'))
 ESCAPES = re.compile(rb'\x1b\[[0-9;?]*[a-zA-Z]')
@@ -31,7 +31,7 @@ class Terminal:
         fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack('HHHH', 40, 160, 0, 0))
         self.settings = termios.tcgetattr(theirs)
         self.theirs = theirs
-        environ = {**os.environ, 'TERM': 'xterm', 'PYTHONPATH': str(ROOT)}
+        environ = {**USER_ENVIRON, 'TERM': 'xterm'}
         # Its own session's terminal, so that Ctrl-C between two prompts is a signal.
         words = ['setsid', '--ctty', *command]
         self.process = subprocess.Popen(

@@ -15,6 +15,8 @@ from collections.abc import Mapping, Sequence
 
 import pyte
 
+from tests.launcher.conftest import USER_ENVIRON
+
 ASKS_FOR_CURSOR = b'\x1b[6n'
 
 
@@ -43,7 +45,7 @@ class Terminal:
             stdin=theirs,
             stdout=theirs,
             stderr=theirs,
-            env={**os.environ, 'TERM': 'xterm-256color', **(environ or {})},
+            env={**USER_ENVIRON, 'TERM': 'xterm-256color', **(environ or {})},
             preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0),
             start_new_session=True,
         )

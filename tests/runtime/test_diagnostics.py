@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import os
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
 from surveillance_runtime import diagnostics, health
-from surveillance_runtime.diagnostics import DiagnosticsThread
+from surveillance_runtime.diagnostics import DiagnosticsThread, Heartbeat
 from surveillance_runtime.health import ERROR, OK, WARN, Health
 from surveillance_runtime.node import PatrolNode, report_exception
 
@@ -110,3 +111,24 @@ def test_a_second_robot_has_names_of_its_own(graph: Any, monkeypatch: pytest.Mon
     status = second.until(OK)
     second.thread.stop()
     assert (status.name, status.hardware_id) == ('robot2/plain', 'robot2')
+
+
+class BeatenByHand:
+    """Stands in for the node whose timer beats."""
+
+    def create_timer(self, _period: float, callback: Callable[[], None], **_options: Any) -> None:
+        self.beat = callback
+
+
+def test_a_process_that_did_not_run_for_long_says_that_it_slept(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    reader, writer = os.pipe()
+    monkeypatch.setenv(diagnostics.HEARTBEAT, str(writer))
+    times = iter((0.0, 1.0, 2.0 + diagnostics.SLEPT_AFTER, 3.0 + diagnostics.SLEPT_AFTER))
+    node: Any = BeatenByHand()
+    Heartbeat([node], lambda: next(times))
+    for _ in range(3):
+        node.beat()
+    assert os.read(reader, 9) == b'.S.'
+    os.close(reader)

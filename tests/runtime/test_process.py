@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from surveillance_runtime.process import prefer_quick_discovery
+from surveillance_runtime.discovery import prefer_quick_discovery
 
 PROGRAM = """
 import numpy, scipy.linalg
