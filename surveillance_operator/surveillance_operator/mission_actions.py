@@ -98,7 +98,7 @@ class MissionActions:
 
     def set_door(self, door: str, is_open: bool) -> str:
         """Open or close a door: a simulated one, or else as the map has it."""
-        request = SetDoor.Request(door=_name(door), open=is_open)
+        request = SetDoor.Request(door=_name(door), open=bool(is_open))
         try:
             return self._told('simulation/set_door', request)
         except NoServerError:
@@ -106,7 +106,7 @@ class MissionActions:
 
     def place_obstacle(self, name: str, x: float, y: float, radius: float) -> str:
         """Put a cylinder in the simulated robot's way, metres."""
-        at = {'x': _number(x), 'y': _number(y), 'radius': _number(radius)}
+        at = {'x': _number('x', x), 'y': _number('y', y), 'radius': _number('radius', radius)}
         return self._told(
             'simulation/place_obstacle', PlaceObstacle.Request(name=_name(name), **at)
         )
@@ -117,14 +117,14 @@ class MissionActions:
 
     def drain_battery(self, percent: float) -> str:
         """Take charge out of the simulated battery."""
-        request = DrainBattery.Request(percent=_number(percent))
+        request = DrainBattery.Request(percent=_number('percent', percent))
         return self._told('simulation/drain_battery', request)
 
     def add_room(self, name: str, x: float, y: float, doors: Sequence[str]) -> str:
         """Add a place to the map and the ontology."""
         request = AddRoom.Request(
             room_name=_name(name),
-            position=Point(x=_number(x), y=_number(y)),
+            position=Point(x=_number('x', x), y=_number('y', y)),
             doors=[_name(door) for door in doors],
         )
         return self._told('ontology_map/add_room', request)
@@ -135,7 +135,7 @@ class MissionActions:
 
     def go_to(self, place: str) -> str:
         """Send the robot to a place next; an empty one calls it home."""
-        return self._told('go_to', GoTo.Request(place=place and _name(place)))
+        return self._told('go_to', GoTo.Request(place=_name(place) if place else ''))
 
     def why_not(self, place: str) -> tuple[str, list[str]]:
         """Return why the robot would not go to a place now, and the premises of that."""
@@ -156,7 +156,7 @@ class MissionActions:
 
     def set_threshold(self, seconds: float) -> str:
         """Set after how long a place is URGENT, seconds."""
-        number = _number(seconds)
+        number = _number('threshold', seconds)
         if number != int(number):
             raise ActionError(f'threshold {number:g}: expected whole seconds')
         value = ParameterValue(type=ParameterType.PARAMETER_INTEGER, integer_value=int(number))
@@ -164,12 +164,12 @@ class MissionActions:
 
     def set_policy(self, policy: str) -> str:
         """Set how a place is chosen among those that the rules allow."""
-        value = ParameterValue(type=ParameterType.PARAMETER_STRING, string_value=policy)
-        return self._set('policy', value, policy)
+        value = ParameterValue(type=ParameterType.PARAMETER_STRING, string_value=str(policy))
+        return self._set('policy', value, str(policy))
 
     def move_arm(self, pose: str) -> str:
         """Move the camera arm to a named pose: left, home, right, back; or stop it."""
-        number = getattr(MarkerRoutine.Request, pose.upper(), None) if pose.isalpha() else None
+        number = getattr(MarkerRoutine.Request, str(pose).upper(), None)
         if not isinstance(number, int):
             raise ActionError(f'{pose!r}: expected left, home, right, back or stop')
         return self._told('move_arm', MarkerRoutine.Request(pos=number), ARM_SECONDS)
@@ -178,7 +178,9 @@ class MissionActions:
         """Give a controller one of its console's commands: the answers of mode MANUAL."""
         if controller not in CONTROLLERS:
             raise ActionError(f'{controller!r}: expected one of {", ".join(CONTROLLERS)}')
-        answer = self._call(f'{controller}/command', ConsoleCommand.Request(line=line[:20_000]))
+        answer = self._call(
+            f'{controller}/command', ConsoleCommand.Request(line=str(line)[:20_000])
+        )
         if not answer.accepted:
             raise ActionError(answer.answer)
         return str(answer.answer)
@@ -252,11 +254,11 @@ def _name(text: str) -> str:
     return text
 
 
-def _number(value: float) -> float:
+def _number(what: str, value: float) -> float:
     try:
         number = float(value)
     except (TypeError, ValueError):
         number = math.nan
     if not math.isfinite(number):
-        raise ActionError(f'{str(value)[:40]!r}: expected a finite number')
+        raise ActionError(f'{what} {str(value)[:40]!r}: expected a finite number')
     return number

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from rclpy.qos import QoSProfile, ReliabilityPolicy
@@ -90,30 +90,30 @@ class MissionPage(PatrolNode):
     def _questions(self) -> dict[str, Action]:
         actions = self._actions
 
-        def why_not(given: Mapping[str, Any]) -> Any:
-            text, premises = actions.why_not(given['place'])
+        def why_not(place: str) -> Any:
+            text, premises = actions.why_not(place)
             return {'ok': True, 'text': text, 'premises': premises}
 
         return {
-            'facts': lambda given: {'ok': True, 'facts': actions.facts(given['place'])},
-            'explain': lambda given: {'ok': True, 'lines': actions.explain(given['fact'])},
+            'facts': lambda place: {'ok': True, 'facts': actions.facts(place)},
+            'explain': lambda fact: {'ok': True, 'lines': actions.explain(fact)},
             'why_not': why_not,
         }
 
     def _hands(self) -> dict[str, Action]:
         actions = self._actions
         return {
-            'door': lambda g: actions.set_door(g['door'], bool(g['open'])),
-            'obstacle': lambda g: actions.place_obstacle(g['name'], g['x'], g['y'], g['radius']),
-            'remove_obstacle': lambda g: actions.remove_obstacle(g['name']),
-            'add_room': lambda g: actions.add_room(g['name'], g['x'], g['y'], list(g['doors'])),
-            'remove_room': lambda g: actions.remove_room(g['name']),
-            'go': lambda g: actions.go_to(str(g['place'])),
-            'arm': lambda g: actions.move_arm(str(g['pose'])),
-            'machine': lambda g: actions.machine(str(g['word'])),
-            'threshold': lambda g: actions.set_threshold(g['seconds']),
-            'policy': lambda g: actions.set_policy(str(g['policy'])),
-            'command': lambda g: actions.command(str(g['controller']), str(g['line'])),
+            'door': actions.set_door,
+            'obstacle': actions.place_obstacle,
+            'remove_obstacle': actions.remove_obstacle,
+            'add_room': actions.add_room,
+            'remove_room': actions.remove_room,
+            'go': actions.go_to,
+            'arm': actions.move_arm,
+            'machine': actions.machine,
+            'threshold': actions.set_threshold,
+            'policy': actions.set_policy,
+            'command': actions.command,
         }
 
 

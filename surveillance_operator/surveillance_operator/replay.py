@@ -12,7 +12,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -105,24 +105,24 @@ class Player:
         """End `run`."""
         self._ended.set()
 
-    def seek(self, seconds: float) -> str:
+    def seek(self, to: float) -> str:
         """Go to a moment, seconds from the recording's start."""
         with self._lock:
-            self._jump(self._line.times[0] + max(0.0, float(seconds)))
+            self._jump(self._line.times[0] + max(0.0, float(to)))
         return 'moved'
 
     def actions(self) -> dict[str, Action]:
         """Return what a viewer may do."""
         return {
-            'seek': lambda given: self.seek(given['to']),
+            'seek': self.seek,
             'speed': self._set_speed,
-            'play': lambda _: self._set_playing(True),
-            'pause': lambda _: self._set_playing(False),
+            'play': lambda: self._set_playing(True),
+            'pause': lambda: self._set_playing(False),
             'jump': self._jump_to_mark,
         }
 
-    def _set_speed(self, given: Mapping[str, Any]) -> str:
-        speed = float(given['speed'])
+    def _set_speed(self, speed: float) -> str:
+        speed = float(speed)
         if not SPEEDS[0] <= speed <= SPEEDS[1]:
             raise ValueError(f'speed {speed:g}: expected {SPEEDS[0]} to {SPEEDS[1]:g}')
         with self._lock:
@@ -136,8 +136,7 @@ class Player:
             self._tell({}, None)
         return 'playing' if playing else 'paused'
 
-    def _jump_to_mark(self, given: Mapping[str, Any]) -> str:
-        kind = given['kind']
+    def _jump_to_mark(self, kind: str) -> str:
         if kind not in MARKS:
             raise ValueError(f'{kind!r}: expected one of {", ".join(MARKS)}')
         with self._lock:

@@ -93,7 +93,7 @@ def hub() -> Hub:
 
 @pytest.fixture(scope='module')
 def viewer(hub: Hub) -> Iterator[Viewer]:
-    page = Page(hub, questions={}, actions={'go': lambda _: 'going'}, port=0)
+    page = Page(hub, questions={}, actions={'threshold': lambda seconds: f'set {seconds}'}, port=0)
     page.start()
     viewer = Viewer(page.address)
     yield viewer
@@ -165,3 +165,24 @@ def test_the_next_mission_starts_on_a_clean_page(hub: Hub, viewer: Viewer) -> No
     assert viewer.js('return mission.state.trail') == []
     assert viewer.text('#decision-line') == 'no decision yet'
     assert viewer.count('#scores td') == 0
+
+
+def test_enter_does_what_a_forms_first_button_does(hub: Hub, viewer: Viewer) -> None:
+    show(hub, viewer, 'large')
+    viewer.driver.find_element('name', 'seconds').clear()
+    viewer.driver.find_element('name', 'seconds').send_keys('soon\n')
+    viewer.until(lambda: viewer.text('[aria-label=Threshold] #done') == '✓ set soon')
+
+
+def test_no_link_leads_below_the_header(hub: Hub, viewer: Viewer) -> None:
+    show(hub, viewer, 'large')
+    long = replace(STATES['large'].status, text='charging, for which there are reasons ' * 20)  # type: ignore[type-var]
+    hub.show(replace(STATES['large'], status=long))
+    viewer.until(lambda: 'reasons' in viewer.text('#state'))
+    viewer.size(*PHONE)
+    for section in ('why', 'camera-section', 'hands', 'machine-section'):
+        viewer.click(f'nav [href="#{section}"]')
+        bottom = viewer.js('return document.querySelector("header").getBoundingClientRect().bottom')
+        top = viewer.js(f'return document.getElementById("{section}").getBoundingClientRect().top')
+        assert bottom <= top < 300
+    viewer.size(*DESK)

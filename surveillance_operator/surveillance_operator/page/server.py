@@ -7,6 +7,7 @@ in any case, comes from the page's own origin, and only where control was switch
 
 from __future__ import annotations
 
+import inspect
 import ipaddress
 import json
 import secrets
@@ -45,8 +46,8 @@ HEADERS = {
     'Cache-Control': 'no-store',
 }
 
-Action = Callable[[Mapping[str, Any]], Any]
-"""Takes the fields of a request; returns what came of it; raises `ValueError` with one line."""
+Action = Callable[..., Any]
+"""Takes a request's fields by name; returns what came of it; raises `ValueError` with one line."""
 
 
 class Page:
@@ -226,10 +227,10 @@ class _Guard:
 
 async def _answered(call: Action, fields: Mapping[str, Any]) -> Response:
     try:
-        result = await run_in_threadpool(call, fields)
-    except (ValueError, KeyError, TypeError) as error:
-        text = f'field {error} is missing' if isinstance(error, KeyError) else str(error)
-        return JSONResponse({'ok': False, 'text': text}, 422)
+        inspect.signature(call).bind(**fields)
+        result = await run_in_threadpool(call, **fields)
+    except (ValueError, TypeError) as error:
+        return JSONResponse({'ok': False, 'text': str(error)}, 422)
     return JSONResponse({'ok': True, 'text': result} if isinstance(result, str) else result)
 
 

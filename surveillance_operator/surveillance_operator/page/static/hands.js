@@ -1,4 +1,4 @@
-// What a person may do: one line for each thing, and what came of it above them.
+// What a person may do: one form for each thing, and what came of it below the form.
 import {$, h, act, names} from './dom.js';
 
 // An example of each controller's commands.
@@ -49,15 +49,15 @@ export class Hands {
     this.answer = this.form('Command', [this.requests, this.controller, this.command], [['Send', 'command', (g) => g]]);
     this.arm = this.form('Arm', [select('pose', 'Pose', ...POSES)], [['Move', 'arm', (g) => g]]);
     this.obstacle = this.form('Obstacle', [input('name', 'name', 'box', {class: 'short'}), number('radius', 'radius [m]', '0.3')],
-      [['Place', 'obstacle', (g) => ({name: g.name, ...this.at(), radius: +g.radius}), this.point],
+      [['Place', 'obstacle', (g) => ({...g, ...this.at()}), this.point],
         ['Take away', 'remove_obstacle', (g) => ({name: g.name})]]);
     $('hands-body').append(
-      this.form('Robot', [this.place], [['Go there', 'go', (g) => ({place: g.place})], ['Call it home', 'go', () => ({place: ''})]]),
-      this.form('Door', [this.door], [['Open', 'door', (g) => ({door: g.door, open: true})], ['Close', 'door', (g) => ({door: g.door, open: false})]]),
-      this.form('Threshold', [this.seconds, h('span', {}, 's')], [['Set', 'threshold', (g) => ({seconds: +g.seconds})]]),
-      this.form('Policy', [this.policy], [['Set', 'policy', (g) => ({policy: g.policy})]]),
+      this.form('Robot', [this.place], [['Go there', 'go', (g) => g], ['Call it home', 'go', () => ({place: ''})]]),
+      this.form('Door', [this.door], [['Open', 'door', (g) => ({...g, is_open: true})], ['Close', 'door', (g) => ({...g, is_open: false})]]),
+      this.form('Threshold', [this.seconds, h('span', {}, 's')], [['Set', 'threshold', (g) => g]]),
+      this.form('Policy', [this.policy], [['Set', 'policy', (g) => g]]),
       this.arm,
-      this.form('Room', [this.room], [['Remove', 'remove_room', (g) => ({name: g.name})]]),
+      this.form('Room', [this.room], [['Remove', 'remove_room', (g) => g]]),
       this.point,
       this.form('New room', [input('name', 'name', 'R9', {class: 'short'}), input('doors', 'doors', 'D1', {class: 'short'})],
         [['Add', 'add_room', (g) => ({name: g.name, ...this.at(), doors: g.doors.split(/[ ,]+/).filter(Boolean)}), this.point]]),
@@ -67,12 +67,14 @@ export class Hands {
     this.controller.addEventListener('change', () => { this.command.value = COMMANDS[this.controller.value]; });
   }
 
-  // Buttons: label, action, its fields from the form's, another form that it reads, too.
+  // Buttons: label, action, its fields from the form's, another form that it reads, too. The Enter key in a field is the first button.
   form(title, fields, buttons) {
-    const form = h('form', {'aria-label': title, onsubmit: (event) => event.preventDefault()});
-    const pressed = buttons.map(([label, name, fieldsOf, other]) => h('button', {type: 'button', 'data-act': name, onclick: async () => {
+    const form = h('form', {'aria-label': title});
+    const pressed = buttons.map(([label, name, fieldsOf, other], number) => h('button', {type: number ? 'button' : 'submit', 'data-act': name, onclick: async (event) => {
+      event.preventDefault();
       if (![form, other].every((each) => !each || each.reportValidity())) return;
       const found = await act(name, fieldsOf(Object.fromEntries(new FormData(form))));
+      form.append($('done'));
       $('done').textContent = (found.ok ? '✓ ' : '✗ ') + found.text;
       $('done').className = found.ok ? 'ok' : 'warn';
     }}, label));
@@ -89,7 +91,7 @@ export class Hands {
   }
 
   at() {
-    return {x: +this.point.elements.x.value, y: +this.point.elements.y.value};
+    return Object.fromEntries(new FormData(this.point));
   }
 
   // Offers what this mission has, and shows what its controllers wait for.

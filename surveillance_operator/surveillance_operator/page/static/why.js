@@ -41,14 +41,22 @@ export class Why {
     }
   }
 
-  async whyNot() {
+  // The place that is asked about; what was answered about another one goes.
+  asked() {
     const place = $('place').value;
+    if (place !== this.place) for (const id of ['answer', 'facts']) $(id).replaceChildren();
+    this.place = place;
+    return place;
+  }
+
+  async whyNot() {
+    const place = this.asked();
     const found = await ask('why_not', {place});
     $('answer').replaceChildren(h('p', {class: found.ok ? 'strong' : 'warn'}, h('time', {}, clock()), found.text), ...(found.premises?.length ? [h('ul', {class: 'proof'}, ...found.premises.map((text) => h('li', {}, text)))] : []));
   }
 
   async facts() {
-    const place = $('place').value;
+    const place = this.asked();
     const found = await ask('facts', {place});
     if (!found.ok) { $('facts').replaceChildren(h('p', {class: 'warn'}, found.text)); return; }
     $('facts').replaceChildren(h('h3', {}, h('time', {}, clock()), `What is known of ${place}`), ...found.facts.map(([fact, asserted]) => asserted ? h('p', {class: 'fact'}, fact, h('small', {}, ' asserted')) : this.derived(fact)));
