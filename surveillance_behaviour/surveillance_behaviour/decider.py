@@ -229,6 +229,9 @@ class Decider:
         self.model.target = decision.target
         if decision.rule == RECHARGE and not self.experience.sent_to_charge:
             self.experience.sent_to_charge = decision.reason.rpartition(': ')[0]
+        if self.model.contradiction:
+            reason = f'{decision.reason}; {self.model.contradiction}'
+            decision = replace(decision, reason=reason)
         self._leg = decision
         self._save()
         return decision

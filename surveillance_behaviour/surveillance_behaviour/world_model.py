@@ -158,6 +158,7 @@ class WorldModel:
         self.place = ''
         self.target: str | None = None
         self.world: World | None = None
+        self.contradiction = ''
         self._ontology = ontology
         self._places = places
         self._memory = PolicyMemory(generator or random.Random())
@@ -220,6 +221,7 @@ class WorldModel:
             own = visits.get(place, -1.0)
             visited_at[place] = own if own >= seconds else seconds
         self.place = found.place
+        self.contradiction = found.contradiction
         self.world = World(
             place=found.place,
             now=now,

@@ -76,6 +76,7 @@ class Snapshot:
         classes: The classes of every place, among those that were asked for.
         visited_at: When each place was visited last, seconds; without those that never were.
         connections: The neighbours of every place.
+        contradiction: Which facts clashed while it was taken, as a sentence; empty: none did.
     """
 
     place: str
@@ -84,6 +85,7 @@ class Snapshot:
     classes: Mapping[str, frozenset[str]]
     visited_at: Mapping[str, float]
     connections: Mapping[str, tuple[str, ...]]
+    contradiction: str = ''
 
 
 @dataclass(frozen=True)
@@ -111,6 +113,7 @@ class PatrolOntology:
         self._armor = armor
         self._robot = robot
         self._places: tuple[str, ...] = ()
+        self._last: Snapshot | None = None
 
     @property
     def reference(self) -> str:
@@ -312,7 +315,9 @@ class PatrolOntology:
         """Tell the time, and ask for all that a decision needs; mostly one round trip.
 
         It takes another one when the map has changed, or for a visit that the ontology does not
-        know and that is not of this moment.
+        know and that is not of this moment. From an ontology that contradicts itself nothing
+        follows: after the patience, or at once where the snapshot before met a contradiction as
+        well, the answer is what followed last, with the robot's place and visits as they are.
 
         Args:
             now: The robot's time, seconds.
@@ -333,19 +338,54 @@ class PatrolOntology:
         """
         pause = interrupt or threading.Event()
         deadline = time.monotonic() + patience
+        clashed = self._last is not None and bool(self._last.contradiction)
+        why = ''
         while True:
+            is_over = time.monotonic() >= deadline
             try:
                 found = self._ask(now, classes, visits or {})
-                if found.seen_at >= not_before:
-                    return found
-                raise OntologyNotReadyError(
-                    f'nobody told it where the robot is since {not_before / 1e9:.1f} s'
-                )
+                if found.is_in.is_consistent:
+                    snapshot = self._snapshot_of(found, classes)
+                else:
+                    why = why or self._clash()
+                    if not (is_over or clashed):
+                        raise OntologyNotReadyError(why)
+                    snapshot = self._as_known(found, visits or {}, why)
+                if snapshot.seen_at < not_before:
+                    raise OntologyNotReadyError(
+                        f'nobody told it where the robot is since {not_before / 1e9:.1f} s'
+                    )
+                self._last = replace(snapshot, contradiction=why)
+                return self._last
             except OntologyNotReadyError:
-                if time.monotonic() >= deadline or pause.wait(RETRY_PERIOD):
+                if is_over or pause.wait(RETRY_PERIOD):
                     raise
 
-    def _ask(self, now: float, classes: Sequence[str], visits: Mapping[str, float]) -> Snapshot:
+    def _clash(self) -> str:
+        """Return which facts clash, with the ontology's name."""
+        _, because, facts = self.contradiction().partition(' because ')
+        return f'ontology {self.reference} is inconsistent{because}{facts}'
+
+    def _as_known(self, found: _Answers, visits: Mapping[str, float], why: str) -> Snapshot:
+        """Return the last snapshot with what was told since: nothing follows from a contradiction.
+
+        Raises:
+            OntologyNotReadyError: There is none, or the robot is not in one place of it.
+        """
+        where, last = _names(found.is_in), self._last
+        if last is None or len(where) != 1 or where[0] not in last.connections:
+            raise OntologyNotReadyError(why)
+        told = {place: at for place, at in visits.items() if place in last.connections}
+        return replace(
+            last,
+            place=where[0],
+            seen_at=_time(f'seenAt of {self._robot}', found.seen_at),
+            reachable=last.connections[where[0]],
+            visited_at={**last.visited_at, **told},
+        )
+
+    def _ask(self, now: float, classes: Sequence[str], visits: Mapping[str, float]) -> _Answers:
+        """Tell and ask until the answers are about all places, of one moment."""
         asked = self._places
         # A visit of this moment is the latest there can be, and nobody takes away the place that
         # the robot stands in: it can be told unasked. For any other the ontology is asked first.
@@ -364,7 +404,7 @@ class PatrolOntology:
                 )
             ]
             if asked == self._places and not owed:
-                return self._snapshot_of(found, classes)
+                return found
             asked = self._places
 
     def _exchange(
@@ -398,11 +438,8 @@ class PatrolOntology:
         """Make a snapshot of answers about all places.
 
         Raises:
-            OntologyNotReadyError: The ontology contradicts itself, or has the robot in no place, or
-                in several.
+            OntologyNotReadyError: The ontology has the robot in no place, or in several.
         """
-        if not found.is_in.is_consistent:
-            raise OntologyNotReadyError(f'ontology {self.reference} is inconsistent')
         where = _names(found.is_in)
         if len(where) != 1:
             what = f'in {" and ".join(where)}' if where else 'in no place'

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -69,6 +70,19 @@ def test_a_clock_that_is_set_back_while_nobody_decides_empties_no_visit(
     now = date + 30.0 + after
     told.begin(now, NOBODY)
     assert told.experience.visits == {'C1': now - 20.0, 'E': now}
+
+
+def test_a_decision_says_which_facts_clash_while_they_do(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    world = World()
+    told = decider(world, tmp_path / 'mission.jsonl')
+    told.begin(1.0, NOBODY)
+    clash, right = 'ontology map is inconsistent because R4 is ROOM and R4 is DOOR', world.snapshot
+    monkeypatch.setattr(world, 'snapshot', lambda *args: replace(right(*args), contradiction=clash))
+    assert told.decide(2.0, NOBODY).reason.endswith('; ' + clash)
+    monkeypatch.undo()
+    assert 'inconsistent' not in told.decide(3.0, NOBODY).reason
 
 
 def test_a_request_is_taken_while_somebody_looks(tmp_path: Path) -> None:

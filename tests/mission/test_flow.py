@@ -123,3 +123,5 @@ def test_a_mission_outlives_an_ontology_that_contradicts_itself(
     told = [line for line in capfd.readouterr().err.splitlines() if 'contradicts itself' in line]
     assert len(told) == 1
     assert 'R4 is DOOR' in told[0]
+    last = [event.text('reason') for event in robot.events() if event.name == 'decision'][-1]
+    assert 'R4 is DOOR' not in last, 'no decision names what is over'

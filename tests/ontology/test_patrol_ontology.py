@@ -210,6 +210,46 @@ def test_what_clashes_is_named(ontology: PatrolOntology, armor: ArmorClient) -> 
     assert 'R1 is LOCATION and R1 is DOOR' in ontology.contradiction()
 
 
+def test_a_contradiction_is_named_while_it_lasts_and_the_last_map_serves(
+    ontology: PatrolOntology, armor: ArmorClient
+) -> None:
+    def clash() -> None:
+        armor.manipulation.add_ind_to_class('R4', 'DOOR')
+        assert not armor.utils.sync_buffered_reasoner()
+
+    clash()
+    with pytest.raises(OntologyNotReadyError, match=r'inconsistent because .*R4 is DOOR'):
+        ontology.snapshot(130.0, RULES)
+    armor.manipulation.remove_ind_from_class('R4', 'DOOR')
+    before = ontology.snapshot(130.0, RULES)
+    assert before.contradiction == ''
+    clash()
+    ontology.record_place('C1', 5)
+    during = ontology.snapshot(140.0, RULES, visits={'C1': 139.5})
+    assert 'R4 is DOOR' in during.contradiction
+    assert during.contradiction.isprintable()
+    assert (during.place, during.visited_at['C1']) == ('C1', 139.5)
+    assert during.reachable == before.connections['C1']
+    armor.manipulation.remove_ind_from_class('R4', 'DOOR')
+    after = ontology.snapshot(150.0, RULES, visits={'C1': 139.5})
+    assert (after.contradiction, after.place) == ('', 'C1')
+
+
+def test_a_contradiction_that_ends_while_it_is_waited_for_is_named_once(
+    ontology: PatrolOntology, armor: ArmorClient
+) -> None:
+    class Mended(threading.Event):
+        def wait(self, timeout: float | None = None) -> bool:
+            armor.manipulation.remove_ind_from_class('R4', 'DOOR')
+            return False
+
+    armor.manipulation.add_ind_to_class('R4', 'DOOR')
+    first = ontology.snapshot(130.0, RULES, patience=60.0, interrupt=Mended())
+    assert 'R4 is DOOR' in first.contradiction
+    assert first.reachable == ('C1', 'C2')
+    assert ontology.snapshot(131.0, RULES).contradiction == ''
+
+
 def test_a_time_of_visit_that_is_none_is_named(
     ontology: PatrolOntology, armor: ArmorClient
 ) -> None:
