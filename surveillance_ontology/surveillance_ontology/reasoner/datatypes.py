@@ -9,7 +9,7 @@ are never equal to decimals.
 
 from __future__ import annotations
 
-import datetime
+import base64
 import math
 import re
 import struct
@@ -29,16 +29,16 @@ from surveillance_ontology.owl.expressions import (
     Literal,
 )
 from surveillance_ontology.owl.vocabulary import OWL, RDF, RDFS, TOP_LITERAL, XSD, local_name
+from surveillance_ontology.reasoner import moments
+from surveillance_ontology.reasoner.moments import moment_of, text_of
 
 Value: TypeAlias = 'int | Fraction | str | tuple[Any, ...]'
 
 _INTEGER = re.compile(r'[+-]?[0-9]+')
 _DECIMAL = re.compile(r'[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)')
 _FLOAT = re.compile(r'[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?')
-_MOMENT = re.compile(
-    r'(-?\d{4,}-\d\d-\d\dT\d\d:\d\d:\d\d)(\.\d+)?(Z|[+-]\d\d:\d\d)?',
-    re.ASCII,
-)
+_HEXADECIMAL = re.compile(r'(?:[0-9a-fA-F]{2})*')
+_SPACES = ' \t\n\r'
 _MAX_DIGITS = 4000
 
 BOUNDS: dict[str, tuple[int | None, int | None]] = {
@@ -59,9 +59,9 @@ BOUNDS: dict[str, tuple[int | None, int | None]] = {
 _STRINGS = ('string', 'normalizedString', 'token', 'language', 'Name', 'NCName', 'NMTOKEN')
 _PATTERNS = {
     'normalizedString': re.compile(r'[^\t\n\r]*'),
-    'token': re.compile(r'(?:[^\s]+(?: [^\s]+)*)?'),
+    'token': re.compile(r'(?:[^ \t\n\r]+(?: [^ \t\n\r]+)*)?'),
     'language': re.compile(r'[a-zA-Z]{1,8}(?:-[a-zA-Z0-9]{1,8})*'),
-    'Name': re.compile(r'[\w:][\w.:\-]*'),
+    'Name': re.compile(r'(?:[^\W\d]|:)[\w.:\-]*'),
     'NCName': re.compile(r'[^\W\d][\w.\-]*'),
     'NMTOKEN': re.compile(r'[\w.:\-]+'),
 }
@@ -99,28 +99,6 @@ def floating_value(space: str, number: float) -> Value:
     return (space, number)
 
 
-def _moment(text: str) -> Value:
-    found = _MOMENT.fullmatch(text)
-    if not found:
-        raise ValueError
-    try:
-        moment = datetime.datetime.fromisoformat(found[1].removeprefix('-'))
-    except ValueError:
-        raise ValueError from None
-    seconds: int | Fraction = (moment - datetime.datetime(1, 1, 1)) // datetime.timedelta(seconds=1)
-    if found[1].startswith('-'):
-        raise ValueError
-    if found[2]:
-        seconds += Fraction('0' + found[2])
-    zone = found[3]
-    if zone is None:
-        return ('dateTime', 'local', seconds)
-    offset = 0
-    if zone != 'Z':
-        offset = (int(zone[1:3]) * 60 + int(zone[4:6])) * (60 if zone[0] == '+' else -60)
-    return ('dateTime', 'utc', seconds - offset, offset)
-
-
 def parse_value(literal: Literal) -> Value:
     """Return the value a literal denotes.
 
@@ -137,7 +115,7 @@ def parse_value(literal: Literal) -> Value:
         name = datatype[len(XSD) :]
         bounds = BOUNDS.get(name)
         if bounds is not None:
-            text = text.strip()
+            text = text.strip(_SPACES)
             if not _INTEGER.fullmatch(text) or len(text) > _MAX_DIGITS:
                 raise ValueError
             number = int(text)
@@ -151,24 +129,32 @@ def parse_value(literal: Literal) -> Value:
                 raise ValueError
             return text
         if name == 'decimal':
-            if not _DECIMAL.fullmatch(text.strip()):
+            if not _DECIMAL.fullmatch(text.strip(_SPACES)):
                 raise ValueError
-            return _number(text.strip())
+            return _number(text.strip(_SPACES))
         if name == 'boolean':
-            if text.strip() not in ('true', 'false', '0', '1'):
+            if text.strip(_SPACES) not in ('true', 'false', '0', '1'):
                 raise ValueError
-            return ('boolean', text.strip() in ('true', '1'))
+            return ('boolean', text.strip(_SPACES) in ('true', '1'))
         if name in ('float', 'double'):
-            return _floating(name, text.strip())
+            return _floating(name, text.strip(_SPACES))
         if name in ('dateTime', 'dateTimeStamp'):
-            value = _moment(text.strip())
-            if name == 'dateTimeStamp' and value[1] != 'utc':  # type: ignore[index]
+            value = moment_of(text.strip(_SPACES))
+            if name == 'dateTimeStamp' and value[1] != 'utc':
                 raise ValueError
             return value
         if name == 'anyURI':
-            return ('anyURI', text.strip())
-        if name in ('hexBinary', 'base64Binary'):
-            return (name, text.strip().upper() if name == 'hexBinary' else text.strip())
+            return ('anyURI', text.strip(_SPACES))
+        if name == 'hexBinary':
+            if not _HEXADECIMAL.fullmatch(text.strip(_SPACES)):
+                raise ValueError
+            return (name, bytes.fromhex(text))
+        if name == 'base64Binary':
+            compact = ''.join(text.split())
+            octets = base64.b64decode(compact, validate=True)
+            if base64.b64encode(octets).decode() != compact:
+                raise ValueError  # Bits behind the last octet are not zero.
+            return (name, octets)
     elif datatype == OWL + 'rational':
         numerator, _, denominator = text.partition('/')
         if not (_INTEGER.fullmatch(numerator.strip()) and _INTEGER.fullmatch(denominator.strip())):
@@ -212,22 +198,13 @@ def literal_of(value: Value) -> Literal:
         text = {'inf': 'INF', '-inf': '-INF'}.get(text, text)
         return Literal(text, XSD + space)
     if space == 'dateTime':
-        seconds = value[2]
-        if value[1] == 'utc':
-            seconds += value[3]
-        whole = math.floor(seconds)
-        moment = datetime.datetime(1, 1, 1) + datetime.timedelta(seconds=whole)
-        text = moment.isoformat()
-        if seconds != whole:
-            text += (_terminating(Fraction(seconds - whole)) or '0.0')[1:]
-        if value[1] == 'utc':
-            minutes = value[3] // 60
-            sign = '+' if minutes >= 0 else '-'
-            zone = f'{sign}{abs(minutes) // 60:02d}:{abs(minutes) % 60:02d}'
-            text += 'Z' if minutes == 0 else zone
-        return Literal(text, XSD + 'dateTime')
-    if space in ('anyURI', 'hexBinary', 'base64Binary'):
+        return Literal(text_of(value), XSD + space)
+    if space == 'anyURI':
         return Literal(value[1], XSD + space)
+    if space == 'hexBinary':
+        return Literal(value[1].hex().upper(), XSD + space)
+    if space == 'base64Binary':
+        return Literal(base64.b64encode(value[1]).decode(), XSD + space)
     return Literal(value[2], value[1])
 
 
@@ -316,45 +293,93 @@ def comparable(value: Value) -> tuple[str, Any]:
         return 'string', value
     if value[0] in ('float', 'double'):
         return 'number', math.nan if value[1] == 'NaN' else value[1]
-    if value[0] == 'dateTime':
-        return 'dateTime ' + value[1], value[2]
     return value[0], value[1:]
+
+
+def order(first: Value, second: Value) -> int | None:
+    """Return -1, 0 or 1 as `first` is below, equal to or above `second`; None: they have no order.
+
+    Equal by order may be different values: 0.0 and -0.0, or one instant in two zones.
+    """
+    if isinstance(first, tuple) and isinstance(second, tuple) and first[0] == second[0]:
+        if first[0] == 'dateTime':
+            return moments.order(first, second)
+        if first[0] in ('other', 'ill-formed'):
+            return None
+    (kind, key), (other, other_key) = comparable(first), comparable(second)
+    if kind != other or key != key or other_key != other_key:
+        return None
+    return int(key > other_key) - int(key < other_key)
+
+
+_ORDERS: dict[str, tuple[int, ...]] = {
+    'minInclusive': (0, 1),
+    'maxInclusive': (0, -1),
+    'minExclusive': (1,),
+    'maxExclusive': (-1,),
+}
 
 
 def facet_test(facet: str, bound: Literal) -> Test | None:
     """Return a predicate on values for one facet; None when the facet is not supported."""
     name = facet[len(XSD) :] if facet.startswith(XSD) else facet
     limit = value_of(bound)
-    if name in ('minInclusive', 'maxInclusive', 'minExclusive', 'maxExclusive'):
-        kind, key = comparable(limit)
-
-        def ordered(value: Value) -> bool:
-            other, mine = comparable(value)
-            if other != kind:
-                return False
-            if name == 'minInclusive':
-                return bool(mine >= key)
-            if name == 'maxInclusive':
-                return bool(mine <= key)
-            return bool(mine > key) if name == 'minExclusive' else bool(mine < key)
-
-        return ordered
+    if name in _ORDERS:
+        orders = _ORDERS[name]
+        return lambda value: order(value, limit) in orders
     if name in ('length', 'minLength', 'maxLength') and isinstance(limit, int):
 
         def sized(value: Value) -> bool:
-            text = value if isinstance(value, str) else literal_of(value).lexical
+            if isinstance(value, tuple) and value[0] in ('hexBinary', 'base64Binary'):
+                length = len(value[1])  # In octets.
+            else:
+                length = len(lexical_of(value))
             if name == 'length':
-                return len(text) == limit
-            return len(text) >= limit if name == 'minLength' else len(text) <= limit
+                return length == limit
+            return length >= limit if name == 'minLength' else length <= limit
 
         return sized
     if name == 'pattern':
         try:
-            pattern = re.compile(bound.lexical)
-        except re.error:
+            pattern = schema_pattern(bound.lexical)
+        except ValueError:
             return None
-        return lambda value: pattern.fullmatch(literal_of(value).lexical) is not None
+        return lambda value: pattern.match(lexical_of(value)) is not None
     return None
+
+
+def lexical_of(value: Value) -> str:
+    """Return the text of a value, as patterns and lengths see it."""
+    return value if isinstance(value, str) else literal_of(value).lexical
+
+
+@cache
+def schema_pattern(text: str, *, whole: bool = True) -> re.Pattern[str]:
+    """Return a regular expression of XML Schema as one of Python's.
+
+    Args:
+        text: The expression.
+        whole: It is a facet, which all of a text must match; otherwise it is one of XPath, which
+            may have anchors, back references and lazy quantifiers.
+
+    Raises:
+        ValueError: It is none.
+    """
+    # The library takes 80 ms to import, and few ontologies have a pattern.
+    from elementpath.regex import RegexError, translate_pattern
+
+    try:
+        return re.compile(
+            translate_pattern(
+                text,
+                xsd_version='1.1',
+                back_references=not whole,
+                lazy_quantifiers=not whole,
+                anchors=not whole,
+            )
+        )
+    except (RegexError, re.error) as error:
+        raise ValueError(f'{text!r} is no regular expression of XML Schema: {error}') from None
 
 
 @cache

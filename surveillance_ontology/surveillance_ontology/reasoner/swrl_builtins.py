@@ -18,7 +18,13 @@ from collections.abc import Callable, Iterable
 from fractions import Fraction
 from typing import Any
 
-from surveillance_ontology.reasoner.datatypes import Value, comparable, floating_value
+from surveillance_ontology.reasoner.datatypes import (
+    Value,
+    floating_value,
+    lexical_of,
+    order,
+    schema_pattern,
+)
 
 _Number = int | Fraction | float
 _Solve = Callable[..., Iterable[Value]]
@@ -60,11 +66,10 @@ def _comparison(compare: Callable[[Any, Any], bool]) -> Callable[[Value, Value],
         pair = _numbers((first, second))
         if pair is not None:
             return compare(*pair[1])
-        kind, key = comparable(first)
-        other, other_key = comparable(second)
-        if kind != other or kind in ('other', 'ill-formed', 'number'):
+        sign = order(first, second)
+        if sign is None:
             return compare in (operator.eq, operator.ne) and compare(first, second)
-        return compare(key, other_key)
+        return compare(sign, 0)
 
     return holds
 
@@ -154,16 +159,10 @@ def _string_test(test: Callable[..., bool]) -> Callable[..., bool]:
     def holds(*arguments: Value) -> bool:
         try:
             return _text(*arguments) and test(*arguments)
-        except re.error:
+        except ValueError:
             return False
 
     return holds
-
-
-def _lexical(value: Value) -> str:
-    from surveillance_ontology.reasoner.datatypes import literal_of
-
-    return value if isinstance(value, str) else literal_of(value).lexical
 
 
 def _substring(text: str, start: int, length: int | None = None) -> str | None:
@@ -198,15 +197,15 @@ def _after(text: str, mark: str) -> str | None:
 def _replace(text: str, pattern: str, new: str) -> str | None:
     if not _text(text, pattern, new):
         return None
-    return re.sub(pattern, re.sub(r'\$(\d)', r'\\g<\1>', new), text)
+    return _pattern(pattern).sub(re.sub(r'\$(\d)', r'\\g<\1>', new), text)
 
 
 def _tokens(text: Value, pattern: Value) -> Iterable[Value]:
     if not isinstance(text, str) or not isinstance(pattern, str):
         return ()
     try:
-        return tuple(dict.fromkeys(re.split(pattern, text)))
-    except re.error:
+        return tuple(dict.fromkeys(_pattern(pattern).split(text)))
+    except ValueError:
         return ()
 
 
@@ -217,7 +216,11 @@ def _negation(value: Value) -> Value | None:
 
 
 def _matches(text: str, pattern: str) -> bool:
-    return re.search(pattern, text) is not None
+    return _pattern(pattern).search(text) is not None
+
+
+def _pattern(text: str) -> re.Pattern[str]:
+    return schema_pattern(text, whole=False)
 
 
 _TESTS: dict[str, tuple[int, Callable[..., bool]]] = {
@@ -255,7 +258,7 @@ _COMPUTATIONS: dict[str, tuple[int, int, _Solve]] = {
     'cos': (2, 2, _floating(math.cos)),
     'tan': (2, 2, _floating(math.tan)),
     'booleanNot': (2, 2, _strings(_negation)),
-    'stringConcat': (2, 99, _strings(lambda *parts: ''.join(map(_lexical, parts)))),
+    'stringConcat': (2, 99, _strings(lambda *parts: ''.join(map(lexical_of, parts)))),
     'substring': (3, 4, _strings(_substring)),
     'stringLength': (2, 2, _strings(lambda text: len(text) if _text(text) else None)),
     'normalizeSpace': (
