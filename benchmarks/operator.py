@@ -256,8 +256,7 @@ def write_messages(recording: Path, hours: float) -> None:
     streams = ((serialize_message(pose), '/amcl_pose'), (serialize_message(scan), '/scan'))
     for second in range(int(hours * 3600)):
         if second and second % 3600 == 0:
-            bag.close()
-            bag = BagWriter(recording, segment_seconds=1e9)
+            bag.close()  # the next message begins a segment
         for tenth in range(0, 10, 2):
             stamp = struct.pack('<iI', second, tenth * 100_000_000)
             at = int((START + second + tenth / 10) * 1e9)
@@ -315,8 +314,9 @@ def mission_rows(folder: Path, quick: bool) -> list[Row]:
 def memory_rows(folder: Path, minutes: float) -> list[Row]:
     """Watch memory beside a mission whose time runs as fast as it can.
 
-    What grows is fitted to the last two thirds of the time: the first fills what is kept, such as
-    an hour's history, the trail, caches.
+    What grows is fitted to what comes after the first hour of the mission's time, which fills the
+    history of an hour; to the last two thirds where there is no second hour. The allocator takes
+    and gives back the megabyte of a camera's image, so that a short time shows a slope of that.
     """
     if not (CHROMIUM and DRIVER):
         return [('memory of server and tab', 'no Chromium here', 'flat')]
@@ -332,7 +332,8 @@ def memory_rows(folder: Path, minutes: float) -> list[Row]:
         finally:
             viewer.close()
     times, *memories = np.array(seen).T
-    settled = len(times) // 3
+    settled = int(np.searchsorted(times - times[0], 1.0))
+    settled = settled if settled < 0.7 * len(times) else len(times) // 3
     rows = []
     for name, memory in zip(('server', 'tab'), memories, strict=True):
         growth = np.polyfit(times[settled:], memory[settled:], 1)[0]

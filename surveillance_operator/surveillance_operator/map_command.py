@@ -68,17 +68,7 @@ def run_of(events: Sequence[mission_log.Event], place: Place, source: str) -> Ru
             f"{source}: visits '{unknown[0]}', which the place does not have; "
             f'expected the record of a run through {", ".join(place.rooms)}'
         )
-    hours, seconds = divmod(round(summary.seconds), 3600)
-    lasted = f'{hours} h {seconds // 60} min' if hours else f'{seconds // 60} min {seconds % 60} s'
-    line = ' · '.join(
-        (
-            f'{lasted} of patrol',
-            _count(sum(summary.visits.values()), 'visit'),
-            f'{summary.distance:.0f} m driven',
-            _count(summary.recharges, 'recharge'),
-            _count(sum(summary.failures.values()), 'failure'),
-        )
-    )
+    line = in_words(summary)
     if events[0].name == 'snapshot':
         listed = max(event.time for event in events) - events[0].time
         line += f' · the ways of the last {listed / 3600.0:.1f} h'
@@ -96,6 +86,23 @@ def run_of(events: Sequence[mission_log.Event], place: Place, source: str) -> Ru
         threshold=numbers[-1] if numbers else None,
         summary=line,
     )
+
+
+def in_words(summary: mission_log.Summary) -> str:
+    """Return what a mission did in one line."""
+    hours, seconds = divmod(round(summary.seconds), 3600)
+    lasted = f'{hours} h {seconds // 60} min' if hours else f'{seconds // 60} min {seconds % 60} s'
+    charged = f' ({summary.charging_seconds:.0f} s)' if summary.recharges else ''
+    parts = [
+        f'{lasted} of patrol',
+        _count(sum(summary.visits.values()), 'visit'),
+        f'{summary.distance:.0f} m driven',
+        _count(summary.recharges, 'recharge') + charged,
+        _count(sum(summary.failures.values()), 'failure'),
+    ]
+    if summary.restarts:
+        parts.append(f'the behaviour was started again {_count(summary.restarts, "time")}')
+    return ' · '.join(parts)
 
 
 def _way(event: mission_log.Event, field: str) -> Way:

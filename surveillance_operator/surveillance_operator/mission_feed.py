@@ -58,9 +58,9 @@ PLANNER = 'planner_controller'
 """The node that knows the doors' lines and the execution mode, as its parameters."""
 POSE_TYPE = 'geometry_msgs/msg/PoseWithCovarianceStamped'
 OBSERVERS = ('mission_', 'console')
-"""How the names of nodes begin that only look on."""
+"""How the names of nodes begin that only look on: after a mission they may go."""
 TERMINALS = ('mission_view', 'console')
-"""The nodes of a person's terminal: that they are gone is no fault."""
+"""And of those that are a person's terminal: they may go at any time."""
 
 
 class MissionFeed:
@@ -241,15 +241,16 @@ class MissionFeed:
             )
 
     def _note_silent(self) -> None:
-        """Mark the nodes whose own reports have ceased."""
+        """Mark the nodes whose own reports have ceased, and forget those that may go."""
         now = time.monotonic()
+        may_go = TERMINALS if self._snapshot.nodes else OBSERVERS
         health = dict(self._snapshot.health)
         for name, each in self._snapshot.health.items():
-            if each.level == STALE or now - each.heard <= STALE_AFTER:
+            if now - each.heard <= STALE_AFTER:
                 continue
-            if _is_terminal(name):
+            if name.rpartition('/')[2].startswith(may_go):
                 del health[name]
-            else:
+            elif each.level != STALE:
                 health[name] = replace(each, level=STALE, message=f'silent, last: {each.message}')
         if health != self._snapshot.health:
             self.update(lambda old: replace(old, health=health), begins=False)
@@ -418,11 +419,6 @@ class _OtherRobots:
                 with contextlib.suppress(ValueError):
                     came[robot] = conversions.pose_from(newest[0].pose.pose)
         return came
-
-
-def _is_terminal(name: str) -> bool:
-    """Tell whether a part of this name, which reports on `/diagnostics`, is a person's terminal."""
-    return name.rpartition('/')[2].partition(':')[0] in TERMINALS
 
 
 def _mismatch(reason: str) -> str:

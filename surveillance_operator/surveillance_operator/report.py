@@ -13,7 +13,7 @@ from pathlib import Path
 
 from surveillance_behaviour.mission import mission_log
 from surveillance_behaviour.mission.mission_log import Event
-from surveillance_operator.map_command import facts, graph_over_doors, run_of
+from surveillance_operator.map_command import facts, graph_over_doors, in_words, run_of
 from surveillance_operator.recording import bag, timeline
 from surveillance_operator.recording.bag import RecordingError
 from surveillance_operator.recording.runs import PLACE, RECORD, find_run, run_parser
@@ -209,21 +209,11 @@ def _overview(
 ) -> list[str]:
     """Return the mission in a few sentences."""
     visited = sum(1 for times in summary.visits.values() if times)
-    minutes, seconds = divmod(round(summary.seconds), 60)
-    did = [
-        f'{minutes} min {seconds:02d} s',
-        f'{visited} of {len(summary.visits)} places visited',
-        f'{sum(summary.visits.values())} visits',
-        f'{summary.distance:.0f} m driven',
-        f'{summary.recharges} recharges ({summary.charging_seconds:.0f} s)',
-        f'{sum(summary.failures.values())} failures',
-    ]
-    if summary.restarts:
-        did.append(f'the behaviour started {summary.restarts} times again')
+    did = f'{in_words(summary)} · {visited} of {len(summary.visits)} places visited'
     limits = [f'Threshold {threshold:g} s.' if threshold else 'The threshold was not recorded.']
     if bound:
         limits.append(f'No patrol at this pace keeps every place below {bound:.0f} s.')
-    return [' · '.join(did), ' '.join(limits)]
+    return [did, ' '.join(limits)]
 
 
 def _idleness(

@@ -57,7 +57,7 @@ class ArucoDetector(PatrolNode):
         self._rest_since: Time | None = Time(clock_type=self.get_clock().clock_type)
         self._stale = False
         self._said_left_out = False
-        self.skipped = 0
+        self.skipped = self._skipped_before = 0
         self._watch = MarkerStream(self._options.settings())
         self._images: Latest[Image | CompressedImage] = Latest()
         self._ids = self.create_publisher(Int32, 'aruco_detector/id', IDS_QOS)
@@ -184,7 +184,10 @@ class ArucoDetector(PatrolNode):
         }
         stamp = self.get_clock().now().to_msg()
         statistics = self._watch.take_statistics()
-        self._diagnostics.publish(diagnostics_to_ros(self.get_name(), stamp, statistics, further))
+        in_motion, self._skipped_before = self.skipped - self._skipped_before, self.skipped
+        self._diagnostics.publish(
+            diagnostics_to_ros(self.get_name(), stamp, statistics, in_motion, further)
+        )
 
 
 def main(args: Sequence[str] | None = None) -> int:

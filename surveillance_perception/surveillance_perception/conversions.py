@@ -221,13 +221,23 @@ def transforms_to_ros(header: Header, sightings: Iterable[Sighting]) -> list[Tra
 
 
 def diagnostics_to_ros(
-    name: str, stamp: Any, statistics: Statistics, further: Mapping[str, Any]
+    name: str, stamp: Any, statistics: Statistics, in_motion: int, further: Mapping[str, Any]
 ) -> DiagnosticArray:
-    """Return how the stream of images was, with further figures to show."""
+    """Return how the stream of images was, with further figures to show.
+
+    Args:
+        name: Of the node.
+        stamp: Of the message.
+        statistics: Of the images since the last message.
+        in_motion: How many of that time were left out because the arm moved.
+        further: Figures by name.
+    """
     status = DiagnosticStatus(name=f'{name}: pictures', hardware_id='camera')
     status.level, status.message = DiagnosticStatus.OK, 'looking'
     if statistics.refused:
         status.level, status.message = DiagnosticStatus.ERROR, statistics.last_error
+    elif in_motion and not statistics.images:
+        status.message = 'waiting for the arm to rest'
     elif not statistics.images:
         status.level, status.message = DiagnosticStatus.WARN, 'no images'
     figures = {

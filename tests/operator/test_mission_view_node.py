@@ -174,3 +174,19 @@ def test_the_next_mission_begins_with_an_empty_picture(graph: Any) -> None:
     assert view.snapshot.history.battery == ()
     assert view.see().now > 1e9
     assert any('waiting for the next mission' in text for _, text in view.snapshot.events)
+
+
+def test_that_the_observers_of_an_ended_mission_are_gone_is_no_fault(
+    graph: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    view = graph.add(MissionViewNode)
+    status = say(graph, 'mission_status', MissionStatus(state='MOVE'))
+    graph.until(lambda: view.snapshot.nodes)
+    names = ('mission_recorder', 'arm_controller')
+    reports = DiagnosticArray(status=[DiagnosticStatus(name=name) for name in names])
+    say(graph, '/diagnostics', reports, 10)
+    graph.until(lambda: view.snapshot.health.keys() == set(names))
+    monkeypatch.setattr(mission_feed, 'STALE_AFTER', 0.0)
+    graph.until(lambda: [each.level for each in view.snapshot.health.values()] == [3, 3])
+    graph.node.destroy_publisher(status)
+    graph.until(lambda: view.snapshot.health.keys() == {'arm_controller'})

@@ -237,7 +237,7 @@ def node_page(snapshot: Snapshot) -> list[Text]:
     for name in sorted({*snapshot.nodes, *snapshot.ended}):
         up = name in snapshot.nodes
         again = snapshot.restarts.get(name, 0)
-        words = f', started again {again} times' if again else ''
+        words = f', started again {again} time{"s" if again > 1 else ""}' if again else ''
         lines.append(Text(f'{"● up   " if up else "✗ ended"} {name}{words}', '' if up else URGENT))
     for name, health in sorted(snapshot.health.items()):
         level = ('ok', 'WARN', 'ERROR', 'STALE')[min(health.level, 3)]
