@@ -28,11 +28,15 @@ from surveillance_ontology.armor.client import (
     ArmorServiceCallError,
     ArmorServiceInternalError,
     Batch,
+)
+from surveillance_ontology.armor.facts import FactSet, ShortFact
+from surveillance_ontology.armor.protocol import (
+    DirectiveRequest,
+    DirectiveResponse,
+    ListResponse,
     name_in,
     value_in,
 )
-from surveillance_ontology.armor.facts import FactSet, ShortFact
-from surveillance_ontology.armor.protocol import DirectiveRequest, DirectiveResponse, ListResponse
 from surveillance_ontology.conversions import (
     changes_from_ros,
     request_to_ros,

@@ -18,8 +18,8 @@ from rclpy.event_handler import PublisherEventCallbacks
 
 from surveillance_interfaces.msg import ArmorDirectiveRes, FactChanges
 from surveillance_interfaces.srv import ArmorDirective, ArmorDirectiveList
-from surveillance_ontology.armor.change_feed import ChangeFeed, NumberedChange
 from surveillance_ontology.armor.protocol import DirectiveRequest
+from surveillance_ontology.armor.session import ChangeFeed, NumberedChange
 from surveillance_ontology.armor_client import CHANGES_TOPIC
 from surveillance_ontology.conversions import changes_to_ros, fill_response, request_from_ros
 from surveillance_ontology.ontology_parameters import described_service
@@ -216,7 +216,7 @@ class ArmorServer(PatrolNode):
             return
         self._untold = []
         for change in changes:
-            msg = changes_to_ros(*change)
+            msg = changes_to_ros(change)
             msg.stamp = self.get_clock().now().to_msg()
             self._publisher.publish(msg)
 

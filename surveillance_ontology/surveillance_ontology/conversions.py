@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from geometry_msgs.msg import Point
 
@@ -16,11 +17,13 @@ from surveillance_interfaces.msg import (
     QueryItem,
 )
 from surveillance_ontology.armor import protocol
-from surveillance_ontology.armor.facts import ShortFact, short_facts
+from surveillance_ontology.armor.facts import ShortFact
 from surveillance_ontology.armor.protocol import DirectiveRequest, DirectiveResponse
 from surveillance_ontology.map_building import RoomNote
-from surveillance_ontology.owl.axioms import Axiom
 from surveillance_runtime.place import Position
+
+if TYPE_CHECKING:
+    from surveillance_ontology.armor.session import NumberedChange  # A client needs none of it.
 
 
 def request_from_ros(msg: ArmorDirectiveReq) -> DirectiveRequest:
@@ -80,25 +83,21 @@ def fill_response(msg: ArmorDirectiveRes, response: DirectiveResponse) -> ArmorD
     return msg
 
 
-def changes_to_ros(
-    reference_name: str,
-    sequence: int,
-    added: Iterable[tuple[Axiom, bool]],
-    removed: Iterable[tuple[Axiom, bool]],
-    is_consistent: bool,
-) -> FactChanges:
-    """Write a batch of changed facts; other axioms are left out. The stamp stays zero."""
+def changes_to_ros(change: NumberedChange) -> FactChanges:
+    """Write a batch of changed facts. The stamp stays zero."""
     changes = [
-        FactChange(fact=_fact_to_ros(fact), added=came, derived=derived)
-        for came, batch in ((False, removed), (True, added))
-        for axiom, derived in batch
-        for fact in short_facts(axiom)
+        FactChange(
+            fact=Fact(predicate=fact.predicate, arguments=list(fact.arguments)),
+            added=came,
+            derived=derived,
+        )
+        for fact, came, derived in change.facts()
     ]
     return FactChanges(
-        reference_name=reference_name,
-        sequence=sequence,
+        reference_name=change.reference_name,
+        sequence=change.sequence,
         changes=changes,
-        is_consistent=is_consistent,
+        is_consistent=change.is_consistent,
     )
 
 
@@ -108,10 +107,6 @@ def changes_from_ros(msg: FactChanges) -> Sequence[tuple[ShortFact, bool, bool]]
         (ShortFact(c.fact.predicate, tuple(c.fact.arguments)), c.added, c.derived)
         for c in msg.changes
     ]
-
-
-def _fact_to_ros(fact: ShortFact) -> Fact:
-    return Fact(predicate=fact.predicate, arguments=list(fact.arguments))
 
 
 def point_to_ros(position: Position) -> Point:

@@ -25,10 +25,14 @@ from typing import Protocol
 from surveillance_ontology.armor.client import (
     ArmorClient,
     ArmorServiceInternalError,
+)
+from surveillance_ontology.armor.protocol import (
+    DirectiveRequest,
+    DirectiveResponse,
+    ExitCode,
     name_in,
     value_in,
 )
-from surveillance_ontology.armor.protocol import DirectiveRequest, DirectiveResponse, ExitCode
 from surveillance_ontology.map_building import closed_doors, shown_doors
 from surveillance_runtime.place import Place
 

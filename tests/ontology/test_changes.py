@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from surveillance_interfaces.msg import ArmorDirectiveRes
-from surveillance_ontology.armor.change_feed import LARGE, ChangeFeed
 from surveillance_ontology.armor.client import ArmorClient, InProcessTransport
 from surveillance_ontology.armor.facts import FactSet, ShortFact, parse_fact
 from surveillance_ontology.armor.service import ArmorService
+from surveillance_ontology.armor.session import LARGE, ChangeFeed
 from surveillance_ontology.armor.store import decode, encode
 from surveillance_ontology.conversions import (
     changes_from_ros,
@@ -37,7 +37,7 @@ def test_changes_are_numbered_and_say_what_is_derived(
     assert announced == [1], 'once, until it is taken'
     client.manipulation.replace_one_dataprop_b2_ind('visitedAt', 'R2', 'LONG', '1')
     client.utils.sync_buffered_reasoner()
-    asserted, derived = (changes_to_ros(*change) for change in feed.take())
+    asserted, derived = (changes_to_ros(change) for change in feed.take())
     assert [(str(f), came, d) for f, came, d in changes_from_ros(asserted)] == [
         ('visitedAt(R2, "1665579740"^^xsd:long)', False, False),
         ('visitedAt(R2, "1"^^xsd:long)', True, False),
@@ -174,7 +174,7 @@ def test_followed_facts_are_those_that_the_server_has(
     for words, args in steps:
         service.execute(client.request(words, *args))
         for change in feed.take():
-            told = changes_from_ros(changes_to_ros(*change))
+            told = changes_from_ros(changes_to_ros(change))
             for facts in sets:
                 assert facts.follow(change.sequence, told) is not None
         for facts in sets:

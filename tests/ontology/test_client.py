@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import subprocess
+import sys
 from typing import Any
 
 import pytest
@@ -11,10 +13,14 @@ from surveillance_ontology.armor.client import (
     ArmorClient,
     ArmorServiceCallError,
     ArmorServiceInternalError,
+)
+from surveillance_ontology.armor.protocol import (
+    DirectiveRequest,
+    DirectiveResponse,
+    ListResponse,
     name_in,
     value_in,
 )
-from surveillance_ontology.armor.protocol import DirectiveRequest, DirectiveResponse, ListResponse
 
 from .seven_rooms import IRI, ONTOLOGY, build_seven_rooms
 
@@ -226,3 +232,16 @@ def test_names_and_values_are_taken_out_of_answers() -> None:
     assert name_in('<http://example.org/x/R1>') == 'R1'
     assert name_in('owl:Nothing') == 'owl:Nothing'
     assert value_in('"a \\"b\\""^^xsd:string') == 'a "b"'
+
+
+def test_a_client_imports_no_reasoner_and_no_documents() -> None:
+    script = (
+        'import sys, armor_api, surveillance_ontology.patrol_ontology; '
+        "print(*(name for name in sys.modules if name.startswith('surveillance_ontology.')))"
+    )
+    run = subprocess.run([sys.executable, '-c', script], capture_output=True, text=True, check=True)
+    loaded = run.stdout.split()
+    assert 'surveillance_ontology.armor_client' in loaded
+    for needless in ('reasoner', 'documents', 'owl.axioms', 'knowledge_base', 'armor.session'):
+        prefix = f'surveillance_ontology.{needless}'
+        assert not [name for name in loaded if name.startswith(prefix)]

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from surveillance_ontology.armor.access import DATA, Settings
-from surveillance_ontology.armor.change_feed import ChangeFeed
 from surveillance_ontology.armor.service import ArmorService
+from surveillance_ontology.armor.session import ChangeFeed
 from surveillance_ontology.armor.store import Store
 from surveillance_ontology.owl.axioms import ClassAssertion
 from surveillance_ontology.reasoner import java_reasoning

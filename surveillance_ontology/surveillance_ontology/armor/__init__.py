@@ -10,7 +10,7 @@ stand outside: `surveillance_ontology.armor_server_node`, `surveillance_ontology
 Modules, from the bottom: `protocol` (requests, answers), `rendering` and `facts` (texts),
 `reference` (a loaded ontology), `store` (what outlives the process), `access` (limits and files),
 `session` (all of these together), `directives` (what each directive does), `service` (dispatch and
-locks), `change_feed` and `client`.
+locks) and `client`.
 """
 
 from __future__ import annotations
@@ -25,10 +25,14 @@ if TYPE_CHECKING:
         ArmorServiceCallError,
         ArmorServiceInternalError,
         InProcessTransport,
+    )
+    from surveillance_ontology.armor.protocol import (
+        DirectiveRequest,
+        DirectiveResponse,
+        ExitCode,
         name_in,
         value_in,
     )
-    from surveillance_ontology.armor.protocol import DirectiveRequest, DirectiveResponse, ExitCode
     from surveillance_ontology.armor.service import ArmorService
     from surveillance_ontology.armor.store import Store
 
@@ -39,10 +43,8 @@ _HOMES = {
         'ArmorServiceCallError',
         'ArmorServiceInternalError',
         'InProcessTransport',
-        'name_in',
-        'value_in',
     ),
-    'protocol': ('DirectiveRequest', 'DirectiveResponse', 'ExitCode'),
+    'protocol': ('DirectiveRequest', 'DirectiveResponse', 'ExitCode', 'name_in', 'value_in'),
     'service': ('ArmorService',),
     'store': ('Store',),
 }

@@ -19,7 +19,6 @@ business of the client's `Transport`. The client for ROS is
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import suppress
 from functools import update_wrapper
@@ -40,9 +39,8 @@ from surveillance_ontology.armor.protocol import (
     DirectiveResponse,
     ExitCode,
     ListResponse,
+    name_in,
 )
-from surveillance_ontology.armor.rendering import parse_rendered
-from surveillance_ontology.owl.vocabulary import local_name
 
 if TYPE_CHECKING:
     from surveillance_ontology.armor.service import ArmorService
@@ -208,24 +206,6 @@ def checked(response: DirectiveResponse) -> DirectiveResponse:
     if not response.success:
         raise ArmorServiceInternalError(response.error_description, response.exit_code)
     return response
-
-
-_IN_BRACKETS = re.compile(r'<([^<>]*)>')
-
-
-def name_in(rendered: str) -> str:
-    """Return the local name in ``<iri#name>``; a text of another form as it is."""
-    match = _IN_BRACKETS.fullmatch(rendered)
-    return local_name(match[1]) if match else rendered
-
-
-def value_in(rendered: str) -> str:
-    """Return the value in ``"1665579740"^^xsd:long``.
-
-    Raises:
-        ValueError: Not of that form.
-    """
-    return parse_rendered(rendered).lexical
 
 
 class Manipulation(ClientPart):

@@ -11,14 +11,6 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from surveillance_ontology.armor.rendering import render_literal
-from surveillance_ontology.owl.axioms import (
-    Axiom,
-    ClassAssertion,
-    DataPropertyAssertion,
-    ObjectPropertyAssertion,
-    SameIndividual,
-)
 from surveillance_ontology.owl.vocabulary import local_name
 
 SAME_AS = 'owl:sameAs'
@@ -102,23 +94,6 @@ def short_name(name: str) -> str:
 def _shown(name: str) -> str:
     plain = name == ANY or name[:1] == '"' or _PLAIN.fullmatch(name)
     return name if plain else f'<{name}>'
-
-
-def short_facts(axiom: Axiom) -> Sequence[ShortFact]:
-    """Return the short forms of an assertion; empty for any other axiom."""
-    if isinstance(axiom, ClassAssertion):
-        if isinstance(axiom.cls, str):
-            return (ShortFact(local_name(axiom.cls), (local_name(axiom.individual),)),)
-    elif isinstance(axiom, ObjectPropertyAssertion):
-        names = (local_name(axiom.subject), local_name(axiom.object))
-        return (ShortFact(local_name(axiom.prop), names),)
-    elif isinstance(axiom, DataPropertyAssertion):
-        value = render_literal(axiom.literal)
-        return (ShortFact(local_name(axiom.prop), (local_name(axiom.subject), value)),)
-    elif isinstance(axiom, SameIndividual):
-        first, *others = sorted(map(local_name, axiom.individuals))
-        return tuple(ShortFact(SAME_AS, (first, other)) for other in others)
-    return ()
 
 
 FactChange = tuple[ShortFact, bool, bool]

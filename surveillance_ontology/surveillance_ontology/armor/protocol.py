@@ -1,14 +1,17 @@
-"""Requests, responses and exit codes of ARMOR's two services, as plain Python.
+"""Requests, responses and exit codes of ARMOR's two services, and what stands in an answer.
 
 The fields and codes are those of ARMOR 2.2 (`armor_msgs`), so that its clients need not change.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import NamedTuple
+
+from surveillance_ontology.owl.vocabulary import local_name
 
 
 class ExitCode(IntEnum):
@@ -119,3 +122,35 @@ class DirectiveError(Exception):
         self.exit_code = exit_code
         self.success = success
         self.timeout = timeout
+
+
+_IN_BRACKETS = re.compile(r'<([^<>]*)>')
+RENDERED = re.compile(
+    r'"(?P<text>(?:[^"\\]|\\.)*)"'
+    r'(?:\^\^(?:<(?P<iri>[^<>\s]+)>|(?P<name>[^\s<>"]+))|@(?P<language>[A-Za-z0-9-]+))?\Z',
+    re.DOTALL,
+)
+"""A literal as answers have it; see `rendering`."""
+
+
+def name_in(rendered: str) -> str:
+    """Return the local name in ``<iri#name>``; a text of another form as it is."""
+    match = _IN_BRACKETS.fullmatch(rendered)
+    return local_name(match[1]) if match else rendered
+
+
+def value_in(rendered: str) -> str:
+    """Return the value in ``"1665579740"^^xsd:long``.
+
+    Raises:
+        ValueError: Not of that form.
+    """
+    match = RENDERED.match(rendered)
+    if match is None:
+        raise ValueError(f'{rendered[:80]!r} is not a literal, expected "text"^^xsd:type')
+    return unescaped(match['text'])
+
+
+def unescaped(text: str) -> str:
+    """Return what stands between the quotes of a literal without backslashes before characters."""
+    return re.sub(r'\\(.)', r'\1', text, flags=re.DOTALL)

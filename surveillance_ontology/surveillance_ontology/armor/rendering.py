@@ -1,4 +1,4 @@
-"""How entities and literals are written in directives and answers, and read back.
+"""How entities, literals and facts are written in directives and answers, and read back.
 
 The forms are those of the OWL API's ``toString``, which clients of ARMOR split by hand:
 ``<http://example.org/place#R1>``, ``owl:Thing``, ``"1665579740"^^xsd:long``, ``"x"@en``.
@@ -9,12 +9,21 @@ from __future__ import annotations
 import math
 import re
 import struct
+from collections.abc import Sequence
 from decimal import Decimal
 from functools import lru_cache
 
-from surveillance_ontology.armor.protocol import DirectiveError, ExitCode
+from surveillance_ontology.armor.facts import SAME_AS, ShortFact
+from surveillance_ontology.armor.protocol import RENDERED, DirectiveError, ExitCode, unescaped
+from surveillance_ontology.owl.axioms import (
+    Axiom,
+    ClassAssertion,
+    DataPropertyAssertion,
+    ObjectPropertyAssertion,
+    SameIndividual,
+)
 from surveillance_ontology.owl.expressions import Literal
-from surveillance_ontology.owl.vocabulary import OWL, RDF, RDFS, XSD
+from surveillance_ontology.owl.vocabulary import OWL, RDF, RDFS, XSD, local_name
 from surveillance_ontology.reasoner.datatypes import parse_value
 
 MAX_NAME = 2048
@@ -23,11 +32,6 @@ _FORBIDDEN_IN_IRI = re.compile(r'[\x00-\x20<>"{}|\\^`\x7f-\x9f\ud800-\udfff]')
 _BARE_PERCENT = re.compile(r'%(?![0-9A-Fa-f]{2})')
 _FORBIDDEN_IN_TEXT = re.compile(r'[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]')
 _ABSOLUTE_IRI = re.compile(r'[A-Za-z][A-Za-z0-9+.-]*:[^\s]+\Z')
-_RENDERED = re.compile(
-    r'"(?P<text>(?:[^"\\]|\\.)*)"'
-    r'(?:\^\^(?:<(?P<iri>[^<>\s]+)>|(?P<name>[^\s<>"]+))|@(?P<language>[A-Za-z0-9-]+))?\Z',
-    re.DOTALL,
-)
 _INTEGER = re.compile(r'[+-]?[0-9]+\Z')
 _MAX_DIGITS = 4000
 _NUMBERS = frozenset(
@@ -78,6 +82,23 @@ def render_datatype(iri: str) -> str:
         if iri.startswith(namespace):
             return f'{prefix}:{iri[len(namespace) :]}'
     return f'<{iri}>'
+
+
+def short_facts(axiom: Axiom) -> Sequence[ShortFact]:
+    """Return the short forms of an assertion; empty for any other axiom."""
+    if isinstance(axiom, ClassAssertion):
+        if isinstance(axiom.cls, str):
+            return (ShortFact(local_name(axiom.cls), (local_name(axiom.individual),)),)
+    elif isinstance(axiom, ObjectPropertyAssertion):
+        names = (local_name(axiom.subject), local_name(axiom.object))
+        return (ShortFact(local_name(axiom.prop), names),)
+    elif isinstance(axiom, DataPropertyAssertion):
+        value = render_literal(axiom.literal)
+        return (ShortFact(local_name(axiom.prop), (local_name(axiom.subject), value)),)
+    elif isinstance(axiom, SameIndividual):
+        first, *others = sorted(map(local_name, axiom.individuals))
+        return tuple(ShortFact(SAME_AS, (first, other)) for other in others)
+    return ()
 
 
 @lru_cache(maxsize=65536)
@@ -138,7 +159,7 @@ def parse_literal(
     wanted = TYPES[type_word]
     if wanted == 'double' and narrow_doubles:
         wanted = 'float'
-    if text[:1] == '"' and (match := _RENDERED.match(text)):
+    if text[:1] == '"' and (match := RENDERED.match(text)):
         rendered = _rendered_literal(match)
         typed = bool(match['iri'] or match['name'] or match['language'])
         if rendered is not None and not typed and wanted != 'string':
@@ -156,7 +177,7 @@ def parse_rendered(text: str) -> Literal:
     Raises:
         ValueError: Not of that form.
     """
-    match = _RENDERED.match(text)
+    match = RENDERED.match(text)
     literal = _rendered_literal(match) if match else None
     if literal is None:
         raise ValueError(f'{shown(text)} is not a literal, expected "text"^^xsd:type')
@@ -164,7 +185,7 @@ def parse_rendered(text: str) -> Literal:
 
 
 def _rendered_literal(match: re.Match[str]) -> Literal | None:
-    text = re.sub(r'\\(.)', r'\1', match['text'], flags=re.DOTALL)
+    text = unescaped(match['text'])
     if match['language']:
         # Language tags mean the same in any case (RDF 1.1); files are read in lower case.
         return Literal(text, RDF + 'langString', match['language'].lower())

@@ -18,12 +18,16 @@ from surveillance_ontology.armor.facts import (
     ShortFact,
     parse_fact,
     parse_names,
-    short_facts,
     short_name,
 )
 from surveillance_ontology.armor.protocol import DirectiveError, DirectiveResponse
 from surveillance_ontology.armor.reference import Reference
-from surveillance_ontology.armor.rendering import parse_entity, parse_rendered, render_entity
+from surveillance_ontology.armor.rendering import (
+    parse_entity,
+    parse_rendered,
+    render_entity,
+    short_facts,
+)
 from surveillance_ontology.armor.rendering import render_literal as _literal
 from surveillance_ontology.armor.session import Session
 from surveillance_ontology.knowledge_base import Fact, KnowledgeBase
