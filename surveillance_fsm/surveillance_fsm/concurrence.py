@@ -38,8 +38,8 @@ from surveillance_fsm.execution import (
     Node,
     SpecialStep,
 )
-from surveillance_fsm.state import State, structure_version
-from surveillance_fsm.timeouts import LimitOptions, make_limits, supervise
+from surveillance_fsm.state import State
+from surveillance_fsm.timeouts import LimitOptions, supervise
 from surveillance_fsm.userdata import raw
 
 Outcomes = dict[str, str | None]
@@ -239,10 +239,7 @@ class Concurrence(Container):
             InvalidStateError: The label is taken, or the state is none.
         """
         return Concurrence._currently_opened_container().add_state(
-            label,
-            state,
-            remapping,
-            **limits,
+            label, state, remapping, **limits
         )
 
     def add_state(
@@ -253,15 +250,7 @@ class Concurrence(Container):
         **limits: Unpack[LimitOptions],
     ) -> State:
         """Add a state to a concurrence at hand, open or not; for the arguments see `add`."""
-        self._check_new(label, state)
-        path = self.fsm_path_of(label)
-        checked = make_limits(path, state, {}, **limits)
-        if checked is not None:
-            self.fsm_limits[label] = checked
-        self.fsm_states[label] = state
-        if remapping:
-            self.fsm_remappings[label] = dict(remapping)
-        structure_version.changed()
+        self._register(label, state, (), remapping, None, **limits)
         return state
 
     def check_consistency(self) -> None:

@@ -11,7 +11,7 @@ import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from types import TracebackType
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Self, Unpack
 
 from surveillance_fsm.clock import Clock, Interrupt
 from surveillance_fsm.control import Control
@@ -44,7 +44,14 @@ from surveillance_fsm.state import (
     structure_version,
     this_thread,
 )
-from surveillance_fsm.timeouts import block_reentry, limited, supervise
+from surveillance_fsm.timeouts import (
+    TIMEOUT,
+    LimitOptions,
+    block_reentry,
+    limited,
+    make_limits,
+    supervise,
+)
 from surveillance_fsm.userdata import Remapper, UserData, raw
 
 
@@ -399,6 +406,49 @@ class Container(State):
                 f"State '{path}' must be an instance of State, not {shown(state)}"
             )
 
+    def check_state_spec(self, label: str, state: State, transitions: Iterable[str]) -> None:
+        """Raise `InvalidTransitionError` when `transitions` binds an outcome the state lacks."""
+        outcomes = state.get_registered_outcomes()
+        for outcome in transitions:
+            if outcome not in outcomes:
+                raise InvalidTransitionError(
+                    f"State '{self.fsm_path_of(label)}' has no outcome '{outcome}' to bind: its "
+                    f'outcomes are {sorted(outcomes)}'
+                )
+
+    def _register(
+        self,
+        label: str,
+        state: State,
+        bound: Iterable[str],
+        remapping: Mapping[str, str] | None,
+        constants: Mapping[str, Any] | None,
+        **limits: Unpack[LimitOptions],
+    ) -> None:
+        """Check a state of any kind of container and put it under its label.
+
+        Args:
+            label: The state's name in the container.
+            state: The state.
+            bound: The outcomes that the container binds; ``timeout`` need not be declared.
+            remapping: From the state's userdata keys to the container's.
+            constants: Values for input keys of the state that come from no userdata.
+            **limits: See `LimitOptions`.
+        """
+        self._check_new(label, state)
+        checked = make_limits(self.fsm_path_of(label), state, bound, **limits)
+        self.check_state_spec(
+            label, state, [name for name in bound if checked is None or name != TIMEOUT]
+        )
+        self.fsm_states[label] = state
+        if checked is not None:
+            self.fsm_limits[label] = checked
+        if remapping:
+            self.fsm_remappings[label] = dict(remapping)
+        if constants:
+            self.fsm_constants[label] = dict(constants)
+        structure_version.changed()
+
     def fsm_path_of(self, label: str) -> str:
         """Return the path of the state with a label."""
         return f'{self.fsm_path}/{label}'
@@ -628,14 +678,8 @@ class Container(State):
             InvalidTransitionError: `transitions` binds an outcome the state does not have.
         """
         self._check_new(label, state)
-        path = self.fsm_path_of(label)
         bound = dict(transitions or {})
-        for outcome in bound:
-            if outcome not in state.get_registered_outcomes():
-                raise InvalidTransitionError(
-                    f"Interrupt '{path}' has no outcome '{outcome}' to bind: its outcomes are "
-                    f'{sorted(state.get_registered_outcomes())}'
-                )
+        self.check_state_spec(label, state, bound)
         for outcome in state.get_registered_outcomes():
             ends = outcome == 'preempted' and outcome in self._outcomes
             bound.setdefault(outcome, outcome if ends else RESUME)

@@ -278,7 +278,9 @@ def _state_data(container: Container, label: str, state: State, path: str) -> di
         if bound:
             data['transitions'] = bound
     elif isinstance(container, IteratorContainer):
-        data |= container.loop_data()
+        data['loop_outcomes'] = sorted(container.loop_outcomes)
+        if container.final_outcome_map:
+            data['final_outcome_map'] = dict(container.final_outcome_map)
     if container.fsm_remappings.get(label):
         data['remapping'] = dict(container.fsm_remappings[label])
     if container.fsm_constants.get(label):

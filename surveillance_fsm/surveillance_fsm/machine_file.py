@@ -227,14 +227,8 @@ class _Builder:
 
     def _add(self, machine: Container, kind: str, label: str, data: Any, place: str) -> None:
         state, options = self._state(data, place, _IN_KIND[kind])
-        add: Callable[..., Any]
-        if isinstance(machine, Sequence):
-            add = machine.append_state
-        elif isinstance(machine, StateMachine | Concurrence):
-            add = machine.add_state
-        else:
-            assert isinstance(machine, Iterator)
-            add = machine.set_state
+        # Every kind but the iterator, which has one state only, has `add_state`.
+        add = machine.set_state if isinstance(machine, Iterator) else machine.add_state  # type: ignore[attr-defined]
         _guarded(place, add, label, state, **options)
 
     def _state(self, data: Any, place: str, further: set[str]) -> tuple[State, dict[str, Any]]:

@@ -25,7 +25,7 @@ from surveillance_fsm.execution import (
 from surveillance_fsm.log import logwarn
 from surveillance_fsm.sequential import SequentialFrame
 from surveillance_fsm.state import State, structure_version
-from surveillance_fsm.timeouts import TIMEOUT, LimitOptions, make_limits
+from surveillance_fsm.timeouts import LimitOptions
 from surveillance_fsm.userdata import UserData, raw
 
 Items = Iterable[Any] | Callable[[], Iterable[Any]]
@@ -56,8 +56,8 @@ class StateMachine(Container):
         super().__init__(outcomes, input_keys, output_keys)
         self._transitions: dict[str, Mapping[str, str | None]] = {}
         self._initial_state_label: str | None = None
-        self._last_added_label: str | None = None
-        self._connector_outcomes: list[str] = []
+        # The last state of `add_auto`, and its outcomes that lead to the next one.
+        self._to_connect: tuple[str, list[str]] | None = None
 
     # Construction.
 
@@ -89,13 +89,8 @@ class StateMachine(Container):
             InvalidTransitionError: `transitions` binds an outcome the state does not have.
         """
         machine = StateMachine._currently_opened_container()
-        return machine.add_state(
-            label,
-            state,
-            transitions,
-            remapping,
-            constants,
-            **limits,
+        return StateMachine.add_state(
+            machine, label, state, transitions, remapping, constants, **limits
         )
 
     @staticmethod
@@ -111,30 +106,16 @@ class StateMachine(Container):
 
         `transitions` that bind one of them have precedence. For the rest see `add`.
         """
-        return StateMachine._currently_opened_container().add_connected(
-            label, state, connector_outcomes, transitions, remapping, **limits
-        )
-
-    def add_connected(
-        self,
-        label: str,
-        state: State,
-        connector_outcomes: Iterable[str],
-        transitions: Mapping[str, str | None] | None,
-        remapping: Mapping[str, str] | None,
-        **limits: Unpack[LimitOptions],
-    ) -> State:
-        """Add a state that goes on to the next one, to a machine at hand; see `add_auto`."""
+        machine = StateMachine._currently_opened_container()
         connectors = list(connector_outcomes)
         unknown = [name for name in connectors if name not in state.get_registered_outcomes()]
         if unknown:
             raise InvalidStateError(
-                f"State '{self.fsm_path_of(label)}' cannot be connected by {unknown}: its outcomes "
-                f'are {sorted(state.get_registered_outcomes())}'
+                f"State '{machine.fsm_path_of(label)}' cannot be connected by {unknown}: its "
+                f'outcomes are {sorted(state.get_registered_outcomes())}'
             )
-        self.add_state(label, state, transitions, remapping, **limits)
-        self._last_added_label = label
-        self._connector_outcomes = connectors
+        StateMachine.add_state(machine, label, state, transitions, remapping, **limits)
+        machine._to_connect = label, connectors
         return state
 
     def add_state(
@@ -147,50 +128,26 @@ class StateMachine(Container):
         **limits: Unpack[LimitOptions],
     ) -> State:
         """Add a state to a machine at hand, open or not; for the arguments see `add`."""
-        self._check_new(label, state)
         bound = dict(transitions or {})
-        checked = make_limits(self.fsm_path_of(label), state, bound, **limits)
-        declared = {k: v for k, v in bound.items() if checked is None or k != TIMEOUT}
-        self.check_state_spec(label, state, declared)
-        if checked is not None:
-            self.fsm_limits[label] = checked
+        self._register(label, state, tuple(bound), remapping, constants, **limits)
         group = self._group_transitions() if self.is_opened() else {}
         for outcome in sorted(state.get_registered_outcomes()):
             bound.setdefault(outcome, group.get(outcome))
-        self.fsm_states[label] = state
         self._transitions[label] = bound
-        if remapping:
-            self.fsm_remappings[label] = dict(remapping)
-        if constants:
-            self.fsm_constants[label] = dict(constants)
-        structure_version.changed()
         if self._initial_state_label is None:
             self._initial_state_label = label
-        if self._last_added_label is not None:
-            for outcome in self._connector_outcomes:
-                self.connect(self._last_added_label, outcome, label)
-            self._last_added_label = None
-            self._connector_outcomes = []
+        if self._to_connect is not None:
+            before, connectors = self._to_connect
+            self._to_connect = None
+            self._connect(before, connectors, label)
         return state
 
-    def connect(self, label: str, outcome: str, target: str) -> None:
-        """Have an outcome of a state lead to `target`, unless it is bound already."""
+    def _connect(self, label: str, outcomes: Iterable[str], target: str) -> None:
+        """Have outcomes of a state lead to `target`, but for those that are bound."""
         transitions = self._transitions[label]
-        if not transitions.get(outcome):
-            self._transitions[label] = {**transitions, outcome: target}
-            structure_version.changed()
-
-    def check_state_spec(
-        self, label: str, state: State, transitions: Mapping[str, str | None]
-    ) -> None:
-        """Raise `InvalidTransitionError` when `transitions` binds an outcome the state lacks."""
-        outcomes = state.get_registered_outcomes()
-        for outcome in transitions:
-            if outcome not in outcomes:
-                raise InvalidTransitionError(
-                    f"State '{self.fsm_path_of(label)}' has no outcome '{outcome}' to bind: its "
-                    f'outcomes are {sorted(outcomes)}'
-                )
+        free = [outcome for outcome in outcomes if not transitions.get(outcome)]
+        self._transitions[label] = {**transitions, **dict.fromkeys(free, target)}
+        structure_version.changed()
 
     def check_consistency(self) -> None:
         """Raise `InvalidTransitionError` naming all that keeps the machine from running."""
@@ -296,13 +253,8 @@ class Sequence(StateMachine):
         output_keys: Iterable[str] = (),
     ) -> None:
         super().__init__(outcomes, input_keys, output_keys)
-        self._connector_outcome = connector_outcome
-        self._last_added_seq_label: str | None = None
-
-    @property
-    def connector_outcome(self) -> str:
-        """The outcome that leads on to the next state."""
-        return self._connector_outcome
+        self.connector_outcome = connector_outcome
+        self._last_label: str | None = None
 
     @staticmethod
     def add(
@@ -318,9 +270,9 @@ class Sequence(StateMachine):
         The last state's connector outcome leads here, unless its own transitions bind it.
         """
         sequence = Sequence._currently_opened_container()
-        return sequence.append_state(label, state, transitions, remapping, constants, **limits)
+        return sequence.add_state(label, state, transitions, remapping, constants, **limits)
 
-    def append_state(
+    def add_state(
         self,
         label: str,
         state: State,
@@ -330,11 +282,10 @@ class Sequence(StateMachine):
         **limits: Unpack[LimitOptions],
     ) -> State:
         """Add a state to a sequence at hand, open or not; for the arguments see `add`."""
-        last = self._last_added_seq_label
-        self.add_state(label, state, transitions, remapping, constants, **limits)
-        if last is not None:
-            self.connect(last, self._connector_outcome, label)
-        self._last_added_seq_label = label
+        super().add_state(label, state, transitions, remapping, constants, **limits)
+        if self._last_label is not None:
+            self._connect(self._last_label, [self.connector_outcome], label)
+        self._last_label = label
         return state
 
 
@@ -370,24 +321,19 @@ class Iterator(Container):
         exhausted_outcome: str = 'exhausted',
     ) -> None:
         super().__init__([*outcomes, exhausted_outcome], input_keys, output_keys)
-        self._items: Items = it
-        self._items_label = it_label
-        self._exhausted_outcome = exhausted_outcome
-        self._exhausted = _Exhausted(exhausted_outcome)
-        self._state_label = ''
-        self._loop_outcomes: list[str] = []
+        self.items: Items = it
+        self.items_label = it_label
+        self.exhausted_outcome = exhausted_outcome
+        self.loop_outcomes: list[str] = []
+        self.final_outcome_map: dict[str, str] = {}
         self._break_outcomes: list[str] = []
-        self._final_outcome_map: dict[str, str] = {}
+        self._state_label = ''
 
     @staticmethod
     def set_iteritems(it: Items, it_label: str = 'it_data') -> None:
         """Set the items of the open iterator, and the userdata key that holds the current one."""
-        Iterator._currently_opened_container().set_items(it, it_label)
-
-    def set_items(self, it: Items, it_label: str = 'it_data') -> None:
-        """Set the items of an iterator at hand; see `set_iteritems`."""
-        self._items = it
-        self._items_label = it_label
+        iterator = Iterator._currently_opened_container()
+        iterator.items, iterator.items_label = it, it_label
 
     @staticmethod
     def set_contained_state(
@@ -414,12 +360,7 @@ class Iterator(Container):
             InvalidTransitionError: An outcome is named that the state does not have.
         """
         return Iterator._currently_opened_container().set_state(
-            label,
-            state,
-            loop_outcomes,
-            break_outcomes,
-            final_outcome_map,
-            **limits,
+            label, state, loop_outcomes, break_outcomes, final_outcome_map, **limits
         )
 
     def set_state(
@@ -432,36 +373,24 @@ class Iterator(Container):
         **limits: Unpack[LimitOptions],
     ) -> State:
         """Set the state of an iterator at hand, open or not; see `set_contained_state`."""
-        path = self.fsm_path_of(label)
         if self.fsm_states:
             raise InvalidStateError(
                 f"Iterator '{self.fsm_path}' has the state '{self._state_label}' already"
             )
-        self._check_new(label, state)
         loop, breaking = list(loop_outcomes), list(break_outcomes)
-        checked = make_limits(path, state, dict.fromkeys([*loop, *breaking]), **limits)
-        outcomes = list(state.get_registered_outcomes())
-        if checked is not None and checked.late_outcome == TIMEOUT and TIMEOUT not in outcomes:
-            outcomes.append(TIMEOUT)
-        for outcome in (*loop, *breaking):
-            if outcome not in outcomes:
-                raise InvalidTransitionError(
-                    f"State '{path}' has no outcome '{outcome}' to loop or break on: its outcomes "
-                    f'are {sorted(outcomes)}'
-                )
+        bound = [*loop, *breaking]
+        self._register(label, state, bound, None, None, **limits)
         if loop and breaking:
             logwarn(f"Iterator '{self.fsm_path}' has loop and break outcomes: the latter count")
+        # With ``timeout`` among them where it is bound without being declared.
+        outcomes = dict.fromkeys([*state.get_registered_outcomes(), *bound])
         if breaking:
             loop = [outcome for outcome in outcomes if outcome not in breaking]
         else:
             breaking = [outcome for outcome in outcomes if outcome not in loop]
         self._state_label = label
-        self.fsm_states[label] = state
-        self._loop_outcomes, self._break_outcomes = loop, breaking
-        self._final_outcome_map = dict(final_outcome_map or {})
-        if checked is not None:
-            self.fsm_limits[label] = checked
-        structure_version.changed()
+        self.loop_outcomes, self._break_outcomes = loop, breaking
+        self.final_outcome_map = dict(final_outcome_map or {})
         return state
 
     def check_consistency(self) -> None:
@@ -478,18 +407,19 @@ class Iterator(Container):
     def fsm_make_table(self) -> dict[str, Node]:
         """Make the nodes of the state and of all interrupts."""
         node = self.fsm_node(self._state_label, self.fsm_states[self._state_label])
-        for outcome in self._loop_outcomes:
+        for outcome in self.loop_outcomes:
             node.targets[outcome] = node
         for outcome in self._break_outcomes:
             node.targets[outcome] = Exit(self.ending(outcome))
-        node.targets[self._exhausted] = Exit(self.ending(self._exhausted_outcome))
+        exhausted = _Exhausted(self.exhausted_outcome)
+        node.targets[exhausted] = Exit(self.ending(self.exhausted_outcome))
         within_limits = node.execute if node.limits is not None else None
 
         def execute_for_item(view: Any) -> Any:
             frame = self.fsm_frame
             assert isinstance(frame, IteratorFrame)
             if not frame.draw():
-                return self._exhausted
+                return exhausted
             outcome = within_limits(view) if within_limits is not None else node.enter(view)
             frame.repeat = outcome is SUSPENDED
             return outcome
@@ -502,33 +432,9 @@ class Iterator(Container):
         table = self.fsm_current_table(path, thread.run.clock)
         return IteratorFrame(self, thread, path, table[self._state_label], parent_ud)
 
-    @property
-    def items(self) -> Items:
-        """The items, or the function that gives them."""
-        return self._items
-
-    @property
-    def items_label(self) -> str:
-        """The userdata key that holds the current item."""
-        return self._items_label
-
-    @property
-    def exhausted_outcome(self) -> str:
-        """What the iterator ends with when no item is left, before the final outcome map."""
-        return self._exhausted_outcome
-
-    def loop_data(self) -> dict[str, Any]:
-        """Return which outcomes of the state go on and which end, as `set_contained_state` takes
-        it.
-        """
-        data: dict[str, Any] = {'loop_outcomes': sorted(self._loop_outcomes)}
-        if self._final_outcome_map:
-            data['final_outcome_map'] = dict(self._final_outcome_map)
-        return data
-
     def ending(self, outcome: str) -> str:
         """Return the iterator's outcome when its state's `outcome` ends the loop."""
-        return self._final_outcome_map.get(outcome, outcome)
+        return self.final_outcome_map.get(outcome, outcome)
 
     # The container's interface.
 
@@ -538,13 +444,12 @@ class Iterator(Container):
 
     def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
         """Loop and break outcomes as (outcome, label, label or outcome of the iterator)."""
-        edges: list[tuple[str, str, str | None]] = [
-            (outcome, self._state_label, self._state_label) for outcome in self._loop_outcomes
+        label, endings = self._state_label, self.final_outcome_map
+        loops = [(outcome, label, label) for outcome in self.loop_outcomes]
+        return [
+            *loops,
+            *((outcome, label, endings.get(outcome)) for outcome in self._break_outcomes),
         ]
-        for outcome in self._break_outcomes:
-            ending = self._final_outcome_map.get(outcome)
-            edges.append((outcome, self._state_label, None if ending == outcome else ending))
-        return edges
 
 
 class IteratorFrame(SequentialFrame):

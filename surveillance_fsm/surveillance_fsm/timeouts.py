@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, TypedDict
 
 from surveillance_fsm.clock import Interrupt
@@ -54,7 +54,7 @@ class LimitOptions(TypedDict, total=False):
 def make_limits(
     path: str,
     state: State,
-    transitions: Mapping[str, Any],
+    bound: Iterable[str],
     *,
     timeout: float | None = None,
     deadline: float | None = None,
@@ -66,7 +66,7 @@ def make_limits(
     Args:
         path: The state's path, for errors.
         state: The state.
-        transitions: Its transitions; ``timeout`` may be among them without being declared.
+        bound: The outcomes that its container binds; ``timeout`` need not be declared.
         timeout: See `LimitOptions`, as the rest.
         deadline: Seconds.
         retry: How often.
@@ -88,7 +88,7 @@ def make_limits(
     late = ''
     if timeout is not None or deadline is not None:
         for late in (TIMEOUT, 'aborted', 'preempted'):
-            if late in transitions or late in outcomes:
+            if late in bound or late in outcomes:
                 break
         else:
             raise InvalidTransitionError(

@@ -12,18 +12,16 @@ size of the machine, however deep it is nested.
 from __future__ import annotations
 
 import ast
-import heapq
 import inspect
 import textwrap
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
-from functools import lru_cache
+from dataclasses import dataclass
+from functools import lru_cache, reduce
 from typing import Any
 
 from surveillance_fsm.concurrence import Concurrence
 from surveillance_fsm.container import Container
 from surveillance_fsm.exceptions import InvalidStateError, InvalidTransitionError
-from surveillance_fsm.execution import RESUME
 from surveillance_fsm.state import CBState, State
 from surveillance_fsm.state_machine import Iterator as IteratorContainer
 from surveillance_fsm.structure import Edge, Structure, structure_of
@@ -61,16 +59,19 @@ def verify(machine: Container, userdata_keys: Iterable[str] = ()) -> list[Findin
     Returns:
         What is wrong; errors first, outermost containers first.
     """
-    root = _look_at(structure_of(machine))
+    root = _View(structure_of(machine))
     findings: list[Finding] = []
     for view in root.walk():
-        findings += _unbound(view.structure)
-        findings += _unreachable(view)
-        findings += _no_exit(view)
-        findings += _unproduced(view)
-        findings += _wrong_remappings(view.structure)
-        findings += _two_writers(view)
-        findings += _deaf(view.structure)
+        for check in (
+            _unbound,
+            _unreachable,
+            _no_exit,
+            _unproduced,
+            _wrong_remappings,
+            _two_writers,
+            _deaf,
+        ):
+            findings += check(view)
     keys = frozenset(userdata_keys)
     findings += _unset_reads(root, keys, keys)
     return sorted(findings, key=lambda finding: finding.severity != 'error')
@@ -79,7 +80,6 @@ def verify(machine: Container, userdata_keys: Iterable[str] = ()) -> list[Findin
 # The machine as the checks need it.
 
 
-@dataclass
 class _View:
     """A container as the checks need it.
 
@@ -89,19 +89,25 @@ class _View:
         edges: The transitions that can be taken, by the label of the state they leave.
         reached: Labels of the states that can be reached.
         endings: What the container can end with.
-        numbers: The number of each userdata key, see `_Keys`.
         before: Keys that are written inside before each state, on all ways to it and on some.
         written: Keys that have been written inside when it ends, likewise.
     """
 
-    structure: Structure
-    inner: dict[str, _View]
-    edges: dict[str, list[Edge]]
-    reached: set[str] = field(default_factory=set)
-    endings: set[str] = field(default_factory=set)
-    numbers: dict[str, int] = field(default_factory=dict)
-    before: dict[str, _Keys] = field(default_factory=dict)
-    written: _Keys = field(default_factory=lambda: _Keys())
+    def __init__(self, structure: Structure) -> None:
+        self.structure = structure
+        self.inner = {label: _View(inner) for label, inner in structure.inner.items()}
+        self.edges: dict[str, list[Edge]] = {label: [] for label in structure.members}
+        for edge in structure.edges:
+            within = self.inner.get(edge.source)
+            # Interrupts and unknown labels are held against the states by other checks.
+            if edge.source in self.edges and (within is None or edge.outcome in within.endings):
+                self.edges[edge.source].append(edge)
+        self.reached = _reachable(self)
+        self.endings: set[str] = _endings(self)
+        self._numbers: dict[str, int] = {}
+        self.before: dict[str, _Keys] = {}
+        self.written = _Keys()
+        _follow_keys(self)
 
     def walk(self) -> Iterator[_View]:
         """Return this container and all inside, outermost first."""
@@ -109,20 +115,29 @@ class _View:
         for inner in self.inner.values():
             yield from inner.walk()
 
+    def bits(self, keys: Iterable[str]) -> int:
+        """Return userdata keys as a set of bits, see `_Keys`."""
+        numbers, bits = self._numbers, 0
+        for key in keys:
+            bits |= 1 << numbers.setdefault(key, len(numbers))
+        return bits
 
-def _look_at(structure: Structure) -> _View:
-    inner = {label: _look_at(each) for label, each in structure.inner.items()}
-    edges: dict[str, list[Edge]] = {label: [] for label in structure.members}
-    for edge in structure.edges:
-        within = inner.get(edge.source)
-        # Interrupts and unknown labels are held against the states by other checks.
-        if edge.source in edges and (within is None or edge.outcome in within.endings):
-            edges[edge.source].append(edge)
-    view = _View(structure, inner, edges)
-    view.reached = _reachable(view)
-    view.endings = _endings(view)
-    _follow_keys(view)
-    return view
+    def remapping(self, label: str) -> dict[str, str]:
+        """Return the remapping of a state or an interrupt."""
+        container = self.structure.container
+        branch = container.fsm_branches.get(label)
+        return dict(container.fsm_remappings.get(label, {}) if branch is None else branch.remapping)
+
+    def error(self, check: str, message: str, label: str = '') -> Finding:
+        """Return an error of the container, or of the state with a label."""
+        return Finding('error', check, self._path(label), message)
+
+    def warning(self, check: str, message: str, label: str = '') -> Finding:
+        """Return a warning, likewise."""
+        return Finding('warning', check, self._path(label), message)
+
+    def _path(self, label: str) -> str:
+        return f'{self.structure.path}/{label}' if label else self.structure.path
 
 
 def _reachable(view: _View) -> set[str]:
@@ -134,12 +149,9 @@ def _reachable(view: _View) -> set[str]:
     pending = [*structure.initial, *structure.interrupts]
     while pending:
         label = pending.pop()
-        if label in reached or label not in structure.members:
-            continue
-        reached.add(label)
-        pending += [
-            edge.target for edge in view.edges[label] if not edge.leaving and edge.target != RESUME
-        ]
+        if label not in reached and label in structure.members:
+            reached.add(label)
+            pending += [edge.target for edge in view.edges[label] if not edge.leaving]
     return reached
 
 
@@ -158,35 +170,29 @@ def _endings(view: _View) -> set[str]:
 # The checks.
 
 
-def _unbound(structure: Structure) -> list[Finding]:
+def _unbound(view: _View) -> list[Finding]:
+    structure = view.structure
     try:
         structure.container.check_consistency()
     except (InvalidTransitionError, InvalidStateError) as error:
-        return [Finding('error', 'unbound', structure.path, str(error))]
-    outcomes = set(structure.outcomes)
+        return [view.error('unbound', str(error))]
     return [
-        Finding(
-            'error',
+        view.error(
             'unbound',
-            f'{structure.path}/{edge.source}',
             f"outcome '{edge.outcome}' leads to '{edge.target}', which is not an outcome of the "
-            f'container',
+            'container',
+            edge.source,
         )
         for edge in structure.edges
-        if edge.leaving and edge.target not in outcomes
+        if edge.leaving and edge.target not in structure.outcomes
     ]
 
 
 def _unreachable(view: _View) -> list[Finding]:
-    structure = view.structure
+    start = ', '.join(view.structure.initial)
     return [
-        Finding(
-            'error',
-            'unreachable',
-            f'{structure.path}/{label}',
-            f"no transition leads here from '{', '.join(structure.initial)}'",
-        )
-        for label in structure.states
+        view.error('unreachable', f"no transition leads here from '{start}'", label)
+        for label in view.structure.states
         if label not in view.reached
     ]
 
@@ -210,91 +216,65 @@ def _no_exit(view: _View) -> list[Finding]:
                 leads_out.add(source)
                 pending.append(source)
     if not view.reached & leads_out:
-        return [
-            Finding(
-                'error',
-                'no-exit',
-                structure.path,
-                f'no outcome can be reached: it would run for ever (its outcomes: '
-                f'{", ".join(structure.outcomes) or "none"})',
-            )
-        ]
+        outcomes = ', '.join(structure.outcomes) or 'none'
+        message = f'no outcome can be reached: it would run for ever (its outcomes: {outcomes})'
+        return [view.error('no-exit', message)]
     return [
-        Finding('error', 'no-exit', f'{structure.path}/{label}', 'no way out leads from here')
+        view.error('no-exit', 'no way out leads from here', label)
         for label in structure.states
         if label in view.reached and label not in leads_out
     ]
 
 
 def _unproduced(view: _View) -> list[Finding]:
-    structure = view.structure
     return [
-        Finding(
-            'warning',
-            'unproduced',
-            structure.path,
-            f"nothing inside produces its outcome '{outcome}'",
-        )
-        for outcome in structure.outcomes
+        view.warning('unproduced', f"nothing inside produces its outcome '{outcome}'")
+        for outcome in view.structure.outcomes
         if outcome not in view.endings and view.endings
     ]
 
 
-def _wrong_remappings(structure: Structure) -> list[Finding]:
-    container = structure.container
+def _wrong_remappings(view: _View) -> list[Finding]:
     findings = []
-    for label, state in structure.members.items():
-        declared = {*state.get_registered_input_keys(), *state.get_registered_output_keys()}
-        renamed = _remapping(container, label)
-        for key in renamed:
-            if key not in declared:
-                findings.append(
-                    Finding(
-                        'error',
-                        'remapping',
-                        f'{structure.path}/{label}',
-                        f"its remapping names the key '{key}', which it does not declare: its keys "
-                        f'are {sorted(declared)}',
-                    )
-                )
-        for key in container.fsm_constants.get(label, ()):
-            if key not in state.get_registered_input_keys():
-                findings.append(
-                    Finding(
-                        'error',
-                        'remapping',
-                        f'{structure.path}/{label}',
-                        f"its constant '{key}' is not among its input keys "
-                        f'{sorted(state.get_registered_input_keys())}',
-                    )
-                )
+    for label, state in view.structure.members.items():
+        inputs = sorted(state.get_registered_input_keys())
+        declared = sorted({*inputs, *state.get_registered_output_keys()})
+        findings += [
+            view.error(
+                'remapping',
+                f"its remapping names the key '{key}', which it does not declare: its keys are "
+                f'{declared}',
+                label,
+            )
+            for key in view.remapping(label)
+            if key not in declared
+        ]
+        findings += [
+            view.error(
+                'remapping', f"its constant '{key}' is not among its input keys {inputs}", label
+            )
+            for key in view.structure.container.fsm_constants.get(label, ())
+            if key not in inputs
+        ]
     return findings
 
 
 def _two_writers(view: _View) -> list[Finding]:
-    structure = view.structure
-    if not structure.together:
+    if not view.structure.together:
         return []
     writers: dict[str, list[str]] = {}
-    for label, state in structure.states.items():
-        renamed = _remapping(structure.container, label)
+    for label, state in view.structure.states.items():
+        renamed = view.remapping(label)
         for key in state.get_registered_output_keys():
             writers.setdefault(renamed.get(key, key), []).append(label)
     return [
-        Finding(
-            'warning',
+        view.warning(
             'two-writers',
-            structure.path,
             f"userdata key '{key}' is written by {labels}, which run at the same time",
         )
         for key, labels in sorted(writers.items())
         if len(labels) > 1
     ]
-
-
-def _remapping(container: Container, label: str) -> dict[str, str]:
-    branch = container.fsm_branches.get(label)
-    return dict(container.fsm_remappings.get(label, {}) if branch is None else branch.remapping)
 
 
 # States that would not hear a preempt.
@@ -303,23 +283,17 @@ _HEEDS = {'preempt_requested', 'wait', 'interrupt', 'request_preempt', 'service_
 _BLOCKS = {'sleep', 'input', 'join', 'acquire', 'spin', 'spin_until_future_complete', 'result'}
 
 
-def _deaf(structure: Structure) -> list[Finding]:
+def _deaf(view: _View) -> list[Finding]:
     """Return the states whose code waits or loops without ever looking at the preempt."""
     findings = []
-    for label, state in structure.members.items():
+    for label, state in view.structure.members.items():
         if isinstance(state, Container):
             continue
         code: Any = state.function if isinstance(state, CBState) else type(state)
         why = _cannot_be_preempted(code)
         if why is not None:
-            findings.append(
-                Finding(
-                    'warning',
-                    'deaf',
-                    f'{structure.path}/{label}',
-                    f'{why} without looking at preempt_requested: it cannot be preempted',
-                )
-            )
+            message = f'{why} without looking at preempt_requested: it cannot be preempted'
+            findings.append(view.warning('deaf', message, label))
     return findings
 
 
@@ -374,118 +348,96 @@ class _Keys:
 
     def plus(self, added: _Keys) -> _Keys:
         """After something that always adds `added.always`, and sometimes `added.sometimes`."""
-        return _Keys(self.always | added.always, self.sometimes | added.always | added.sometimes)
-
-
-def _bits(view: _View, keys: Iterable[str]) -> int:
-    numbers, bits = view.numbers, 0
-    for key in keys:
-        bits |= 1 << numbers.setdefault(key, len(numbers))
-    return bits
+        return _Keys(self.always | added.always, self.sometimes | added.sometimes)
 
 
 def _follow_keys(view: _View) -> None:
     """Find which keys are written before each state of a container, and when it ends."""
     structure, container = view.structure, view.structure.container
-    preset = _bits(view, container.userdata.keys())
+    preset = view.bits(container.userdata.keys())
     if isinstance(container, IteratorContainer):
-        preset |= _bits(view, [container.items_label])
+        preset |= view.bits([container.items_label])
     entry = _Keys(preset, preset)
     adds = {label: _added(view, label) for label in structure.members}
     if structure.together:
-        _follow_together(view, entry, adds)
+        # All states start with the same keys; what one writes, another may find.
+        view.written = reduce(_Keys.plus, (adds[label] for label in structure.states), entry)
+        view.before = dict.fromkeys(structure.members, _Keys(entry.always, view.written.sometimes))
         return
-    before = _follow_loop(view, entry, adds)
+    before = _follow_transitions(view, entry, adds)
     everywhere = entry.sometimes
     for label, keys in before.items():
         everywhere |= keys.plus(adds[label]).sometimes
     for label in structure.interrupts:
         # It may come at any time.
         before[label] = _Keys(entry.always, everywhere)
-        everywhere |= adds[label].always | adds[label].sometimes
-    end: _Keys | None = None
-    for label, keys in before.items():
-        if any(edge.leaving for edge in view.edges[label]):
-            after = keys.plus(adds[label])
-            end = after if end is None else end.joined(after)
-    end = _Keys(entry.always, everywhere) if end is None else end
+        everywhere |= adds[label].sometimes
+    ends = [
+        keys.plus(adds[label])
+        for label, keys in before.items()
+        if any(edge.leaving for edge in view.edges[label])
+    ]
+    end = reduce(_Keys.joined, ends) if ends else _Keys(entry.always, everywhere)
     for label in structure.interrupts:
-        end = end.plus(_Keys(0, adds[label].always | adds[label].sometimes))
+        end = end.plus(_Keys(0, adds[label].sometimes))
     view.before, view.written = before, end
 
 
-def _follow_loop(view: _View, entry: _Keys, adds: dict[str, _Keys]) -> dict[str, _Keys]:
+def _follow_transitions(view: _View, entry: _Keys, adds: dict[str, _Keys]) -> dict[str, _Keys]:
     """Return the keys before each state that can be reached, when one runs at a time."""
     order = _order(view)
-    before: dict[str, _Keys] = {label: entry for label in view.structure.initial if label in order}
-    pending = [(order[label], label) for label in before]
-    heapq.heapify(pending)
-    waiting = set(before)
-    while pending:
-        _, label = heapq.heappop(pending)
-        waiting.discard(label)
-        after = before[label].plus(adds[label])
-        for edge in view.edges[label]:
-            target = edge.target
-            if edge.leaving or target not in order:
-                continue
-            known = before.get(target)
-            joined = after if known is None else known.joined(after)
-            if joined != known:
-                before[target] = joined
-                if target not in waiting:
-                    waiting.add(target)
-                    heapq.heappush(pending, (order[target], target))
+    before = {label: entry for label in view.structure.initial if label in order}
+    changed = True
+    while changed:
+        # Twice, and once more for each loop inside a loop.
+        changed = False
+        for label in order:
+            after = before[label].plus(adds[label])
+            for edge in view.edges[label]:
+                if edge.leaving or edge.target not in view.edges:
+                    continue
+                known = before.get(edge.target)
+                joined = after if known is None else known.joined(after)
+                if joined != known:
+                    before[edge.target] = joined
+                    changed = True
     return before
 
 
-def _follow_together(view: _View, entry: _Keys, adds: dict[str, _Keys]) -> None:
-    """All states start with the same keys; what one writes, another may find."""
-    end = entry
-    for label in view.structure.states:
-        end = end.plus(adds[label])
-    start = _Keys(entry.always, end.sometimes)
-    view.before = dict.fromkeys(view.structure.members, start)
-    view.written = end
-
-
-def _order(view: _View) -> dict[str, int]:
-    """Reachable states, numbered so that a state comes after those that lead to it, but loops."""
-    number: dict[str, int] = {}
+def _order(view: _View) -> list[str]:
+    """Return the reachable states, each after those that lead to it, but for loops."""
+    seen: set[str] = set()
     finished: list[str] = []
     for first in view.structure.initial:
-        if first in number or first not in view.edges:
+        if first in seen or first not in view.edges:
             continue
-        number[first] = 0
+        seen.add(first)
         stack = [(first, iter(view.edges[first]))]
         while stack:
             label, edges = stack[-1]
             for edge in edges:
                 target = edge.target
-                if not edge.leaving and target in view.edges and target not in number:
-                    number[target] = 0
+                if not edge.leaving and target in view.edges and target not in seen:
+                    seen.add(target)
                     stack.append((target, iter(view.edges[target])))
                     break
             else:
                 stack.pop()
                 finished.append(label)
-    return {label: place for place, label in enumerate(reversed(finished))}
+    return finished[::-1]
 
 
 def _added(view: _View, label: str) -> _Keys:
     """Return what a state adds, in the container's names."""
-    state = view.structure.members[label]
-    renamed = _remapping(view.structure.container, label)
-    outputs = state.get_registered_output_keys()
-    inner = view.inner.get(label)
-    if inner is None:
-        return _Keys(_bits(view, (renamed.get(key, key) for key in outputs)))
-    always = [key for key in outputs if inner.written.always & _bits(inner, [key])]
-    sometimes = [key for key in outputs if inner.written.sometimes & _bits(inner, [key])]
-    return _Keys(
-        _bits(view, (renamed.get(key, key) for key in always)),
-        _bits(view, (renamed.get(key, key) for key in sometimes)),
-    )
+    renamed, inner = view.remapping(label), view.inner.get(label)
+    always = sometimes = 0
+    for key in view.structure.members[label].get_registered_output_keys():
+        bit = view.bits([renamed.get(key, key)])
+        if inner is None or inner.written.always & inner.bits([key]):
+            always |= bit
+        if inner is None or inner.written.sometimes & inner.bits([key]):
+            sometimes |= bit
+    return _Keys(always, sometimes)
 
 
 def _unset_reads(view: _View, always: Iterable[str], sometimes: Iterable[str]) -> list[Finding]:
@@ -496,33 +448,29 @@ def _unset_reads(view: _View, always: Iterable[str], sometimes: Iterable[str]) -
         always: Keys that it is always entered with, in its own names.
         sometimes: Keys that it is sometimes entered with.
     """
-    container, findings = view.structure.container, []
-    given = _Keys(_bits(view, always), _bits(view, sometimes))
+    findings = []
+    given = _Keys(view.bits(always), view.bits(sometimes))
     for label, local in view.before.items():
         before = local.plus(given)
-        state = view.structure.members[label]
-        renamed = _remapping(container, label)
-        constants = container.fsm_constants.get(label, {})
+        renamed = view.remapping(label)
+        constants = view.structure.container.fsm_constants.get(label, {})
         there: list[str] = []
         at_times: list[str] = []
-        for key in sorted(state.get_registered_input_keys()):
-            bit = _bits(view, [renamed.get(key, key)])
+        for key in sorted(view.structure.members[label].get_registered_input_keys()):
+            bit = view.bits([renamed.get(key, key)])
             if key in constants or before.always & bit:
                 there.append(key)
             elif before.sometimes & bit:
                 at_times.append(key)
-            if label not in view.inner and key not in there:
-                findings.append(_unset(view, label, key, key in at_times))
+            if label in view.inner or key in there:
+                continue
+            message = f"reads userdata key '{key}', which %s written"
+            if key in at_times:
+                message %= 'on some ways to it nobody has'
+                findings.append(view.warning('unset-key', message, label))
+            else:
+                message %= 'nobody has ever'
+                findings.append(view.error('unset-key', message, label))
         if label in view.inner:
             findings += _unset_reads(view.inner[label], there, [*there, *at_times])
     return findings
-
-
-def _unset(view: _View, label: str, key: str, on_some_ways: bool) -> Finding:
-    when = 'on some ways to it nobody has' if on_some_ways else 'nobody has ever'
-    return Finding(
-        'warning' if on_some_ways else 'error',
-        'unset-key',
-        f'{view.structure.path}/{label}',
-        f"reads userdata key '{key}', which {when} written",
-    )
