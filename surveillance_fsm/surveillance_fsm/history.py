@@ -21,6 +21,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from queue import Empty, SimpleQueue
 from typing import IO, Any, NamedTuple
 
 from surveillance_fsm.clock import elapsed_of
@@ -29,7 +30,7 @@ from surveillance_fsm.exceptions import MachineFileError, describe, shown
 from surveillance_fsm.execution import History, RawTransition
 from surveillance_fsm.log import logerr, logwarn
 from surveillance_fsm.state import State
-from surveillance_fsm.structure import Structure, children_of, structure_of
+from surveillance_fsm.structure import Edge, Structure, children_of, structure_of
 from surveillance_fsm.userdata import raw
 
 RECORD_FORMAT = 'surveillance-fsm-record'
@@ -135,66 +136,56 @@ class TransitionFeed:
         consume: Callable[[Transition], object],
     ) -> None:
         self._consume = consume
-        self._queue: deque[RawTransition] = deque()
+        # An event among the transitions is set by whoever comes to it.
+        self._queue: SimpleQueue[RawTransition | threading.Event] = SimpleQueue()
         self._lost: deque[None] = deque()
         self._visits: dict[tuple[str, str], int] = {}
         self._entered: dict[str, float] = {}
         self._sequence = 0
-        self._wakeup = threading.Event()
-        self._drained = threading.Condition()
-        self._asleep = False
         self._closing = False
         self._thread = threading.Thread(target=self._run, name='fsm transitions', daemon=True)
         self._thread.start()
-        self._end_reports = machine.control.add_trace(self._make_sink())
+        self._end_reports = machine.control.add_trace(self._take)
 
-    def _make_sink(self) -> Callable[[RawTransition], None]:
+    def _take(self, raw: RawTransition) -> None:
         # Several threads may come here at once: each of these is one step.
-        queue, append, wake = self._queue, self._queue.append, self._wakeup.set
-
-        def sink(raw: RawTransition) -> None:
-            append(raw)
-            if self._asleep:
-                wake()
-            if len(queue) > QUEUE_LENGTH:
-                with suppress(IndexError):
-                    queue.popleft()
+        queue = self._queue
+        queue.put(raw)
+        if queue.qsize() > QUEUE_LENGTH:
+            with suppress(Empty):
+                oldest = queue.get_nowait()
+                if isinstance(oldest, threading.Event):
+                    queue.put(oldest)
+                else:
                     self._lost.append(None)
-
-        return sink
 
     def flush(self, timeout: float | None = None) -> bool:
         """Wait until everything so far has been consumed; tells whether that was in time."""
-        with self._drained:
-            return self._drained.wait_for(lambda: self._asleep and not self._queue, timeout)
+        consumed = threading.Event()
+        self._queue.put(consumed)
+        return consumed.wait(timeout)
 
     def close(self, timeout: float = 5.0) -> None:
         """Stop reporting, consume what is left and end the thread."""
         self._end_reports()
         self._closing = True
-        self._wakeup.set()
+        self._queue.put(threading.Event())
         self._thread.join(timeout)
 
     def _run(self) -> None:
-        queue = self._queue
         while True:
-            while queue:
+            raw = self._queue.get()
+            if isinstance(raw, threading.Event):
+                raw.set()
+            else:
                 try:
-                    transition = self._transition(queue.popleft())
+                    transition = self._transition(raw)
                     if transition is not None:
                         self._consume(transition)
                 except Exception as error:
                     logerr(f'Reporting a transition raised {describe(error)}')
-            if self._closing:
+            if self._closing and self._queue.empty():
                 return
-            self._wakeup.clear()
-            with self._drained:
-                self._asleep = True
-                self._drained.notify_all()
-            # It says first that it waits, then looks once more: the machine does the reverse.
-            if not queue and not self._closing:
-                self._wakeup.wait()
-            self._asleep = False
 
     def _transition(self, raw: RawTransition) -> Transition | None:
         noted = unfold(raw)
@@ -324,10 +315,8 @@ def replay(machine: Container, transitions: Iterable[Transition]) -> Iterator[St
             )
         _check_transition(container, transition)
         left = f'{transition.path}/{transition.from_state}'
-        if transition.kind == 'exit' or transition.kind == 'ended':
-            active = {path for path in active if not _within(path, left)}
-        else:
-            active = {path for path in active if not _within(path, left)}
+        active = {path for path in active if path != left and not path.startswith(f'{left}/')}
+        if transition.kind not in ('exit', 'ended'):
             place = f'{transition.path}/{transition.to_state}'
             active.add(place)
             if place in containers:
@@ -344,41 +333,24 @@ def _entered(container: Structure) -> list[str]:
     return paths
 
 
-def _within(path: str, place: str) -> bool:
-    return path == place or path.startswith(place + '/')
-
-
 def _check_transition(container: Structure, transition: Transition) -> None:
     what = f'Transition {transition.sequence} in {container.path!r}'
-    states = container.members
-    if transition.from_state not in states:
-        raise MachineFileError(f'{what}: no state {transition.from_state!r}')
-    if transition.kind in ('interrupt', 'resume'):
-        if transition.to_state not in states:
-            raise MachineFileError(f'{what}: no state {transition.to_state!r}')
+    states, kind = container.members, transition.kind
+    left, outcome, target = transition.from_state, transition.outcome, transition.to_state
+    if left not in states:
+        raise MachineFileError(f'{what}: no state {left!r}')
+    if kind in ('interrupt', 'resume'):
+        if target not in states:
+            raise MachineFileError(f'{what}: no state {target!r}')
+    elif kind == 'ended':
+        if outcome not in states[left].get_registered_outcomes():
+            raise MachineFileError(f'{what}: {left!r} has no outcome {outcome!r}')
+    elif kind == 'exit' and target in container.outcomes:
+        # By more than edges: an iterator that was preempted, or an interrupt's state that ended
+        # where the container was about to end.
         return
-    if transition.kind == 'ended':
-        if transition.outcome not in states[transition.from_state].get_registered_outcomes():
-            raise MachineFileError(
-                f'{what}: {transition.from_state!r} has no outcome {transition.outcome!r}'
-            )
-        return
-    leaving = transition.kind == 'exit'
-    for edge in container.edges:
-        if (
-            edge.source == transition.from_state
-            and edge.leaving == leaving
-            and edge.target == transition.to_state
-        ):
-            return
-    if leaving and transition.to_state in container.outcomes:
-        # An iterator that was preempted, or an interrupt's state that ended where the container
-        # was about to end.
-        return
-    raise MachineFileError(
-        f'{what}: {transition.from_state!r} does not lead to {transition.to_state!r} by '
-        f'{transition.outcome!r}'
-    )
+    elif Edge(left, outcome, target, kind == 'exit') not in container.edges:
+        raise MachineFileError(f'{what}: {left!r} does not lead to {target!r} by {outcome!r}')
 
 
 # Checkpoints.
@@ -426,14 +398,7 @@ def _capture(state: State, path: str, leave_out: frozenset[str]) -> dict[str, An
     frame = state.fsm_frame
     history = state.fsm_history if frame is None else frame.where()
     if history is not None:
-        entry['at'] = {
-            'current': history.current,
-            'leaving': history.leaving,
-            'saved': [list(saved) for saved in history.saved],
-            'index': history.index,
-            'repeat': history.repeat,
-            'outcomes': history.outcomes,
-        }
+        entry['at'] = {name: getattr(history, name) for name in _PLACE}
     if state.fsm_raised:
         entry['raised'] = [branch.label for branch in state.fsm_raised]
     inside = {
@@ -445,6 +410,16 @@ def _capture(state: State, path: str, leave_out: frozenset[str]) -> dict[str, An
         entry['states'] = inside
     return entry
 
+
+_PLACE = {
+    'current': str,
+    'leaving': bool,
+    'saved': list,
+    'index': int,
+    'repeat': bool,
+    'outcomes': dict,
+}
+"""What is kept of a `History`."""
 
 _TAG = '!'
 """The key that tells a value JSON has no form for from a dictionary of the user's."""
@@ -610,28 +585,25 @@ def _read_place(state: Container, path: str, at: Any) -> History:
         MachineFileError: It is none of its states.
     """
     _expect(isinstance(at, dict), path, 'a place as an object', at)
-    current, leaving = at.get('current', ''), at.get('leaving', False)
-    saved, outcomes = at.get('saved', []), at.get('outcomes', {})
-    index, repeat = at.get('index', 0), at.get('repeat', True)
-    _expect(isinstance(saved, list), path, 'a list of places', saved)
-    for place in saved:
-        _expect(isinstance(place, list) and len(place) == 2, path, 'a place', place)
-    _expect(type(index) is int and index >= 0, path, 'a number of items', index)
-    _expect(type(repeat) is bool, path, 'true or false', repeat)
-    _expect(isinstance(outcomes, dict), path, 'outcomes by label', outcomes)
+    history = History(**{name: value for name, value in at.items() if name in _PLACE})
+    for name, kind in _PLACE.items():
+        value = getattr(history, name)
+        _expect(type(value) is kind, path, f"'{name}' of type {kind.__name__}", value)
+    _expect(history.index >= 0, path, 'a number of items', history.index)
+    for place in history.saved:
+        pair = isinstance(place, list | tuple) and [type(part) for part in place]
+        _expect(pair == [str, bool], path, 'a place', place)
     labels = children_of(state)
-    for label, leaves in ((current, leaving), *saved):
-        _expect(isinstance(label, str) and type(leaves) is bool, path, 'a place', label)
-        if not (state.together or leaves or label in labels):
+    for label, leaving in ((history.current, history.leaving), *history.saved):
+        if not (state.together or leaving or label in labels):
             raise MachineFileError(
                 f"'{path}' has no state '{label}' to resume in: its states are {sorted(labels)}"
             )
-    for label, outcome in outcomes.items():
+    for label, outcome in history.outcomes.items():
         if label not in state.fsm_states:
             raise MachineFileError(f"'{path}' has no state '{label}'")
         _expect(isinstance(outcome, str), f'{path}/{label}', 'an outcome', outcome)
-    places = [(label, leaves) for label, leaves in saved]
-    return History(current, leaving, places, index, repeat, dict(outcomes))
+    return history
 
 
 def save(machine: Container, path: str | Path, leave_out: Iterable[str] = ()) -> None:

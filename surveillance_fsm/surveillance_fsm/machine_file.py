@@ -37,7 +37,7 @@ import difflib
 import importlib
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from surveillance_fsm.concurrence import Concurrence
 from surveillance_fsm.container import Container
@@ -46,19 +46,21 @@ from surveillance_fsm.state import CBState, State
 from surveillance_fsm.state_machine import Iterator, Sequence, StateMachine
 from surveillance_fsm.timeouts import LimitOptions
 
-Made = TypeVar('Made')
-
-KINDS = ('StateMachine', 'Sequence', 'Concurrence', 'Iterator')
+KINDS: dict[str, type[Container]] = {
+    kind.__name__: kind for kind in (StateMachine, Sequence, Concurrence, Iterator)
+}
 
 _LIMITS = set(LimitOptions.__annotations__)
 _KEYS = {'input_keys', 'output_keys'}
 _CONTAINER = {'machine', 'name', 'outcomes', 'userdata', 'states', 'interrupts', *_KEYS}
 _OF_KIND = {
-    'StateMachine': {'initial'},
-    'Sequence': {'initial', 'connector_outcome'},
-    'Concurrence': {'default_outcome', 'outcome_map'},
-    'Iterator': {'items', 'item_key', 'exhausted_outcome'},
+    'StateMachine': {},
+    'Sequence': {'connector_outcome': 'connector_outcome'},
+    'Concurrence': {'default_outcome': 'default_outcome', 'outcome_map': 'outcome_map'},
+    'Iterator': {'items': 'it', 'item_key': 'it_label', 'exhausted_outcome': 'exhausted_outcome'},
 }
+"""Further keys of a container, and the arguments of its class that they stand for."""
+_NEEDED = {'connector_outcome', 'default_outcome', 'items'}
 _IN_KIND = {
     'StateMachine': {'transitions', 'remapping', 'constants', *_LIMITS},
     'Sequence': {'transitions', 'remapping', 'constants', *_LIMITS},
@@ -173,10 +175,12 @@ class _Builder:
         kind = entry.get('machine', 'StateMachine')
         if kind not in KINDS:
             raise MachineFileError(f'{place}.machine: {_unknown(kind, KINDS)}')
-        _known_keys(place, entry, _CONTAINER | _OF_KIND[kind] | set(further))
+        initial = {'initial'} if issubclass(KINDS[kind], StateMachine) else set()
+        _known_keys(place, entry, _CONTAINER | {*_OF_KIND[kind], *initial, *further})
         outcomes = _names(f'{place}.outcomes', entry.get('outcomes', []))
         keys = {key: _names(f'{place}.{key}', entry.get(key, [])) for key in sorted(_KEYS)}
-        machine = self._make(kind, entry, place, outcomes, keys)
+        arguments = self._arguments(kind, entry, place)
+        machine: Container = _guarded(place, KINDS[kind], outcomes, **keys, **arguments)
         if 'name' in entry:
             _guarded(f'{place}.name', machine.set_name, entry['name'])
         for key, value in _mapping(f'{place}.userdata', entry.get('userdata', {})).items():
@@ -193,37 +197,24 @@ class _Builder:
             _guarded(f'{place}.initial', machine.set_initial_state, [entry['initial']])
         return machine
 
-    def _make(
-        self,
-        kind: str,
-        entry: Mapping[str, Any],
-        place: str,
-        outcomes: list[str],
-        keys: Mapping[str, list[str]],
-    ) -> Container:
-        if kind == 'StateMachine':
-            return _made(place, StateMachine, outcomes, **keys)
-        if kind == 'Sequence':
-            connector = _needed(place, entry, 'connector_outcome')
-            return _made(place, Sequence, outcomes, connector, **keys)
-        if kind == 'Concurrence':
-            default = _needed(place, entry, 'default_outcome')
-            outcome_map = _mapping(f'{place}.outcome_map', entry.get('outcome_map', {}))
-            for outcome, wanted in outcome_map.items():
-                _mapping(f'{place}.outcome_map.{outcome}', wanted)
-            return _made(place, Concurrence, outcomes, default, **keys, outcome_map=outcome_map)
-        items = self._value(_needed(place, entry, 'items'), f'{place}.items')
-        if not callable(items) and not isinstance(items, Iterable):
-            raise MachineFileError(f'{place}.items: expected a list, not {shown(items)}')
-        options = {
-            name: entry[key]
-            for key, name in (
-                ('item_key', 'it_label'),
-                ('exhausted_outcome', 'exhausted_outcome'),
-            )
-            if key in entry
-        }
-        return _made(place, Iterator, outcomes, **keys, it=items, **options)
+    def _arguments(self, kind: str, entry: Mapping[str, Any], place: str) -> dict[str, Any]:
+        """Return the arguments that one kind of container alone takes."""
+        arguments = {}
+        for key, argument in _OF_KIND[kind].items():
+            if key in _NEEDED:
+                _needed(place, entry, key)
+            elif key not in entry:
+                continue
+            value, where = entry[key], f'{place}.{key}'
+            if key == 'outcome_map':
+                for outcome, wanted in _mapping(where, value).items():
+                    _mapping(f'{where}.{outcome}', wanted)
+            elif key == 'items':
+                value = self._value(value, where)
+                if not callable(value) and not isinstance(value, Iterable):
+                    raise MachineFileError(f'{where}: expected a list, not {shown(value)}')
+            arguments[argument] = value
+        return arguments
 
     def _add(self, machine: Container, kind: str, label: str, data: Any, place: str) -> None:
         state, options = self._state(data, place, _IN_KIND[kind])
@@ -253,7 +244,7 @@ class _Builder:
             given = {key: _names(f'{place}.{key}', entry[key]) for key in declared if key in entry}
             if not callable(function):
                 raise MachineFileError(f'{place}.function: {entry["function"]} cannot be called')
-            return _made(place, CBState, function, **given), options
+            return _guarded(place, CBState, function, **given), options
         _known_keys(place, entry, {'state', 'arguments', *further})
         kind = self._value(_needed(place, entry, 'state'), f'{place}.state', import_names=True)
         if not callable(kind):
@@ -290,11 +281,6 @@ class _Builder:
                 raise MachineFileError(f"{place}: '{module}' has no {_unknown(part, dir(found))}")
             found = getattr(found, part)
         return found
-
-
-def _made(place: str, kind: Callable[..., Made], *args: Any, **kwargs: Any) -> Made:
-    made: Made = _guarded(place, kind, *args, **kwargs)
-    return made
 
 
 def _mapping(place: str, data: Any) -> Mapping[str, Any]:

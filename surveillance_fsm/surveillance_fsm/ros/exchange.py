@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import surveillance_fsm as fsm
@@ -18,46 +17,39 @@ def seconds(duration: Any) -> float | None:
     return float(duration.nanoseconds) / 1e9
 
 
-@dataclass
 class UserCallback:
-    """A user's callback and what it may touch.
+    """A user's callback; one without a `cb_interface` sees all that its state declares.
 
-    Attributes:
+    Args:
+        state: The state that it belongs to; what the callback declares is added to it.
         name: The argument it was given as, for errors.
         function: The callback; None for none.
         args: Further positional arguments.
         kwargs: Further keyword arguments.
-        input_keys: Userdata it may read, if it does not declare that itself.
-        output_keys: Userdata it may write, likewise.
-        outcomes: Outcomes it may return, likewise.
+
+    Raises:
+        InvalidStateError: It cannot be called.
     """
 
-    name: str
-    function: Callable[..., Any] | None
-    args: Iterable[Any] = ()
-    kwargs: Mapping[str, Any] | None = None
-    input_keys: Iterable[str] = ()
-    output_keys: Iterable[str] = ()
-    outcomes: Iterable[str] = ()
-
-    def declare(self, state: fsm.State) -> None:
-        """Check the callback and add what it declares to `state`.
-
-        Raises:
-            InvalidStateError: It cannot be called.
-        """
-        if self.function is None:
-            return
-        if not callable(self.function):
-            raise fsm.InvalidStateError(f'{self.name} {self.function!r} cannot be called')
-        declared: Any = self.function
-        if fsm.has_smach_interface(declared):
-            self.input_keys = declared.get_registered_input_keys()
-            self.output_keys = declared.get_registered_output_keys()
-            self.outcomes = declared.get_registered_outcomes()
-        state.register_input_keys(self.input_keys)
-        state.register_output_keys(self.output_keys)
-        state.register_outcomes(self.outcomes)
+    def __init__(
+        self,
+        state: fsm.State,
+        name: str,
+        function: Any,
+        args: Iterable[Any],
+        kwargs: Mapping[str, Any] | None,
+    ) -> None:
+        if function is not None and not callable(function):
+            raise fsm.InvalidStateError(f'{name} {function!r} cannot be called')
+        self.name = name
+        self.function = function
+        self._args = tuple(args)
+        self._kwargs = dict(kwargs or {})
+        self._declares = fsm.has_smach_interface(function)
+        if self._declares:
+            state.register_input_keys(function.get_registered_input_keys())
+            state.register_output_keys(function.get_registered_output_keys())
+            state.register_outcomes(function.get_registered_outcomes())
 
     def call(self, ud: Any, *message: Any) -> Any:
         """Call it with its view of userdata.
@@ -65,19 +57,22 @@ class UserCallback:
         Raises:
             InvalidUserCodeError: It raised something.
         """
-        assert self.function is not None
-        view = fsm.Remapper(ud, tuple(self.input_keys), tuple(self.output_keys))
+        function = self.function
+        if self._declares:
+            ud = fsm.Remapper(
+                ud, function.get_registered_input_keys(), function.get_registered_output_keys()
+            )
         try:
-            return self.function(view, *message, *self.args, **dict(self.kwargs or {}))
+            return function(ud, *message, *self._args, **self._kwargs)
         except Exception as error:
             raise fsm.InvalidUserCodeError(f'{self.name} raised {describe(error)}') from error
 
 
-@dataclass
 class Outgoing:
     """How a goal or a request is made.
 
-    Attributes:
+    Args:
+        state: The state that sends it; it declares the userdata keys.
         kind: ``goal`` or ``request``, for errors.
         message_type: The message's class.
         message: The message to begin with; an empty one by default.
@@ -85,31 +80,29 @@ class Outgoing:
         slots: Fields that are taken from userdata keys of the same names.
         callback: Given the userdata and the message; returns the message to send, or None when it
             changed the one it was given.
+
+    Raises:
+        InvalidStateError: The message is of another type, or a field does not exist.
     """
 
-    kind: str
-    message_type: Any
-    message: Any
-    key: str | None
-    slots: Iterable[str]
-    callback: UserCallback
-
-    def declare(self, state: fsm.State) -> None:
-        """Check the policy and declare its userdata keys.
-
-        Raises:
-            InvalidStateError: A field does not exist, or a callback cannot be called.
-        """
-        if self.message is not None and not isinstance(self.message, self.message_type):
+    def __init__(
+        self,
+        state: fsm.State,
+        kind: str,
+        message_type: Any,
+        message: Any,
+        key: str | None,
+        slots: Iterable[str],
+        callback: UserCallback,
+    ) -> None:
+        if message is not None and not isinstance(message, message_type):
             raise fsm.InvalidStateError(
-                f'{self.kind} is a {type(self.message).__name__}, expected '
-                f'{self.message_type.__name__}'
+                f'{kind} is a {type(message).__name__}, expected {message_type.__name__}'
             )
-        check_slots(f'{self.kind}_slots', self.slots, self.message_type)
-        if self.key is not None:
-            state.register_input_keys([self.key])
-        state.register_input_keys(self.slots)
-        self.callback.declare(state)
+        self.kind, self.message_type, self.message = kind, message_type, message
+        self.key, self.callback = key, callback
+        self.slots = checked_slots(f'{kind}_slots', slots, message_type)
+        state.register_input_keys(self.slots if key is None else (key, *self.slots))
 
     def make(self, ud: Any) -> Any:
         """Make the message to send.
@@ -140,37 +133,35 @@ class Outgoing:
         return message
 
 
-@dataclass
 class Incoming:
     """What becomes of a result or a response.
 
-    Attributes:
+    Args:
+        state: The state that receives it; it declares the userdata keys.
         kind: ``result`` or ``response``, for errors.
         message_type: The message's class.
         key: Userdata key that takes the whole message.
         slots: Fields that go to userdata keys of the same names.
         callback: Given the userdata and the message; may return an outcome.
+
+    Raises:
+        InvalidStateError: A field does not exist.
     """
 
-    kind: str
-    message_type: Any
-    key: str | None
-    slots: Iterable[str]
-    callback: UserCallback
+    def __init__(
+        self,
+        state: fsm.State,
+        kind: str,
+        message_type: Any,
+        key: str | None,
+        slots: Iterable[str],
+        callback: UserCallback,
+    ) -> None:
+        self.state, self.key, self.callback = state, key, callback
+        self.slots = checked_slots(f'{kind}_slots', slots, message_type)
+        state.register_output_keys(self.slots if key is None else (key, *self.slots))
 
-    def declare(self, state: fsm.State) -> None:
-        """Check the policy and declare its userdata keys and outcomes.
-
-        Raises:
-            InvalidStateError: A field does not exist, or a callback cannot be called.
-        """
-        check_slots(f'{self.kind}_slots', self.slots, self.message_type)
-        if self.key is not None:
-            state.register_output_keys([self.key])
-        state.register_output_keys(self.slots)
-        self.callback.declare(state)
-
-    def take(self, ud: Any, state: fsm.State, *message: Any) -> str | None:
+    def take(self, ud: Any, *message: Any) -> str | None:
         """Put a message, the last of `message`, into userdata; the callback's outcome, if any.
 
         Raises:
@@ -179,10 +170,11 @@ class Incoming:
         outcome = None
         if self.callback.function is not None:
             outcome = self.callback.call(ud, *message)
-            if outcome is not None and outcome not in state.get_registered_outcomes():
+            outcomes = self.state.get_registered_outcomes()
+            if outcome is not None and outcome not in outcomes:
                 raise fsm.InvalidUserCodeError(
                     f'{self.callback.name} returned outcome {outcome!r}: the outcomes are '
-                    f'{sorted(state.get_registered_outcomes())}'
+                    f'{sorted(outcomes)}'
                 )
         if self.key is not None:
             ud[self.key] = message[-1]
@@ -191,15 +183,16 @@ class Incoming:
         return outcome
 
 
-def check_slots(name: str, slots: Iterable[str], message_type: Any) -> None:
-    """Check that fields exist.
+def checked_slots(name: str, slots: Iterable[str], message_type: Any) -> tuple[str, ...]:
+    """Return names of fields, all of which exist.
 
     Raises:
         InvalidStateError: One does not.
     """
-    fields = message_type.get_fields_and_field_types()
+    slots, fields = tuple(slots), message_type.get_fields_and_field_types()
     for slot in slots:
         if slot not in fields:
             raise fsm.InvalidStateError(
                 f"{name}: {message_type.__name__} has no field '{slot}', only {sorted(fields)}"
             )
+    return slots

@@ -119,25 +119,18 @@ class ServiceState(RosState):
         *,
         timeout: Any = 60.0,
     ) -> None:
-        keys = tuple(input_keys), tuple(output_keys)
-        super().__init__(node, ['succeeded', 'aborted', 'preempted', *outcomes], *keys)
+        outcomes = ['succeeded', 'aborted', 'preempted', *outcomes]
+        super().__init__(node, outcomes, input_keys, output_keys)
+        made_by = UserCallback(self, 'request_cb', request_cb, request_cb_args, request_cb_kwargs)
         self._request = Outgoing(
-            'request',
-            service_spec.Request,
-            request,
-            request_key,
-            tuple(request_slots),
-            UserCallback('request_cb', request_cb, request_cb_args, request_cb_kwargs, *keys),
+            self, 'request', service_spec.Request, request, request_key, request_slots, made_by
+        )
+        taken_by = UserCallback(
+            self, 'response_cb', response_cb, response_cb_args, response_cb_kwargs
         )
         self._response = Incoming(
-            'response',
-            service_spec.Response,
-            response_key,
-            tuple(response_slots),
-            UserCallback('response_cb', response_cb, response_cb_args, response_cb_kwargs, *keys),
+            self, 'response', service_spec.Response, response_key, response_slots, taken_by
         )
-        self._request.declare(self)
-        self._response.declare(self)
         self._timeout = seconds(timeout) or 0.0
         self._caller = ServiceCaller(node, service_spec, service_name)
 
@@ -149,7 +142,7 @@ class ServiceState(RosState):
         try:
             request = self._request.make(ud)
             response = self._caller.call(request, self._timeout, self.interrupt)
-            return self._response.take(ud, self, response) or 'succeeded'
+            return self._response.take(ud, response) or 'succeeded'
         except CallInterruptedError:
             self.service_preempt()
             return 'preempted'
@@ -223,29 +216,17 @@ class SimpleActionState(RosState):
         feedback_cb_args: Iterable[Any] = (),
         feedback_cb_kwargs: Mapping[str, Any] | None = None,
     ) -> None:
-        keys = tuple(input_keys), tuple(output_keys)
-        super().__init__(node, ['succeeded', 'aborted', 'preempted', *outcomes], *keys)
-        self._goal = Outgoing(
-            'goal',
-            action_spec.Goal,
-            goal,
-            goal_key,
-            tuple(goal_slots),
-            UserCallback('goal_cb', goal_cb, goal_cb_args, goal_cb_kwargs, *keys),
-        )
+        outcomes = ['succeeded', 'aborted', 'preempted', *outcomes]
+        super().__init__(node, outcomes, input_keys, output_keys)
+        made_by = UserCallback(self, 'goal_cb', goal_cb, goal_cb_args, goal_cb_kwargs)
+        self._goal = Outgoing(self, 'goal', action_spec.Goal, goal, goal_key, goal_slots, made_by)
+        taken_by = UserCallback(self, 'result_cb', result_cb, result_cb_args, result_cb_kwargs)
         self._result = Incoming(
-            'result',
-            action_spec.Result,
-            result_key,
-            tuple(result_slots),
-            UserCallback('result_cb', result_cb, result_cb_args, result_cb_kwargs, *keys),
+            self, 'result', action_spec.Result, result_key, result_slots, taken_by
         )
         self._feedback = UserCallback(
-            'feedback_cb', feedback_cb, feedback_cb_args, feedback_cb_kwargs, *keys
+            self, 'feedback_cb', feedback_cb, feedback_cb_args, feedback_cb_kwargs
         )
-        self._goal.declare(self)
-        self._result.declare(self)
-        self._feedback.declare(self)
         self._exec_timeout = seconds(exec_timeout)
         self._server_wait_timeout = seconds(server_wait_timeout) or 0.0
         self._caller = GoalCaller(
@@ -271,7 +252,7 @@ class SimpleActionState(RosState):
             if end.status == 'rejected':
                 fsm.logerr(f"Action '{self._caller.name}': the server rejected the goal")
                 return 'aborted'
-            outcome = self._result.take(ud, self, _STATUS[end.status], end.result)
+            outcome = self._result.take(ud, _STATUS[end.status], end.result)
         except CallInterruptedError:
             if not self.preempt_requested():
                 fsm.logerr(f"Action '{self._caller.name}': the node's executor does not spin")
