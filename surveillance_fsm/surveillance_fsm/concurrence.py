@@ -1,23 +1,18 @@
 """The concurrence: all states at the same time, one outcome made of theirs.
 
-`OutcomePolicy` makes the outcome, `Concurrence` is the container, and `ConcurrentFrame` runs it:
-each state on a logical thread of its own, which the concurrence's thread watches.
+`Concurrence` is the container, and `ConcurrentFrame` runs it: each state on a logical thread of its
+own, which the concurrence's thread watches.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable, Mapping
+from operator import methodcaller
 from typing import Any, Unpack
 
 from surveillance_fsm import log
 from surveillance_fsm.clock import Interrupt
-from surveillance_fsm.container import (
-    Container,
-    forget,
-    forget_progress,
-    release_frame,
-    suspend,
-)
+from surveillance_fsm.container import Container
 from surveillance_fsm.exceptions import (
     InvalidStateError,
     InvalidTransitionError,
@@ -50,136 +45,6 @@ TOGETHER = Exit('')
 """Where every outcome of a concurrence's state leads: it has ended."""
 
 
-class OutcomePolicy:
-    """The default outcome, the outcome map and the callbacks of a concurrence.
-
-    Args:
-        outcomes: The concurrence's outcomes.
-        default: See `Concurrence`.
-        outcome_map: See `Concurrence`.
-        outcome_cb: See `Concurrence`.
-        child_termination_cb: See `Concurrence`.
-
-    Raises:
-        InvalidStateError: It names outcomes that are not declared, or a callback cannot be called.
-    """
-
-    def __init__(
-        self,
-        outcomes: Iterable[str],
-        default: str,
-        outcome_map: Mapping[str, Mapping[str, str]] | None,
-        outcome_cb: OutcomeCallback | None,
-        child_termination_cb: ChildTerminationCallback | None,
-    ) -> None:
-        self._outcomes = outcomes = frozenset(outcomes)
-        self.default = default
-        self._outcome_cb = outcome_cb
-        self._child_termination_cb = child_termination_cb
-        self.outcome_map = {key: dict(value) for key, value in (outcome_map or {}).items()}
-        faults = [
-            f'{shown(outcome)} is not one of its outcomes {sorted(outcomes)}'
-            for outcome in (default, *self.outcome_map)
-            if outcome not in outcomes
-        ]
-        for name, callback in (
-            ('outcome_cb', outcome_cb),
-            ('child_termination_cb', child_termination_cb),
-        ):
-            if callback is not None and not callable(callback):
-                faults.append(f'{name} {shown(callback)} cannot be called')
-        if faults:
-            raise InvalidStateError(
-                f'The outcome policy of a Concurrence is wrong: {"; ".join(faults)}'
-            )
-
-    def faults(self, states: Mapping[str, State]) -> list[str]:
-        """Return what the outcome map asks of states that they cannot do."""
-        faults = []
-        for outcome, wanted in self.outcome_map.items():
-            for label, end in wanted.items():
-                state = states.get(label)
-                if state is None:
-                    faults.append(f"outcome '{outcome}' asks for state '{label}', which it lacks")
-                elif end not in state.get_registered_outcomes():
-                    faults.append(
-                        f"outcome '{outcome}' asks for '{end}' of state '{label}', whose outcomes "
-                        f'are {sorted(state.get_registered_outcomes())}'
-                    )
-        return faults
-
-    @property
-    def has_callbacks(self) -> bool:
-        """Whether a callback has a say."""
-        return self._outcome_cb is not None or self._child_termination_cb is not None
-
-    def possible_outcomes(self) -> set[str]:
-        """Return the outcomes that may come of it; all of them, if a callback decides."""
-        if self._outcome_cb is not None:
-            return set(self._outcomes)
-        return {self.default, *self.outcome_map}
-
-    def to_stop(self, path: str, ends: Outcomes) -> frozenset[str]:
-        """Return the labels of the states to stop now that one has ended.
-
-        Args:
-            path: The concurrence's path, for errors.
-            ends: The outcomes of all states; None for those that run.
-
-        Raises:
-            InvalidUserCodeError: The callback raised, or returned no labels of states.
-        """
-        if self._child_termination_cb is None:
-            return frozenset()
-        try:
-            stop = self._child_termination_cb(dict(ends))
-        except Exception as error:
-            raise InvalidUserCodeError(
-                f"The child_termination_cb of '{path}' raised {describe(error)}"
-            ) from error
-        if isinstance(stop, str):
-            stop = [stop]
-        if not isinstance(stop, Iterable):
-            # SMACH looks at the truth of what is returned.
-            return frozenset(ends) if stop else frozenset()
-        labels = list(stop)
-        unknown = [label for label in labels if not isinstance(label, str) or label not in ends]
-        if unknown:
-            raise InvalidUserCodeError(
-                f"The child_termination_cb of '{path}' returned {shown(unknown)}: expected True, "
-                f'False or labels among {sorted(ends)}'
-            )
-        return frozenset(labels)
-
-    def decide(self, path: str, ends: Outcomes) -> str:
-        """Return the concurrence's outcome, all states having ended.
-
-        Raises:
-            InvalidUserCodeError: The callback raised.
-            InvalidTransitionError: It returned an outcome that is not declared.
-        """
-        outcome, most = self.default, 0
-        for name, wanted in self.outcome_map.items():
-            if len(wanted) >= most and all(ends[label] == end for label, end in wanted.items()):
-                outcome, most = name, len(wanted)
-        if self._outcome_cb is None:
-            return outcome
-        try:
-            chosen = self._outcome_cb(dict(ends))
-        except Exception as error:
-            raise InvalidUserCodeError(
-                f"The outcome_cb of '{path}' raised {describe(error)}"
-            ) from error
-        if not chosen:
-            return outcome
-        if not isinstance(chosen, Hashable) or chosen not in self._outcomes:
-            raise InvalidTransitionError(
-                f"The outcome_cb of '{path}' returned {shown(chosen)}: the outcomes are "
-                f'{sorted(self._outcomes)}'
-            )
-        return chosen
-
-
 class Concurrence(Container):
     """Executes all its states at the same time and ends when all have ended.
 
@@ -195,7 +60,7 @@ class Concurrence(Container):
             those that run). True stops all others; a list of labels stops those.
 
     Raises:
-        InvalidStateError: The outcome policy names outcomes that are not declared.
+        InvalidStateError: It names outcomes that are not declared, or a callback cannot be called.
     """
 
     together = True
@@ -211,13 +76,25 @@ class Concurrence(Container):
         child_termination_cb: ChildTerminationCallback | None = None,
     ) -> None:
         super().__init__(outcomes, input_keys, output_keys)
-        self.policy = OutcomePolicy(
-            self._outcomes,
-            default_outcome,
-            outcome_map,
-            outcome_cb,
-            child_termination_cb,
-        )
+        self.default_outcome = default_outcome
+        self.outcome_map = {key: dict(value) for key, value in (outcome_map or {}).items()}
+        self.outcome_cb = outcome_cb
+        self.child_termination_cb = child_termination_cb
+        faults = [
+            f'{shown(outcome)} is not one of its outcomes {sorted(self._outcomes)}'
+            for outcome in (default_outcome, *self.outcome_map)
+            if outcome not in self._outcomes
+        ]
+        for name, callback in (
+            ('outcome_cb', outcome_cb),
+            ('child_termination_cb', child_termination_cb),
+        ):
+            if callback is not None and not callable(callback):
+                faults.append(f'{name} {shown(callback)} cannot be called')
+        if faults:
+            raise InvalidStateError(
+                f'The outcome policy of a Concurrence is wrong: {"; ".join(faults)}'
+            )
 
     @staticmethod
     def add(
@@ -262,11 +139,83 @@ class Concurrence(Container):
         """
         if not self.fsm_states:
             raise InvalidStateError(f"Concurrence '{self.fsm_path}' cannot run: it has no states")
-        faults = self.policy.faults(self.fsm_states) + self._branch_faults()
+        faults = self._branch_faults()
+        for outcome, wanted in self.outcome_map.items():
+            for label, end in wanted.items():
+                state = self.fsm_states.get(label)
+                if state is None:
+                    faults.append(f"outcome '{outcome}' asks for state '{label}', which it lacks")
+                elif end not in state.get_registered_outcomes():
+                    faults.append(
+                        f"outcome '{outcome}' asks for '{end}' of state '{label}', whose outcomes "
+                        f'are {sorted(state.get_registered_outcomes())}'
+                    )
         if faults:
             raise InvalidTransitionError(
                 f"Concurrence '{self.fsm_path}' cannot run: {'; '.join(faults)}"
             )
+
+    # What comes of the states' outcomes.
+
+    def possible_outcomes(self) -> set[str]:
+        """Return the outcomes that may come of it; all of them, if a callback decides."""
+        if self.outcome_cb is not None:
+            return set(self._outcomes)
+        return {self.default_outcome, *self.outcome_map}
+
+    def states_to_stop(self, ends: Outcomes) -> frozenset[str]:
+        """Return the labels of the states to stop now that one has ended.
+
+        Args:
+            ends: The outcomes of all states; None for those that run.
+
+        Raises:
+            InvalidUserCodeError: The callback raised, or returned no labels of states.
+        """
+        if self.child_termination_cb is None:
+            return frozenset()
+        what = f"The child_termination_cb of '{self.fsm_path}'"
+        try:
+            stop = self.child_termination_cb(dict(ends))
+        except Exception as error:
+            raise InvalidUserCodeError(f'{what} raised {describe(error)}') from error
+        if isinstance(stop, str):
+            stop = [stop]
+        if not isinstance(stop, Iterable):
+            # SMACH looks at the truth of what is returned.
+            return frozenset(ends) if stop else frozenset()
+        labels = list(stop)
+        unknown = [label for label in labels if not isinstance(label, str) or label not in ends]
+        if unknown:
+            raise InvalidUserCodeError(
+                f'{what} returned {shown(unknown)}: expected True, False or labels among '
+                f'{sorted(ends)}'
+            )
+        return frozenset(labels)
+
+    def outcome_of(self, ends: Outcomes) -> str:
+        """Return the concurrence's outcome, all states having ended.
+
+        Raises:
+            InvalidUserCodeError: The callback raised.
+            InvalidTransitionError: It returned an outcome that is not declared.
+        """
+        outcome, most = self.default_outcome, 0
+        for name, wanted in self.outcome_map.items():
+            if len(wanted) >= most and all(ends[label] == end for label, end in wanted.items()):
+                outcome, most = name, len(wanted)
+        if self.outcome_cb is None:
+            return outcome
+        what = f"The outcome_cb of '{self.fsm_path}'"
+        try:
+            chosen = self.outcome_cb(dict(ends)) or outcome
+        except Exception as error:
+            raise InvalidUserCodeError(f'{what} raised {describe(error)}') from error
+        if not isinstance(chosen, Hashable) or chosen not in self._outcomes:
+            raise InvalidTransitionError(
+                f'{what} returned {shown(chosen)}: the outcomes are {sorted(self._outcomes)}'
+            )
+        return chosen
 
     # Running.
 
@@ -296,7 +245,7 @@ class Concurrence(Container):
         """Return the outcome map as (child outcome, label, outcome)."""
         return [
             (child_outcome, label, outcome)
-            for outcome, wanted in self.policy.outcome_map.items()
+            for outcome, wanted in self.outcome_map.items()
             for label, child_outcome in wanted.items()
         ]
 
@@ -356,7 +305,7 @@ class ConcurrentFrame(Frame):
             log.loginfo(f"'{self.path}' starts {sorted(container.fsm_states)} together")
         if history is None:
             container.call_start_cbs()
-        if run.trace is not None:
+        if run.control.trace is not None:
             self.note((SpecialStep(self.path, '', '', 'start'), '', run.now(), NO_USERDATA))
         return self._finish(self._run_states())
 
@@ -401,13 +350,13 @@ class ConcurrentFrame(Frame):
         container = self.container
         preempted = container.preempt_requested()
         served = self._served_preempt(preempted=preempted)
-        outcome = container.policy.decide(self.path, self.outcomes)
+        outcome = container.outcome_of(self.outcomes)
         if not (preempted and served):
             # A request that came too late for all of them stays, for what runs next.
             return outcome
         if 'preempted' in container.get_registered_outcomes():
             outcome = 'preempted'
-        elif outcome == container.policy.default:
+        elif outcome == container.default_outcome:
             # Nothing says that the outcome stands for a preempt: what runs next is asked.
             return outcome
         container.service_preempt()
@@ -472,7 +421,7 @@ class ConcurrentFrame(Frame):
                 thread = running.pop(label)
                 if thread.error is not None:
                     first_error = first_error or thread.error
-                    self._stop(running, _preempt)
+                    self._stop(running)
                     continue
                 with self.run.condition:
                     ended = self._note_end(label, thread)
@@ -488,26 +437,27 @@ class ConcurrentFrame(Frame):
         """Stop the states that are to stop now that one has ended; the error of deciding that."""
         error = None
         try:
-            stop: Iterable[str] = self.container.policy.to_stop(self.path, self.outcomes)
+            stop: Iterable[str] = self.container.states_to_stop(self.outcomes)
         except SmachError as raised:
             error, stop = raised, list(running)
-        self._stop({label: running[label] for label in stop if label in running}, _preempt)
+        self._stop({label: running[label] for label in stop if label in running})
         return error
 
     def _note_end(self, label: str, thread: ExecutionThread) -> str | None:
         """Note what a state ended with; None when it only made way."""
-        state, outcome = self.container.fsm_states[label], thread.outcome
+        node, outcome = self.container.fsm_table[label], thread.outcome
+        state = node.state
         if thread.without_leaf:
             self._left_behind.add(label)
         if thread.forced is not None:
             # A preempt that it was asked for, too, is not served by that.
             outcome = thread.forced[1]
             self._told_to_stop.discard(label)
-            forget(state)
+            state.fsm_forget()
             if label not in self._left_behind:
                 state.recall_preempt()
         elif outcome is SUSPENDED:
-            release_frame(state)
+            node.release()
             return None
         elif label in self._making_way and isinstance(state, Container):
             # One that makes way is suspended; any other outcome is its own.
@@ -520,20 +470,24 @@ class ConcurrentFrame(Frame):
                 return None
             # Nor by ending by itself.
             self._told_to_stop.discard(label)
-        forget_progress(state)
+        state.fsm_progress = None
         self.outcomes[label] = outcome
-        release_frame(state)
+        node.release()
         return str(outcome)
 
     def _tell_end(self, label: str, outcome: str) -> None:
-        if self.run.trace is not None:
+        if self.run.control.trace is not None:
             step = SpecialStep(self.path, label, '', 'ended')
             self.note((step, outcome, self.run.now(), raw(self.container.userdata).copy()))
         if self.run.chatty:
             log.loginfo(f"'{self.path}': '{label}' ended with '{outcome}'")
         self.container.call_transition_cbs()
 
-    def _stop(self, threads: Mapping[str, ExecutionThread], ask: Callable[[State], object]) -> None:
+    def _stop(
+        self,
+        threads: Mapping[str, ExecutionThread],
+        ask: Callable[[State], object] = methodcaller('request_preempt'),
+    ) -> None:
         for label, thread in threads.items():
             if not thread.done:
                 thread.wanted = True
@@ -541,7 +495,7 @@ class ConcurrentFrame(Frame):
                 ask(self.container.fsm_states[label])
 
     def _abandon(self, running: Mapping[str, ExecutionThread]) -> None:
-        self._stop(running, _preempt)
+        self._stop(running)
         for thread in running.values():
             thread.disown()
         raise LeftBehindError
@@ -576,7 +530,7 @@ class ConcurrentFrame(Frame):
                 raise LeftBehindError
             self.thread.heeded()
             self.current = TOGETHER
-            release_frame(branch.state)
+            node.release()
             gone, self.gone = self.gone is node, None
             pending = branch.state.preempt_requested() and not gone
             served = not pending or outcome == 'preempted'
@@ -591,14 +545,14 @@ class ConcurrentFrame(Frame):
                     container.fsm_history = self.where()
                     return SUSPENDED
                 return None
-            forget(branch.state)
+            branch.state.fsm_forget()
             if forced is None and container.preempt_requested() and not pending:
                 container.service_preempt()
         target = node.target(outcome)
         if target is RESUMPTION:
             return None
         for state in container.fsm_states.values():
-            forget(state)
+            state.fsm_forget()
         return target.label
 
     # What others want; under the run's condition.
@@ -620,7 +574,7 @@ class ConcurrentFrame(Frame):
             if not thread.done and label not in self._told_to_stop
         }
         self._told_to_stop.update(asked)
-        self._stop(asked, _preempt)
+        self._stop(asked)
 
     def interrupted(self) -> None:
         """Make way for the container's raised interrupts."""
@@ -637,11 +591,11 @@ class ConcurrentFrame(Frame):
         if isinstance(current, Node):
             self.cut = current
             self.thread.asked()
-            suspend(current.state)
+            current.state.fsm_suspend()
             return
         going_on = [label for label, thread in self._threads.items() if not thread.done]
         self._making_way.update(going_on)
-        self._stop(self._threads, suspend)
+        self._stop(self._threads, methodcaller('fsm_suspend'))
 
     def woken(self) -> None:
         """Wake the thread that waits for the states: it was left behind."""
@@ -668,7 +622,3 @@ def _execute(node: Node) -> Any:
         raise node.user_fault(error) from error
     node.target(outcome)
     return outcome
-
-
-def _preempt(state: State) -> None:
-    state.request_preempt()

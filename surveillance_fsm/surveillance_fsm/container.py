@@ -38,12 +38,7 @@ from surveillance_fsm.execution import (
     Run,
 )
 from surveillance_fsm.log import logerr, logwarn
-from surveillance_fsm.state import (
-    State,
-    has_smach_interface,
-    structure_version,
-    this_thread,
-)
+from surveillance_fsm.state import State, structure_version, this_thread
 from surveillance_fsm.timeouts import (
     TIMEOUT,
     LimitOptions,
@@ -401,7 +396,7 @@ class Container(State):
         path = self.fsm_path_of(label)
         if label in self.fsm_states or label in self.fsm_branches:
             raise InvalidStateError(f"State '{path}' is already there: a label names one state")
-        if not has_smach_interface(state) or not callable(getattr(state, 'execute', None)):
+        if not isinstance(state, State):
             raise InvalidStateError(
                 f"State '{path}' must be an instance of State, not {shown(state)}"
             )
@@ -474,11 +469,10 @@ class Container(State):
         if isinstance(state, Container) and state.is_entered_directly():
             node.enter = node.execute = state.fsm_enter
         clock = self.fsm_clock
-        if isinstance(state, State) and state.fsm_clock is not clock:
+        if state.fsm_clock is not clock:
             state.fsm_clock = clock
-        left = getattr(state, 'fsm_left', None)
-        if left is not None and left.is_going_on():
-            block_reentry(node, left)
+        if state.fsm_left is not None and state.fsm_left.is_going_on():
+            block_reentry(node, state.fsm_left)
         limits = node.limits = self.fsm_limits.get(label)
         if limits is not None:
             node.execute = limited(node, limits)
@@ -532,10 +526,7 @@ class Container(State):
         """Tell whether a state inside has limits that somebody must watch."""
         return bool(self.fsm_limits) or any(
             isinstance(state, Container) and state.has_limits()
-            for state in (
-                *self.fsm_states.values(),
-                *(branch.state for branch in self.fsm_branches.values()),
-            )
+            for state in self.fsm_children().values()
         )
 
     # Running.
@@ -574,9 +565,7 @@ class Container(State):
     def _execute_as_root(self, parent_ud: Any) -> Any:
         """Begin a run of its own, and watch it to its end."""
         control, wakeup = self.control, Interrupt()
-        run = Run(
-            control.condition, control.lock, self.fsm_clock, self._preempt_timeout, control.trace
-        )
+        run = Run(control, self.fsm_clock, self._preempt_timeout)
         thread = ExecutionThread(run, self.fsm_path, wakeup, self)
 
         def body() -> Any:
@@ -739,6 +728,12 @@ class Container(State):
         """Tell whether an interrupt was raised that is more urgent than `priority`."""
         return any(branch.priority > priority for branch in self.fsm_raised)
 
+    def fsm_children(self) -> dict[str, State]:
+        """Return the states and interrupts inside by label."""
+        return self.fsm_states | {
+            label: branch.state for label, branch in self.fsm_branches.items()
+        }
+
     def fsm_suspend(self) -> None:
         """Have the container put aside with its history; under the run's condition."""
         # Noted first: an execution that begins in this moment looks after it has become visible.
@@ -747,6 +742,17 @@ class Container(State):
         if frame is not None:
             self.fsm_aside = False
             frame.suspend()
+
+    def fsm_recall_suspend(self) -> None:
+        """Take that back from a container that had not begun."""
+        self.fsm_aside = False
+
+    def fsm_forget(self) -> None:
+        """Drop the history of the container and of all inside: it will not be resumed."""
+        super().fsm_forget()
+        self.fsm_history = None
+        for child in self.fsm_children().values():
+            child.fsm_forget()
 
     def _branch_faults(self) -> list[str]:
         names = {*self.fsm_states, *self.get_registered_outcomes(), RESUME}
@@ -757,42 +763,3 @@ class Container(State):
             for outcome, target in branch.transitions.items()
             if target not in names
         ]
-
-
-def suspend(state: State) -> None:
-    """Suspend a container, which keeps its history; preempt any other state."""
-    if isinstance(state, Container):
-        state.fsm_suspend()
-    else:
-        state.request_preempt()
-
-
-def recall_suspend(state: State) -> None:
-    """Take `suspend` back from a state that had not begun."""
-    if isinstance(state, Container):
-        state.fsm_aside = False
-    else:
-        state.recall_preempt()
-
-
-def forget(state: State) -> None:
-    """Drop the history of a state that will not be resumed."""
-    forget_progress(state)
-    if isinstance(state, Container):
-        state.fsm_history = None
-        for child in state.fsm_states.values():
-            forget(child)
-        for branch in state.fsm_branches.values():
-            forget(branch.state)
-
-
-def release_frame(state: State) -> None:
-    """Drop the frame of a container that has ended, once its parent has noted that."""
-    if isinstance(state, Container):
-        state.fsm_frame = None
-
-
-def forget_progress(state: State) -> None:
-    """Drop how far a state has come."""
-    if getattr(state, 'fsm_progress', None) is not None:
-        state.fsm_progress = None

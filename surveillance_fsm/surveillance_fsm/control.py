@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING
 
 from surveillance_fsm.exceptions import InvalidStateError, InvalidTransitionError, describe
 from surveillance_fsm.execution import (
@@ -17,9 +17,11 @@ from surveillance_fsm.execution import (
     RawTransition,
     Run,
     Trace,
-    Work,
 )
 from surveillance_fsm.log import logerr
+
+if TYPE_CHECKING:
+    from surveillance_fsm.container import Container
 
 shutdown_check: Callable[[], bool] | None = None
 """What was set with `set_shutdown_check`."""
@@ -48,23 +50,22 @@ class Control:
     Attributes:
         condition: The one condition of the machine.
         lock: Its lock.
+        paused: No further state is entered; see `pause`.
+        steps: States that may be entered although paused.
+        trace: Where transitions are reported, if anywhere.
     """
 
-    def __init__(self, container: Any) -> None:
+    def __init__(self, container: Container) -> None:
         # The condition's lock by itself, too: it is taken sooner.
         self.lock = threading.RLock()
         self.condition = threading.Condition(self.lock)
+        self.paused = False
+        self.steps = 0
+        self.trace: Trace | None = None
         self._container = container
-        self._run: Run | None = None
-        self._paused = False
         self._traces: list[Trace] = []
-        self._trace: Trace | None = None
-        self._left: list[tuple[str, Work]] = []
-
-    @property
-    def trace(self) -> Trace | None:
-        """Where transitions are reported, if anywhere."""
-        return self._trace
+        # The last one, which may have ended.
+        self._run: Run | None = None
 
     def add_trace(self, trace: Trace) -> Callable[[], None]:
         """Report every transition to `trace`, in the thread that makes it.
@@ -98,15 +99,8 @@ class Control:
                 except Exception as error:
                     logerr(f'Trace {trace!r} raised {describe(error)}')
 
-        self._trace = None if not traces else traces[0] if len(traces) == 1 else tell_all
-        if self._run is not None:
-            self._run.trace = self._trace
-            self._run.call_attention()
-
-    @property
-    def paused(self) -> bool:
-        """Whether no further state is entered."""
-        return self._paused
+        self.trace = None if not traces else traces[0] if len(traces) == 1 else tell_all
+        self._call_attention()
 
     def pause(self) -> None:
         """Enter no further state; the one that runs is not disturbed. A preempt goes through."""
@@ -118,11 +112,8 @@ class Control:
 
     def _set_paused(self, paused: bool) -> None:
         with self.condition:
-            self._paused = paused
-            if self._run is not None:
-                self._run.paused = paused
-                self._run.steps = 0
-                self._run.call_attention()
+            self.paused, self.steps = paused, 0
+            self._call_attention()
 
     def step(self) -> None:
         """Enter one more state of a paused machine.
@@ -131,14 +122,24 @@ class Control:
             InvalidStateError: The machine is not paused, or does not run.
         """
         with self.condition:
-            run = self._run
-            if run is None or not run.paused:
+            running = self._run is not None and not self._run.ended
+            if not running or not self.paused:
                 raise InvalidStateError(
                     f"'{self._container.get_name()}' cannot step: it is not "
-                    f'{"running" if run is None else "paused"}'
+                    f'{"paused" if running else "running"}'
                 )
-            run.steps += 1
-            run.call_attention()
+            self.steps += 1
+            self._call_attention()
+
+    def _call_attention(self) -> None:
+        """Make every thread look up at its next transition, and wake those that pause."""
+        for thread in self._threads():
+            for frame in tuple(thread.stack):
+                frame.attention = True
+        self.condition.notify_all()
+
+    def _threads(self) -> list[ExecutionThread]:
+        return self._run.threads if self._run is not None else []
 
     def force_outcome(self, path: str, outcome: str) -> None:
         """End the state at `path` with `outcome`, whatever it returns itself.
@@ -152,10 +153,8 @@ class Control:
             InvalidTransitionError: It has no such outcome.
         """
         with self.condition:
-            frames = self._run.frames() if self._run is not None else []
             # Attention first, then a look: what is current now is held until this is done.
-            for each in frames:
-                each.attention = True
+            self._call_attention()
             active = self._active()
             if path not in active:
                 raise InvalidStateError(
@@ -189,7 +188,7 @@ class Control:
     def _active(self) -> dict[str, tuple[Frame | ExecutionThread, Node]]:
         """Return the active states by path: where an outcome is forced, and their nodes."""
         active: dict[str, tuple[Frame | ExecutionThread, Node]] = {}
-        for thread in self._run.threads if self._run is not None else ():
+        for thread in self._threads():
             if thread.leaf is not None:
                 active[thread.path] = thread, thread.leaf
             for frame in tuple(thread.stack):
@@ -200,8 +199,7 @@ class Control:
     def left_behind(self) -> list[str]:
         """Paths of states that the last run went on without and that are still running."""
         with self.condition:
-            run = self._run
-            left = run.left_behind if run is not None else self._left
+            left = self._run.left_behind if self._run is not None else []
             return [path for path, work in left if work.is_going_on()]
 
     def begin(self, run: Run) -> None:
@@ -211,15 +209,12 @@ class Control:
             InvalidStateError: Another run has not ended.
         """
         with self.lock:
-            if self._run is not None:
+            if self._run is not None and not self._run.ended:
                 raise InvalidStateError(f"'{self._container.get_name()}' is running already")
-            run.paused = self._paused
-            run.trace = self._trace
-            self._run = run
+            self._run, self.steps = run, 0
 
     def end(self, run: Run) -> None:
         """Let go of a run that has ended."""
         with self.lock:
-            self._left = run.left_behind
-            self._run = None
+            run.ended = True
             self.condition.notify_all()

@@ -18,7 +18,7 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from surveillance_fsm import log
 from surveillance_fsm.clock import WALL_CLOCK, Clock, Interrupt, elapsed_of
@@ -32,6 +32,10 @@ from surveillance_fsm.exceptions import (
 )
 from surveillance_fsm.state import State, this_thread
 from surveillance_fsm.userdata import Remapper
+
+if TYPE_CHECKING:
+    from surveillance_fsm.container import Container
+    from surveillance_fsm.control import Control
 
 LOWEST = float('-inf')
 """The priority of ordinary work, below that of every interrupt."""
@@ -98,16 +102,6 @@ class Limits:
     late_outcome: str
 
 
-class Enclosing(Protocol):
-    """What a node asks of the container that its state is in."""
-
-    def get_name(self) -> str:
-        """Return the container's path."""
-
-    def fsm_view(self, node: Node) -> Remapper:
-        """Make a state's view of the container's userdata."""
-
-
 class Node:
     """One state of a container as the loop needs it.
 
@@ -142,7 +136,7 @@ class Node:
     kind = 'transition'
 
     def __init__(
-        self, container: Enclosing, label: str, state: State, priority: float = LOWEST
+        self, container: Container, label: str, state: State, priority: float = LOWEST
     ) -> None:
         self.container = container
         self.label = label
@@ -183,6 +177,11 @@ class Node:
             return self.targets[outcome]
         except (KeyError, TypeError):
             raise self.wrong_outcome(outcome) from None
+
+    def release(self) -> None:
+        """Drop the frame of a container that has ended, now that its parent has noted that."""
+        if self.is_container:
+            self.state.fsm_frame = None  # type: ignore[attr-defined]
 
     def revoke(self) -> None:
         """Cut the view in use off the userdata, and make a new one for the next execution."""
@@ -334,7 +333,7 @@ class Frame:
 
     def __init__(
         self,
-        container: Any,
+        container: Container,
         thread: ExecutionThread,
         path: str,
         current: Node | Exit,
@@ -447,7 +446,7 @@ class Frame:
 
     def note(self, raw: RawTransition) -> None:
         """Tell the run's trace of a transition; what that raises is logged."""
-        trace = self.run.trace
+        trace = self.run.control.trace
         if trace is None:
             return
         try:
@@ -463,51 +462,31 @@ class Run:
     """One execution of a root container: what all its threads share.
 
     Attributes:
+        control: What others want of the machine, over all executions.
         condition: The one condition of the machine; its lock guards everything slow.
         lock: That lock by itself.
         clock: The machine's clock.
         preempt_timeout: See `DEFAULT_PREEMPT_TIMEOUT`; None waits for ever.
-        trace: Where transitions are reported, if anywhere.
         now: The time of reports and limits.
         chatty: Transitions are worth a line in the log.
-        paused: No further state is entered.
-        steps: States that may be entered although paused.
+        ended: It is over.
         sleeps_on_clock: A thread watches time limits and waits on the machine's clock.
         left_behind: Paths of the states the machine went on without, and the work that hangs.
         threads: The logical threads that are at work.
     """
 
-    def __init__(
-        self,
-        condition: threading.Condition,
-        lock: threading.RLock,
-        clock: Clock,
-        preempt_timeout: float | None,
-        trace: Trace | None,
-    ) -> None:
-        self.condition = condition
-        self.lock = lock
+    def __init__(self, control: Control, clock: Clock, preempt_timeout: float | None) -> None:
+        self.control = control
+        self.condition = control.condition
+        self.lock = control.lock
         self.clock = clock
         self.preempt_timeout = preempt_timeout
-        self.trace = trace
         self.now: Callable[[], float] = time.monotonic if clock is WALL_CLOCK else elapsed_of(clock)
         self.chatty = log.chatty()
-        self.paused = False
-        self.steps = 0
+        self.ended = False
         self.sleeps_on_clock = False
         self.left_behind: list[tuple[str, Work]] = []
         self.threads: list[ExecutionThread] = []
-
-    def frames(self) -> list[Frame]:
-        """Return the frames of all threads, outermost first; under the condition."""
-        return [frame for thread in self.threads for frame in tuple(thread.stack)]
-
-    def call_attention(self) -> None:
-        """Make every thread look up at its next transition, and wake those that pause."""
-        with self.condition:
-            for frame in self.frames():
-                frame.attention = True
-            self.condition.notify_all()
 
 
 @dataclass
@@ -684,7 +663,6 @@ class Work:
         self._thread = thread
         self._body = body
         self._context = contextvars.copy_context()
-        self._ended = False
         self._going_on = threading.Lock()
         self._going_on.acquire()
 
@@ -703,7 +681,7 @@ class Work:
 
     def is_going_on(self) -> bool:
         """Tell whether it has not ended."""
-        return not self._ended
+        return self._going_on.locked()
 
     def await_end(self, seconds: float | None) -> bool:
         """Wait for the end, in seconds of steady time; whether it came."""
@@ -726,7 +704,6 @@ class Work:
             error = raised
         finally:
             here.thread = here.stack = None
-            self._ended = True
             self._going_on.release()
         with thread.run.lock:
             if self.stack is not thread.stack:

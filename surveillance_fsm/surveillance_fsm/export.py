@@ -245,12 +245,11 @@ def _container_data(container: Container, path: str) -> dict[str, Any]:
 
 def _kind_data(container: Container, path: str) -> dict[str, Any]:
     if isinstance(container, Concurrence):
-        policy = container.policy
-        if policy.has_callbacks:
+        if container.outcome_cb is not None or container.child_termination_cb is not None:
             raise MachineFileError(f"'{path}' has callbacks, which have no form as data")
-        data: dict[str, Any] = {'default_outcome': policy.default}
-        if policy.outcome_map:
-            data['outcome_map'] = policy.outcome_map
+        data: dict[str, Any] = {'default_outcome': container.default_outcome}
+        if container.outcome_map:
+            data['outcome_map'] = container.outcome_map
         return data
     if isinstance(container, IteratorContainer):
         items = container.items

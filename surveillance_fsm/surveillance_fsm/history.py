@@ -30,7 +30,7 @@ from surveillance_fsm.exceptions import MachineFileError, describe, shown
 from surveillance_fsm.execution import History, RawTransition
 from surveillance_fsm.log import logerr, logwarn
 from surveillance_fsm.state import State
-from surveillance_fsm.structure import Edge, Structure, children_of, structure_of
+from surveillance_fsm.structure import Edge, Structure, structure_of
 from surveillance_fsm.userdata import raw
 
 RECORD_FORMAT = 'surveillance-fsm-record'
@@ -384,8 +384,8 @@ def capture(machine: Container, leave_out: Iterable[str] = ()) -> dict[str, Any]
 
 def _capture(state: State, path: str, leave_out: frozenset[str]) -> dict[str, Any]:
     entry: dict[str, Any] = {}
-    progress = dict(getattr(state, 'fsm_progress', None) or {})
-    waiting = getattr(state, 'fsm_waiting', None)
+    progress = dict(state.fsm_progress or {})
+    waiting = state.fsm_waiting
     if waiting is not None:
         progress[waiting[0]] = elapsed_of(state.fsm_clock)() - waiting[1]
     if progress:
@@ -403,7 +403,7 @@ def _capture(state: State, path: str, leave_out: frozenset[str]) -> dict[str, An
         entry['raised'] = [branch.label for branch in state.fsm_raised]
     inside = {
         label: _capture(child, f'{path}/{label}', leave_out)
-        for label, child in children_of(state).items()
+        for label, child in state.fsm_children().items()
     }
     inside = {label: child for label, child in inside.items() if child}
     if inside:
@@ -540,7 +540,7 @@ def _plan(state: State, path: str, entry: Any, todo: list[Callable[[], None]]) -
                 )
         return
     userdata = _read_values(path, 'userdata', entry.get('userdata', {}))
-    children = children_of(state)
+    children = state.fsm_children()
     at = entry.get('at')
     history = None if at is None else _read_place(state, path, at)
     raised = entry.get('raised', [])
@@ -593,7 +593,7 @@ def _read_place(state: Container, path: str, at: Any) -> History:
     for place in history.saved:
         pair = isinstance(place, list | tuple) and [type(part) for part in place]
         _expect(pair == [str, bool], path, 'a place', place)
-    labels = children_of(state)
+    labels = state.fsm_children()
     for label, leaving in ((history.current, history.leaving), *history.saved):
         if not (state.together or leaving or label in labels):
             raise MachineFileError(

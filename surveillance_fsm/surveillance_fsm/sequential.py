@@ -11,14 +11,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from surveillance_fsm import control, log
-from surveillance_fsm.container import (
-    Container,
-    forget,
-    forget_progress,
-    recall_suspend,
-    release_frame,
-    suspend,
-)
+from surveillance_fsm.container import Container
 from surveillance_fsm.exceptions import SmachError, describe
 from surveillance_fsm.execution import (
     LOWEST,
@@ -89,12 +82,12 @@ class SequentialFrame(Frame):
             or container.fsm_raised
             or self.attention
             or self.suspending
-            or run.paused
+            or run.control.paused
             or history is not None
             or control.shutdown_check is not None
         ):
             target = self._attend(None, None, target)
-        elif run.trace is not None:
+        elif run.control.trace is not None:
             self._tell(_Move(None, None, target, 'start'))
         return self._run_from(target)
 
@@ -107,14 +100,14 @@ class SequentialFrame(Frame):
             end_watch(self.thread, watch)
             outcome = settle(node, self, watch, outcome)
         self.current = target = node.target(outcome)
-        release_frame(node.state)
+        node.release()
         return self._run_from(self._attend(node, outcome, target))
 
     def _run_from(self, target: Any) -> Any:
         """Execute states from `target` on until one leads out of the container; the outcome."""
         container, run = self.container, self.run
         data, now = container.fsm_data, run.now
-        trace, callbacks, chatty = run.trace, container.fsm_transition_cbs, run.chatty
+        trace, callbacks, chatty = run.control.trace, container.fsm_transition_cbs, run.chatty
         told: Node | Exit = target
         node: Any = None
         while not target.is_exit:
@@ -134,7 +127,7 @@ class SequentialFrame(Frame):
                 node.state.fsm_frame = None
             if self.attention:
                 told = target = self._attend(node, outcome, target)
-                trace, chatty = run.trace, run.chatty
+                trace, chatty = run.control.trace, run.chatty
             elif trace is not None or callbacks or chatty or control.shutdown_check is not None:
                 if control.is_shutdown():
                     self.stopped = target
@@ -173,7 +166,12 @@ class SequentialFrame(Frame):
         kind, moved = '', True
         while True:
             with run.condition:
-                if still and not (self.attention or self.stale) and run.paused and not run.steps:
+                if (
+                    still
+                    and not (self.attention or self.stale)
+                    and run.control.paused
+                    and not run.control.steps
+                ):
                     run.condition.wait()
                 if self.stale:
                     raise LeftBehindError
@@ -246,7 +244,7 @@ class SequentialFrame(Frame):
         """Take the request to make way back from a state that had not begun when it came."""
         cut = self.cut
         if cut is not None and cut is not ended:
-            recall_suspend(cut.state)
+            cut.state.fsm_recall_suspend()
             if self.preempted is cut:
                 self.preempted = None  # It is asked again.
             self.cut = None
@@ -289,7 +287,7 @@ class SequentialFrame(Frame):
         if stays:
             self.repeat = True
         else:
-            forget_progress(state)
+            state.fsm_progress = None
             if preempted and target is left:
                 target = self._end_of_loop(outcome, target)
         return target, not stays
@@ -300,7 +298,7 @@ class SequentialFrame(Frame):
 
     def _drop_requests(self, left: Node) -> None:
         left.state.recall_preempt()
-        forget(left.state)
+        left.state.fsm_forget()
         self.forced = self.preempted = self.cut = None
 
     def _preempt_next(self, target: Node) -> None:
@@ -314,15 +312,19 @@ class SequentialFrame(Frame):
 
     def _stands_still(self, target: Node | Exit) -> bool:
         """Tell whether the machine is paused here; takes one step if it may."""
-        run = self.run
-        if not run.paused or not isinstance(target, Node) or isinstance(target.state, Container):
+        control = self.run.control
+        if (
+            not control.paused
+            or not isinstance(target, Node)
+            or isinstance(target.state, Container)
+        ):
             return False
         if self.suspending:
             return False
         if any(other.container.preempt_requested() for other in self.thread.stack):
             return False
-        if run.steps:
-            run.steps -= 1
+        if control.steps:
+            control.steps -= 1
             return False
         return True
 
@@ -335,8 +337,8 @@ class SequentialFrame(Frame):
             or self.suspending
             or self.cut
             or self.forced
-            or self.run.paused
-            or (isinstance(target, Node) and getattr(target.state, 'fsm_progress', None))
+            or self.run.control.paused
+            or (isinstance(target, Node) and target.state.fsm_progress)
         )
 
     def _leave_branch(self, target: Node | Exit, kind: str) -> tuple[Node | Exit, str]:
@@ -347,7 +349,7 @@ class SequentialFrame(Frame):
             return target, 'resume'
         for node in self.saved:
             if isinstance(node, Node):
-                forget(node.state)
+                node.state.fsm_forget()
         self.saved = ()
         return target, kind
 
@@ -358,11 +360,11 @@ class SequentialFrame(Frame):
         container, run = self.container, self.run
         left, outcome, target, kind = move
         if left is None:
-            if run.trace is not None:
+            if run.control.trace is not None:
                 step = SpecialStep(self.path, '', target.label, kind or 'start')
                 self.note((step, '', run.now(), NO_USERDATA))
             return
-        if run.trace is not None:
+        if run.control.trace is not None:
             kind = target.kind if target.is_exit else kind or 'transition'
             step = SpecialStep(self.path, left.label, target.label, kind)
             self.note((step, outcome, run.now(), raw(container.userdata).copy()))
@@ -387,7 +389,7 @@ class SequentialFrame(Frame):
             self.preempted = current
             self.thread.asked()
             current.state.request_preempt()
-        if self.run.paused:
+        if self.run.control.paused:
             self.run.condition.notify_all()
 
     def interrupted(self) -> None:
@@ -395,7 +397,7 @@ class SequentialFrame(Frame):
         self.attention = True
         if self.container.fsm_urgent(self.current.priority):
             self._cut()
-        if self.run.paused:
+        if self.run.control.paused:
             self.run.condition.notify_all()
 
     def suspend(self) -> None:
@@ -408,7 +410,7 @@ class SequentialFrame(Frame):
         if isinstance(current, Node) and self.cut is not current:
             self.cut = current
             self.thread.asked()
-            suspend(current.state)
+            current.state.fsm_suspend()
 
     def where(self) -> History | None:
         """Return where the container would go on if its process ended now."""

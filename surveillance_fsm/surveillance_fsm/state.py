@@ -113,20 +113,14 @@ class CBInterface:
         return tuple(self._outcomes)
 
 
-class cb_interface:  # noqa: N801 - SMACH's name
-    """Decorator that gives a function a `CBInterface`."""
-
-    def __init__(
-        self,
-        outcomes: Iterable[str] | None = None,
-        input_keys: Iterable[str] | None = None,
-        output_keys: Iterable[str] | None = None,
-        io_keys: Iterable[str] | None = None,
-    ) -> None:
-        self._declared = (outcomes, input_keys, output_keys, io_keys)
-
-    def __call__(self, cb: Callable[..., Any]) -> CBInterface:
-        return CBInterface(cb, *self._declared)
+def cb_interface(
+    outcomes: Iterable[str] | None = None,
+    input_keys: Iterable[str] | None = None,
+    output_keys: Iterable[str] | None = None,
+    io_keys: Iterable[str] | None = None,
+) -> Callable[[Callable[..., Any]], CBInterface]:
+    """Return a decorator that gives a function a `CBInterface`."""
+    return lambda cb: CBInterface(cb, outcomes, input_keys, output_keys, io_keys)
 
 
 class State:
@@ -250,11 +244,14 @@ class State:
 
     def service_preempt(self) -> None:
         """Acknowledge the request: the state stopped because of it."""
-        self._drop_preempt()
+        State.recall_preempt(self)
 
     def recall_preempt(self) -> None:
         """Take the request back."""
-        self._drop_preempt()
+        with _preempt_lock:
+            self._preempt_requested = False
+            if self.fsm_interrupt is not None:
+                self.fsm_interrupt.clear()
 
     def preempt_requested(self) -> bool:
         """Tell whether a request to stop is pending."""
@@ -282,7 +279,7 @@ class State:
         if progress is not None:
             self.fsm_waiting = (progress, start)
         while True:
-            interrupt = self._armed_interrupt()
+            interrupt = self.interrupt
             finished = clock.sleep(max(0.0, start + seconds - elapsed()), interrupt)
             # A preempt that was serviced meanwhile may wake a wait it was not meant for.
             if finished or self._preempt_requested:
@@ -309,9 +306,6 @@ class State:
     @property
     def interrupt(self) -> Interrupt:
         """What a preempt raises: for waits and calls that take an interrupt of their own."""
-        return self._armed_interrupt()
-
-    def _armed_interrupt(self) -> Interrupt:
         with _preempt_lock:
             interrupt = self.fsm_interrupt
             if interrupt is None:
@@ -324,11 +318,23 @@ class State:
             interrupt.set()
         return interrupt
 
-    def _drop_preempt(self) -> None:
-        with _preempt_lock:
-            self._preempt_requested = False
-            if self.fsm_interrupt is not None:
-                self.fsm_interrupt.clear()
+    # What a container overrides.
+
+    def fsm_children(self) -> dict[str, State]:
+        """Return the states and interrupts inside by label; none but in a container."""
+        return {}
+
+    def fsm_suspend(self) -> None:
+        """Ask the state to make way for an interrupt; under the run's condition."""
+        self.request_preempt()
+
+    def fsm_recall_suspend(self) -> None:
+        """Take that back from a state that had not begun."""
+        self.recall_preempt()
+
+    def fsm_forget(self) -> None:
+        """Drop how far the state has come: it will not be resumed."""
+        self.fsm_progress = None
 
 
 class CBState(State):

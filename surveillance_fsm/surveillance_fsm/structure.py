@@ -112,14 +112,6 @@ def structure_of(container: Container, path: str | None = None) -> Structure:
     )
 
 
-def children_of(state: State) -> dict[str, State]:
-    """Return the states and interrupts inside a container by label; none inside any other state."""
-    if not isinstance(state, Container):
-        return {}
-    branches = {label: branch.state for label, branch in state.fsm_branches.items()}
-    return {**state.fsm_states, **branches}
-
-
 def state_at(container: Container, path: str) -> State:
     """Return the state at a path that begins with the container's own.
 
@@ -133,7 +125,7 @@ def state_at(container: Container, path: str) -> State:
     walked = root
     labels = path[len(root) + 1 :].split('/') if path != root else []
     for label in labels:
-        children = children_of(state)
+        children = state.fsm_children()
         if label not in children:
             raise KeyError(f"'{walked}' has no state '{label}': its states are {sorted(children)}")
         state = children[label]
