@@ -178,7 +178,6 @@ class Control:
                 place.wanted = True
                 place.asked()
             node.state.request_preempt()
-            self.condition.notify_all()
 
     def active_paths(self) -> list[str]:
         """Paths of all states that are active, containers included, outermost first."""

@@ -166,12 +166,8 @@ class SequentialFrame(Frame):
         kind, moved = '', True
         while True:
             with run.condition:
-                if (
-                    still
-                    and not (self.attention or self.stale)
-                    and run.control.paused
-                    and not run.control.steps
-                ):
+                paused = run.control.paused and not run.control.steps
+                if still and paused and not (self.attention or self.stale):
                     run.condition.wait()
                 if self.stale:
                     raise LeftBehindError
@@ -312,19 +308,15 @@ class SequentialFrame(Frame):
 
     def _stands_still(self, target: Node | Exit) -> bool:
         """Tell whether the machine is paused here; takes one step if it may."""
-        control = self.run.control
-        if (
-            not control.paused
-            or not isinstance(target, Node)
-            or isinstance(target.state, Container)
-        ):
+        steering = self.run.control
+        if not steering.paused or self.suspending:
             return False
-        if self.suspending:
+        if not isinstance(target, Node) or target.is_container:
             return False
         if any(other.container.preempt_requested() for other in self.thread.stack):
             return False
-        if control.steps:
-            control.steps -= 1
+        if steering.steps:
+            steering.steps -= 1
             return False
         return True
 
