@@ -12,7 +12,6 @@ most machines need for all their states.
 from __future__ import annotations
 
 import contextvars
-import itertools
 import os
 import threading
 import time
@@ -203,7 +202,7 @@ class Node:
         )
 
 
-@dataclass
+@dataclass(eq=False)
 class Branch:
     """An interrupt declared on a container.
 
@@ -220,7 +219,6 @@ class Branch:
     priority: float
     transitions: dict[str, str]
     remapping: dict[str, str]
-    order: int = field(default_factory=itertools.count().__next__)
 
 
 # What is told to a trace.

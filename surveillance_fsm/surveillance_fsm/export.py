@@ -13,13 +13,13 @@ from surveillance_fsm.execution import RESUME
 from surveillance_fsm.state import CBState, State
 from surveillance_fsm.state_machine import Iterator as IteratorContainer
 from surveillance_fsm.state_machine import Sequence, StateMachine
-from surveillance_fsm.structure import Edge, Structure, structure_of
+from surveillance_fsm.structure import Edge, Structure
 from surveillance_fsm.userdata import raw
 
 
 def to_mermaid(container: Container) -> str:
     """Draw as a Mermaid ``stateDiagram-v2``; interrupts have dashed-looking notes of their own."""
-    structure = structure_of(container)
+    structure = Structure(container)
     lines = ['stateDiagram-v2']
     _mermaid(structure, lines, '    ')
     return '\n'.join(lines) + '\n'
@@ -61,7 +61,7 @@ def _mermaid(structure: Structure, lines: list[str], indent: str) -> None:
 
 def to_graphviz(container: Container) -> str:
     """Draw as a Graphviz digraph in which containers are clusters."""
-    structure = structure_of(container)
+    structure = Structure(container)
     lines = [
         f'digraph {_quoted(structure.path)} {{',
         '    compound=true; rankdir=TB; fontname="Helvetica";',
@@ -117,7 +117,7 @@ def _entry(structure: Structure, label: str) -> tuple[str, str]:
 
 def to_ascii(container: Container) -> str:
     """Draw as an indented list for a terminal or a log; ``>`` marks what runs now."""
-    structure = structure_of(container)
+    structure = Structure(container)
     marked = {
         f'{inner.path}/{label}'
         for inner in structure.walk()
@@ -213,13 +213,7 @@ def _kind_of(container: Container) -> str:
 
 
 def _container_data(container: Container, path: str) -> dict[str, Any]:
-    data: dict[str, Any] = {'outcomes': sorted(container.get_registered_outcomes())}
-    for name, keys in (
-        ('input_keys', container.get_registered_input_keys()),
-        ('output_keys', container.get_registered_output_keys()),
-    ):
-        if keys:
-            data[name] = sorted(keys)
+    data = {'outcomes': [], **_declared(container)}
     if raw(container.userdata):
         data['userdata'] = {
             key: _plain(f'userdata key {key!r} of {path!r}', value)
@@ -307,16 +301,18 @@ def _what(state: State, path: str) -> dict[str, Any]:
             source['arguments'] = dict(state.fsm_source['arguments'])
         return source
     if type(state) is CBState:
-        data: dict[str, Any] = {'function': _name_of(state.function, path)}
-        for name, given in (
-            ('outcomes', state.get_registered_outcomes()),
-            ('input_keys', state.get_registered_input_keys()),
-            ('output_keys', state.get_registered_output_keys()),
-        ):
-            if given:
-                data[name] = sorted(given)
-        return data
+        return {'function': _name_of(state.function, path), **_declared(state)}
     return {'state': _name_of(type(state), path)}
+
+
+def _declared(state: State) -> dict[str, Any]:
+    """Return outcomes and keys of a state, as far as it has any."""
+    declared = {
+        'outcomes': state.get_registered_outcomes(),
+        'input_keys': state.get_registered_input_keys(),
+        'output_keys': state.get_registered_output_keys(),
+    }
+    return {name: sorted(names) for name, names in declared.items() if names}
 
 
 def _name_of(thing: Any, path: str) -> str:

@@ -30,7 +30,7 @@ from surveillance_fsm.exceptions import MachineFileError, describe, shown
 from surveillance_fsm.execution import History, RawTransition
 from surveillance_fsm.log import logerr, logwarn
 from surveillance_fsm.state import State
-from surveillance_fsm.structure import Edge, Structure, structure_of
+from surveillance_fsm.structure import Edge, Structure
 from surveillance_fsm.userdata import raw
 
 RECORD_FORMAT = 'surveillance-fsm-record'
@@ -228,7 +228,7 @@ class Recorder:
 
     def __init__(self, machine: Container, path: str | Path) -> None:
         self._file: IO[str] = open(path, 'w', encoding='utf-8', buffering=1)  # noqa: SIM115
-        root = structure_of(machine).path
+        root = Structure(machine).path
         header = {'format': RECORD_FORMAT, 'version': RECORD_VERSION, 'root': root}
         self._file.write(json.dumps(header) + '\n')
         self._feed = TransitionFeed(machine, self._write)
@@ -304,7 +304,7 @@ def replay(machine: Container, transitions: Iterable[Transition]) -> Iterator[St
     Raises:
         MachineFileError: A transition that the machine cannot make.
     """
-    root = structure_of(machine)
+    root = Structure(machine)
     containers = {inner.path: inner for inner in root.walk()}
     active: set[str] = set(_entered(root))
     for transition in transitions:
@@ -673,7 +673,7 @@ class Checkpointer:
         self._leave_out = frozenset(leave_out)
         # A concurrence's children change places in threads of their own: the last word is kept.
         self._turn = threading.Lock()
-        for inner in structure_of(machine).walk():
+        for inner in Structure(machine).walk():
             inner.container.register_start_cb(self._changed)
             inner.container.register_transition_cb(self._changed)
         machine.register_termination_cb(self._ended)

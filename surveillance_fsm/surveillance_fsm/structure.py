@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import dataclass
 
 from surveillance_fsm.container import Container
 from surveillance_fsm.execution import RESUME
@@ -29,87 +28,63 @@ class Edge:
     leaving: bool
 
 
-@dataclass
 class Structure:
     """One container, with those inside.
+
+    Args:
+        container: The container.
+        path: Its path; by default the name it has as a root.
 
     Attributes:
         path: The container's path.
         label: Its label in its parent.
+        kind: The container's class, as in ``StateMachine``.
+        together: All states run at the same time.
         container: The container itself.
         states: Its states by label.
         interrupts: Labels and states of its interrupts, most urgent first.
+        members: States and interrupts by label.
         initial: Labels of the states a run begins with.
         outcomes: What it may end with.
         edges: Its transitions, in the order of the states.
         inner: The containers among its states and interrupts, by label.
     """
 
-    path: str
-    label: str
-    container: Container
-    states: dict[str, State]
-    interrupts: dict[str, State]
-    initial: list[str]
-    outcomes: list[str]
-    edges: list[Edge]
-    inner: dict[str, Structure] = field(default_factory=dict)
-
-    @property
-    def kind(self) -> str:
-        """The container's class, as in ``StateMachine``."""
-        return type(self.container).__name__
-
-    @property
-    def together(self) -> bool:
-        """Whether all states run at the same time."""
-        return self.container.together
+    def __init__(self, container: Container, path: str | None = None) -> None:
+        self.path = container.get_name() if path is None else path
+        self.label = self.path.rpartition('/')[2]
+        self.kind = type(container).__name__
+        self.together = container.together
+        self.container = container
+        branches = sorted(container.fsm_branches.values(), key=lambda branch: -branch.priority)
+        self.states = container.get_children()
+        self.interrupts = {branch.label: branch.state for branch in branches}
+        self.members = self.states | self.interrupts
+        self.initial = container.get_initial_states() if self.states else []
+        self.outcomes = sorted(container.get_registered_outcomes())
+        self.edges = [
+            # What is not bound leads out, also where a state has the outcome's name.
+            Edge(source, outcome, target or outcome, not target or target not in self.states)
+            for outcome, source, target in container.get_internal_edges()
+        ]
+        if isinstance(container, IteratorContainer):
+            exhausted, ending = container.exhausted_outcome, container.ending
+            self.edges += [Edge(label, exhausted, ending(exhausted), True) for label in self.states]
+        for branch in branches:
+            for outcome, name in sorted(branch.transitions.items()):
+                leaving = name not in self.states and name != RESUME
+                self.edges.append(Edge(branch.label, outcome, name, leaving))
+        self.inner = {
+            label: Structure(state, f'{self.path}/{label}')
+            for label, state in self.members.items()
+            if isinstance(state, Container)
+        }
 
     def walk(self) -> Iterator[Structure]:
         """Return this container and all inside, outermost first."""
         yield self
         for inner in self.inner.values():
             yield from inner.walk()
-
-    @cached_property
-    def members(self) -> dict[str, State]:
-        """States and interrupts by label."""
-        return {**self.states, **self.interrupts}
-
-
-def structure_of(container: Container, path: str | None = None) -> Structure:
-    """Describe a container and all inside it."""
-    path = container.get_name() if path is None else path
-    states = dict(container.get_children())
-    outcomes = sorted(container.get_registered_outcomes())
-    branches = sorted(container.fsm_branches.values(), key=lambda branch: -branch.priority)
-    interrupts = {branch.label: branch.state for branch in branches}
-    edges = []
-    for outcome, source, target in container.get_internal_edges():
-        # What is not bound leads out, also where a state has the outcome's name.
-        edges.append(Edge(source, outcome, target or outcome, not target or target not in states))
-    if isinstance(container, IteratorContainer):
-        exhausted = container.exhausted_outcome
-        edges += [Edge(label, exhausted, container.ending(exhausted), True) for label in states]
-    for branch in branches:
-        for outcome, name in sorted(branch.transitions.items()):
-            edges.append(Edge(branch.label, outcome, name, name not in states and name != RESUME))
-    inner = {
-        label: structure_of(state, f'{path}/{label}')
-        for label, state in {**states, **interrupts}.items()
-        if isinstance(state, Container)
-    }
-    return Structure(
-        path,
-        path.rpartition('/')[2],
-        container,
-        states,
-        interrupts,
-        container.get_initial_states() if states else [],
-        outcomes,
-        edges,
-        inner,
-    )
 
 
 def state_at(container: Container, path: str) -> State:

@@ -24,7 +24,7 @@ from surveillance_fsm.exceptions import InvalidStateError, InvalidTransitionErro
 from surveillance_fsm.execution import RawTransition
 from surveillance_fsm.history import unfold
 from surveillance_fsm.state import State
-from surveillance_fsm.structure import state_at, structure_of
+from surveillance_fsm.structure import Structure, state_at
 
 
 class FakeClock:
@@ -145,7 +145,7 @@ class Watched:
     """
 
     def __init__(self, machine: Container) -> None:
-        self._structure = structure_of(machine)
+        self._structure = Structure(machine)
         self.transitions: list[tuple[str, str, str, str]] = []
 
     def saw(self, raw: RawTransition) -> None:

@@ -221,25 +221,23 @@ class Remapper:
 
     def _undeclared(self, deed: str, key: str) -> InvalidUserCodeError:
         kind, declared = ('input', self._input) if deed == 'read' else ('output', self._output)
-        where = str(self._where)
-        state = f"State '{where}'" if where else 'A state'
+        why = f'not among its {kind} keys {sorted(declared)}'
         if key in self._constants:
-            return InvalidUserCodeError(f"{state} cannot write userdata key '{key}': a constant")
-        return InvalidUserCodeError(
-            f"{state} cannot {deed} userdata key '{key}': not among its {kind} keys "
-            f'{sorted(declared)}'
-        )
+            why = 'a constant'
+        return InvalidUserCodeError(f"{self._state()} cannot {deed} userdata key '{key}': {why}")
 
     def _missing(self, key: str) -> MissingKeyError:
         outer = self._input.get(key, key)
         renamed = f" (remapped to '{outer}')" if outer != key else ''
         available = sorted(self._data.keys()) if hasattr(self._data, 'keys') else []
-        where = str(self._where)
-        state = f"State '{where}'" if where else 'A state'
         return MissingKeyError(
-            f"{state} reads userdata key '{key}'{renamed}, which nothing has written; the keys "
-            f'set are {available}'
+            f"{self._state()} reads userdata key '{key}'{renamed}, which nothing has written; the "
+            f'keys set are {available}'
         )
+
+    def _state(self) -> str:
+        where = str(self._where)
+        return f"State '{where}'" if where else 'A state'
 
 
 _NO_CONSTANTS: Mapping[str, Any] = {}
@@ -280,7 +278,8 @@ def _view_class(
             namespace[key] = property(_constant(key), _refused_write(key))
         else:
             name = outer.get(key, key)
-            read = _reader(key, name) if key in inputs else _refused_read(key)
+            # Without a reader, `Remapper.__getattr__` refuses.
+            read = _reader(key, name) if key in inputs else None
             write = _writer(name) if key in outputs else _refused_write(key)
             namespace[key] = property(read, write)
     return type(_VIEW_NAME, (Remapper,), namespace)
@@ -305,13 +304,6 @@ def _writer(name: str) -> Callable[[Remapper, Any], None]:
 
 def _constant(key: str) -> Callable[[Remapper], Any]:
     return lambda view: view._constants[key]
-
-
-def _refused_read(key: str) -> Callable[[Remapper], Any]:
-    def read(view: Remapper) -> Any:
-        raise view._undeclared('read', key)
-
-    return read
 
 
 def _refused_write(key: str) -> Callable[[Remapper, Any], None]:

@@ -24,7 +24,7 @@ from surveillance_fsm.container import Container
 from surveillance_fsm.exceptions import InvalidStateError, InvalidTransitionError
 from surveillance_fsm.state import CBState, State
 from surveillance_fsm.state_machine import Iterator as IteratorContainer
-from surveillance_fsm.structure import Edge, Structure, structure_of
+from surveillance_fsm.structure import Edge, Structure
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ def verify(machine: Container, userdata_keys: Iterable[str] = ()) -> list[Findin
     Returns:
         What is wrong; errors first, outermost containers first.
     """
-    root = _View(structure_of(machine))
+    root = _View(Structure(machine))
     findings: list[Finding] = []
     for view in root.walk():
         for check in (

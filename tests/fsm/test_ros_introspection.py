@@ -5,12 +5,13 @@ from __future__ import annotations
 import json
 
 import pytest
+from builtin_interfaces.msg import Time
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_srvs.srv import Trigger
 
 from surveillance_fsm.history import Transition
 from surveillance_fsm.ros import ServiceCaller
-from surveillance_fsm.ros.conversions import transition_from, transition_message
+from surveillance_fsm.ros.conversions import transition_message
 from surveillance_interfaces.msg import FsmStatus, FsmStructure, FsmTransition
 from surveillance_interfaces.srv import ForceOutcome, SetInitialState
 
@@ -154,11 +155,13 @@ def test_a_wrong_outcome_is_not_forced(graph, watched):
     assert run.result() == 'preempted'
 
 
-def test_a_transition_survives_the_message():
+def test_a_transition_is_told_whole():
     transition = Transition(
         3, 12.5, 'A/B', 'C', 'done', 'D', 'transition', 0.25, 2, {'x': [1, {'y': None}]}
     )
-    from builtin_interfaces.msg import Time
-
     message = transition_message(transition, ['A/B'], Time(sec=12, nanosec=500_000_000))
-    assert transition_from(message) == transition
+    for name in ('sequence', 'path', 'from_state', 'outcome', 'to_state', 'kind', 'duration'):
+        assert getattr(message, name) == getattr(transition, name)
+    assert (message.visits, message.active) == (2, ['A/B'])
+    told = dict(zip(message.userdata_keys, message.userdata_values, strict=True))
+    assert {key: json.loads(value) for key, value in told.items()} == transition.userdata

@@ -7,7 +7,7 @@ import pytest
 import surveillance_fsm as fsm
 from surveillance_fsm.export import to_ascii
 from surveillance_fsm.history import replay
-from surveillance_fsm.structure import structure_of
+from surveillance_fsm.structure import Structure
 from surveillance_fsm.testing import watching
 
 from .states import Answer, Background, Deaf, Waiter, began
@@ -22,7 +22,7 @@ def test_an_outcome_that_is_not_bound_leads_out_although_a_state_has_its_name():
     with watching(machine) as watched:
         assert machine.execute() == 'done'
     watched.assert_path('done')
-    (edge,) = structure_of(machine).edges
+    (edge,) = Structure(machine).edges
     assert edge.leaving
     assert 'done -> [done]' in to_ascii(machine)
     assert list(replay(machine, [])) == []

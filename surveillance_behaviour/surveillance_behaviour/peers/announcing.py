@@ -13,7 +13,7 @@ from surveillance_behaviour import conversions
 from surveillance_behaviour.mission.mission import Mission
 from surveillance_behaviour.policy.world import Decision
 from surveillance_fsm.ros import ClockWait
-from surveillance_fsm.structure import structure_of
+from surveillance_fsm.structure import Structure
 from surveillance_interfaces.msg import Decision as DecisionMessage
 from surveillance_interfaces.msg import MissionStatus
 from surveillance_runtime.node import PatrolNode
@@ -114,7 +114,7 @@ class RosAnnouncer:
             )
 
         self._status = status
-        for inner in structure_of(machine).walk():
+        for inner in Structure(machine).walk():
             inner.container.register_start_cb(lambda _data, _states: self._publish())
             inner.container.register_transition_cb(lambda _data, _states: self._publish())
 

@@ -13,7 +13,8 @@ from __future__ import annotations
 import math
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from typing import Any
 
@@ -76,6 +77,17 @@ class RoundTrips:
         self.smoothed: float | None = None
         self._variation = 0.0
         self._doubled = 1.0
+
+    @contextmanager
+    def measured(self) -> Iterator[None]:
+        """Take into account how long the block waits for an answer, or that none came in time."""
+        asked = time.monotonic()
+        try:
+            yield
+        except CallTimeoutError:
+            self.note_missed()
+            raise
+        self.note(time.monotonic() - asked)
 
     def note(self, seconds: float) -> None:
         """Take the time that an answer took into account (RFC 6298, 2.2 and 2.3)."""
@@ -151,20 +163,16 @@ class ServiceCaller:
         found_by = deadline if discovery is None else time.monotonic() + min(discovery, timeout)
         what = f'service {self.name}'
         await_ready(self.is_ready, found_by, interrupt, what)
-        asked = time.monotonic()
         if discovery is None:
             deadline += self.round_trips.deadline(timeout) - timeout
         future = self._client.call_async(request)
         try:
-            answer = block_on(future, deadline, interrupt, what, self._look_for_loss())
-        except CallError as error:
-            if isinstance(error, CallTimeoutError):
-                self.round_trips.note_missed()
+            with nullcontext() if discovery is not None else self.round_trips.measured():
+                answer = block_on(future, deadline, interrupt, what, self._look_for_loss())
+        except CallError:
             self._client.remove_pending_request(future)
             raise
-        if discovery is None:
-            self.round_trips.note(time.monotonic() - asked)
-            _show(self._node, self.name, self.round_trips)
+        _show(self._node, self.name, self.round_trips)
         return answer
 
     def _look_for_loss(self) -> Callable[[], None]:
@@ -205,14 +213,14 @@ class ServiceCaller:
         """
         if not self.is_ready():
             raise UnavailableError(f'service {self.name}: no server')
-        timeout, asked = self.round_trips.deadline(timeout), time.monotonic()
+        timeout = self.round_trips.deadline(timeout)
+        deadline = time.monotonic() + timeout
         future = self._client.call_async(request)
         look, failure = self._look_for_loss(), []
 
         def check() -> None:
             try:
-                if time.monotonic() - asked > timeout:
-                    self.round_trips.note_missed()
+                if time.monotonic() > deadline:
                     raise CallTimeoutError(f'service {self.name}: no answer within {timeout:g} s')
                 look()
             except CallError as error:
@@ -223,14 +231,14 @@ class ServiceCaller:
         if self._checks is None:
             self._checks = _PeriodicChecks(self._node)
         self._checks.add(check)
-        try:
-            response = await future
-        finally:
-            self._checks.remove(check)
-        if failure:
-            self._client.remove_pending_request(future)
-            raise failure[0]
-        self.round_trips.note(time.monotonic() - asked)
+        with self.round_trips.measured():
+            try:
+                response = await future
+            finally:
+                self._checks.remove(check)
+            if failure:
+                self._client.remove_pending_request(future)
+                raise failure[0]
         _show(self._node, self.name, self.round_trips)
         return response
 
@@ -504,17 +512,14 @@ class GoalCaller:
             def feedback(message: Any) -> None:
                 told(message.feedback)
 
-        asked = time.monotonic()
         sent = self._client.send_goal_async(goal, feedback_callback=feedback)
         try:
-            handle = block_on(sent, deadline, interrupt, self._what)
-        except CallError as error:
-            if isinstance(error, CallTimeoutError):
-                self.round_trips.note_missed()
+            with self.round_trips.measured():
+                handle = block_on(sent, deadline, interrupt, self._what)
+        except CallError:
             # The goal may be accepted yet; it must not run on unseen.
             sent.add_done_callback(_cancel_when_accepted)
             raise
-        self.round_trips.note(time.monotonic() - asked)
         _show(self._node, self.name, self.round_trips)
         return handle
 

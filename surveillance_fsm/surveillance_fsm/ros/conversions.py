@@ -12,7 +12,7 @@ from surveillance_fsm.container import Container
 from surveillance_fsm.exceptions import InvalidStateError
 from surveillance_fsm.export import to_mermaid
 from surveillance_fsm.history import Transition, presentable
-from surveillance_fsm.structure import Structure, structure_of
+from surveillance_fsm.structure import Structure
 from surveillance_fsm.userdata import UserData, raw
 from surveillance_interfaces.msg import (
     FsmContainer,
@@ -42,25 +42,6 @@ def transition_message(transition: Transition, active: list[str], stamp: Any) ->
         active=active,
         userdata_keys=list(transition.userdata),
         userdata_values=[json.dumps(value) for value in transition.userdata.values()],
-    )
-
-
-def transition_from(message: FsmTransition) -> Transition:
-    """Return the transition of a message; its time is the time of publishing, in seconds."""
-    return Transition(
-        sequence=message.sequence,
-        time=message.stamp.sec + message.stamp.nanosec / 1e9,
-        path=message.path,
-        from_state=message.from_state,
-        outcome=message.outcome,
-        to_state=message.to_state,
-        kind=message.kind,
-        duration=message.duration,
-        visits=message.visits,
-        userdata={
-            key: json.loads(value)
-            for key, value in zip(message.userdata_keys, message.userdata_values, strict=True)
-        },
     )
 
 
@@ -95,7 +76,7 @@ def structure_message(root: Container, stamp: Any) -> FsmStructure:
                     for edge in structure.edges
                 ],
             )
-            for structure in structure_of(root).walk()
+            for structure in Structure(root).walk()
         ],
         mermaid=to_mermaid(root),
     )
@@ -143,7 +124,7 @@ def smach_structure_messages(root: Container, stamp: Any) -> list[SmachContainer
             outcomes_to=[edge.target for edge in structure.edges],
             container_outcomes=structure.outcomes,
         )
-        for structure in structure_of(root).walk()
+        for structure in Structure(root).walk()
     ]
 
 

@@ -26,7 +26,7 @@ from surveillance_fsm.ros.conversions import (
     userdata_text,
 )
 from surveillance_fsm.ros.exchange import seconds
-from surveillance_fsm.structure import Structure, state_at, structure_of
+from surveillance_fsm.structure import Structure, state_at
 from surveillance_interfaces.msg import (
     FsmStatus,
     FsmStructure,
@@ -93,7 +93,6 @@ class IntrospectionServer:
         if path.strip('/'):
             state.set_name(path.strip('/'))
         prefix = f'{server_name.rstrip("/")}/fsm' if server_name else 'fsm'
-        self._prefix = prefix
         self._feed: TransitionFeed | None = None
         self._sequence = 0
         self._transitions = node.create_publisher(
@@ -131,7 +130,7 @@ class IntrospectionServer:
         self._structure.publish(structure_message(self._root, self._stamp()))
         for message in smach_structure_messages(self._root, self._stamp()):
             self._smach_structure.publish(message)
-        self._containers = {each.path: each for each in structure_of(self._root).walk()}
+        self._containers = {each.path: each for each in Structure(self._root).walk()}
         self._publish_smach(self._containers.values(), 'initial state')
         self._feed = TransitionFeed(self._root, self._publish)
         self._root.register_start_cb(self._changed)
