@@ -122,7 +122,7 @@ class Decider:
         battery = Battery(
             monitor.level,
             monitor.low,
-            experience.draw.percent_per_second,
+            experience.draw.draw,
             experience.sent_to_charge,
         )
         if battery.sent_to_charge and battery.charged_enough(self.settings.battery):

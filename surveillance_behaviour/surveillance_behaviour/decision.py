@@ -132,15 +132,15 @@ def why_charge(world: World, battery: Battery, settings: DecisionSettings) -> st
         return f'the battery is low ({battery.level_text()})'
     if battery.level is None:
         return ''
-    graph = world.late_graph or world.graph
     required, words = settings.battery.require_recharge, 'the place is not on the map'
-    if world.place in graph.index:
+    if world.place in world.graph.index:
         required, words = reserve(
-            graph,
+            world.graph,
             world.place,
             world.reachable,
             settings.recharge_rooms,
             battery.draw,
+            world.time_spread,
             settings.battery,
         )
     if battery.level >= required:

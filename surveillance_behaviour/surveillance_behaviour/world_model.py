@@ -32,7 +32,7 @@ from surveillance_behaviour.peers.ports import (
 )
 from surveillance_behaviour.policy.battery_reserve import DrawEstimate
 from surveillance_behaviour.policy.graph import GraphError, PatrolGraph
-from surveillance_behaviour.policy.leg_times import LegTimes, graphs_of_places
+from surveillance_behaviour.policy.leg_times import LegTimes, graph_of_places
 from surveillance_behaviour.policy.world import PolicyMemory, World
 from surveillance_fsm import Interrupt
 from surveillance_ontology.patrol_ontology import Snapshot
@@ -163,16 +163,11 @@ class WorldModel:
         self._places = places
         self._memory = PolicyMemory(generator or random.Random())
         self._positions: dict[str, Point] = {}
-        self._graphs = (PatrolGraph({}), PatrolGraph({}))
+        self.graph = PatrolGraph({})
         self._all: frozenset[str] = frozenset()
         self._graph_key: object = None
         self._since: float | None = None
         self._told_threshold: float | None = None
-
-    @property
-    def graph(self) -> PatrolGraph:
-        """The part of the map that could be reached when it was last looked at."""
-        return self._graphs[0]
 
     @property
     def places(self) -> frozenset[str]:
@@ -214,7 +209,7 @@ class WorldModel:
             # The ontology that comes back may be another one.
             self._told_threshold = None
             raise
-        graph, late_graph = self._map_of(found, interrupt)
+        graph = self._map_of(found, interrupt)
         visited_at = {}
         for place, seconds in found.visited_at.items():
             # The ontology counts whole seconds; another robot's visit may be later.
@@ -229,7 +224,7 @@ class WorldModel:
             classes=found.classes,
             visited_at=visited_at,
             graph=graph,
-            late_graph=late_graph,
+            time_spread=self.experience.leg_times.spread,
             since=self._since,
             threshold=threshold,
             target=self.target,
@@ -240,7 +235,7 @@ class WorldModel:
         )
         return self.world
 
-    def _map_of(self, found: Snapshot, interrupt: Interrupt) -> tuple[PatrolGraph, PatrolGraph]:
+    def _map_of(self, found: Snapshot, interrupt: Interrupt) -> PatrolGraph:
         positions = {}
         # A place that went may come back elsewhere.
         self._positions = {p: at for p, at in self._positions.items() if p in found.connections}
@@ -264,16 +259,15 @@ class WorldModel:
             for place, others in connections.items()
             for other in others
         }
-        key = (found.place in self.graph.index, connections, used, dwell, round(times.spread, 1))
+        key = (found.place in self.graph.index, connections, used, dwell)
         if key != self._graph_key:
             try:
-                graphs = graphs_of_places(connections, positions, times, dwell)
-                whole, late = (graph.connected(found.place) for graph in graphs)
+                whole = graph_of_places(connections, positions, times, dwell)
+                self.graph = whole.connected(found.place)
             except GraphError as error:
                 raise PeerError('ontology', str(error)) from None
-            self._graphs = whole, late
             self._graph_key = (True, *key[1:])
-        return self._graphs
+        return self.graph
 
     def _position(self, place: str, interrupt: Interrupt) -> Point:
         if place not in self._positions:

@@ -2,42 +2,83 @@
 
 from __future__ import annotations
 
+import math
+import random
+
 import pytest
 
-from surveillance_behaviour.policy.battery_reserve import BatteryLimits, DrawEstimate, reserve
+from surveillance_behaviour.policy.battery_reserve import (
+    BatteryLimits,
+    Draw,
+    DrawEstimate,
+    reserve,
+)
 
 from .worlds import seven_rooms
 
 
 def test_the_reserve_covers_the_worst_leg_and_the_way_home() -> None:
     graph = seven_rooms()
-    level, words = reserve(graph, 'C2', ['R3', 'R4', 'E'], ['E'], 1.0, BatteryLimits(10, 90, 5))
+    limits = BatteryLimits(10, 90, 5)
+    level, words = reserve(graph, 'C2', ['R3', 'R4', 'E'], ['E'], Draw(1.0), 0.0, limits)
     away = graph.seconds('C2', 'R4') + graph.seconds('R4', 'E')
     assert level == pytest.approx(away + 5.0)
-    assert words == f'R4 and home from there takes {away:.1f} s at 1 % a second, with 5 % to spare'
+    assert words == (
+        f'R4 and home from there takes {away:.1f} s at 1 % a second, '
+        f'at most {away:.1f} % in 99 of 100 times, with 5 % to spare'
+    )
 
 
 def test_the_reserve_leaves_a_charged_robot_room_to_go() -> None:
     graph = seven_rooms()
-    level, _ = reserve(graph, 'C2', ['R4'], ['E'], 50.0, BatteryLimits(10, 90, 5))
-    assert level == 85.0
-    assert reserve(graph, 'C2', [], ['E'], 50.0, BatteryLimits(10, 90, 5))[0] == 10
+    draw, limits = Draw(50.0), BatteryLimits(10, 90, 5)
+    assert reserve(graph, 'C2', ['R4'], ['E'], draw, 0.0, limits)[0] == 85.0
+    assert reserve(graph, 'C2', [], ['E'], draw, 0.0, limits)[0] == 10
 
 
-def test_the_draw_is_learnt_from_the_worst_leg() -> None:
-    draw = DrawEstimate()
-    for time, level in [(0.0, 100.0), (10.0, 97.0), (20.0, 92.0), (30.0, 90.0)]:
-        draw.observe(time, level)
-    assert draw.percent_per_second == pytest.approx(0.6)
-    draw.observe(40.0, 100.0)
-    draw.observe(50.0, 99.0)
-    assert draw.percent_per_second == pytest.approx(0.6)
+def learnt(rates: list[float], level: float = 100.0) -> Draw:
+    """Return the draw learned from a level in whole percents, told each second of its rate."""
+    estimate = DrawEstimate()
+    for time, rate in enumerate(rates):
+        if level <= 20.0:
+            level = 100.0
+        level -= rate
+        estimate.observe(float(time), math.floor(level))
+    return estimate.draw
+
+
+def test_a_steady_draw_is_learnt_without_a_margin_for_whole_percents() -> None:
+    assert learnt([0.1] * 3000).rate == pytest.approx(0.1, rel=0.05)
+    assert learnt([0.1] * 3000).spread < 0.1
+    assert learnt([]).rate == 0.0
+
+
+def test_99_of_100_ways_need_no_more_and_not_much_less() -> None:
+    """A robot that stands a third of the time, on ways whose times vary by a tenth."""
+    chance = random.Random(7)
+
+    def rates(seconds: float) -> list[float]:
+        found: list[float] = []
+        while len(found) < seconds:
+            found += [chance.choice((0.04, 0.1, 0.12))] * 10
+        return found[: round(seconds)]
+
+    draw = learnt(rates(3000))
+    falls = sorted(sum(rates(chance.gauss(300.0, 30.0))) for _ in range(2000))
+    most = draw.most(300.0, 0.1)
+    assert sum(fall > most for fall in falls) <= 0.02 * len(falls)
+    assert most < 1.1 * falls[int(0.99 * len(falls))]
+
+
+def test_one_jump_of_the_level_is_no_draw() -> None:
     jump = DrawEstimate()
     for time, level in [(0.0, 100.0), (9.0, 97.0), (20.0, 94.0), (30.0, 91.0), (40.0, 88.0)]:
         jump.observe(time, level)
     jump.observe(41.0, 60.0)
-    assert jump.percent_per_second < 1.0, 'one jump of the level is no draw'
-    assert DrawEstimate(fixed=0.1).percent_per_second == 0.1
+    assert jump.draw.rate == pytest.approx(0.3, rel=0.1)
+    jump.observe(60.0, 100.0)
+    jump.observe(70.0, 99.0)
+    assert jump.draw.rate == pytest.approx(0.3, rel=0.1), 'charging is no fall'
 
 
 def test_battery_limits_out_of_order_are_named() -> None:

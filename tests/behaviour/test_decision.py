@@ -15,8 +15,7 @@ from surveillance_behaviour.decision import (
     why_charge,
     why_not,
 )
-from surveillance_behaviour.policy.battery_reserve import Battery
-from surveillance_behaviour.policy.graph import PatrolGraph
+from surveillance_behaviour.policy.battery_reserve import Battery, Draw
 from surveillance_behaviour.policy.policies import POLICIES
 from surveillance_behaviour.policy.world import PolicyMemory
 
@@ -106,14 +105,10 @@ def test_a_robot_that_was_sent_to_charge_charges_until_it_has() -> None:
 
 
 def test_the_reserve_goes_by_the_times_that_nearly_all_drives_keep_to() -> None:
-    graph = seven_rooms()
-    late = PatrolGraph(
-        {place: {to: 3.0 * s for to, s in ways.items()} for place, ways in graph.legs.items()}, 2.0
-    )
-    battery = Battery(40.0, draw=1.0)
+    battery = Battery(40.0, draw=Draw(1.0))
     assert why_charge(world(), battery, DecisionSettings()) == ''
     assert 'and home from there takes' in why_charge(
-        world(late_graph=late), battery, DecisionSettings()
+        world(time_spread=0.5), battery, DecisionSettings()
     )
 
 

@@ -1,8 +1,9 @@
 """When to go charging: early enough for the worst next leg and the way home from there.
 
 A fixed level strands a robot: what is enough beside the station is not enough at the far end of
-the map. The reserve therefore depends on where the robot is, on how long the legs may take, and
-on how fast the battery was seen to fall.
+the map. The reserve therefore depends on where the robot is, on how long the legs take, and on how
+fast the battery falls. Both are uncertain; their deviations are added as those of independent
+quantities, and the reserve is what 99 of 100 such ways need.
 """
 
 from __future__ import annotations
@@ -11,10 +12,44 @@ import math
 from collections import deque
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from statistics import fmean
 
 from surveillance_behaviour.policy.graph import PatrolGraph
 
-LEGS_REMEMBERED = 50
+FALLS_REMEMBERED = 50
+LEARNED_FALL = 2.0
+"""Percent by which the level falls while one rate is learned."""
+PERCENTILE_99 = 2.326
+"""Standard deviations from the mean to the 99th percentile of a normal distribution."""
+PRIOR_SPREAD = 0.15
+"""Spread of the rates before any was learned, as a part of their mean."""
+PRIOR_WEIGHT = 5.0
+"""How many falls the prior of the spread weighs as much as."""
+
+
+@dataclass(frozen=True)
+class Draw:
+    """How fast the battery falls.
+
+    Attributes:
+        rate: Percent per second; 0: not known.
+        spread: Standard deviation of the rate over a fall of `LEARNED_FALL`, as a part of it.
+    """
+
+    rate: float = 0.0
+    spread: float = 0.0
+
+    def most(self, seconds: float, time_spread: float) -> float:
+        """Return the percent that the level falls by in 99 of 100 ways.
+
+        Args:
+            seconds: How long the way is expected to take.
+            time_spread: Standard deviation of that time, as a part of it.
+        """
+        fall = self.rate * seconds
+        # Of the rate's deviations, those of one part of a way do not depend on those of another.
+        deviation = self.spread * math.sqrt(LEARNED_FALL * max(fall, LEARNED_FALL))
+        return fall + PERCENTILE_99 * math.hypot(time_spread * fall, deviation)
 
 
 @dataclass(frozen=True)
@@ -49,14 +84,14 @@ class Battery:
     Attributes:
         level: Charge in percent; None: not heard yet.
         low: Whether the battery's own warning is up.
-        draw: Percent per second that it falls at most; 0: not known.
+        draw: How fast it falls.
         sent_to_charge: Why the robot was sent to charge and has not been charged since; empty: it
             was not.
     """
 
     level: float | None = None
     low: bool = False
-    draw: float = 0.0
+    draw: Draw = Draw()
     sent_to_charge: str = ''
 
     def charged_enough(self, limits: BatteryLimits) -> bool:
@@ -70,44 +105,41 @@ class Battery:
 
 @dataclass
 class DrawEstimate:
-    """How fast the battery falls, learned from its level before and after each leg.
+    """How fast the battery falls, learned from its level whenever that is heard.
 
-    The highest rate of the last legs counts: a reserve that is right on average strands every
-    second time. A percent is added to each fall, since the level is known in whole percents. One
-    fall that is more than twice the next highest is not counted until it is seen again: it was a
-    jump of the level, not a draw.
-
-    Attributes:
-        fixed: Percent per second; 0: learn it.
+    The level is known in whole percents. Between two moments at which it changes the fall is
+    exact. One that is more than twice as fast as the next fastest is not counted until it is seen
+    again: it was a jump of the level, not a draw.
     """
 
-    fixed: float = 0.0
-    _rates: deque[float] = field(default_factory=lambda: deque(maxlen=LEGS_REMEMBERED))
+    _rates: deque[float] = field(default_factory=lambda: deque(maxlen=FALLS_REMEMBERED))
     _mark: tuple[float, float] | None = None
 
     def observe(self, time: float, level: float) -> None:
-        """Take the level at the end of a leg or of a stay; charging starts a new stretch."""
+        """Take the level at a time; charging begins anew."""
         if self._mark is None or level > self._mark[1] or time <= self._mark[0]:
             self._mark = (time, level)
             return
         fallen = self._mark[1] - level
-        if fallen >= 2.0:
-            self._rates.append((fallen + 1.0) / (time - self._mark[0]))
+        if fallen >= LEARNED_FALL:
+            self._rates.append(fallen / (time - self._mark[0]))
             self._mark = (time, level)
 
     def forget(self) -> None:
-        """Note that the level was set from outside: what it did since the last leg says nothing."""
+        """Note that the level was set from outside: what it did since then says nothing."""
         self._mark = None
 
     @property
-    def percent_per_second(self) -> float:
-        """The fastest fall of the last legs; 0 while nothing is known."""
-        if self.fixed > 0.0:
-            return self.fixed
-        highest = sorted(self._rates, reverse=True)[:2]
-        if len(self._rates) >= 5 and highest[0] > 2.0 * highest[1]:
-            return highest[1]
-        return highest[0] if highest else 0.0
+    def draw(self) -> Draw:
+        """The mean and the spread of the last rates; the mean is 0 while nothing is known."""
+        rates = sorted(self._rates)
+        if len(rates) >= 5 and rates[-1] > 2.0 * rates[-2]:
+            rates.pop()
+        if not rates:
+            return Draw()
+        rate = fmean(rates)
+        squares = PRIOR_WEIGHT * PRIOR_SPREAD**2 + sum((each / rate - 1.0) ** 2 for each in rates)
+        return Draw(rate, math.sqrt(squares / (PRIOR_WEIGHT + len(rates))))
 
     def to_json(self) -> list[float]:
         """Return the rates, to be kept in a file."""
@@ -123,40 +155,43 @@ def reserve(
     place: str,
     next_places: Iterable[str],
     stations: Sequence[str],
-    draw: float,
+    draw: Draw,
+    time_spread: float,
     limits: BatteryLimits,
 ) -> tuple[float, str]:
     """Return the level at which the robot must not go on, and why that one.
 
     Args:
-        graph: The map, with the times that legs may take.
+        graph: The map, with the times that legs are expected to take.
         place: Where the robot is.
         next_places: Where it could go instead of charging.
         stations: The places with a charging station.
-        draw: Percent per second.
+        draw: How fast the battery falls.
+        time_spread: Standard deviation of what legs take, as a part of what is expected.
         limits: The parameters; the result lies between ``require_recharge`` and a little below
             ``stop_recharge``, so that a charged robot always goes on.
 
     Returns:
         Percent, and a clause that explains it.
     """
-    needed = {
+    away = {
         other: graph.seconds(place, other) + way_home(graph, other, stations)
         for other in next_places
         if other in graph.index
     }
-    finite = {other: seconds for other, seconds in needed.items() if math.isfinite(seconds)}
+    finite = {other: seconds for other, seconds in away.items() if math.isfinite(seconds)}
     fixed = f'the level that requires charging is {limits.require_recharge:g} %'
-    if not finite or draw <= 0.0:
+    if not finite or draw.rate <= 0.0:
         return limits.require_recharge, fixed
     worst = max(sorted(finite), key=lambda other: finite[other])
-    level = draw * finite[worst] + limits.margin
+    needed = draw.most(finite[worst], time_spread)
+    level = needed + limits.margin
     if level <= limits.require_recharge:
         return limits.require_recharge, fixed
     most = max(limits.require_recharge, limits.stop_recharge - limits.margin)
     words = (
-        f'{worst} and home from there takes {finite[worst]:.1f} s at {draw:.3g} % a second, '
-        f'with {limits.margin:g} % to spare'
+        f'{worst} and home from there takes {finite[worst]:.1f} s at {draw.rate:.3g} % a second, '
+        f'at most {needed:.1f} % in 99 of 100 times, with {limits.margin:g} % to spare'
     )
     return min(level, most), words
 

@@ -6,7 +6,7 @@ mean of its own drives, drawn towards that prediction while they are few. Each d
 is learned for itself; while one was not driven, the other stands for it.
 
 The spread is the standard deviation of what drives took over what was predicted for them just
-before, pooled over all legs; the 99th percentile takes 2.33 of it (normal distribution).
+before, pooled over all legs.
 """
 
 from __future__ import annotations
@@ -22,8 +22,6 @@ from surveillance_behaviour.policy.graph import GraphError, PatrolGraph
 DRIVES_REMEMBERED = 20
 """How many of the last drives of a leg count."""
 ERRORS_REMEMBERED = 200
-PERCENTILE_99 = 2.326
-"""Standard deviations from the mean to the 99th percentile of a normal distribution."""
 PRIOR_SPREAD = 0.15
 """Spread before anything was driven, as a part of the time."""
 PRIOR_WEIGHT = 5.0
@@ -158,13 +156,13 @@ class LegTimes:
         self._fit = None
 
 
-def graphs_of_places(
+def graph_of_places(
     connections: Mapping[str, Iterable[str]],
     positions: Mapping[str, Sequence[float]],
     times: LegTimes,
     dwell: float,
-) -> tuple[PatrolGraph, PatrolGraph]:
-    """Return the map with expected times, and with times that 99 of 100 drives keep to.
+) -> PatrolGraph:
+    """Return the map with expected times.
 
     Args:
         connections: For each place, its neighbours.
@@ -186,9 +184,4 @@ def graphs_of_places(
         }
         for place, others in connections.items()
     }
-    late = 1.0 + PERCENTILE_99 * float(f'{times.spread:.1g}')
-    late_legs = {
-        place: {other: seconds * late for other, seconds in ways.items()}
-        for place, ways in legs.items()
-    }
-    return PatrolGraph(legs, dwell), PatrolGraph(late_legs, dwell)
+    return PatrolGraph(legs, dwell)

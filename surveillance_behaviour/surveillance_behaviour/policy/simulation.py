@@ -18,7 +18,7 @@ from surveillance_behaviour.decision import (
     decide,
     why_charge,
 )
-from surveillance_behaviour.policy.battery_reserve import Battery, BatteryLimits
+from surveillance_behaviour.policy.battery_reserve import Battery, BatteryLimits, Draw
 from surveillance_behaviour.policy.graph import PatrolGraph
 from surveillance_behaviour.policy.world import Decision, PolicyMemory, World
 
@@ -151,7 +151,7 @@ class Patrol:
     def _battery(self, world: World) -> Battery:
         if self.battery is None:
             return Battery()
-        draw = self.battery.draw if self.battery.keeps_reserve else 0.0
+        draw = Draw(self.battery.draw) if self.battery.keeps_reserve else Draw()
         battery = Battery(self.level, draw=draw)
         charged = self.place == self.station and self.level >= 99.0
         return Battery() if charged and why_charge(world, battery, self._settings) else battery

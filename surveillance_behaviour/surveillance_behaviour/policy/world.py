@@ -53,7 +53,7 @@ class World:
         visited_at: When each place was visited last, seconds; a place that is missing was never
             visited and counts as visited at ``since``.
         graph: The map, with the time that each leg is expected to take.
-        late_graph: The same map with times that 99 of 100 drives keep to; None: as ``graph``.
+        time_spread: Standard deviation of what legs take, as a part of what is expected.
         since: When the patrol began, seconds.
         threshold: Seconds after which the ontology counts a place as URGENT.
         target: What the last decision was heading for, if that was not reached yet.
@@ -69,7 +69,7 @@ class World:
     classes: Mapping[str, frozenset[str]]
     visited_at: Mapping[str, float]
     graph: PatrolGraph
-    late_graph: PatrolGraph | None = None
+    time_spread: float = 0.0
     since: float = 0.0
     threshold: float = 0.0
     target: str | None = None
