@@ -57,8 +57,9 @@ class StateFile:
 
     def save(self, state: State) -> None:
         """Have a state written instead of the last one; returns at once."""
-        self._state = state
-        self._news.set()
+        if self._path is not None:
+            self._state = state
+            self._news.set()
 
     def _work(self) -> None:
         stopping = self._node.stopping

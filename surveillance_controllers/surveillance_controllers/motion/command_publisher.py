@@ -65,15 +65,16 @@ class CommandPublisher:
         """Publish a command as far as the age of what was heard allows it."""
         with self._lock:
             self.wanted = velocity
-            self._publish(self._now())
-            self._watch()
+            now = self._now()
+            self._publish(now)
+            self._watch(now)
 
     def _limit_again(self) -> None:
         with self._lock:
             now = self._now()
             if self._age.share(self.wanted.speed, now) < 1.0:
                 self._publish(now + LEAD)
-            self._watch()
+            self._watch(now)
 
     def _publish(self, now: float) -> None:
         share = self._age.share(self.wanted.speed, now)
@@ -84,12 +85,12 @@ class CommandPublisher:
             self._on_silence(silent)
         self._silent = silent
 
-    def _watch(self) -> None:
+    def _watch(self, now: float) -> None:
         """Look again when the speed must fall."""
         if self.wanted == Velocity() or self._silent:
             self._timer.cancel()
             return
-        wait = self._age.seconds_to_brake(self.wanted.speed, self._now())
+        wait = self._age.seconds_to_brake(self.wanted.speed, now)
         self._timer.timer_period_ns = int(1e9 * max(wait, WATCH_PERIOD))
         self._timer.reset()
 

@@ -60,8 +60,13 @@ class ObstacleMemory:
     def is_unknown(self, points: Points, apart: float) -> NDArray[np.bool_]:
         """Tell which points, shape (n, 2), lie on the map and further than `apart` metres from
         what it has."""
-        inside = self._grid.contains(self._grid.cells_of(points))
-        return inside & (self._grid.interpolated(self._known, points) > apart)
+        cells = self._grid.cells_of(points)
+        unknown = self._grid.contains(cells)
+        # Most points are the map's: within a cell the distance changes by its diagonal at most.
+        row, column = cells[unknown].T
+        unknown[unknown] = self._known[row, column] > apart - 2.0 * self._grid.resolution
+        unknown[unknown] = self._grid.interpolated(self._known, points[unknown]) > apart
+        return unknown
 
     def update(
         self,

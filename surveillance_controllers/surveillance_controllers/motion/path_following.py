@@ -189,12 +189,19 @@ class PathFollower:
             return self._end(off_path)
         end = min(self.progress + 2.5, self.length)
         count = max(2, math.ceil((end - self.progress) / 0.1) + 1)
-        way = geometry.point_at(self.path, np.linspace(self.progress, end, count)) - position
+        way = self._at(np.linspace(self.progress, end, count)) - position
         cos, sin = math.cos(pose[2]), math.sin(pose[2])
         wanted = choose(way @ np.array([[cos, -sin], [sin, cos]]), self._velocity)
         turn = self._ramped(self._velocity.turn, wanted.turn, p.turn_acceleration * dt)
         speed = self._sped(wanted.speed, dt)
         return self._guide(self._safely(speed, turn, seen), turn, False, off_path, dt)
+
+    def _at(self, along: Points) -> Points:
+        """Return the points at some ways along the path, shape (n, 2), metres."""
+        x, y = self.path.T
+        return np.stack(
+            [np.interp(along, self._along, x), np.interp(along, self._along, y)], axis=1
+        )
 
     def _remaining(self, position: Points) -> float:
         """Return how far the end is, metres; 0 when it is reached."""
@@ -253,7 +260,7 @@ class PathFollower:
             return True
         end = min(self.progress + ahead, self.length)
         count = max(2, math.ceil((end - self.progress) / 0.05) + 1)
-        way = geometry.point_at(self.path, np.linspace(self.progress, end, count))
+        way = self._at(np.linspace(self.progress, end, count))
         gaps = np.hypot(way[:, :1] - obstacles[:, 0], way[:, 1:] - obstacles[:, 1])
         return bool((gaps >= np.minimum(reach, gaps[0] - 1e-3)).all())
 
@@ -342,7 +349,7 @@ class PathFollower:
     def _target(self, position: Points) -> Points:
         p = self.parameters
         look = min(max(self._velocity.speed * p.look_time, p.shortest_look), p.longest_look)
-        ahead = geometry.point_at(self.path, self.progress + np.linspace(0.0, look, 9))
+        ahead = self._at(self.progress + np.linspace(0.0, look, 9))
         first = max(1, math.ceil(8 * p.shortest_look / look))
         for index in range(8, first, -1):
             line = ahead[index] - position

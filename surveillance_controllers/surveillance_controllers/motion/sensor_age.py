@@ -37,6 +37,7 @@ class SensorAge:
         self._deceleration = deceleration
         self._standstill = standstill
         self._heard = {topic: (-math.inf, deque([0.1], _COUNT)) for topic in topics}
+        self._stands_at = dict.fromkeys(self._heard, -math.inf)
 
     def hear(self, topic: str, now: float) -> None:
         """Note a message of a topic that came now, seconds."""
@@ -44,16 +45,15 @@ class SensorAge:
         if before <= now <= before + LONGEST_PERIOD + self._standstill:
             intervals.append(now - before)
         self._heard[topic] = now, intervals
+        self._stands_at[topic] = now + min(fmean(intervals), LONGEST_PERIOD) + self._standstill
 
     def left(self, now: float) -> tuple[float, str]:
         """Return the seconds within which the robot must stand, and the topic they are due to.
 
         Nothing is left when it should stand already.
         """
-        return min(
-            (at + min(fmean(intervals), LONGEST_PERIOD) + self._standstill - now, topic)
-            for topic, (at, intervals) in self._heard.items()
-        )
+        at, topic = min((at, topic) for topic, at in self._stands_at.items())
+        return at - now, topic
 
     def seconds_to_brake(self, speed: float, now: float) -> float:
         """Return after how long a robot of some speed, m/s, must brake if nothing is heard."""

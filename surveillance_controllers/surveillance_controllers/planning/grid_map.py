@@ -60,10 +60,10 @@ class GridMap:
         map.
         """
         xy = np.asarray(points, dtype=float).reshape(-1, 2)
-        columns_rows = np.nan_to_num(np.floor((xy - self.origin) / self.resolution), nan=-1.0)
-        # Far outside is outside: no larger number survives the conversion.
-        cells: NDArray[np.intp] = np.clip(columns_rows, -1, 2**40).astype(np.intp)[:, ::-1]
-        return cells
+        columns_rows = np.floor((xy - self.origin) / self.resolution)
+        # Far outside, and what is no number, is outside: no larger number survives the conversion.
+        cells: NDArray[np.intp] = np.fmin(np.fmax(columns_rows, -1), 2**40).astype(np.intp)
+        return cells[:, ::-1]
 
     def centres_of(self, cells: ArrayLike) -> Points:
         """Return the centre of each cell (row, column), shape (n, 2), metres."""
