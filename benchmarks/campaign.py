@@ -54,7 +54,7 @@ from rclpy.node import Node  # noqa: E402
 from rclpy.qos import qos_profile_sensor_data  # noqa: E402
 from std_msgs.msg import UInt32  # noqa: E402
 
-from benchmarks.link_campaign import LinkCampaign, LinkResults  # noqa: E402
+from benchmarks.hosts import Host, Network, may_be_made  # noqa: E402
 from benchmarks.machine_faults import SmallDisk, SteppedClock  # noqa: E402
 from surveillance_fsm.ros import ServiceCaller  # noqa: E402
 from surveillance_interfaces.srv import ArmorDirective  # noqa: E402
@@ -86,10 +86,25 @@ ASK_PERIOD = 0.1
 """Seconds between two requests to a node that may not be there yet."""
 PATIENCE = 60.0
 """After how long a node that was hit counts as staying away, seconds."""
+ROBOT = ('simulator', 'motion_controller', 'planner_controller', 'battery_controller')
+DESK = ('armor_server', 'ontology_map_builder', 'robot_behavior')
+VISIT_PATIENCE = 120.0
+"""Seconds that the next visit may take on a failing link."""
+LOSS, DELAY = 0.2, 0.2
+"""Of a frame in either direction: the chance that it is lost, and seconds that it takes."""
+ALLOWED_SHARE, ALLOWED_SECONDS = 0.5, 5.0
+"""What a campaign that passed has reached: share of undisturbed visits, seconds to go on."""
 
 
 class Launcher:
     """`python3 launch.py` as a process, read line by line.
+
+    Args:
+        words: Its options.
+        domain: The ROS domain.
+        log: Where its output is kept.
+        more: Further variables of its environment.
+        on: Makes a command one for another host.
 
     Attributes:
         processes: The process id of each node that was started last.
@@ -97,15 +112,20 @@ class Launcher:
     """
 
     def __init__(
-        self, words: Sequence[str], domain: int, log: Path, more: Mapping[str, str]
+        self,
+        words: Sequence[str],
+        domain: int,
+        log: Path,
+        more: Mapping[str, str] | None = None,
+        on: Callable[..., list[str]] = lambda *command: list(command),
     ) -> None:
-        environ = {**ENVIRON, **more, 'ROS_DOMAIN_ID': str(domain)}
+        environ = {**ENVIRON, **(more or {}), 'ROS_DOMAIN_ID': str(domain)}
         self.processes: dict[str, int] = {}
         self.steps: defaultdict[str, dict[str, float]] = defaultdict(dict)
         self.folder: Path | None = None
         self._log = log.open('a')
         self.process = subprocess.Popen(
-            [sys.executable, str(ROOT / 'launch.py'), *words],
+            on(sys.executable, str(ROOT / 'launch.py'), *words),
             cwd=ROOT,
             env=environ,
             stdin=subprocess.DEVNULL,
@@ -296,12 +316,23 @@ def records(folder: Path) -> list[Path]:
     return sorted(folder.glob('mission*.jsonl')) + sorted(folder.glob('mission/*.jsonl'))
 
 
+def events_of(folder: Path) -> Iterator[dict[str, Any]]:
+    """Yield the events of a run's mission record."""
+    for path in records(folder):
+        for line in path.read_text('utf-8', 'replace').splitlines():
+            try:
+                event = json.loads(line)
+            except ValueError:
+                continue  # the last line of a process that was killed while it wrote
+            if isinstance(event, dict):
+                yield event
+
+
 def visits(folder: Path) -> list[tuple[float, str]]:
     """Return (simulated seconds, place) of every visit in a run's record."""
     return [
         (float(event['time']), str(event['place']))
-        for path in records(folder)
-        for event in _events(path)
+        for event in events_of(folder)
         if event.get('event') == 'visit'
     ]
 
@@ -310,22 +341,12 @@ def _last_visits(folder: Path) -> dict[str, float]:
     """Return when each place was visited last, on the clock as it is at the record's end."""
     last: dict[str, float] = {}
     before = 0.0
-    for event in (event for path in records(folder) for event in _events(path)):
+    for event in events_of(folder):
         back = max(0.0, before - event['time'])
         last, before = {place: at - back for place, at in last.items()}, event['time']
         if event.get('event') == 'visit':
             last[event['place']] = before
     return last
-
-
-def _events(path: Path) -> Iterator[dict[str, Any]]:
-    for line in path.read_text('utf-8', 'replace').splitlines():
-        try:
-            event = json.loads(line)
-        except ValueError:
-            continue  # the last line of a process that was killed while it wrote
-        if isinstance(event, dict):
-            yield event
 
 
 class Campaign:
@@ -551,6 +572,125 @@ class Campaign:
         self.results.left_behind = list(_processes_of(self._folder))
 
 
+@dataclass
+class LinkResults:
+    """What the campaign saw.
+
+    Attributes:
+        undisturbed, disturbed: Visits a minute.
+        lost_frames: Share that was lost while the link was disturbed.
+        visits: Seconds from each joining to the first visit after it.
+        waits: Seconds until the mission went on.
+    """
+
+    undisturbed: float = 0.0
+    disturbed: float = 0.0
+    lost_frames: float = 0.0
+    visits: list[float] = field(default_factory=list)
+    waits: list[float] = field(default_factory=list)
+
+    def passed(self) -> bool:
+        """Tell whether the figures are as good as they have to be."""
+        enough = self.disturbed >= ALLOWED_SHARE * self.undisturbed
+        return enough and max(self.waits, default=0.0) <= ALLOWED_SECONDS
+
+    def rows(self) -> list[tuple[str, str]]:
+        """Return the table to print."""
+        shown = ', '.join(
+            f'{wait:.1f} s, {visit:.1f} s'
+            for wait, visit in zip(self.waits, self.visits, strict=True)
+        )
+        return [
+            ('visits a minute, undisturbed', f'{self.undisturbed:.1f}'),
+            (f'with {LOSS:.0%} loss, {DELAY * 1000:.0f} ms each way', f'{self.disturbed:.1f}'),
+            ('frames lost meanwhile', f'{self.lost_frames:.0%}'),
+            ('joined again: mission goes on, first visit', shown or 'not tried'),
+        ]
+
+
+class LinkCampaign:
+    """One mission on two hosts.
+
+    The simulated robot and its controllers are on one host, ontology and behaviour on the other.
+    First the visits are counted over an undisturbed link, then over one that loses and delays
+    frames, then the hosts are cut off from each other, at any moment of a leg, and joined again.
+    What counts then is when the mission goes on: when it decides anew, or the leg ends that it was
+    on. How long the first visit takes, whose drive depends on the place, is told as well.
+
+    Args:
+        scratch: Folder for logs and runs.
+        seed: Of the losses.
+    """
+
+    def __init__(self, scratch: Path, seed: int) -> None:
+        if not may_be_made():
+            raise SystemExit('campaign: --network needs root, unshare and /dev/net/tun')
+        self._scratch = scratch
+        self._chance = random.Random(seed)
+        self._domain = claim_domain()
+        self.network = Network(2, seed)
+        robot, desk = self.network.hosts
+        self._launchers = [
+            self._launch(robot, 'robot', ROBOT),
+            self._launch(desk, 'desk', DESK),
+        ]
+
+    def _launch(self, host: Host, name: str, nodes: Sequence[str]) -> Launcher:
+        words = ['--network', '--record', str(self._scratch / name), '--only', ','.join(nodes)]
+        return Launcher(words, self._domain, self._scratch / f'{name}.log', on=host.words)
+
+    def run(self, seconds: float, cuts: int, cut_seconds: float) -> LinkResults:
+        """Go through the phases; `seconds` for each of the first two."""
+        results = LinkResults()
+        self._await_visit()
+        results.undisturbed = self._rate(seconds)
+        network = self.network
+        network.loss, network.delay = LOSS, DELAY
+        network.passed = network.lost = 0
+        results.disturbed = self._rate(seconds)
+        results.lost_frames = network.lost / max(1, network.lost + network.passed)
+        network.loss = network.delay = 0.0
+        for _ in range(cuts):
+            self._await_visit()
+            time.sleep(self._chance.uniform(0.0, 10.0))
+            network.cut = True
+            time.sleep(cut_seconds)
+            network.cut = False
+            joined = time.time()
+            self._await_visit()
+            results.visits.append(time.time() - joined)
+            steps = [float(each['time']) for each in (*self._of('decision'), *self._of('visit'))]
+            results.waits.append(min(step for step in steps if step > joined) - joined)
+        return results
+
+    def _of(self, kind: str) -> list[dict[str, Any]]:
+        return [
+            event
+            for folder in (self._scratch / 'desk').glob('*')
+            for event in events_of(folder)
+            if event.get('event') == kind
+        ]
+
+    def _await_visit(self) -> None:
+        before, late = len(self._of('visit')), time.monotonic() + VISIT_PATIENCE
+        while len(self._of('visit')) == before:
+            if time.monotonic() > late:
+                raise SystemExit(f'campaign: no visit in {VISIT_PATIENCE:g} s, see {self._scratch}')
+            time.sleep(0.1)
+
+    def _rate(self, seconds: float) -> float:
+        """Return visits a minute."""
+        before = len(self._of('visit'))
+        time.sleep(seconds)
+        return 60.0 * (len(self._of('visit')) - before) / seconds
+
+    def close(self) -> None:
+        """Stop both and take the hosts down."""
+        for launcher in self._launchers:
+            launcher.end()
+        self.network.close()
+
+
 def _processes_of(folder: Path) -> Iterator[str]:
     """Yield the processes whose command line names a folder."""
     for entry in Path('/proc').glob('[0-9]*'):
@@ -640,11 +780,7 @@ def main(words: Sequence[str] | None = None) -> int:
 def run_on_two_hosts(chosen: argparse.Namespace, scratch: Path) -> LinkResults:
     """Run the campaign on a failing link."""
     seconds, cuts, cut_seconds = (20.0, 0, 0.0) if chosen.quick else (120.0, chosen.cuts, 120.0)
-    campaign = LinkCampaign(
-        scratch,
-        chosen.seed,
-        lambda folder: [event for path in records(folder) for event in _events(path)],
-    )
+    campaign = LinkCampaign(scratch, chosen.seed)
     try:
         return campaign.run(seconds, cuts, cut_seconds)
     finally:

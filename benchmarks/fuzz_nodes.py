@@ -4,11 +4,11 @@
     .venv/bin/python benchmarks/fuzz_nodes.py --quick
     .venv/bin/python benchmarks/fuzz_nodes.py --messages 1000000 --seed 7 --node armor_server
 
-Each node runs as a process of its own in a ROS domain of its own. What it takes is read from the
-ROS graph, what a message may hold from the message's definition: NaN, infinities, 1e308, negative
-stamps, empty and long arrays, long strings, control characters, names of places and of files. Half
-of the messages are plain ones with a few fields changed, because a message that is wrong everywhere
-is refused at its first field.
+Each node of the table runs as a process of its own in a ROS domain of its own. What it takes is
+read from the ROS graph, what a message may hold from the message's definition: NaN, infinities,
+1e308, negative stamps, empty and long arrays, long strings, control characters, names of places and
+of files. Half of the messages are plain ones with a few fields changed, because a message that is
+wrong everywhere is refused at its first field.
 
 A node fails when its process ends, or when it does not answer a parameter request at the end. The
 table prints the deaths, the log lines a second (on average of the node's life, and of the minute
@@ -66,6 +66,8 @@ STRANGE_STRINGS = (
     *('"5"^^xsd:long', '{}', '[[1,2],[3]]', 'nan', '1e308', '-1'),
 )
 PLACE = ROOT / 'config' / 'patrol_world.yaml'
+PARAMETERS = {'video_source': {'source': str(ROOT / 'docs' / 'images'), 'loop': True}}
+"""Without which a node does not start."""
 ARRAY_CODES = {
     **{'double': 'd', 'float': 'f', 'int8': 'b', 'uint8': 'B', 'int16': 'h', 'uint16': 'H'},
     **{'int32': 'i', 'uint32': 'I', 'int64': 'q', 'uint64': 'Q'},
@@ -221,12 +223,12 @@ class NodeProcess:
     def __init__(self, name: str, domain: int, folder: Path, place: Path) -> None:
         node = node_table.find(name)
         start = f'import sys; from {node.module} import main; sys.exit(main())'
-        words = [sys.executable, '-c', start, *ros_arguments(place, folder, {})]
+        words = [sys.executable, '-c', start, *ros_arguments(place, folder, PARAMETERS)]
         environ = {**os.environ, 'ROS_DOMAIN_ID': str(domain)}
         self.output = folder / f'{name}.log'
         self._file = self.output.open('ab')
         self.process = subprocess.Popen(
-            words, cwd=folder, env=environ, stdin=subprocess.DEVNULL, stdout=self._file,
+            words, cwd=folder, env=environ, stdin=subprocess.PIPE, stdout=self._file,
             stderr=subprocess.STDOUT, preexec_fn=_bound_memory,
         )  # fmt: skip
 
@@ -462,9 +464,7 @@ def main(words: Sequence[str] | None = None) -> int:
     parser.add_argument('--quick', action='store_true', help='100 messages a node')
     parser.add_argument('--keep', type=Path, help='folder for the logs (default: thrown away)')
     chosen = parser.parse_args(words)
-    names = chosen.node or [
-        node.name for node in node_table.NODES if node.name not in ('console', 'video_source')
-    ]
+    names = chosen.node or [node.name for node in node_table.NODES]
     each = 100 if chosen.quick else max(1, chosen.messages // len(names))
     reports = []
     print(f'{"node":22} {"targets":>7} {"sent":>8} {"deaths":>6} {"answers":>7} '

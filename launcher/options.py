@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import argparse
+import math
+from collections.abc import Callable
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from launcher import package_commands
 from surveillance_runtime import node_table
@@ -40,30 +42,21 @@ def _names(text: str) -> list[str]:
     return names
 
 
-def _seconds(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = 0.0
-    if not 0.0 < value < 1e9:
-        raise argparse.ArgumentTypeError(f'{text!r} is not a positive number of seconds')
-    return value
+def _number(
+    kind: type[float], expected: str, fits: Callable[[float], bool]
+) -> Callable[[str], Any]:
+    """Return what reads an option's number, an `int` or a `float`."""
 
+    def read(text: str) -> Any:
+        try:
+            value = kind(text)
+        except ValueError:
+            value = math.nan
+        if not fits(value):
+            raise argparse.ArgumentTypeError(f'{text!r} is not {expected}')
+        return value
 
-def _gigabytes(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = -1.0
-    if not 0.0 <= value < 1e6:
-        raise argparse.ArgumentTypeError(f'{text!r} is not a number of gigabytes')
-    return value
-
-
-def _megabytes(text: str) -> int:
-    if not text.isdecimal() or not (int(text) == 0 or 100 <= int(text) < 10**7):
-        raise argparse.ArgumentTypeError(f'{text!r} is not a number of megabytes from 100, or 0')
-    return int(text)
+    return read
 
 
 def shared_options() -> argparse.ArgumentParser:
@@ -148,7 +141,7 @@ def _add_process_options(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         '--for',
         dest='seconds',
-        type=_seconds,
+        type=_number(float, 'a positive number of seconds', lambda value: 0.0 < value < 1e9),
         metavar='SECONDS',
         help='stop after this time (default: at Ctrl-C)',
     )
@@ -175,7 +168,11 @@ def _add_process_options(group: argparse._ArgumentGroup) -> None:
     )
     group.add_argument(
         '--memory',
-        type=_megabytes,
+        type=_number(
+            int,
+            'a number of megabytes from 100, or 0',
+            lambda value: value == 0 or 100 <= value < 1e7,
+        ),
         default=2048,
         metavar='MB',
         help='a node that holds more is started again; 0: any (default: %(default)s)',
@@ -201,7 +198,7 @@ def _add_recording_options(group: argparse._ArgumentGroup) -> None:
     )
     group.add_argument(
         '--keep',
-        type=_gigabytes,
+        type=_number(float, 'a number of gigabytes', lambda value: 0.0 <= value < 1e6),
         default=DEFAULT_KEEP,
         metavar='GB',
         help='delete the oldest recordings beyond this size (default: %(default)g)',

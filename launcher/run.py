@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import re
+import shlex
+import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 from launcher import run_folder
 from launcher.system import LaunchError
@@ -96,11 +99,13 @@ class Run:
             except (YamlFileError, ParameterError) as error:
                 raise LaunchError(f'--params {error}') from None
         if self.web_address is not None:
-            _, _, port = self.web_address.rpartition(':')
-            if not port.isdecimal() or int(port) > 65535:
-                raise LaunchError(
-                    f'--web-address {self.web_address!r}: expected HOST:PORT like 0.0.0.0:8080'
-                )
+            page_address(self.web_address)
+        try:
+            alarm = shlex.split(self.alarm)
+        except ValueError as error:
+            raise LaunchError(f'--alarm {self.alarm!r}: {error}') from None
+        if alarm and shutil.which(alarm[0]) is None:
+            raise LaunchError(f'--alarm {self.alarm!r}: {alarm[0]!r} cannot be run')
 
     def nodes(self) -> tuple[node_table.Node, ...]:
         chosen = node_table.select(
@@ -118,6 +123,22 @@ class Run:
         if self.web or self.web_control:
             names.append(PAGE)
         return tuple(node_table.find(name) for name in names)
+
+
+def page_address(text: str) -> tuple[str, int]:
+    """Return host and port of the page's address.
+
+    Raises:
+        LaunchError: It is not of the form HOST:PORT.
+    """
+    try:
+        found = urlsplit(f'//{text}')
+        port = found.port
+    except ValueError:  # of the port, or of brackets that are not closed
+        port = None
+    if port is None or found.netloc != text or found.username is not None:
+        raise LaunchError(f'--web-address {text!r}: expected HOST:PORT like 0.0.0.0:8080')
+    return found.hostname or '127.0.0.1', port
 
 
 def options_of(run: Run) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from launcher.run import PAGE, RECORDER, Run
+from launcher.run import PAGE, RECORDER, Run, page_address
 from launcher.system import LaunchError
 from surveillance_runtime import node_table
 from surveillance_runtime.configuration import (
@@ -106,9 +106,9 @@ def _observer_entries(run: Run, folder: Path) -> Iterator[Entry]:
         # Made here, so that a page that is started again keeps it.
         yield for_node(PAGE, 'token', secrets.token_urlsafe(24), 'this run')
     if run.web_address is not None:
-        host, _, port = run.web_address.rpartition(':')
-        yield for_node(PAGE, 'host', host.strip('[]') or '127.0.0.1', '--web-address')
-        yield for_node(PAGE, 'port', int(port), '--web-address')
+        host, port = page_address(run.web_address)
+        yield for_node(PAGE, 'host', host, '--web-address')
+        yield for_node(PAGE, 'port', port, '--web-address')
 
 
 def _check_behaviour(merged: Configuration, run: Run) -> None:

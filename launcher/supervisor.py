@@ -29,7 +29,7 @@ from launcher.process_watch import (
 )
 from launcher.service import notify
 
-PAUSES = (0.1, 0.5, 1.0, 2.0, 4.0, 8.0, 15.0, 30.0)
+PAUSES = (0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 15.0, 30.0)
 """Seconds before the first, second, ... restart in a row; the last one is kept."""
 START_WITHIN = 1.5
 """Seconds after which a process that did not say that it is up no longer holds the next one up."""
@@ -347,7 +347,8 @@ class Supervisor:
         pause = self._pauses[min(child.deaths, len(self._pauses)) - 1]
         child.restart_at = time.monotonic() + pause
         why = child.ended_for or describe_exit(code)
-        self._log.warn(f'{name} died ({why}): starting it again in {pause:g} s')
+        when = f' in {pause:g} s' if pause else ''
+        self._log.warn(f'{name} died ({why}): starting it again{when}')
         if child.deaths == TROUBLE_AFTER:
             text = f'{name} died {child.deaths} times in a row, last: {why}'
             self._log.error(f'{text}: somebody should have a look')

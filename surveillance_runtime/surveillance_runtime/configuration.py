@@ -59,6 +59,11 @@ _VALUED = (
     *('-r', '--remap', '--log-level', '--log-config-file'),
     *('--log-file-name', '-e', '--enclave'),
 )
+_LEVELS = 'debug|info|warn|error|fatal'
+_FORMS = dict.fromkeys(
+    ('-r', '--remap'), (re.compile(r'([^:=]+:)?[^:=]+:=[^:=]+'), 'FROM:=TO or NODE:FROM:=TO')
+) | {'--log-level': (re.compile(f'([^:=]+:=)?({_LEVELS})', re.IGNORECASE), f'one of {_LEVELS}')}
+"""What ROS would refuse in more than a line."""
 _FLAGS = re.compile(r'--(enable|disable)-(rosout|stdout|external-lib)-logs\Z')
 _RENAME = re.compile(r'(?:(?P<node>[^:=]+):)?__(?P<what>ns|node|name):=(?P<to>.+)\Z')
 
@@ -555,6 +560,8 @@ def split_arguments(words: Sequence[str]) -> RosArguments:
         elif word == '--params-file':
             files.append(words[at])
         elif word in _VALUED:
+            if (form := _FORMS.get(word)) and not form[0].fullmatch(words[at]):
+                raise ParameterError(f'{word} {_short(words[at])}: expected {form[1]}')
             rest += [word, words[at]]
         elif _FLAGS.match(word):
             rest.append(word)

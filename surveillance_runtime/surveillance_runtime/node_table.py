@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from surveillance_runtime.suggestions import nearest
+
 MODES = ('SIMULATED', 'RANDOM', 'MANUAL')
 DEFAULT_MODE = 'SIMULATED'
 BEHAVIOURS = ('surveillance', 'patrol')
@@ -187,7 +189,7 @@ def find(name: str) -> Node:
     try:
         return BY_NAME[name]
     except KeyError:
-        raise ValueError(f'unknown node {name!r}: expected one of {", ".join(BY_NAME)}') from None
+        raise ValueError(f'unknown node {name!r}: expected {nearest(name, BY_NAME)}') from None
 
 
 def select(

@@ -15,7 +15,7 @@ import yaml
 from launcher.cli import CONFIG, wanted_run
 from launcher.log_merge import MergedLog
 from launcher.options import make_parser
-from launcher.run import MARKERS, PAGE, RECORDER, Run, options_of, resumed, run_from
+from launcher.run import MARKERS, PAGE, RECORDER, Run, options_of, page_address, resumed, run_from
 from launcher.run_configuration import check_assignments, configuration, with_mode_of
 from launcher.run_folder import RunState, make_folder
 from launcher.run_mission import alarm_caller, summary, watch_command
@@ -43,6 +43,25 @@ def test_a_namespace_that_ros_refuses_is_named(namespace):
 @pytest.mark.parametrize('domain', [-1, 102, 10**6])
 def test_a_domain_out_of_range_is_named(domain):
     assert error_of(Run(domain=domain)) == f'--domain {domain}: expected a number from 0 to 101'
+
+
+@pytest.mark.parametrize(
+    'address', ['', ':', '80', '[::1', '[::1:80', '::1:80', 'a:b', 'a@b:80', 'a/b:1', 'a:99999']
+)
+def test_an_address_of_the_page_that_is_none_is_named(address):
+    expected = f'--web-address {address!r}: expected HOST:PORT like 0.0.0.0:8080'
+    assert error_of(Run(web_address=address)) == expected
+
+
+def test_addresses_of_the_page():
+    assert page_address('0.0.0.0:8080') == ('0.0.0.0', 8080)
+    assert page_address('[::1]:80') == ('::1', 80)
+    assert page_address(':80') == ('127.0.0.1', 80)
+
+
+@pytest.mark.parametrize('alarm', ["call '", 'no-such-program', '/etc/passwd now'])
+def test_an_alarm_that_cannot_be_raised_is_named(alarm):
+    assert error_of(Run(alarm=alarm)).startswith(f'--alarm {alarm!r}: ')
 
 
 def test_a_place_that_is_none_is_named_with_file_and_line(tmp_path):
