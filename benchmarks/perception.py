@@ -18,16 +18,16 @@ times its answers.
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import os
 import resource
 import subprocess
 import sys
 import time
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +37,7 @@ for variable in ('OPENBLAS_NUM_THREADS', 'OMP_NUM_THREADS'):
 import cv2
 import numpy as np
 import numpy.typing as npt
+from photographs import AS_TAKEN, VARIATIONS, Photograph, photographs_in
 
 from surveillance_perception.detection.camera_model import CameraModel
 from surveillance_perception.detection.detector import DetectorSettings, MarkerDetector
@@ -77,6 +78,7 @@ DEGRADED = {
 TEXTURES = ('clouds', 'bricks', 'boxes', 'letters', 'leaves', 'boards')
 IMAGE_TOPIC, DETECTIONS_TOPIC = 'camera/rgb/image_raw', 'aruco_detector/detections'
 WARM_UP = 10
+PHOTO_DETECTORS = ('OpenCV', 'ladder', 'AprilTag 3', 'here')
 DECOYS = ('DICT_4X4_50', 'DICT_6X6_250', 'DICT_APRILTAG_36h11')
 
 Found = list[tuple[int, npt.NDArray[np.float64]]]
@@ -303,50 +305,50 @@ def print_lights(samples: int) -> None:
     print_table(['recall (wrong ids) under', *detectors], rows)
 
 
-def print_photos(folder: Path | None) -> None:
-    """Markers found in real photographs."""
+def print_photos(folder: Path | None, every: int) -> None:
+    """Print what is found of the markers in real photographs, as taken and varied.
+
+    Args:
+        folder: Holds the photographs and `markers.json`.
+        every: Variations are made of each so many-th photograph only.
+    """
     if folder is None or not (folder / 'markers.json').exists():
         print('no photographs: name their folder with --photos or MARKER_PHOTOS\n')
         return
-    entries = json.loads((folder / 'markers.json').read_text())
-    names = ('OpenCV', 'ladder', 'AprilTag 3', 'here')
-    totals = {name: [0, 0, 0, 0.0] for name in names}
-    detectors: dict[tuple[str, str], Detect | None] = {}
-    for entry in entries:
-        image = cv2.imread(str(folder / entry['file']))
-        kind = entry['dictionary']
-        for name in names:
-            if (name, kind) not in detectors:
-                detectors[name, kind] = _photo_detector(name, kind)
-            detect = detectors[name, kind]
+    photographs = list(photographs_in(folder))
+    rows = []
+    for variation, change in VARIATIONS.items():
+        chosen = photographs if variation == AS_TAKEN else photographs[::every]
+        rows.append([variation, *_found_in([change(each) for each in chosen])])
+    print_table(['photographs: found', *PHOTO_DETECTORS, 'of', 'not listed', 'ms in all'], rows)
+
+
+def _found_in(photographs: Sequence[Photograph]) -> list[str]:
+    """Return how many markers each detector found, all together found, and what else we did."""
+    found, union, others = Counter[str](), 0, Counter[str]()
+    seconds = Counter[str]()
+    for photograph in photographs:
+        seen: dict[str, set[int]] = {}
+        for name in PHOTO_DETECTORS:
+            detect = _photo_detector(name, photograph.dictionary)
             if detect is None:
                 continue
             start = time.thread_time()
-            seen = detect(image)
-            totals[name][3] += time.thread_time() - start
-            totals[name][1] += len(entry['markers'])
-            left = list(entry['markers'])
-            for marker_id, corners in seen:
-                middle = corners.mean(axis=0)
-                reach = max(8.0, float(np.linalg.norm(corners - middle, axis=1).mean()))
-                hits = [
-                    each
-                    for each in left
-                    if each['id'] == marker_id and math.dist(each['centre'], middle) < reach
-                ]
-                if hits:
-                    left.remove(hits[0])
-                totals[name][0 if hits else 2] += 1
-    print_table(
-        [f'{len(entries)} photographs', 'found', 'of', 'not on the list', 'ms in all'],
-        [
-            [name, str(found), str(shown), str(other), f'{1e3 * seconds:.0f}']
-            for name, (found, shown, other, seconds) in totals.items()
-            if shown
-        ],
-    )
+            listed = photograph.listed(detect(photograph.image))
+            seconds[name] += time.thread_time() - start
+            seen[name] = {index for index in listed if index is not None}
+            others[name] += listed.count(None)
+            found[name] += len(seen[name])
+        union += len(set().union(*seen.values()))
+    return [
+        *(str(found[name]) for name in PHOTO_DETECTORS),
+        str(union),
+        ' '.join(str(others[name]) for name in PHOTO_DETECTORS),
+        ' '.join(f'{1e3 * seconds[name]:.0f}' for name in PHOTO_DETECTORS),
+    ]
 
 
+@cache
 def _photo_detector(name: str, kind: str) -> Detect | None:
     if name == 'AprilTag 3':
         return apriltag3() if kind == 'DICT_APRILTAG_36h11' else None
@@ -631,7 +633,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     print_times(12 if options.quick else 60)
     print_lights(3 if options.quick else 60)
-    print_photos(options.photos)
+    print_photos(options.photos, 12 if options.quick else 1)
     print_natural(40 if options.quick else 1500)
     cells = grid(detectors, samples)
     for name in detectors:

@@ -268,6 +268,20 @@ def test_thin_margin_on_a_dark_wall_is_enough():
         assert set(found(DETECTOR.detect(image))) == {14}
 
 
+@pytest.mark.parametrize('distance', [2.0, 7.0])
+def test_black_and_white_may_differ_by_few_levels(distance):
+    image = seen([Panel(14, distance, 0.2)], Degradation(blur=0.8, noise=0.0), 'plain')
+    faint = np.rint(180.0 + 0.05 * image).astype(np.uint8)
+    assert set(found(DETECTOR.detect(faint))) == {14}
+
+
+def test_grey_code_without_a_margin_before_bright_light_is_read():
+    marker = cv2.aruco.generateImageMarker(DICTIONARY, 14, 56)
+    image = np.full((160, 160), 255, np.uint8)
+    image[50:106, 50:106] = marker // 4
+    assert [each.marker_id for each in DETECTOR.detect(image)] == [14]
+
+
 @pytest.mark.parametrize('backdrop', ['letters', 'leaves', 'bricks', 'boards'])
 def test_busy_textures_show_no_marker(backdrop):
     for seed in range(5):

@@ -41,7 +41,8 @@ _PER_SIDE = 6
 _INNER = 5
 _LEAST_CORRELATION = 0.68
 _LEAST_SIDE, _WORST_SIDE = 0.15, 0.5
-_LEAST_INNER_DEVIATION, _MOST_INNER_DEVIATION = 0.2, 1.1
+# beyond a missing margin may lie what is far brighter than print, or a thin one half darker
+_LEAST_INNER_DEVIATION, _MOST_INNER_DEVIATION = 0.1, 2.0
 _CELL_PIXELS = 6.0
 # an outline runs through the middles of the outermost dark pixels, and blur makes dark smaller
 _INSET = 0.65

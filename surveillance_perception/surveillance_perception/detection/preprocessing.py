@@ -10,11 +10,13 @@ import numpy.typing as npt
 
 from surveillance_perception.detection.image_sampling import Grey
 
-_DARK_LEVEL = 90
-_STRETCHED_LEVEL = 200.0
+# fewer pixels than the smallest marker has are not taken for the image's black and white
+_FEW_PIXELS = 16
+_FAINT_RANGE = 160
+_STRETCHED = (25.0, 230.0)
 _LARGEST_GAIN = 16.0
-_QUIET = 4.0
-_SMOOTHING = 1.2
+_QUIET = 2.8
+_SMOOTHINGS = (0.5, 0.7, 0.9, 1.2)
 _STRIPS = 10
 # the second difference of white noise in both directions has 6 times its deviation (Immerkaer,
 # "Fast noise variance estimation", CVIU 64(2), 1996); 0.6745 turns a median into a deviation
@@ -43,16 +45,27 @@ def prepare(image: npt.NDArray[np.uint8]) -> PreparedImage:
     Raises:
         ValueError: The image is empty, not of 8 bits, or of another shape.
     """
-    grey = grey_of(image)
-    brightest = _quantile(grey, 0.99)
-    if brightest < _DARK_LEVEL:
-        gain = min(_STRETCHED_LEVEL / max(brightest, 1), _LARGEST_GAIN)
-        grey = cv2.convertScaleAbs(grey, alpha=gain)
-    noise = _noise(grey)
-    if noise <= _QUIET:
-        return PreparedImage(grey, grey, noise)
-    smooth = cv2.GaussianBlur(grey, (0, 0), _SMOOTHING)
-    return PreparedImage(grey, smooth, noise / (2.0 * _SMOOTHING * np.sqrt(np.pi)))
+    grey = _stretched(grey_of(image))
+    noise = left = _noise(grey)
+    smooth = grey
+    for deviation in _SMOOTHINGS:
+        if left <= _QUIET:
+            break
+        kernel = cv2.getGaussianKernel(9, deviation)
+        smooth = cv2.sepFilter2D(grey, -1, kernel, kernel)
+        left = noise * float(np.square(kernel).sum())
+    return PreparedImage(grey, smooth, left)
+
+
+def _stretched(grey: Grey) -> Grey:
+    """Return a faint image, dark or washed out, with nearly the full range of grey levels."""
+    darker = np.cumsum(cv2.calcHist([grey], [0], None, [256], [0, 256]), dtype=float)
+    dark, bright = np.searchsorted(darker, (_FEW_PIXELS, grey.size - _FEW_PIXELS)).tolist()
+    if bright - dark > _FAINT_RANGE:
+        return grey
+    gain = min((_STRETCHED[1] - _STRETCHED[0]) / max(bright - dark, 1), _LARGEST_GAIN)
+    levels = _STRETCHED[0] + gain * (np.arange(256) - dark)
+    return np.asarray(cv2.LUT(grey, np.clip(np.rint(levels), 0, 255).astype(np.uint8)))
 
 
 def grey_of(image: npt.NDArray[np.uint8]) -> Grey:
@@ -69,11 +82,6 @@ def grey_of(image: npt.NDArray[np.uint8]) -> Grey:
         shape = 'x'.join(str(side) for side in image.shape)
         raise ValueError(f'an image of shape {shape} is neither grey nor BGR')
     return np.ascontiguousarray(image)
-
-
-def _quantile(grey: Grey, share: float) -> int:
-    histogram = cv2.calcHist([grey], [0], None, [256], [0, 256]).ravel()
-    return int(np.searchsorted(np.cumsum(histogram), share * grey.size))
 
 
 def _noise(grey: Grey) -> float:
