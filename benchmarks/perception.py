@@ -14,7 +14,7 @@ times its answers.
 `--picture` draws recall over distance and angle.
 """
 
-# ruff: noqa: E402 - the number of threads must be set before numpy is imported
+# ruff: noqa: E402 - the number of threads must be set before numpy is imported, and where benchmarks lie
 from __future__ import annotations
 
 import argparse
@@ -33,12 +33,13 @@ from typing import Any
 
 for variable in ('OPENBLAS_NUM_THREADS', 'OMP_NUM_THREADS'):
     os.environ.setdefault(variable, '1')
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import cv2
 import numpy as np
 import numpy.typing as npt
-from photographs import AS_TAKEN, VARIATIONS, Photograph, photographs_in
 
+from benchmarks.photographs import AS_TAKEN, VARIATIONS, Photograph, photographs_in
 from surveillance_perception.detection.camera_model import CameraModel
 from surveillance_perception.detection.detector import DetectorSettings, MarkerDetector
 from surveillance_perception.detection.dictionaries import dictionary_named
