@@ -106,6 +106,53 @@ def test_the_past_has_a_bound_and_says_since_when_it_is_kept(tmp_path: Path) -> 
     patrol.service.close()
 
 
+@pytest.mark.parametrize('compact_from', [1 << 20, 1])
+def test_the_bound_holds_over_a_restart(tmp_path: Path, compact_from: int) -> None:
+    patrol = Patrol(tmp_path, history=10, compact_from=compact_from)
+    for number in range(10):
+        patrol.visit(200.0 + number, ('C1', 'E')[number % 2])
+    patrol.service.close()
+    patrol.start()
+    early = asker(patrol.service)('QUERY AT', '206.9', 'isIn(Robot1, ?)')
+    assert 'is before 207.000, since when changes are kept' in early.error_description
+    assert patrol.at(207.0, 'isIn(Robot1, ?)') == ['isIn(Robot1, E)']
+    assert patrol.at(208.0, 'isIn(Robot1, ?)') == ['isIn(Robot1, C1)']
+    patrol.service.close()
+
+
+@pytest.mark.parametrize('restarted', [False, True])
+def test_a_clock_that_is_set_back_mixes_up_nothing(tmp_path: Path, restarted: bool) -> None:
+    patrol = Patrol(tmp_path)
+    patrol.visit(200.0, 'C1')
+    patrol.visit(20.0, 'R1')
+    patrol.visit(30.0, 'C1')
+    if restarted:
+        patrol.service.close()
+        patrol.start()
+    where = 'isIn(Robot1, ?)'
+    assert patrol.at(29.9, where) == ['isIn(Robot1, R1)']
+    assert patrol.at(31.0, where) == ['isIn(Robot1, C1)']
+    assert patrol.at(19.9, where) == ['isIn(Robot1, E)'], 'C1 is taken for 20.0'
+    patrol.now = 5.0
+    assert patrol.at(5.0, where) == ['isIn(Robot1, C1)']
+    patrol.service.close()
+
+
+def test_a_time_ahead_and_a_pattern_that_is_none_are_refused_in_one_line(tmp_path: Path) -> None:
+    patrol = Patrol(tmp_path)
+    ask = asker(patrol.service)
+    for time, pattern, words in (
+        ('1700000000', 'isIn(?, ?)', '1700000000.000 lies ahead of the server'),
+        ('inf', 'isIn(?, ?)', 'inf lies ahead of the server, whose clock says 100.000'),
+        ('100', 'isIn', "QUERY AT: argument pattern 'isIn': expected CLASS(individual)"),
+        ('soon', 'isIn(?, ?)', "argument time 'soon': expected seconds since the epoch"),
+    ):
+        answer = ask('QUERY AT', time, pattern)
+        assert (answer.success, answer.exit_code) == (False, 205)
+        assert words in answer.error_description
+    patrol.service.close()
+
+
 @pytest.mark.parametrize('time', ['', 'yesterday', 'nan', '2022-11-01'])
 def test_what_is_no_time_is_refused(tmp_path: Path, time: str) -> None:
     patrol = Patrol(tmp_path)

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from surveillance_ontology.knowledge_base import Changes
 from surveillance_ontology.owl.axioms import Axiom
+
+AHEAD = 1.0
+"""Seconds by which the clock of who asks may be ahead of the server's."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +54,8 @@ class History:
             self.append(PastChange(time, added, removed))
 
     def append(self, change: PastChange) -> None:
-        """Take in a change, later than those that are there."""
+        """Take in a change; what is there was before it, whatever the clock said."""
+        self.tell_time(change.time)
         self.changes.append(change)
         self._count += len(change.added) + len(change.removed)
         while self._count > self._most:
@@ -59,15 +63,31 @@ class History:
             self._count -= len(oldest.added) + len(oldest.removed)
             self.since = oldest.time
 
-    def at(self, time: float, now: Iterable[Axiom]) -> list[Axiom]:
-        """Return what was asserted at a time, given what is asserted now.
+    def tell_time(self, now: float) -> None:
+        """Take what is kept with a clock that was set back: it is as long ago as it was."""
+        ahead = (self.changes[-1].time if self.changes else self.since) - now
+        if ahead > 0.0:
+            self.since -= ahead
+            moved = [replace(change, time=change.time - ahead) for change in self.changes]
+            self.changes = deque(moved)
+
+    def at(self, time: float, present: Iterable[Axiom], now: float) -> list[Axiom]:
+        """Return what was asserted at a time.
+
+        Args:
+            time: When, seconds since the epoch by the server's clock.
+            present: What is asserted now.
+            now: The server's clock.
 
         Raises:
-            ValueError: The time is before `since`, or no number.
+            ValueError: The time is before `since`, lies ahead, or is no number.
         """
+        self.tell_time(now)
+        if time > now + AHEAD:
+            raise ValueError(f'{time:.3f} lies ahead of the server, whose clock says {now:.3f}')
         if not time >= self.since:
             raise ValueError(f'{time:.3f} is before {self.since:.3f}, since when changes are kept')
-        axioms = dict.fromkeys(now)
+        axioms = dict.fromkeys(present)
         for change in reversed(self.changes):
             if change.time <= time:
                 break

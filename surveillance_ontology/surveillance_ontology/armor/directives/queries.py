@@ -27,6 +27,7 @@ from surveillance_ontology.armor.rendering import (
     parse_rendered,
     render_entity,
     short_facts,
+    shown,
 )
 from surveillance_ontology.armor.rendering import render_literal as _literal
 from surveillance_ontology.armor.session import Session
@@ -237,11 +238,15 @@ def _unsupported(ref: Reference) -> DirectiveResponse:
     'asserted and derived ones, or with the second argument the asserted ones only.',
 )
 def _facts(ref: Reference, pattern: str, asserted: bool) -> DirectiveResponse:
+    return _matching('QUERY FACT', ref, pattern, asserted)
+
+
+def _matching(words: str, ref: Reference, pattern: str, asserted: bool) -> DirectiveResponse:
     try:
         wanted, written = parse_fact(pattern), parse_names(pattern)
         candidates = _asserted(ref, written) if asserted else _candidates(ref, written)
     except ValueError as error:
-        raise DirectiveError(f'QUERY FACT: argument pattern {error}') from None
+        raise DirectiveError(f'{words}: argument pattern {error}') from None
     found = {str(fact) for fact in candidates if wanted.matches(fact)}
     return DirectiveResponse(queried_objects=sorted(found))
 
@@ -261,14 +266,18 @@ def _at(
 ) -> DirectiveResponse:
     try:
         seconds = float(time)
+    except ValueError:
+        problem = f'{shown(time)}: expected seconds since the epoch'
+        raise DirectiveError(f'QUERY AT: argument time {problem}') from None
+    try:
         with ref.held() as kb:
-            axioms = ref.history.at(seconds, kb.axioms())
+            axioms = ref.history.at(seconds, kb.axioms(), session.clock())
     except ValueError as error:
         raise DirectiveError(f'QUERY AT: argument time {error}') from None
     past = Reference(ref.name, KnowledgeBase(ref.kb.iri, axioms), ref.origin)
     if not asserted:
         past.kb.reason()
-    return _facts(past, pattern, asserted)
+    return _matching('QUERY AT', past, pattern, asserted)
 
 
 def _asserted(ref: Reference, wanted: ShortFact) -> Iterable[ShortFact]:
