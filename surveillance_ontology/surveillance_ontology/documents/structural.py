@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import MISSING, dataclass, fields
 from typing import Any, TypeAlias, get_args
 
-from surveillance_ontology.documents.nodes import IllFormedError
+from surveillance_ontology.documents.xml_reading import IllFormedError
 from surveillance_ontology.owl import axioms as ax
 from surveillance_ontology.owl import expressions as ex
 from surveillance_ontology.owl.axioms import Axiom

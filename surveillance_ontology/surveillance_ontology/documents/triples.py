@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from itertools import count
 from typing import Any
 
-from surveillance_ontology.documents.nodes import CARDINALITIES
+from surveillance_ontology.documents.mapping import CARDINALITIES
 from surveillance_ontology.documents.rdf_xml import Node, Triple
 from surveillance_ontology.owl import axioms as ax
 from surveillance_ontology.owl import expressions as ex

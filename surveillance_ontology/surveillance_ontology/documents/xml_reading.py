@@ -39,6 +39,10 @@ class OntologyFileError(ValueError):
         return f'{self.path}{place}: {self.message}' if self.path else self.message
 
 
+class IllFormedError(OntologyFileError):
+    """A class expression or data range that says nothing: its axiom is left out, and reported."""
+
+
 def resolve(base: str, reference: str) -> str:
     """Return an IRI reference against a base IRI (RFC 3986).
 
