@@ -17,17 +17,14 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from surveillance_ontology.documents.reading import (
-        OntologyDocument,
-        read_ontology,
-    )
-    from surveillance_ontology.documents.writing import (
-        ontology_bytes,
-        write_ontology,
-    )
-    from surveillance_ontology.documents.xml_reading import OntologyFileError
-    from surveillance_ontology.knowledge_base import Changes, KnowledgeBase
-    from surveillance_ontology.reasoner.explanation import Explanation
+    from surveillance_ontology.documents.reading import OntologyDocument as OntologyDocument
+    from surveillance_ontology.documents.reading import read_ontology as read_ontology
+    from surveillance_ontology.documents.writing import ontology_bytes as ontology_bytes
+    from surveillance_ontology.documents.writing import write_ontology as write_ontology
+    from surveillance_ontology.documents.xml_reading import OntologyFileError as OntologyFileError
+    from surveillance_ontology.knowledge_base import Changes as Changes
+    from surveillance_ontology.knowledge_base import KnowledgeBase as KnowledgeBase
+    from surveillance_ontology.reasoner.explanation import Explanation as Explanation
 
 _HOME = {
     'Changes': 'knowledge_base',
@@ -39,20 +36,10 @@ _HOME = {
     'read_ontology': 'documents.reading',
     'write_ontology': 'documents.writing',
 }
-__all__ = [
-    'Changes',
-    'Explanation',
-    'KnowledgeBase',
-    'OntologyDocument',
-    'OntologyFileError',
-    'ontology_bytes',
-    'read_ontology',
-    'write_ontology',
-]
+__all__ = list(_HOME)
 
 
 def __getattr__(name: str) -> Any:
-    home = _HOME.get(name)
-    if home is None:
+    if name not in _HOME:
         raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
-    return getattr(importlib.import_module(f'{__name__}.{home}'), name)
+    return getattr(importlib.import_module(f'{__name__}.{_HOME[name]}'), name)

@@ -100,8 +100,7 @@ class RosTransport:
 
     def call_list(self, requests: Batch) -> ListResponse:
         """Carry out a batch and block until the answer."""
-        answer = self._blocking(self._serial, _many(requests))
-        return _list_from_ros(answer)
+        return _list_from_ros(self._blocking(self._serial, _many(requests)))
 
     def _blocking(self, caller: ServiceCaller, request: Any) -> Any:
         try:
@@ -127,19 +126,18 @@ class RosTransport:
 
     async def call_async(self, request: DirectiveRequest) -> DirectiveResponse:
         """Carry out one directive."""
-        try:
-            answer = await self._single.call_async(_one(request), self.timeout)
-        except CallError as error:
-            raise ArmorServiceCallError(str(error)) from error
+        answer = await self._awaited(self._single, _one(request))
         return response_from_ros(answer.armor_response)
 
     async def call_list_async(self, requests: Batch) -> ListResponse:
         """Carry out a batch."""
+        return _list_from_ros(await self._awaited(self._serial, _many(requests)))
+
+    async def _awaited(self, caller: ServiceCaller, request: Any) -> Any:
         try:
-            answer = await self._serial.call_async(_many(requests), self.timeout)
+            return await caller.call_async(request, self.timeout)
         except CallError as error:
             raise ArmorServiceCallError(str(error)) from error
-        return _list_from_ros(answer)
 
 
 class ArmorClient(client.ArmorClient):

@@ -409,7 +409,7 @@ class KnowledgeBase:
         engine = self._usable
         if engine is not None:
             representative = engine.equality.find(individual)
-            gone = {a.cls for a in self._told.removed if isinstance(a, ClassAssertion)} & {
+            gone = {
                 a.cls
                 for a in self._told.removed
                 if isinstance(a, ClassAssertion) and a.individual == individual
@@ -515,25 +515,18 @@ class KnowledgeBase:
 
     def object_properties_of(self, individual: str) -> set[str]:
         """Return object properties with at least one value for the individual."""
-        names = {
-            axiom.prop
-            for axiom in self._told.about.get(individual, ())
-            if isinstance(axiom, ObjectPropertyAssertion)
-        }
-        if self._engine is not None:
-            names.update(self._engine.program.objects)
+        derived = self._engine.program.objects if self._engine else ()
+        names = {*derived, *self._props(individual, ObjectPropertyAssertion)}
         return {name for name in names if self.object_values(name, individual)}
 
     def data_properties_of(self, individual: str) -> set[str]:
         """Return data properties with at least one value for the individual."""
-        names = {
-            axiom.prop
-            for axiom in self._told.about.get(individual, ())
-            if isinstance(axiom, DataPropertyAssertion)
-        }
-        if self._engine is not None:
-            names.update(self._engine.program.datas)
+        derived = self._engine.program.datas if self._engine else ()
+        names = {*derived, *self._props(individual, DataPropertyAssertion)}
         return {name for name in names if self.data_values(name, individual)}
+
+    def _props(self, individual: str, kind: type[Any]) -> set[str]:
+        return {a.prop for a in self._told.about.get(individual, ()) if isinstance(a, kind)}
 
     def equivalents(self, cls: str) -> list[ClassExpression]:
         """Return the other sides of the asserted equivalences that have the class as one side."""
@@ -702,19 +695,11 @@ class KnowledgeBase:
 
     def add(self, axiom: Axiom) -> bool:
         """Assert an axiom; return False when it was asserted already."""
-        if not self._told.insert(axiom):
-            return False
-        if self._feed:
-            self._feed.asserted((axiom,), ())
-        return True
+        return bool(self.change((axiom,)))
 
     def remove(self, axiom: Axiom) -> bool:
         """Retract an axiom; return False when it was not asserted."""
-        if not self._told.discard(axiom):
-            return False
-        if self._feed:
-            self._feed.asserted((), (axiom,))
-        return True
+        return bool(self.change((), (axiom,)))
 
     def change(self, added: Iterable[Axiom] = (), removed: Iterable[Axiom] = ()) -> int:
         """Retract `removed`, then assert `added`, as one batch; return the number of axioms that

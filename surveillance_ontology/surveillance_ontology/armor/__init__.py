@@ -19,54 +19,40 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from surveillance_ontology.armor.access import Settings
+    from surveillance_ontology.armor.access import Settings as Settings
+    from surveillance_ontology.armor.client import ArmorClient as ArmorClient
+    from surveillance_ontology.armor.client import ArmorServiceCallError as ArmorServiceCallError
     from surveillance_ontology.armor.client import (
-        ArmorClient,
-        ArmorServiceCallError,
-        ArmorServiceInternalError,
-        InProcessTransport,
+        ArmorServiceInternalError as ArmorServiceInternalError,
     )
-    from surveillance_ontology.armor.protocol import (
-        DirectiveRequest,
-        DirectiveResponse,
-        ExitCode,
-        name_in,
-        value_in,
-    )
-    from surveillance_ontology.armor.service import ArmorService
-    from surveillance_ontology.armor.store import Store
+    from surveillance_ontology.armor.client import InProcessTransport as InProcessTransport
+    from surveillance_ontology.armor.protocol import DirectiveRequest as DirectiveRequest
+    from surveillance_ontology.armor.protocol import DirectiveResponse as DirectiveResponse
+    from surveillance_ontology.armor.protocol import ExitCode as ExitCode
+    from surveillance_ontology.armor.protocol import name_in as name_in
+    from surveillance_ontology.armor.protocol import value_in as value_in
+    from surveillance_ontology.armor.service import ArmorService as ArmorService
+    from surveillance_ontology.armor.store import Store as Store
 
-_HOMES = {
-    'access': ('Settings',),
-    'client': (
-        'ArmorClient',
-        'ArmorServiceCallError',
-        'ArmorServiceInternalError',
-        'InProcessTransport',
-    ),
-    'protocol': ('DirectiveRequest', 'DirectiveResponse', 'ExitCode', 'name_in', 'value_in'),
-    'service': ('ArmorService',),
-    'store': ('Store',),
+_HOME = {
+    'ArmorClient': 'client',
+    'ArmorService': 'service',
+    'ArmorServiceCallError': 'client',
+    'ArmorServiceInternalError': 'client',
+    'DirectiveRequest': 'protocol',
+    'DirectiveResponse': 'protocol',
+    'ExitCode': 'protocol',
+    'InProcessTransport': 'client',
+    'Settings': 'access',
+    'Store': 'store',
+    'name_in': 'protocol',
+    'value_in': 'protocol',
 }
-__all__ = [
-    'ArmorClient',
-    'ArmorService',
-    'ArmorServiceCallError',
-    'ArmorServiceInternalError',
-    'DirectiveRequest',
-    'DirectiveResponse',
-    'ExitCode',
-    'InProcessTransport',
-    'Settings',
-    'Store',
-    'name_in',
-    'value_in',
-]
+__all__ = list(_HOME)
 
 
 def __getattr__(name: str) -> Any:
     # Late, so that a node that is a client only does not load the reasoner.
-    for module, names in _HOMES.items():
-        if name in names:
-            return getattr(import_module(f'{__name__}.{module}'), name)
-    raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
+    if name not in _HOME:
+        raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
+    return getattr(import_module(f'{__name__}.{_HOME[name]}'), name)

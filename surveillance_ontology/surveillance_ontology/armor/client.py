@@ -196,6 +196,9 @@ class ClientPart:
         """Make a directive of the client."""
         return self.client.request(words, *args)
 
+    def _carry_out(self, words: str, *args: str) -> Steps[DirectiveResponse]:
+        return checked((yield self.request(words, *args)))
+
 
 def checked(response: DirectiveResponse) -> DirectiveResponse:
     """Pass a response on if it is a success.
@@ -216,8 +219,7 @@ class Manipulation(ClientPart):
     """
 
     def _change(self, words: str, *args: str) -> Steps[bool]:
-        response: DirectiveResponse = checked((yield self.request(words, *args)))
-        return response.is_consistent
+        return (yield from self._carry_out(words, *args)).is_consistent
 
     def _change_all(self, requests: Sequence[DirectiveRequest]) -> Steps[bool]:
         if not requests:
@@ -325,14 +327,8 @@ class Manipulation(ClientPart):
         Raises:
             ArmorServiceInternalError: 206, there are several values.
         """
-        query = self.request('QUERY DATAPROP IND', dataprop_name, ind_name)
-        old = checked((yield query)).queried_objects
-        _check_single(old, dataprop_name, ind_name)
-        if not old:
-            args = (dataprop_name, ind_name, value_type, new_value)
-            return (yield from self._change('ADD DATAPROP IND', *args))
         args = (dataprop_name, ind_name, value_type, new_value)
-        return (yield from self._change('REPLACE DATAPROP IND', *args, old[0]))
+        return (yield from self._replace_one('DATAPROP IND', *args))
 
     @operation
     def replace_one_objectprop_b2_ind(
@@ -343,14 +339,18 @@ class Manipulation(ClientPart):
         Raises:
             ArmorServiceInternalError: 206, there are several.
         """
-        query = self.request('QUERY OBJECTPROP IND', objectprop_name, ind_name)
-        old = checked((yield query)).queried_objects
-        _check_single(old, objectprop_name, ind_name)
-        if not old:
-            args = (objectprop_name, ind_name, new_value)
-            return (yield from self._change('ADD OBJECTPROP IND', *args))
         args = (objectprop_name, ind_name, new_value)
-        return (yield from self._change('REPLACE OBJECTPROP IND', *args, old[0]))
+        return (yield from self._replace_one('OBJECTPROP IND', *args))
+
+    def _replace_one(self, words: str, prop: str, ind: str, *new: str) -> Steps[bool]:
+        old = (yield from self._carry_out(f'QUERY {words}', prop, ind)).queried_objects
+        if len(old) > 1:
+            raise ArmorServiceInternalError(
+                f'{prop} of {ind} has {len(old)} values, expected one: {", ".join(old)}',
+                ExitCode.SEVERAL_VALUES,
+            )
+        command = 'REPLACE' if old else 'ADD'
+        return (yield from self._change(f'{command} {words}', prop, ind, *new, *old))
 
     @operation
     def remove_ind(self, ind_name: str) -> Steps[bool]:
@@ -421,20 +421,11 @@ class Manipulation(ClientPart):
         ]
 
 
-def _check_single(values: list[str], prop: str, ind: str) -> None:
-    if len(values) > 1:
-        raise ArmorServiceInternalError(
-            f'{prop} of {ind} has {len(values)} values, expected one: {", ".join(values)}',
-            ExitCode.SEVERAL_VALUES,
-        )
-
-
 class Query(ClientPart):
     """Directives that ask. All raise `ArmorServiceCallError` and `ArmorServiceInternalError`."""
 
     def _objects(self, words: str, *args: str) -> Steps[list[str]]:
-        response: DirectiveResponse = checked((yield self.request(words, *args)))
-        return response.queried_objects
+        return (yield from self._carry_out(words, *args)).queried_objects
 
     def _names(self, with_uri: bool, words: str, *args: str) -> Steps[list[str]]:
         objects = yield from self._objects(words, *args)
@@ -577,30 +568,25 @@ class Query(ClientPart):
 class Utils(ClientPart):
     """Directives about references, files and logging."""
 
-    def _do(self, words: str, *args: str) -> Steps[None]:
-        checked((yield self.request(words, *args)))
-
     @operation
     def apply_buffered_changes(self) -> Steps[bool]:
         """Apply buffered manipulations; whether the ontology was consistent at the last REASON."""
-        response: DirectiveResponse = checked((yield self.request('APPLY')))
-        return response.is_consistent
+        return (yield from self._carry_out('APPLY')).is_consistent
 
     @operation
     def sync_buffered_reasoner(self) -> Steps[bool]:
         """Apply buffered manipulations and reason; whether the ontology is consistent."""
-        response: DirectiveResponse = checked((yield self.request('REASON')))
-        return response.is_consistent
+        return (yield from self._carry_out('REASON')).is_consistent
 
     @operation
     def save_ref_with_inferences(self, filepath: str) -> Steps[None]:
         """Save with the derived facts."""
-        yield from self._do('SAVE INFERENCE', filepath)
+        yield from self._carry_out('SAVE INFERENCE', filepath)
 
     @operation
     def save(self, filepath: str, inference: bool = False) -> Steps[None]:
         """Save, with the derived facts if asked for; an empty path is the file that was loaded."""
-        yield from self._do('SAVE INFERENCE' if inference else 'SAVE', filepath)
+        yield from self._carry_out('SAVE INFERENCE' if inference else 'SAVE', filepath)
 
     @operation
     def load_ref_from_file(
@@ -615,28 +601,27 @@ class Utils(ClientPart):
         """Load an ontology; nothing happens when the reference is loaded already."""
         flags = (str(buffered_manipulation), reasoner, str(buffered_reasoner))
         words = 'LOAD FILE MOUNTED' if mounted else 'LOAD FILE'
-        yield from self._do(words, owl_file_path, iri, *flags)
+        yield from self._carry_out(words, owl_file_path, iri, *flags)
 
     @operation
     def drop_ref(self) -> Steps[None]:
         """Forget the reference."""
-        yield from self._do('DROP')
+        yield from self._carry_out('DROP')
 
     @operation
     def mount_on_ref(self) -> Steps[None]:
         """Let only this client change the ontology."""
-        yield from self._do('MOUNT')
+        yield from self._carry_out('MOUNT')
 
     @operation
     def unmount_from_ref(self) -> Steps[None]:
         """End `mount_on_ref`."""
-        yield from self._do('UNMOUNT')
+        yield from self._carry_out('UNMOUNT')
 
     @operation
     def get_all_refs(self) -> Steps[list[str]]:
         """Yield names of all references."""
-        response: DirectiveResponse = checked((yield self.request('GET ALL REFS')))
-        return response.queried_objects
+        return (yield from self._carry_out('GET ALL REFS')).queried_objects
 
     @operation
     def get_ref_client(self, reference_name: str = '') -> Steps[str | None]:
@@ -644,14 +629,13 @@ class Utils(ClientPart):
         is.
         """
         name = reference_name or self.client.reference_name
-        response: DirectiveResponse = checked((yield self.request('GET REF CLIENT', name)))
-        mounted = response.queried_objects[0]
+        (mounted,) = (yield from self._carry_out('GET REF CLIENT', name)).queried_objects
         return None if mounted == 'none' else mounted
 
     @operation
     def set_log_to_terminal(self, switch: bool) -> Steps[None]:
         """Switch the server's log on its console."""
-        yield from self._do(f'LOG SCREEN {"ON" if switch else "OFF"}')
+        yield from self._carry_out(f'LOG SCREEN {"ON" if switch else "OFF"}')
 
     @operation
     def set_log_to_file(self, switch: bool, filepath: str = '') -> Steps[None]:
@@ -659,9 +643,9 @@ class Utils(ClientPart):
         if switch:
             if not filepath:
                 raise ArmorServiceCallError('set_log_to_file: expected the path of a file')
-            yield from self._do('LOG FILE ON', filepath)
+            yield from self._carry_out('LOG FILE ON', filepath)
         else:
-            yield from self._do('LOG FILE OFF')
+            yield from self._carry_out('LOG FILE OFF')
 
 
 class ArmorClient:

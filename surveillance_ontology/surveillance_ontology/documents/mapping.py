@@ -8,6 +8,8 @@ silence.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from functools import partial
+from typing import TypeAlias
 
 from surveillance_ontology.documents.rdf_xml import Graph, Node
 from surveillance_ontology.documents.xml_reading import IllFormedError, OntologyFileError
@@ -27,6 +29,7 @@ from surveillance_ontology.owl.vocabulary import (
 )
 
 _TYPE = RDF + 'type'
+_ReadNode: TypeAlias = 'Callable[[Mapping, str, dict[str, list[Node]]], None]'
 DECLARATIONS = {
     OWL + 'Class': 'class',
     RDFS + 'Class': 'class',
@@ -57,6 +60,7 @@ CARDINALITIES = (
     ('cardinality', 'qualifiedCardinality', ex.ObjectExactCardinality, ex.DataExactCardinality),
 )
 _CONSTRUCTORS = ('intersectionOf', 'unionOf', 'complementOf', 'oneOf', 'onProperty')
+_CONSTRUCTED = tuple(OWL + name for name in _CONSTRUCTORS[:-1])
 _RESTRICTIONS = (
     *('someValuesFrom', 'allValuesFrom', 'hasValue', 'hasSelf'),
     *(name for row in CARDINALITIES for name in row[:2]),
@@ -286,19 +290,20 @@ class Mapping:
     def _expression(self, node: str) -> ex.ClassExpression:
         properties = self._nodes.get(node, {})
         self._check_one(node, _CONSTRUCTORS, 'a class expression')
-        for predicate, record in (
-            (OWL + 'intersectionOf', ex.ObjectIntersectionOf),
-            (OWL + 'unionOf', ex.ObjectUnionOf),
-        ):
+        for predicate in _CONSTRUCTED:
             if predicate in properties:
-                return record(tuple(map(self.expression, self._list(properties[predicate][0]))))
-        if OWL + 'complementOf' in properties:
-            return ex.ObjectComplementOf(self.expression(properties[OWL + 'complementOf'][0]))
-        if OWL + 'oneOf' in properties:
-            return ex.ObjectOneOf(tuple(self._resources(properties[OWL + 'oneOf'][0])))
+                return self._constructed(predicate, properties[predicate][0])
         if OWL + 'onProperty' in properties:
             return self._restriction(node, properties)
         raise self._ill_formed(node, 'expected a class expression')
+
+    def _constructed(self, predicate: str, value: Node) -> ex.ClassExpression:
+        if predicate == OWL + 'complementOf':
+            return ex.ObjectComplementOf(self.expression(value))
+        if predicate == OWL + 'oneOf':
+            return ex.ObjectOneOf(tuple(self._resources(value)))
+        record = ex.ObjectUnionOf if predicate == OWL + 'unionOf' else ex.ObjectIntersectionOf
+        return record(tuple(map(self.expression, self._list(value))))
 
     def _restriction(self, node: str, properties: dict[str, list[Node]]) -> ex.ClassExpression:
         on = self._resource(node, OWL + 'onProperty')
@@ -350,7 +355,9 @@ class Mapping:
         types = [value for value in properties.get(_TYPE, ()) if isinstance(value, str)]
         special = next((_SPECIAL[name] for name in types if name in _SPECIAL), None)
         if special is None and OWL + 'sourceIndividual' in properties:
-            special = Mapping._negative  # Its type is missing; nothing else has a source.
+            special = _SPECIAL[
+                OWL + 'NegativePropertyAssertion'
+            ]  # Its type is missing; nothing else has a source.
         if special is not None:
             self._attempt(subject, special, self, subject, properties)
             return
@@ -380,7 +387,11 @@ class Mapping:
         if handler is None:
             self._statement(subject, predicate, value)
         elif isinstance(value, str):
-            handler(self, subject, value)
+            is_annotation = self._kinds.get(subject) == {'annotation_property'}
+            if is_annotation and predicate in _OF_PROPERTIES:
+                self._add(ax.AnnotationAssertion(predicate, subject, value))
+            elif axiom := handler(self, subject, value):
+                self._add(axiom)
         else:
             raise self._fail(
                 subject,
@@ -437,110 +448,66 @@ class Mapping:
         else:
             self._add(ax.ObjectPropertyAssertion(predicate, subject, value))
 
-    def _imports(self, subject: str, value: str) -> None:
-        self._add(ax.Import(value))
-
-    def _sub_class(self, subject: str, value: str) -> None:
-        self._add(ax.SubClassOf(self.expression(subject), self.expression(value)))
-
-    def _equivalent_class(self, subject: str, value: str) -> None:
+    def _equivalent_class(self, subject: str, value: str) -> Axiom:
         if self._is_data_range(subject):
-            self._add(ax.DatatypeDefinition(subject, self.data_range(value)))
-        else:
-            self._add(ax.EquivalentClasses((self.expression(subject), self.expression(value))))
+            return ax.DatatypeDefinition(subject, self.data_range(value))
+        return ax.EquivalentClasses((self.expression(subject), self.expression(value)))
 
-    def _disjoint_classes(self, subject: str, value: str) -> None:
-        self._add(ax.DisjointClasses((self.expression(subject), self.expression(value))))
-
-    def _disjoint_union(self, subject: str, value: str) -> None:
-        self._add(ax.DisjointUnion(subject, tuple(map(self.expression, self._list(value)))))
-
-    def _defined(self, subject: str, predicate: str, value: str) -> None:
+    def _defined(self, subject: str, value: str, predicate: str) -> Axiom | None:
         """Read a named class that carries the expression itself (OWL 1 style): an equivalence."""
         if subject.startswith('_:'):
-            return
-        operands = [value] if predicate == OWL + 'complementOf' else self._list(value)
-        if predicate == OWL + 'complementOf':
-            other: ex.ClassExpression = ex.ObjectComplementOf(self.expression(operands[0]))
-        elif predicate == OWL + 'oneOf':
-            if self._is_data_range(subject):
-                values = ex.DataOneOf(self._literals(subject, operands))
-                self._add(ax.DatatypeDefinition(subject, values))
-                return
-            other = ex.ObjectOneOf(tuple(self._resources(value)))
-        elif predicate == OWL + 'unionOf':
-            other = ex.ObjectUnionOf(tuple(map(self.expression, operands)))
-        else:
-            other = ex.ObjectIntersectionOf(tuple(map(self.expression, operands)))
-        self._add(ax.EquivalentClasses((subject, other)))
+            return None
+        if predicate == OWL + 'oneOf' and self._is_data_range(subject):
+            values = ex.DataOneOf(self._literals(subject, self._list(value)))
+            return ax.DatatypeDefinition(subject, values)
+        return ax.EquivalentClasses((subject, self._constructed(predicate, value)))
 
-    def _sub_property(self, subject: str, value: str) -> None:
+    def _between(self, subject: str, value: str, predicate: str) -> Axiom:
+        """Read a relation of two properties."""
+        of_objects, of_data = _BETWEEN[predicate]
         if self._is_data(subject) or self._is_data(value):
-            self._add(ax.SubDataPropertyOf(subject, value))
-        elif self._is_annotation(subject):
-            self._add(ax.AnnotationAssertion(RDFS + 'subPropertyOf', subject, value))
-        else:
-            self._add(ax.SubObjectPropertyOf(self._property(subject), self._property(value)))
+            return of_data(subject, value)
+        return of_objects(self._property(subject), self._property(value))
 
-    def _chain(self, subject: str, value: str) -> None:
+    def _chain(self, subject: str, value: str) -> Axiom:
         chain = tuple(self._property(item) for item in self._resources(value))
-        self._add(ax.SubPropertyChainOf(chain, self._property(subject)))
+        return ax.SubPropertyChainOf(chain, self._property(subject))
 
-    def _equivalent_property(self, subject: str, value: str) -> None:
-        if self._is_data(subject) or self._is_data(value):
-            self._add(ax.EquivalentDataProperties((subject, value)))
-        else:
-            pair = (self._property(subject), self._property(value))
-            self._add(ax.EquivalentObjectProperties(pair))
+    def _inverse(self, subject: str, value: str) -> Axiom | None:
+        if subject.startswith('_:'):
+            return None
+        return ax.InverseObjectProperties(subject, self._property(value))
 
-    def _disjoint_property(self, subject: str, value: str) -> None:
-        if self._is_data(subject) or self._is_data(value):
-            self._add(ax.DisjointDataProperties((subject, value)))
-        else:
-            pair = (self._property(subject), self._property(value))
-            self._add(ax.DisjointObjectProperties(pair))
-
-    def _inverse(self, subject: str, value: str) -> None:
-        if not subject.startswith('_:'):
-            self._add(ax.InverseObjectProperties(subject, self._property(value)))
-
-    def _domain(self, subject: str, value: str) -> None:
+    def _domain(self, subject: str, value: str) -> Axiom:
         if self._is_data(subject):
-            self._add(ax.DataPropertyDomain(subject, self.expression(value)))
-        elif self._is_annotation(subject):
-            self._add(ax.AnnotationAssertion(RDFS + 'domain', subject, value))
-        else:
-            self._add(ax.ObjectPropertyDomain(self._property(subject), self.expression(value)))
+            return ax.DataPropertyDomain(subject, self.expression(value))
+        return ax.ObjectPropertyDomain(self._property(subject), self.expression(value))
 
-    def _range(self, subject: str, value: str) -> None:
-        if self._is_annotation(subject):
-            self._add(ax.AnnotationAssertion(RDFS + 'range', subject, value))
-        elif self._is_data(subject, value):
-            self._add(ax.DataPropertyRange(subject, self.data_range(value)))
-        else:
-            self._add(ax.ObjectPropertyRange(self._property(subject), self.expression(value)))
+    def _range(self, subject: str, value: str) -> Axiom:
+        if self._is_data(subject, value):
+            return ax.DataPropertyRange(subject, self.data_range(value))
+        return ax.ObjectPropertyRange(self._property(subject), self.expression(value))
 
-    def _is_annotation(self, prop: str) -> bool:
-        return self._kinds.get(prop) == {'annotation_property'}
-
-    def _same(self, subject: str, value: str) -> None:
+    def _same(self, subject: str, value: str) -> Axiom:
         if not self._used:
             self._used = {name for properties in self._nodes.values() for name in properties}
         for name in (subject, value):
             if name in self._used:
                 self._report(subject, f'owl:sameAs says nothing of {local_name(name)} as property')
-        self._add(ax.SameIndividual(frozenset((subject, value))))
+        return ax.SameIndividual(frozenset((subject, value)))
 
-    def _different(self, subject: str, value: str) -> None:
-        self._add(ax.DifferentIndividuals(frozenset((subject, value))))
-
-    def _key(self, subject: str, value: str) -> None:
+    def _key(self, subject: str, value: str) -> Axiom:
         props = self._resources(value)
         data = tuple(prop for prop in props if self._is_data(prop))
         objects = tuple(self._property(prop) for prop in props if not self._is_data(prop))
-        self._add(ax.HasKey(self.expression(subject), objects, data))
+        return ax.HasKey(self.expression(subject), objects, data)
 
     # --- nodes with a shape of their own ---
+
+    def _group(self, node: str, properties: dict[str, list[Node]], read: _ReadNode) -> None:
+        """Read a node that stands for axioms, and what it says of them."""
+        read(self, node, properties)
+        self._note(tuple(self._added), node, properties)
 
     def _all_different(self, node: str, properties: dict[str, list[Node]]) -> None:
         for predicate in (OWL + 'members', OWL + 'distinctMembers'):
@@ -548,12 +515,10 @@ class Mapping:
                 members = frozenset(self._resources(head))
                 if len(members) > 1:
                     self._add(ax.DifferentIndividuals(members))
-        self._note(tuple(self._added), node, properties)
 
     def _all_disjoint_classes(self, node: str, properties: dict[str, list[Node]]) -> None:
         for head in properties.get(OWL + 'members', ()):
             self._add(ax.DisjointClasses(tuple(map(self.expression, self._list(head)))))
-        self._note(tuple(self._added), node, properties)
 
     def _all_disjoint_properties(self, node: str, properties: dict[str, list[Node]]) -> None:
         for head in properties.get(OWL + 'members', ()):
@@ -562,7 +527,6 @@ class Mapping:
                 self._add(ax.DisjointDataProperties(tuple(props)))
             else:
                 self._add(ax.DisjointObjectProperties(tuple(map(self._property, props))))
-        self._note(tuple(self._added), node, properties)
 
     def _negative(self, node: str, properties: dict[str, list[Node]]) -> None:
         source = self._resource(node, OWL + 'sourceIndividual')
@@ -576,7 +540,6 @@ class Mapping:
             if isinstance(expression, ex.ObjectInverseOf):
                 source, target, prop = target, source, expression.prop
             self._add(ax.NegativeObjectPropertyAssertion(prop, source, target))
-        self._note(tuple(self._added), node, properties)
 
     def _annotated(self, node: str, properties: dict[str, list[Node]]) -> None:
         source, predicate, target = (
@@ -614,11 +577,9 @@ class Mapping:
         self._report(node, 'an annotation on an annotation is not kept')
 
     def _rule(self, node: str, properties: dict[str, list[Node]]) -> None:
-        body = tuple(
-            map(self._atom, self._resources(self._one(node, SWRL + 'body') or RDF + 'nil'))
-        )
-        head = tuple(
-            map(self._atom, self._resources(self._one(node, SWRL + 'head') or RDF + 'nil'))
+        body, head = (
+            tuple(map(self._atom, self._resources(self._one(node, SWRL + side) or RDF + 'nil')))
+            for side in ('body', 'head')
         )
         annotations = tuple(
             (predicate, value)
@@ -663,34 +624,49 @@ class Mapping:
         raise self._fail(node, f'rule atom of type {kind} is not understood')
 
 
-_PREDICATES: dict[str, Callable[[Mapping, str, str], None]] = {
-    OWL + 'imports': Mapping._imports,
-    RDFS + 'subClassOf': Mapping._sub_class,
+_BETWEEN: dict[str, tuple[Callable[..., Axiom], Callable[..., Axiom]]] = {
+    RDFS + 'subPropertyOf': (ax.SubObjectPropertyOf, ax.SubDataPropertyOf),
+    OWL + 'equivalentProperty': (
+        lambda *pair: ax.EquivalentObjectProperties(pair),
+        lambda *pair: ax.EquivalentDataProperties(pair),
+    ),
+    OWL + 'propertyDisjointWith': (
+        lambda *pair: ax.DisjointObjectProperties(pair),
+        lambda *pair: ax.DisjointDataProperties(pair),
+    ),
+}
+"""The relations of two properties: as axioms of object properties, and of data properties."""
+_OF_PROPERTIES = {*_BETWEEN, RDFS + 'domain', RDFS + 'range'}
+"""What is a mere annotation where it is said of an annotation property."""
+_PREDICATES: dict[str, Callable[[Mapping, str, str], Axiom | None]] = {
+    OWL + 'imports': lambda m, s, v: ax.Import(v),
+    RDFS + 'subClassOf': lambda m, s, v: ax.SubClassOf(m.expression(s), m.expression(v)),
     OWL + 'equivalentClass': Mapping._equivalent_class,
-    OWL + 'disjointWith': Mapping._disjoint_classes,
-    OWL + 'disjointUnionOf': Mapping._disjoint_union,
-    RDFS + 'subPropertyOf': Mapping._sub_property,
+    OWL + 'disjointWith': lambda m, s, v: ax.DisjointClasses((m.expression(s), m.expression(v))),
+    OWL + 'disjointUnionOf': lambda m, s, v: ax.DisjointUnion(
+        s, tuple(map(m.expression, m._list(v)))
+    ),
     OWL + 'propertyChainAxiom': Mapping._chain,
-    OWL + 'equivalentProperty': Mapping._equivalent_property,
-    OWL + 'propertyDisjointWith': Mapping._disjoint_property,
     OWL + 'inverseOf': Mapping._inverse,
     RDFS + 'domain': Mapping._domain,
     RDFS + 'range': Mapping._range,
     OWL + 'sameAs': Mapping._same,
-    OWL + 'differentFrom': Mapping._different,
+    OWL + 'differentFrom': lambda m, s, v: ax.DifferentIndividuals(frozenset((s, v))),
     OWL + 'hasKey': Mapping._key,
     OWL + 'datatypeComplementOf': lambda *_: None,
+    **{name: partial(Mapping._between, predicate=name) for name in _BETWEEN},
+    **{name: partial(Mapping._defined, predicate=name) for name in _CONSTRUCTED},
 }
-for _name in ('intersectionOf', 'unionOf', 'complementOf', 'oneOf'):
-    _PREDICATES[OWL + _name] = lambda mapping, subject, value, predicate=OWL + _name: (  # type: ignore[misc]
-        mapping._defined(subject, predicate, value)
-    )
 
-_SPECIAL: dict[str, Callable[[Mapping, str, dict[str, list[Node]]], None]] = {
-    OWL + 'AllDifferent': Mapping._all_different,
-    OWL + 'AllDisjointClasses': Mapping._all_disjoint_classes,
-    OWL + 'AllDisjointProperties': Mapping._all_disjoint_properties,
-    OWL + 'NegativePropertyAssertion': Mapping._negative,
+_SPECIAL: dict[str, _ReadNode] = {
+    OWL + name: partial(Mapping._group, read=read)
+    for name, read in (
+        ('AllDifferent', Mapping._all_different),
+        ('AllDisjointClasses', Mapping._all_disjoint_classes),
+        ('AllDisjointProperties', Mapping._all_disjoint_properties),
+        ('NegativePropertyAssertion', Mapping._negative),
+    )
+} | {
     OWL + 'Axiom': Mapping._annotated,
     OWL + 'Annotation': Mapping._annotated_annotation,
     SWRL + 'Imp': Mapping._rule,

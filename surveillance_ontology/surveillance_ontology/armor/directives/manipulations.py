@@ -6,9 +6,12 @@ entities come into being by being named.
 
 from __future__ import annotations
 
+from functools import partial
+
 from surveillance_ontology.armor.directives.table import (
     CLS,
     DAT,
+    ENTITY_KINDS,
     GONE,
     IND,
     NEW,
@@ -54,10 +57,6 @@ _OLD_IND = Argument('old individual', Read.INDIVIDUAL)
 _SUPER = Argument('superclass', Read.CLASS)
 _COUNT = Argument('cardinality', Read.NUMBER)
 _FILLER = Argument('value class', Read.CLASS)
-
-
-def _renamed(read: Read) -> tuple[Argument, Argument]:
-    return Argument('old name', read), Argument('new name', read)
 
 
 @manipulation('ADD IND', IND, summary='Makes an individual known, as an instance of owl:Thing.')
@@ -316,40 +315,21 @@ def _set_objectprop(ref: Reference, prop: str, ind: str, other: str) -> list[Cha
     ]
 
 
-@manipulation(
-    'RENAME IND',
-    *_renamed(Read.INDIVIDUAL),
-    summary='Gives an individual another name everywhere; merges it with one that has the name.',
-)
-def _rename_ind(_: Reference, old: str, new: str) -> list[Change]:
-    return [RenameEntity('individual', old, new)]
+def _rename(kind: str, _: Reference, old: str, new: str) -> list[Change]:
+    return [RenameEntity(kind, old, new)]
 
 
-@manipulation(
-    'RENAME CLASS',
-    *_renamed(Read.CLASS),
-    summary='Gives a class another name everywhere; merges it with one that has the name.',
-    schema=True,
-)
-def _rename_class(_: Reference, old: str, new: str) -> list[Change]:
-    return [RenameEntity('class', old, new)]
-
-
-@manipulation(
-    'RENAME DATAPROP',
-    *_renamed(Read.DATA_PROPERTY),
-    summary='Gives a data property another name everywhere; merges it with one that has the name.',
-    schema=True,
-)
-def _rename_dataprop(_: Reference, old: str, new: str) -> list[Change]:
-    return [RenameEntity('data_property', old, new)]
-
-
-@manipulation(
-    'RENAME OBJECTPROP',
-    *_renamed(Read.OBJECT_PROPERTY),
-    summary='Gives an object property another name everywhere; merges it with one that has it.',
-    schema=True,
-)
-def _rename_objectprop(_: Reference, old: str, new: str) -> list[Change]:
-    return [RenameEntity('object_property', old, new)]
+for _word, _read in (
+    ('IND', Read.INDIVIDUAL),
+    ('CLASS', Read.CLASS),
+    ('DATAPROP', Read.DATA_PROPERTY),
+    ('OBJECTPROP', Read.OBJECT_PROPERTY),
+):
+    _article = 'an' if _read.value[0] in 'aeiou' else 'a'
+    manipulation(
+        f'RENAME {_word}',
+        *(Argument('old name', _read), Argument('new name', _read)),
+        summary=f'Gives {_article} {_read.value} another name everywhere; merges it with one that '
+        'has the name.',
+        schema=_read is not Read.INDIVIDUAL,
+    )(partial(_rename, ENTITY_KINDS[_read]))
