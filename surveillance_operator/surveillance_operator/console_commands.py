@@ -153,8 +153,9 @@ class Answer:
 def help_text(columns: int = 1000) -> str:
     """Return every command with its arguments and what it does, in lines of that many columns."""
     usages = [
-        *((command.usage, command.description) for command in GRAMMAR.commands),
+        *((each.usage, each.description) for each in GRAMMAR.commands if each is not EXIT),
         (WHY.usage, WHY.description),
+        (EXIT.usage, 'Leave; in the terminal of a run: end the run.'),
         (EXIT_NODE, 'Stop one controller.'),
     ]
     width = max(len(usage) for usage, _ in usages)

@@ -117,7 +117,7 @@ def _regions(snapshot: Snapshot) -> Any:
     }
 
 
-def _health(snapshot: Snapshot) -> Any:
+def health(snapshot: Snapshot) -> Any:
     """Return what is known of each node, with its own reports, and what else is reported."""
     reports = dict(sorted(snapshot.health.items()))
     nodes = {}
@@ -208,7 +208,7 @@ PARTS: Mapping[str, tuple[tuple[str, ...], Callable[[Snapshot], Any]]] = {
         },
     ),
     'requests': (('requests',), lambda s: dict(s.requests)),
-    'health': (('namespace', 'nodes', 'ended', 'restarts', 'health', 'silent'), _health),
+    'health': (('namespace', 'nodes', 'ended', 'restarts', 'health', 'silent'), health),
     'figures': (('namespace', 'health'), _figures),
     'events': (('events',), lambda s: [list(each) for each in s.events]),
     'history': (('history',), _history),

@@ -158,7 +158,7 @@ class MissionActions:
         """Set after how long a place is URGENT, seconds."""
         number = _number('threshold', seconds)
         if number != int(number):
-            raise ActionError(f'threshold {number:g}: expected whole seconds')
+            raise ActionError(f'{number:g} s: expected whole seconds')
         value = ParameterValue(type=ParameterType.PARAMETER_INTEGER, integer_value=int(number))
         return self._set('urgency_threshold', value, f'{number:g} s')
 

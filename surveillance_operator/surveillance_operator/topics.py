@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
@@ -55,6 +55,7 @@ STILL = 0.01
 POSE_TOPIC = 'amcl_pose'
 DETECTIONS_TOPIC = 'aruco_detector/detections'
 BEHAVIOUR = 'robot_behavior'
+FSM = f'{BEHAVIOUR}/fsm'
 CONTROLLERS = ('battery_controller', 'planner_controller', 'motion_controller')
 
 _QUEUE = QoSProfile(
@@ -67,16 +68,15 @@ _MANY = QoSProfile(depth=200, reliability=ReliabilityPolicy.RELIABLE)
 Fields = dict[str, Any]
 
 
-@dataclass(frozen=True)
-class Topic:
+class Topic(NamedTuple):
     """One topic that a snapshot takes from.
 
     Attributes:
         name: Relative to the namespace, or absolute.
         kind: The type of its messages.
-        qos: How it is heard.
         read: The snapshot's fields that a message changes; raises `ValueError` for one that cannot
             be used.
+        qos: How it is heard.
         stream: Whether a view may do without it.
         beside: Taken only together with a message of this topic, and read before it.
         period: Least time between two looks at it, seconds.
@@ -84,8 +84,8 @@ class Topic:
 
     name: str
     kind: Any
-    qos: QoSProfile
     read: Callable[[Any, Snapshot], Fields]
+    qos: QoSProfile = STATE_QOS
     stream: bool = False
     beside: str = ''
     period: float = 0.0
@@ -118,6 +118,10 @@ def _fed_back(point: Any, old: Snapshot) -> Fields:
         dx, dy = x - old.pose[0], y - old.pose[1]
         yaw = math.atan2(dy, dx) if dx or dy else old.pose[2]
     return moved((x, y, yaw), old)
+
+
+def _on_map(message: OccupancyGrid, _old: Snapshot) -> Fields:
+    return {'grid': conversions.grid_from(message), 'trail': NO_POINTS}
 
 
 def _on_transition(message: FsmTransition, old: Snapshot) -> Fields:
@@ -245,62 +249,35 @@ def _sets(name: str, value: Callable[[Any], Any]) -> Callable[[Any, Snapshot], F
     return lambda message, _: {name: value(message)}
 
 
+def _feedback(action: str, kind: Any, read: Callable[[Any, Snapshot], Fields]) -> Topic:
+    """Return the topic of an action's feedback, read without its envelope."""
+    name, message = f'{action}/_action/feedback', kind.Impl.FeedbackMessage
+    return Topic(name, message, lambda m, old: read(m.feedback, old), _NEWEST)
+
+
 TOPICS: tuple[Topic, ...] = (
-    Topic('mission_status', MissionStatus, STATE_QOS, _sets('status', conversions.status_from)),
-    Topic(
-        'decision',
-        Decision,
-        STATE_QOS,
-        lambda m, _: {'decision': decision_from(m), 'number': m.sequence},
+    Topic('mission_status', MissionStatus, _sets('status', conversions.status_from)),
+    Topic('decision', Decision, lambda m, _: {'decision': decision_from(m), 'number': m.sequence}),
+    Topic('battery_level', UInt8, _sets('battery', conversions.percent_from)),
+    Topic('state/battery_low', Bool, lambda m, _: {'battery_low': m.data}),
+    Topic('map', OccupancyGrid, _on_map),
+    Topic('door_states', DoorStates, _sets('doors', conversions.doors_from)),
+    Topic('obstacles', PointCloud2, _sets('obstacles', conversions.cloud_from)),
+    Topic(POSE_TOPIC, PoseWithCovarianceStamped, _on_pose),
+    Topic('plan', PathMessage, _sets('plan', conversions.path_from)),
+    Topic('scan', LaserScan, _on_scan, _STREAM, stream=True, beside=POSE_TOPIC),
+    _feedback('follow_path', FollowPath, lambda m, old: _fed_back(m.position, old)),
+    _feedback('motion/controller', Control, lambda m, old: _fed_back(m.reached_point, old)),
+    _feedback(
+        'scan_surroundings', ScanSurroundings, lambda m, _: {'scan_progress': (m.view, m.views)}
     ),
-    Topic('battery_level', UInt8, STATE_QOS, _sets('battery', conversions.percent_from)),
-    Topic('state/battery_low', Bool, STATE_QOS, lambda m, _: {'battery_low': m.data}),
-    Topic(
-        'map',
-        OccupancyGrid,
-        STATE_QOS,
-        lambda m, _: {'grid': conversions.grid_from(m), 'trail': NO_POINTS},
-    ),
-    Topic('door_states', DoorStates, STATE_QOS, _sets('doors', conversions.doors_from)),
-    Topic('obstacles', PointCloud2, STATE_QOS, _sets('obstacles', conversions.cloud_from)),
-    Topic(POSE_TOPIC, PoseWithCovarianceStamped, STATE_QOS, _on_pose),
-    Topic('plan', PathMessage, STATE_QOS, _sets('plan', conversions.path_from)),
-    Topic('scan', LaserScan, _STREAM, _on_scan, stream=True, beside=POSE_TOPIC),
-    Topic(
-        'follow_path/_action/feedback',
-        FollowPath.Impl.FeedbackMessage,
-        _NEWEST,
-        lambda m, old: _fed_back(m.feedback.position, old),
-    ),
-    Topic(
-        'motion/controller/_action/feedback',
-        Control.Impl.FeedbackMessage,
-        _NEWEST,
-        lambda m, old: _fed_back(m.feedback.reached_point, old),
-    ),
-    Topic(
-        'scan_surroundings/_action/feedback',
-        ScanSurroundings.Impl.FeedbackMessage,
-        _NEWEST,
-        lambda m, _: {'scan_progress': (m.feedback.view, m.feedback.views)},
-    ),
-    Topic(DETECTIONS_TOPIC, MarkerDetectionArray, _NEWEST, _on_detections),
-    Topic('joint_states', JointState, _STREAM, _on_joints, beside=DETECTIONS_TOPIC),
-    Topic(
-        f'{BEHAVIOUR}/fsm/structure',
-        FsmStructure,
-        STATE_QOS,
-        _sets('containers', conversions.containers_from),
-    ),
-    Topic(
-        f'{BEHAVIOUR}/fsm/status',
-        FsmStatus,
-        STATE_QOS,
-        lambda m, _: {'active': tuple(m.active), 'paused': m.paused},
-    ),
-    Topic(f'{BEHAVIOUR}/fsm/transition', FsmTransition, _QUEUE, _on_transition),
-    *(Topic(f'{name}/announcement', String, STATE_QOS, _on_request(name)) for name in CONTROLLERS),
-    Topic('/diagnostics', DiagnosticArray, _MANY, _on_diagnostics, period=1.0),
-    Topic('/parameter_events', ParameterEvent, _MANY, _on_parameters),
+    Topic(DETECTIONS_TOPIC, MarkerDetectionArray, _on_detections, _NEWEST),
+    Topic('joint_states', JointState, _on_joints, _STREAM, beside=DETECTIONS_TOPIC),
+    Topic(f'{FSM}/structure', FsmStructure, _sets('containers', conversions.containers_from)),
+    Topic(f'{FSM}/status', FsmStatus, lambda m, _: {'active': tuple(m.active), 'paused': m.paused}),
+    Topic(f'{FSM}/transition', FsmTransition, _on_transition, _QUEUE),
+    *(Topic(f'{name}/announcement', String, _on_request(name)) for name in CONTROLLERS),
+    Topic('/diagnostics', DiagnosticArray, _on_diagnostics, _MANY, period=1.0),
+    Topic('/parameter_events', ParameterEvent, _on_parameters, _MANY),
 )
 """All that a snapshot takes from, with how."""

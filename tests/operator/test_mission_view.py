@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from rich.console import Console
 
 from surveillance_behaviour.policy.world import Decision
-from surveillance_operator.snapshot import Grid, Snapshot, Status, changes
+from surveillance_operator.snapshot import Grid, Health, Snapshot, Status, changes
 from surveillance_operator.watch import raster
 from surveillance_operator.watch.raster import Frame, rasterise
-from surveillance_operator.watch.view import MissionView
+from surveillance_operator.watch.view import MissionView, node_page
 
 STATUS = Status(95.0, 'surveillance', 'MOVE_TO_NEXT_ROOM', 'A', 'B', False, 'arrived in A', ())
 DECISION = Decision(90.0, 'A', 'B', 'B', 'URGENT', 'tour', 'B waits longest', {})
@@ -214,4 +214,19 @@ def test_each_change_is_told_once_in_one_line():
         'door D opened',
         'nothing stands about any more',
         'every node has ended: waiting for the next mission',
+    ]
+
+
+def test_each_node_has_one_line_with_the_worst_that_it_reports() -> None:
+    good, late = Health(0, 'up', ()), Health(1, 'late', ())
+    snapshot = Snapshot(
+        nodes={'robot_behavior': frozenset()},
+        ended=frozenset({'simulator'}),
+        restarts={'robot_behavior': 1},
+        health={'robot_behavior': good, 'robot_behavior: clock': late, 'mission_recorder': good},
+    )
+    assert [line.plain for line in node_page(snapshot)] == [
+        '▲ WARN  robot_behavior: late, started again 1 time',
+        '✗ ended simulator',
+        '● up    mission_recorder: up',
     ]

@@ -186,3 +186,16 @@ def test_no_link_leads_below_the_header(hub: Hub, viewer: Viewer) -> None:
         top = viewer.js(f'return document.getElementById("{section}").getBoundingClientRect().top')
         assert bottom <= top < 300
     viewer.size(*DESK)
+
+
+def test_a_jump_that_leads_nowhere_says_so(viewer: Viewer) -> None:
+    def jump(kind: str) -> str:
+        raise ValueError(f'no {kind} after this moment')
+
+    page = Page(Hub(), questions={}, actions={'jump': jump}, port=0, replay=True)
+    page.start()
+    viewer.driver.get(page.address)
+    viewer.until(lambda: viewer.text('#connection') == 'replay')
+    viewer.click('[data-jump=failure]')
+    viewer.until(lambda: viewer.text('#jumped') == 'no failure after this moment')
+    page.stop()

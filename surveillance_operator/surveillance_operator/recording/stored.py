@@ -66,8 +66,8 @@ def _on_place_markers(message: MarkerArray, _old: Snapshot) -> Fields:
 
 STORED_TOPICS = (
     *TOPICS,
-    Topic('fact_changes', FactChanges, QoSProfile(depth=100), _on_fact_changes),
-    Topic('place_markers', MarkerArray, QoSProfile(depth=1), _on_place_markers),
+    Topic('fact_changes', FactChanges, _on_fact_changes, QoSProfile(depth=100)),
+    Topic('place_markers', MarkerArray, _on_place_markers),
 )
 """All that a snapshot takes from in a recording."""
 

@@ -26,6 +26,7 @@ from rich.style import Style
 from rich.text import Text
 
 from surveillance_fsm import Interrupt
+from surveillance_operator.frames import health
 from surveillance_operator.snapshot import Box, Snapshot, decision_line
 from surveillance_operator.watch import raster
 from surveillance_operator.watch.raster import Canvas, Frame, rasterise
@@ -66,6 +67,8 @@ PUBLISHERS = {
     'amcl_pose': 'motion_controller publishes it in mode SIMULATED',
     'door_states': 'the simulator or the doors publish it',
 }
+LEVELS = ('ok', 'WARN', 'ERROR', 'STALE')
+"""Of what nodes report, by their numbers on `/diagnostics`."""
 HEADER = Style(color='black', bgcolor='deep_sky_blue1', bold=True)
 ALARM = Style(color='white', bgcolor='red3', bold=True)
 DIM = Style(dim=True)
@@ -232,16 +235,20 @@ def decision_page(snapshot: Snapshot) -> list[Text]:
 
 
 def node_page(snapshot: Snapshot) -> list[Text]:
-    """Return the nodes: up or ended, how often started again, what they report."""
+    """Return the nodes: up or ended, how often started again, the worst that they report."""
+    known = health(snapshot)
+    others = {name: {'up': True, 'reports': [each]} for name, each in known['others'].items()}
     lines = []
-    for name in sorted({*snapshot.nodes, *snapshot.ended}):
-        up = name in snapshot.nodes
-        again = snapshot.restarts.get(name, 0)
-        words = f', started again {again} time{"s" if again > 1 else ""}' if again else ''
-        lines.append(Text(f'{"● up   " if up else "✗ ended"} {name}{words}', '' if up else URGENT))
-    for name, health in sorted(snapshot.health.items()):
-        level = ('ok', 'WARN', 'ERROR', 'STALE')[min(health.level, 3)]
-        lines.append(Text(f'  {level:<5} {name}: {health.message}'))
+    for name, node in {**known['nodes'], **others}.items():
+        worst = max((each['level'] for each in node['reports']), default=0)
+        said = [each['message'] for each in node['reports'] if each['level'] == worst]
+        words = f': {"; ".join(said)}' if said and node['up'] else ''
+        if again := node.get('restarts', 0):
+            words += f', started again {again} time{"s" if again > 1 else ""}'
+        level = f'▲ {LEVELS[min(worst, 3)]}' if worst else '● up'
+        is_good = node['up'] and not worst
+        sign = level if node['up'] else '✗ ended'
+        lines.append(Text(f'{sign:<7} {name}{words}', '' if is_good else URGENT))
     return lines or [_dim('no nodes')]
 
 
@@ -413,39 +420,29 @@ def show_moving(see: See, stopping: Interrupt, console: Console) -> None:
 @contextlib.contextmanager
 def _keyboard() -> Iterator[Callable[[float, Interrupt], str]]:
     """Read single keys from the terminal; without one, only wait."""
+
+    def wait(seconds: float, stopping: Interrupt) -> str:
+        stopping.wait(seconds)
+        return ''
+
+    def read(seconds: float, _stopping: Interrupt) -> str:
+        try:
+            ready = select.select([keyboard], [], [], seconds)[0]
+            return os.read(keyboard, 64).decode(errors='ignore') if ready else ''
+        except OSError:
+            return ''
+
     try:
         keyboard = sys.stdin.fileno()
         before = termios.tcgetattr(keyboard)
     except (OSError, ValueError, AttributeError, termios.error):
-
-        def wait(seconds: float, stopping: Interrupt) -> str:
-            stopping.wait(seconds)
-            return ''
-
         yield wait
         return
-    wake, waker = os.pipe()
-
-    def rouse() -> None:
-        os.write(waker, b'x')
-
-    def read(seconds: float, stopping: Interrupt) -> str:
-        remove = stopping.subscribe(rouse)
-        try:
-            ready = select.select([keyboard, wake], [], [], seconds)[0]
-            return os.read(keyboard, 64).decode(errors='ignore') if keyboard in ready else ''
-        except OSError:
-            return ''
-        finally:
-            remove()
-
     tty.setcbreak(keyboard)
     try:
         yield read
     finally:
         termios.tcsetattr(keyboard, termios.TCSADRAIN, before)
-        os.close(wake)
-        os.close(waker)
 
 
 def show_once(see: See, stopping: Interrupt, console: Console, timeout: float) -> bool:

@@ -14,7 +14,7 @@ export class Replay {
     $('slider').addEventListener('change', () => { this.dragging = false; });
     for (const button of document.querySelectorAll('[data-jump]')) button.addEventListener('click', async () => {
       const found = await act('jump', {kind: button.dataset.jump});
-      if (!found.ok) $('moment').textContent = found.text;
+      $('jumped').textContent = found.ok ? '' : found.text;
     });
   }
 
