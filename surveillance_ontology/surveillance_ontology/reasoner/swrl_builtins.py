@@ -94,11 +94,6 @@ def _divide(first: _Number, second: _Number) -> _Number:
     return Fraction(first) / Fraction(second)
 
 
-def _integer_divide(first: _Number, second: _Number) -> _Number:
-    quotient = _divide(first, second)
-    return math.trunc(quotient)
-
-
 def _modulo(first: _Number, second: _Number) -> _Number:
     if isinstance(first, float) or isinstance(second, float):
         return math.fmod(first, second)
@@ -113,17 +108,37 @@ def _power(base: _Number, exponent: _Number) -> _Number:
     return Fraction(base) ** exponent
 
 
-def _half_up(number: _Number) -> _Number:
-    return math.floor(number + (0.5 if isinstance(number, float) else Fraction(1, 2)))
+def _rounding(compute: Callable[[Fraction], int]) -> _Solve:
+    """Round exactly, in the space of the number; a zero keeps its sign (XPath functions, 6.4)."""
+
+    def solve(value: Value, places: Value = 0) -> Iterable[Value]:
+        promoted = _numbers((value,))
+        if promoted is None or not isinstance(places, int) or abs(places) > 1024:
+            return ()
+        space, (number,) = promoted
+        if isinstance(number, float) and not math.isfinite(number):
+            return (value,)
+        scale = Fraction(10) ** places
+        rounded = compute(Fraction(number) * scale) / scale
+        if space == 'exact':
+            return (_value(space, rounded),)
+        return (floating_value(space, math.copysign(float(rounded), number)),)
+
+    return solve
 
 
-def _half_even(number: _Number, places: _Number = 0) -> _Number:
-    if not isinstance(places, int) or abs(places) > 1024:
-        raise ValueError
-    if isinstance(number, float):
-        return round(number, places)
-    scale = Fraction(10) ** places
-    return round(Fraction(number) * scale) / scale
+def _half_up(number: _Number) -> int:
+    return math.floor(Fraction(number) + Fraction(1, 2))
+
+
+def _integer_divide(*arguments: Value) -> Iterable[Value]:
+    promoted = _numbers(arguments)
+    if promoted is None:
+        return ()
+    try:
+        return (math.trunc(_divide(*promoted[1])),)
+    except (ArithmeticError, ValueError):
+        return ()
 
 
 def _floating(compute: Callable[[float], float]) -> _Solve:
@@ -165,14 +180,16 @@ def _string_test(test: Callable[..., bool]) -> Callable[..., bool]:
     return holds
 
 
-def _substring(text: str, start: int, length: int | None = None) -> str | None:
-    if not _text(text) or not isinstance(start, int):
+def _substring(text: Value, *bounds: Value) -> str | None:
+    promoted = _numbers(bounds)
+    if not isinstance(text, str) or promoted is None:
         return None
-    if length is not None and not isinstance(length, int):
-        return None
-    first = max(start, 1) - 1
-    last = len(text) if length is None else max(start - 1 + length, first)
-    return text[first:last]
+    start, *length = (
+        number if isinstance(number, float) and not math.isfinite(number) else _half_up(number)
+        for number in promoted[1]
+    )
+    end = start + length[0] if length else math.inf
+    return ''.join(each for place, each in enumerate(text, 1) if start <= place < end)
 
 
 def _translate(text: str, old: str, new: str) -> str | None:
@@ -244,16 +261,16 @@ _COMPUTATIONS: dict[str, tuple[int, int, _Solve]] = {
     'subtract': (3, 3, _arithmetic(operator.sub)),
     'multiply': (3, 99, _arithmetic(lambda *numbers: math.prod(numbers))),
     'divide': (3, 3, _arithmetic(_divide)),
-    'integerDivide': (3, 3, _arithmetic(_integer_divide)),
+    'integerDivide': (3, 3, _integer_divide),
     'mod': (3, 3, _arithmetic(_modulo)),
     'pow': (3, 3, _arithmetic(_power)),
     'unaryPlus': (2, 2, _arithmetic(operator.pos)),
     'unaryMinus': (2, 2, _arithmetic(operator.neg)),
     'abs': (2, 2, _arithmetic(abs)),
-    'ceiling': (2, 2, _arithmetic(math.ceil)),
-    'floor': (2, 2, _arithmetic(math.floor)),
-    'round': (2, 2, _arithmetic(_half_up)),
-    'roundHalfToEven': (2, 3, _arithmetic(_half_even)),
+    'ceiling': (2, 2, _rounding(math.ceil)),
+    'floor': (2, 2, _rounding(math.floor)),
+    'round': (2, 2, _rounding(_half_up)),
+    'roundHalfToEven': (2, 3, _rounding(round)),
     'sin': (2, 2, _floating(math.sin)),
     'cos': (2, 2, _floating(math.cos)),
     'tan': (2, 2, _floating(math.tan)),
