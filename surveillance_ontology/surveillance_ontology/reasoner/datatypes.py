@@ -10,6 +10,7 @@ are never equal to decimals.
 from __future__ import annotations
 
 import base64
+import contextlib
 import math
 import re
 import struct
@@ -17,6 +18,7 @@ from collections.abc import Callable, Mapping
 from fractions import Fraction
 from functools import cache
 from typing import Any, TypeAlias
+from xml.etree import ElementTree
 
 from surveillance_ontology.owl import expressions as ex
 from surveillance_ontology.owl.expressions import (
@@ -155,6 +157,9 @@ def parse_value(literal: Literal) -> Value:
             if base64.b64encode(octets).decode() != compact:
                 raise ValueError  # Bits behind the last octet are not zero.
             return (name, octets)
+    elif datatype == RDF + 'XMLLiteral':
+        with contextlib.suppress(ElementTree.ParseError):
+            text = ElementTree.canonicalize(f'<x>{text}</x>')[len('<x>') : -len('</x>')]
     elif datatype == OWL + 'rational':
         numerator, _, denominator = text.partition('/')
         if not (_INTEGER.fullmatch(numerator.strip()) and _INTEGER.fullmatch(denominator.strip())):
@@ -354,32 +359,46 @@ def lexical_of(value: Value) -> str:
 
 
 @cache
-def schema_pattern(text: str, *, whole: bool = True) -> re.Pattern[str]:
-    """Return a regular expression of XML Schema as one of Python's.
+def schema_pattern(text: str, *, whole: bool = True) -> Any:
+    """Return a regular expression of XML Schema, compiled with the interface of `re`.
+
+    It is matched by an automaton (RE2): no expression takes longer than its text is long.
 
     Args:
         text: The expression.
         whole: It is a facet, which all of a text must match; otherwise it is one of XPath, which
-            may have anchors, back references and lazy quantifiers.
+            may have anchors and lazy quantifiers.
 
     Raises:
-        ValueError: It is none.
+        ValueError: It is none, or it has back references or counts above 1,000.
     """
-    # The library takes 80 ms to import, and few ontologies have a pattern.
+    # The libraries take 80 ms to import, and few ontologies have a pattern.
+    import re2
     from elementpath.regex import RegexError, translate_pattern
 
+    options = re2.Options()
+    options.log_errors = False
     try:
-        return re.compile(
-            translate_pattern(
-                text,
-                xsd_version='1.1',
-                back_references=not whole,
-                lazy_quantifiers=not whole,
-                anchors=not whole,
-            )
+        translated = translate_pattern(
+            _bracketed(text),
+            xsd_version='1.1',
+            back_references=not whole,
+            lazy_quantifiers=not whole,
+            anchors=not whole,
         )
-    except (RegexError, re.error) as error:
+        # What makes `$` of `re` the end of the text it is in RE2 already.
+        return re2.compile(translated.replace(r'(?!\n\Z)', ''), options)
+    except (RegexError, re2.error) as error:
         raise ValueError(f'{text!r} is no regular expression of XML Schema: {error}') from None
+
+
+def _bracketed(pattern: str) -> str:
+    """Put classes of characters into brackets, in which elementpath writes them out."""
+    depth, parts = 0, []
+    for part in re.findall(r'\\?.', pattern, re.DOTALL):
+        depth += (part == '[') - (part == ']')
+        parts.append(f'[{part}]' if not depth and re.fullmatch(r'\\[sSdDwWiIcC]', part) else part)
+    return ''.join(parts)
 
 
 @cache

@@ -159,7 +159,7 @@ def _strings(compute: Callable[..., Value | None]) -> _Solve:
     def solve(*arguments: Value) -> Iterable[Value]:
         try:
             result = compute(*arguments)
-        except (TypeError, ValueError, AttributeError, re.error):
+        except (TypeError, ValueError, AttributeError, LookupError):
             return ()
         return () if result is None else (result,)
 
@@ -214,7 +214,7 @@ def _after(text: str, mark: str) -> str | None:
 def _replace(text: str, pattern: str, new: str) -> str | None:
     if not _text(text, pattern, new):
         return None
-    return _pattern(pattern).sub(re.sub(r'\$(\d)', r'\\g<\1>', new), text)
+    return str(_pattern(pattern).sub(re.sub(r'\$(\d)', r'\\g<\1>', new), text))
 
 
 def _tokens(text: Value, pattern: Value) -> Iterable[Value]:
@@ -233,10 +233,10 @@ def _negation(value: Value) -> Value | None:
 
 
 def _matches(text: str, pattern: str) -> bool:
-    return _pattern(pattern).search(text) is not None
+    return bool(_pattern(pattern).search(text))
 
 
-def _pattern(text: str) -> re.Pattern[str]:
+def _pattern(text: str) -> Any:
     return schema_pattern(text, whole=False)
 
 
