@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -386,12 +387,14 @@ def _history(old: Snapshot, new: Snapshot) -> History:
         last = 0
     marks = [mark for each in new.transitions if each.sequence > last for mark in _marks(each)]
     since = new.now - HISTORY_SECONDS
+
+    def recent(entries: Iterable[Any]) -> tuple[Any, ...]:
+        return tuple(each for each in entries if each[0] >= since)[-MOST_HISTORY:]
+
     return History(
-        tuple(each for each in (*history.visits, *sorted(visits)) if each[0] >= since)[
-            -MOST_HISTORY:
-        ],
-        tuple(each for each in (*history.battery, *battery) if each[0] >= since)[-MOST_HISTORY:],
-        tuple(each for each in (*history.marks, *marks) if each[0] >= since)[-MOST_HISTORY:],
+        recent((*history.visits, *sorted(visits))),
+        recent((*history.battery, *battery)),
+        recent((*history.marks, *marks)),
     )
 
 
