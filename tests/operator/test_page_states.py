@@ -188,6 +188,18 @@ def test_no_link_leads_below_the_header(hub: Hub, viewer: Viewer) -> None:
     viewer.size(*DESK)
 
 
+def test_a_long_report_leaves_the_names_of_nodes_their_room(hub: Hub, viewer: Viewer) -> None:
+    names = ('aruco_detector', 'ontology_map_builder')
+    long = Health(0, 'waiting for the arm to rest', ())
+    hub.show(replace(STATES['begins'], nodes=dict.fromkeys(names), health={names[0]: long}))
+    viewer.size(*PHONE)
+    viewer.until(lambda: 'waiting' in viewer.text('#nodes'))
+    script = 'return [...document.querySelectorAll("#nodes th b")].map((b) => '
+    script += 'b.parentElement.getBoundingClientRect().height)'
+    assert viewer.js(script)[1] < 30, 'one line'
+    viewer.size(*DESK)
+
+
 def test_a_jump_that_leads_nowhere_says_so(viewer: Viewer) -> None:
     def jump(kind: str) -> str:
         raise ValueError(f'no {kind} after this moment')

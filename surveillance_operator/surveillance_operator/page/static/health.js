@@ -2,6 +2,7 @@
 import {$, h} from './dom.js';
 
 const LEVELS = ['ok', 'WARN', 'ERROR', 'STALE'];
+const SHORT = 8;
 
 function words({up, reports}) {
   if (!up) return {text: 'ended', bad: true};
@@ -15,10 +16,11 @@ function row(name, node, own) {
   const {text, bad} = words(node);
   const again = Math.max(node.restarts ?? 0, Number(own.restarts) || 0);
   const sign = node.up ? (bad ? '▲' : '●') : '✗';
-  // What is wrong has room below the name.
+  // What is wrong, and what is long, has room below the name.
+  const below = bad || text.length > SHORT;
   return h('tr', {class: node.up ? 'up' : 'down'},
-    h('th', {scope: 'row', colspan: bad ? 2 : null}, h('b', {class: bad ? 'warn' : 'ok'}, `${sign} `), name, bad ? h('div', {class: 'warn'}, text) : null),
-    bad ? null : h('td', {}, text),
+    h('th', {scope: 'row', colspan: below ? 2 : null}, h('b', {class: bad ? 'warn' : 'ok'}, `${sign}\u00a0`), name, below ? h('div', {class: bad ? 'warn' : null}, text) : null),
+    below ? null : h('td', {}, text),
     h('td', {class: 'n'}, own.memory_mb ?? '–'),
     h('td', {class: again ? 'n warn' : 'n'}, String(again)));
 }
