@@ -4,12 +4,13 @@ A rule says: whoever has all these concepts (and is related to somebody, or has 
 has one of these concepts, or one of them belongs to the other. Complex classes get concepts of
 their own (Motik, Shearer and Horrocks, "Hypertableau reasoning for description logics", JAIR 2009,
 section 4.1): `positive` ones imply the class, `recognised` ones are implied by it. Concepts and
-roles are numbers; a negative role is the inverse. Chains become automata (`property_chains`).
+roles are numbers; everybody has concept 0, and a negative role is the inverse. Chains become
+automata (`property_chains`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -21,16 +22,11 @@ from surveillance_ontology.owl.entities import entities_of
 from surveillance_ontology.owl.expressions import ClassExpression, PropertyExpression
 from surveillance_ontology.owl.vocabulary import NOTHING, OWL, THING, TOP_LITERAL
 from surveillance_ontology.reasoner.clauses import UnsupportedError, closure, turned
-from surveillance_ontology.reasoner.datatypes import unfolded, value_of
+from surveillance_ontology.reasoner.datatypes import unfolded
+from surveillance_ontology.reasoner.normal_form import normal_form
 from surveillance_ontology.reasoner.property_chains import AnyRole, Chains
-from surveillance_ontology.reasoner.translation import (
-    bounds,
-    directed,
-    inclusions,
-    negated,
-    normal,
-)
-from surveillance_ontology.reasoner.value_sets import EVERY, ValueSet, point, value_set
+from surveillance_ontology.reasoner.translation import directed, inclusions
+from surveillance_ontology.reasoner.value_sets import EVERY, ValueSet, value_set
 
 _X, _Y = 0, 1
 Heads = tuple[tuple[int, int], ...]
@@ -40,7 +36,9 @@ FRESH = 'urn:case:'
 TOP, BOTTOM = OWL + 'topObjectProperty', OWL + 'bottomObjectProperty'
 _BOTTOM_DATA = OWL + 'bottomDataProperty'
 _MOST = 300
-_NONE: frozenset[int] = frozenset()
+ANYBODY = 0
+"""The concept of owl:Thing."""
+_ALL = frozenset((ANYBODY,))
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +71,7 @@ class ValueRule:
 
 @dataclass(frozen=True, slots=True)
 class Count:
-    """At least, or at most, `n` by the role with the concept (0: any)."""
+    """At least, or at most, `n` by the role with the concept."""
 
     n: int
     role: int
@@ -106,11 +104,12 @@ class CaseRules:
 
     Attributes:
         names: The classes and individuals of concepts: IRI by number, '' for the others.
-        always: Heads for everybody.
         of_node: Node rules by each concept of the body.
+        excluded: Sets of concepts with all of which a concept has no members.
         by_role, by_source, by_target: Edge rules by role, and by each concept of x and of y.
         by_prop: Value rules by data property; `of_values` by each concept of x.
         at_least, at_most, values_at_least, values_at_most: What a concept counts.
+        counted_by: The concepts in `at_most` that count members of a concept.
         functional, functional_values: Counts that hold for everybody.
         loops: Concepts that relate their members to themselves, and the role.
         marks: Concepts of whoever is related to itself by a role.
@@ -129,8 +128,8 @@ class CaseRules:
         self._numbers: dict[str, int] = {}
         self._roles: dict[str, int] = {}
         self.role_names: list[str] = ['']
-        self.always: list[Heads] = []
         self.of_node: dict[int, list[NodeRule]] = {}
+        self.excluded: dict[int, list[frozenset[int]]] = {}
         self.by_role: dict[int, list[EdgeRule]] = {}
         self.by_source: dict[int, list[EdgeRule]] = {}
         self.by_target: dict[int, list[EdgeRule]] = {}
@@ -140,6 +139,7 @@ class CaseRules:
         self.at_most: dict[int, Count] = {}
         self.values_at_least: dict[int, ValueCount] = {}
         self.values_at_most: dict[int, ValueCount] = {}
+        self.counted_by: dict[int, set[int]] = {}
         self.functional: list[Count] = []
         self.functional_values: list[ValueCount] = []
         self.loops: dict[int, int] = {}
@@ -228,6 +228,11 @@ class CaseRules:
             found = self.props_above[prop] = tuple(above)
         return found
 
+    @property
+    def is_pairwise(self) -> bool:
+        """Whether an individual is blocked only together with the one that it was made for."""
+        return self.has_inverse and bool(self.at_most or self.functional)
+
     def is_complex(self, prop: str) -> bool:
         """Tell whether a chain implies the property."""
         return self._chains.is_complex((prop, False))
@@ -243,11 +248,11 @@ class CaseRules:
     # --- concepts of expressions ---
 
     def positive(self, expression: ClassExpression) -> int:
-        """Return a concept whose members are in the class; 0 for owl:Thing."""
+        """Return a concept whose members are in the class."""
         return self._named(expression, self._positive, self.include)
 
     def recognised(self, expression: ClassExpression) -> int:
-        """Return a concept that all members of the class have; 0 for owl:Thing."""
+        """Return a concept that all members of the class have."""
         return self._named(
             expression, self._recognised, lambda name, found: self.include(found, name)
         )
@@ -258,13 +263,19 @@ class CaseRules:
         known: dict[ClassExpression, int],
         define: Callable[[str, ClassExpression], None],
     ) -> int:
-        expression = normal(expression)
+        expression = normal_form(expression)
         if expression == THING:
-            return 0
+            return ANYBODY
         if isinstance(expression, str):
             return self.concept(expression)
-        if isinstance(expression, ex.ObjectOneOf) and len(expression.individuals) == 1:
+        if isinstance(expression, ex.ObjectOneOf):
             return self.nominal(expression.individuals[0])
+        if isinstance(expression, ex.ObjectHasSelf):
+            return (
+                self.mark(expression.prop)
+                if known is self._recognised
+                else self.loop(expression.prop)
+            )
         if expression not in known:
             name = self.fresh()
             known[expression] = self.concept(name)  # first: the class may contain itself
@@ -279,6 +290,8 @@ class CaseRules:
                 raise UnsupportedError(f'numbers above {_MOST} are not counted by cases')
             known = self._counts[key] = self.concept(self.fresh())
             table[known] = count
+            if isinstance(count, Count):
+                self.counted_by.setdefault(count.concept, set()).add(known)
         return known
 
     def values(self, data_range: ex.DataRange) -> ValueSet:
@@ -295,59 +308,61 @@ class CaseRules:
 
     def include(self, sub: ClassExpression, sup: ClassExpression) -> None:
         """Add the rules by which members of one class are members of another."""
-        _Clause(self).add([negated(normal(sub)), sup])
+        _Clause(self).add(normal_form(ex.ObjectUnionOf((ex.ObjectComplementOf(sub), sup))))
 
     def node_rule(self, body: frozenset[int], heads: Heads) -> None:
         """Add a rule about one individual."""
-        if any(concept in body for _, concept in heads):
+        body = body - _ALL or _ALL
+        if any(concept == ANYBODY or concept in body for _, concept in heads):
             return
-        if not body:
-            self.always.append(heads)
         rule = NodeRule(body, heads)
         for concept in body:
             self.of_node.setdefault(concept, []).append(rule)
+            if not heads:
+                self.excluded.setdefault(concept, []).append(body - {concept})
 
     def edge_rule(self, rule: EdgeRule) -> None:
         """Add a rule about related individuals."""
+        if any(concept == ANYBODY for _, concept in rule.heads):
+            return
         self.by_role.setdefault(rule.role, []).append(rule)
-        for concept in rule.xs:
+        for concept in rule.xs - _ALL:
             self.by_source.setdefault(concept, []).append(rule)
-        for concept in rule.ys:
+        for concept in rule.ys - _ALL:
             self.by_target.setdefault(concept, []).append(rule)
 
     def value_rule(self, prop: str, xs: frozenset[int], values: ValueSet, heads: Heads) -> None:
         """Add a rule about values."""
         if not values.is_empty:
             self.by_prop.setdefault(prop, []).append(ValueRule(xs, values, ~values, heads))
-            self.of_values |= xs
+            self.of_values |= xs - _ALL
 
     def universal(self, concept: int, prop: PropertyExpression, target: int) -> None:
-        """Add the rules by which whoever a member (0: anybody) is related to has a concept."""
-        role = directed(prop)
+        """Add the rules by which whoever a member is related to has another concept."""
+        role, body = directed(prop), frozenset((concept,))
         if not self._chains.is_complex(role):
-            self.edge_rule(EdgeRule(_only(concept), self.role(role), _NONE, ((_Y, target),)))
+            self.edge_rule(EdgeRule(body, self.role(role), _ALL, ((_Y, target),)))
             return
         steps = self._chains.steps(role)
         states: dict[int, int] = {}
-        if not concept:
+        if concept == ANYBODY:
             # Everybody is in the states that are reached without a step.
             free = [(before, after) for before, step, after in steps if step is None]
             at_once = closure(0, lambda here: [after for before, after in free if before == here])
-            states.update(dict.fromkeys(at_once, 0))
+            states.update(dict.fromkeys(at_once, ANYBODY))
         for before, _, after in steps:
             for number in (before, after):
                 if number not in states:
                     states[number] = self.concept(self.fresh())
-        if concept:
-            # State 0 may be entered again, so it is not the concept itself.
-            self.node_rule(_only(concept), ((_X, states[0]),))
-        self.node_rule(_only(states[1]), ((_X, target),))
+        # State 0 may be entered again, so it is not the concept itself.
+        self.node_rule(body, ((_X, states[0]),))
+        self.node_rule(frozenset((states[1],)), ((_X, target),))
         for before, step, after in steps:
-            here, there = _only(states[before]), states[after]
-            if there and step is None:
+            here, there = frozenset((states[before],)), states[after]
+            if step is None:
                 self.node_rule(here, ((_X, there),))
-            elif there and step is not None:
-                self.edge_rule(EdgeRule(here, self.role(step), _NONE, ((_Y, there),)))
+            else:
+                self.edge_rule(EdgeRule(here, self.role(step), _ALL, ((_Y, there),)))
 
     def complex_role(self, prop: PropertyExpression) -> bool:
         """Tell whether a chain implies the role."""
@@ -397,11 +412,11 @@ class CaseRules:
             self._below(role, turned(role))
             self._chains.imply((role, role), role)
             somebody = Count(1, self.role(TOP), self.nominal(self.fresh()))
-            self.always.append(((_X, self._counted(self.at_least, somebody)),))
+            self.node_rule(_ALL, ((_X, self._counted(self.at_least, somebody)),))
         if BOTTOM in used:
-            self.edge_rule(EdgeRule(_NONE, self.role(BOTTOM), _NONE, ()))
+            self.edge_rule(EdgeRule(_ALL, self.role(BOTTOM), _ALL, ()))
         if _BOTTOM_DATA in used:
-            self.value_rule(_BOTTOM_DATA, _NONE, EVERY, ())
+            self.value_rule(_BOTTOM_DATA, _ALL, EVERY, ())
 
     def _below(self, sub: AnyRole, sup: AnyRole) -> None:
         for role in (sub, sup):
@@ -440,13 +455,12 @@ class CaseRules:
             self._property_axiom(axiom)
 
     def _all_disjoint(self, classes: tuple[ClassExpression, ...]) -> None:
-        for first, second in ax.pairs_of(map(normal, classes)):
-            both = frozenset((self.recognised(first), self.recognised(second)))
-            self.node_rule(both - {0}, ())
+        for pair in ax.pairs_of(map(normal_form, classes)):
+            self.node_rule(frozenset(map(self.recognised, pair)), ())
 
     def _property_axiom(self, axiom: Axiom) -> None:
         if isinstance(axiom, ax.ReflexiveObjectProperty):
-            self.always.append(((_X, self.loop(axiom.prop)),))
+            self.node_rule(_ALL, ((_X, self.loop(axiom.prop)),))
         elif isinstance(axiom, ax.IrreflexiveObjectProperty):
             self.node_rule(frozenset((self.mark(axiom.prop),)), ())
         elif isinstance(axiom, ax.AsymmetricObjectProperty):
@@ -463,7 +477,7 @@ class CaseRules:
             role = self.role(axiom.prop)
             if isinstance(axiom, ax.InverseFunctionalObjectProperty):
                 role, self.has_inverse = -role, True
-            self.functional.append(Count(1, role, 0))
+            self.functional.append(Count(1, role, ANYBODY))
         elif isinstance(axiom, ax.ObjectPropertyDomain):
             self.include(ex.ObjectSomeValuesFrom(axiom.prop, THING), axiom.domain)
         elif isinstance(axiom, ax.ObjectPropertyRange):
@@ -492,27 +506,28 @@ class _Clause:
         self._rules = rules
         self._body: set[int] = set()
         self._heads: list[int] = []
-        self._every: list[tuple[PropertyExpression, ClassExpression]] = []
+        self._every: list[ex.ObjectAllValuesFrom] = []
         self._never: list[tuple[str, ValueSet]] = []
         self._both: list[ex.ObjectIntersectionOf] = []
 
-    def add(self, disjuncts: Iterable[ClassExpression]) -> None:
-        """Add the rules of a disjunction."""
-        if not all(map(self._take, _flat(disjuncts))):
+    def add(self, disjunction: ClassExpression) -> None:
+        """Add the rules of a disjunction, which is in the normal form."""
+        if disjunction == THING:
             return
-        if len(self._both) == 1 and not self._every and (not self._heads or self._excludes()):
-            for operand in self._both[0].operands:
-                self._apart(operand)
-            return
+        for disjunct in _disjuncts(disjunction):
+            self._take(disjunct)
+        if len(self._both) == 1 and not self._every:
+            (both,) = self._both
+            if not self._heads or _is_negative(both):
+                for operand in both.operands:
+                    self._apart(operand)
+                return
         for both in self._both:
             if _is_negative(both):
-                self._body.add(self._rules.recognised(negated(both)))
+                self._body.add(self._rules.recognised(ex.ObjectComplementOf(both)))
             else:
                 self._heads.append(self._rules.positive(both))
         self._related()
-
-    def _excludes(self) -> bool:
-        return _is_negative(self._both[0])
 
     def _apart(self, operand: ClassExpression) -> None:
         """Add the disjunction with one operand instead of an intersection."""
@@ -520,222 +535,120 @@ class _Clause:
         other._body |= self._body
         other._heads += self._heads
         other._never += self._never
-        other.add([operand])
+        other.add(operand)
 
-    def _take(self, one: ClassExpression) -> bool:
-        """Sort a disjunct in; False where it holds of everybody."""
+    def _take(self, one: ClassExpression) -> None:
+        """Sort a disjunct in."""
         rules = self._rules
-        if isinstance(one, str):
-            if one == NOTHING:
-                return True
-            if one == THING:
-                return False
-            self._heads.append(rules.concept(one))
+        if isinstance(one, str | ex.ObjectOneOf | ex.ObjectHasSelf):
+            self._heads.append(rules.positive(one))
         elif isinstance(one, ex.ObjectComplementOf):
-            return self._take_complement(one.operand)
+            self._body.add(rules.recognised(one.operand))
         elif isinstance(one, ex.ObjectIntersectionOf):
             self._both.append(one)
-        elif isinstance(one, ex.ObjectOneOf):
-            self._heads += map(rules.nominal, one.individuals)
-        elif isinstance(one, ex.ObjectHasValue):
-            self._some(1, one.prop, rules.nominal(one.individual))
-        elif isinstance(one, ex.ObjectHasSelf):
-            self._heads.append(rules.loop(one.prop))
-        elif isinstance(one, ex.ObjectSomeValuesFrom):
-            if normal(one.filler) != NOTHING:
-                self._some(1, one.prop, rules.positive(one.filler))
-        elif isinstance(one, ex.ObjectMinCardinality):
-            if one.n == 0:
-                return False
-            if normal(one.filler) != NOTHING:
-                self._some(one.n, one.prop, rules.positive(one.filler))
         elif isinstance(one, ex.ObjectAllValuesFrom):
-            if normal(one.filler) == THING:
-                return False
-            self._every.append((one.prop, one.filler))
-        elif isinstance(one, ex.ObjectMaxCardinality):
-            if normal(one.filler) == NOTHING:
-                return False
-            if one.n == 0:
-                self._every.append((one.prop, negated(normal(one.filler))))
-            else:
-                if rules.complex_role(one.prop):
-                    raise UnsupportedError('a property with chains is counted')
-                concept = rules.recognised(one.filler)
-                role = rules.role(one.prop)
-                self._heads.append(rules._counted(rules.at_most, Count(one.n, role, concept)))
-        elif isinstance(one, (ex.ObjectExactCardinality, ex.DataExactCardinality)):
-            self._both.append(ex.ObjectIntersectionOf(bounds(one)))
+            self._every.append(one)
+        elif isinstance(one, ex.ObjectMinCardinality | ex.ObjectMaxCardinality):
+            self._take_number(one)
+        elif isinstance(one, ex.DataMaxCardinality) and one.n == 0:
+            self._never.append((one.prop, rules.values(one.range)))
         else:
-            return self._take_values(one)
-        return True
+            assert isinstance(one, ex.DataMinCardinality | ex.DataMaxCardinality)
+            few = isinstance(one, ex.DataMaxCardinality)
+            table = rules.values_at_most if few else rules.values_at_least
+            count = ValueCount(one.n, one.prop, rules.values(one.range))
+            self._heads.append(rules._counted(table, count))
 
-    def _some(self, n: int, prop: PropertyExpression, concept: int) -> None:
-        rules = self._rules
-        if n > 1 and rules.complex_role(prop):
+    def _take_number(self, one: ex.ObjectMinCardinality | ex.ObjectMaxCardinality) -> None:
+        rules, few = self._rules, isinstance(one, ex.ObjectMaxCardinality)
+        if (few or one.n > 1) and rules.complex_role(one.prop):
             raise UnsupportedError('a property with chains is counted')
-        self._heads.append(rules._counted(rules.at_least, Count(n, rules.role(prop), concept)))
-
-    def _take_values(self, one: ClassExpression) -> bool:
-        rules = self._rules
-        if isinstance(one, ex.DataHasValue):
-            values = point(value_of(one.literal))
-            table = rules.values_at_least
-            self._heads.append(rules._counted(table, ValueCount(1, one.prop, values)))
-        elif isinstance(one, ex.DataSomeValuesFrom):
-            values = rules.values(one.range)
-            table = rules.values_at_least
-            self._heads.append(rules._counted(table, ValueCount(1, one.prop, values)))
-        elif isinstance(one, ex.DataMinCardinality):
-            if one.n == 0:
-                return False
-            values = rules.values(one.range)
-            table = rules.values_at_least
-            self._heads.append(rules._counted(table, ValueCount(one.n, one.prop, values)))
-        elif isinstance(one, ex.DataAllValuesFrom):
-            self._never.append((one.prop, ~rules.values(one.range)))
-        elif isinstance(one, ex.DataMaxCardinality):
-            values = rules.values(one.range)
-            if one.n == 0:
-                self._never.append((one.prop, values))
-            else:
-                table = rules.values_at_most
-                self._heads.append(rules._counted(table, ValueCount(one.n, one.prop, values)))
-        else:
-            raise UnsupportedError('a class expression is not known')
-        return True
-
-    def _take_complement(self, one: ClassExpression) -> bool:
-        rules = self._rules
-        if isinstance(one, str):
-            self._body.add(rules.concept(one))
-        elif isinstance(one, ex.ObjectOneOf):
-            if len(one.individuals) == 1:
-                self._body.add(rules.nominal(one.individuals[0]))
-            else:
-                each = tuple(ex.ObjectComplementOf(ex.ObjectOneOf((a,))) for a in one.individuals)
-                self._both.append(ex.ObjectIntersectionOf(each))
-        elif isinstance(one, ex.ObjectHasValue):
-            other = ex.ObjectComplementOf(ex.ObjectOneOf((one.individual,)))
-            self._every.append((one.prop, other))
-        elif isinstance(one, ex.ObjectHasSelf):
-            self._body.add(rules.mark(one.prop))
-        elif isinstance(one, ex.DataHasValue):
-            self._never.append((one.prop, point(value_of(one.literal))))
-        else:
-            raise UnsupportedError('a class expression is not known')
-        return True
+        concept = rules.recognised(one.filler) if few else rules.positive(one.filler)
+        count = Count(one.n, rules.role(one.prop), concept)
+        self._heads.append(rules._counted(rules.at_most if few else rules.at_least, count))
 
     # --- relations: at most one is spelt out, the others become concepts ---
 
     def _related(self) -> None:
         rules = self._rules
         if self._is_chained():
-            ((prop, filler),), concept = self._every, next(iter(self._body), 0)
-            rules.universal(concept, prop, rules.positive(filler))
+            (every,), concept = self._every, next(iter(self._body), ANYBODY)
+            rules.universal(concept, every.prop, rules.positive(every.filler))
             return
-        inline: tuple[PropertyExpression, ClassExpression] | None = None
-        never = list(self._never)
-        for prop, filler in sorted(self._every, key=lambda one: _is_negative(one[1])):
-            simple = not rules.complex_role(prop)
-            if inline is None and simple and not (never and _is_negative(filler)):
-                inline = (prop, filler)
-            elif _is_negative(filler):
+        inline: ex.ObjectAllValuesFrom | None = None
+        for every in sorted(self._every, key=lambda one: _is_negative(one.filler)):
+            simple, excludes = not rules.complex_role(every.prop), _is_negative(every.filler)
+            if inline is None and simple and not (self._never and excludes):
+                inline = every
+            elif excludes:
                 name = rules.fresh()
                 self._body.add(rules.concept(name))
-                self._recognise(prop, negated(normal(filler)), name)
+                self._recognise(every.prop, ex.ObjectComplementOf(every.filler), name)
             else:
                 concept = rules.concept(rules.fresh())
                 self._heads.append(concept)
-                rules.universal(concept, prop, rules.positive(filler))
-        if inline is None and len(never) == 1:
-            self._finish_values(*never[0])
-            return
-        for data_prop, values in never:
+                rules.universal(concept, every.prop, rules.positive(every.filler))
+        at_last = self._never[0] if inline is None and len(self._never) == 1 else None
+        for data_prop, values in self._never if at_last is None else ():
             concept = rules.concept(rules.fresh())
             self._body.add(concept)
-            rules.value_rule(data_prop, _NONE, values, ((_X, concept),))
-        body = frozenset(self._body)
+            rules.value_rule(data_prop, _ALL, values, ((_X, concept),))
+        body = frozenset(self._body) or _ALL
         heads = tuple((_X, concept) for concept in dict.fromkeys(self._heads))
-        if inline is None:
+        if at_last is not None:
+            rules.value_rule(at_last[0], body, at_last[1], heads)
+        elif inline is None:
             rules.node_rule(body, heads)
         else:
-            self._finish_edge(body, heads, *inline)
+            self._finish_edge(body, heads, inline)
 
     def _is_chained(self) -> bool:
         """Tell whether one concept alone, or none, says what a property with chains leads to."""
         few = len(self._every) == 1 and len(self._body) <= 1 and not (self._heads or self._never)
-        return few and self._rules.complex_role(self._every[0][0])
+        return few and self._rules.complex_role(self._every[0].prop)
 
     def _recognise(self, prop: PropertyExpression, filler: ClassExpression, name: str) -> None:
         """Everybody related to a member of the filler gets the named concept."""
         rules = self._rules
-        source = rules.recognised(filler)
-        target = rules.concept(name)
+        source, target = rules.recognised(filler), rules.concept(name)
         if not rules.complex_role(prop):
-            ys = frozenset((source,)) - {0}
-            rules.edge_rule(EdgeRule(_NONE, rules.role(prop), ys, ((_X, target),)))
+            ys = frozenset((source,))
+            rules.edge_rule(EdgeRule(_ALL, rules.role(prop), ys, ((_X, target),)))
             return
         iri, inverted = directed(prop)
         rules.has_inverse = True
         rules.universal(source, iri if inverted else ex.ObjectInverseOf(iri), target)
 
-    def _finish_values(self, prop: str, values: ValueSet) -> None:
-        heads = tuple((_X, concept) for concept in dict.fromkeys(self._heads))
-        self._rules.value_rule(prop, frozenset(self._body), values, heads)
-
     def _finish_edge(
-        self,
-        body: frozenset[int],
-        heads: Heads,
-        prop: PropertyExpression,
-        filler: ClassExpression,
+        self, body: frozenset[int], heads: Heads, every: ex.ObjectAllValuesFrom
     ) -> None:
         rules = self._rules
-        role = rules.role(prop)
-        filler = normal(filler)
+        role, filler = rules.role(every.prop), every.filler
         parts = filler.operands if isinstance(filler, ex.ObjectIntersectionOf) else (filler,)
         for part in parts:
             ys: set[int] = set()
             ends: list[tuple[int, int]] = []
-            for one in _flat([part]):
-                opposite = one.operand if isinstance(one, ex.ObjectComplementOf) else None
-                if one == NOTHING:
-                    continue
-                if isinstance(opposite, str):
-                    ys.add(rules.concept(opposite))
-                elif isinstance(opposite, ex.ObjectOneOf) and len(opposite.individuals) == 1:
-                    ys.add(rules.nominal(opposite.individuals[0]))
-                elif isinstance(one, ex.ObjectOneOf):
-                    ends += [(_Y, rules.nominal(name)) for name in one.individuals]
-                elif _is_negative(one):
-                    ys.add(rules.recognised(negated(one)))
+            for one in _disjuncts(part):
+                if _is_negative(one):
+                    ys.add(rules.recognised(ex.ObjectComplementOf(one)))
                 else:
                     ends.append((_Y, rules.positive(one)))
-            if (_Y, 0) not in ends:
-                rules.edge_rule(EdgeRule(body, role, frozenset(ys) - {0}, (*heads, *ends)))
+            rules.edge_rule(EdgeRule(body, role, frozenset(ys) or _ALL, (*heads, *ends)))
 
 
-def _only(concept: int) -> frozenset[int]:
-    return frozenset((concept,)) if concept else _NONE
+def _disjuncts(one: ClassExpression) -> tuple[ClassExpression, ...]:
+    """Return the alternatives that an expression in the normal form consists of."""
+    if one == NOTHING:
+        return ()
+    return one.operands if isinstance(one, ex.ObjectUnionOf) else (one,)
 
 
-def _flat(disjuncts: Iterable[ClassExpression]) -> Iterator[ClassExpression]:
-    for disjunct in disjuncts:
-        one = normal(disjunct)
-        if isinstance(one, ex.ObjectUnionOf):
-            yield from _flat(one.operands)
-        else:
-            yield one
-
-
-def _is_negative(expression: ClassExpression) -> bool:
+def _is_negative(one: ClassExpression) -> bool:
     """Tell whether a class only excludes: its complement can be recognised from what is there."""
-    one = normal(expression)
     if isinstance(one, (ex.ObjectUnionOf, ex.ObjectIntersectionOf)):
         return all(map(_is_negative, one.operands))
     if isinstance(one, ex.ObjectAllValuesFrom):
         return _is_negative(one.filler)
-    if isinstance(one, (ex.ObjectMaxCardinality, ex.DataMaxCardinality)):
+    if isinstance(one, ex.DataMaxCardinality):
         return one.n == 0
-    return one == NOTHING or isinstance(one, (ex.ObjectComplementOf, ex.DataAllValuesFrom))
+    return one == NOTHING or isinstance(one, ex.ObjectComplementOf)

@@ -1,0 +1,184 @@
+"""The values of one individual in a model: which there must be, how many, and whether they fit."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+from surveillance_ontology.reasoner.case_model import (
+    CaseModel,
+    Choices,
+    ClashError,
+    Either,
+    Has,
+    In,
+    Same,
+    total,
+)
+from surveillance_ontology.reasoner.case_rules import ValueCount
+from surveillance_ontology.reasoner.datatypes import Value
+
+
+class CaseValues:
+    """Applies the rules about data properties.
+
+    Args:
+        model: Where the values are.
+        either: Takes what is open.
+
+    Attributes:
+        gaps: What was not decided.
+    """
+
+    def __init__(self, model: CaseModel, either: Either) -> None:
+        self._model, self._rules, self._either = model, model.rules, either
+        self._made: dict[tuple[int, int], bool] = {}
+        self.gaps: dict[str, None] = {}
+
+    def check(self, x: int) -> None:
+        """Apply all rules to an individual's values."""
+        model, rules, labels = self._model, self._rules, self._model.labels[x]
+        for concept in rules.values_at_least.keys() & labels.keys():
+            self._need(x, concept, rules.values_at_least[concept])
+        for v in tuple(model.values[x]):
+            self._apply_rules(x, v)
+        self._join_known(x)
+        if model.queue:
+            model.revalue[x] = None
+            return
+        for limit in rules.functional_values:
+            self._limit(x, limit, 0)
+        for concept in rules.values_at_most.keys() & labels.keys():
+            self._limit(x, rules.values_at_most[concept], labels[concept])
+        self._assign(x)
+
+    def known(self, x: int, prop: str) -> dict[Value, Choices]:
+        """Return the values of a property that are known."""
+        model = self._model
+        found: dict[Value, Choices] = {}
+        for v in model.values[x]:
+            if prop in model.props[v]:
+                values, choices = model.sets[v]
+                only = values.only
+                if only is None:
+                    self.gaps['whether unknown values are those of a key'] = None
+                else:
+                    found[only] = choices | model.props[v][prop]
+        return found
+
+    def _need(self, x: int, concept: int, needed: ValueCount) -> None:
+        model = self._model
+        choices = model.labels[x][concept]
+        if needed.n == 1:
+            for v in model.values[x]:
+                if needed.prop in model.props[v] and model.sets[v][0].within(needed.values):
+                    return
+        elif (x, concept) in self._made:
+            return
+        model.put(self._made, (x, concept), True)
+        if needed.values.size < needed.n:
+            raise ClashError(choices)
+        made = [model.value(x, needed.prop, needed.values, choices) for _ in range(needed.n)]
+        if len(made) > 1:
+            model.differ(made, choices)
+
+    def _apply_rules(self, x: int, v: int) -> None:
+        model = self._model
+        model.step()
+        labels, props = model.labels[x], model.props[v]
+        for prop, choices in tuple(props.items()):
+            for other in self._rules.disjoint_props.get(prop, ()):
+                if other in props:
+                    raise ClashError(choices | props[other])
+            for rule in self._rules.by_prop.get(prop, ()):
+                more = total(rule.xs, labels)
+                if more is None or any(concept in labels for _, concept in rule.heads):
+                    continue
+                values, others = model.sets[v]
+                if values.is_empty:
+                    raise ClashError(others)
+                if (values & rule.values).is_empty:
+                    continue
+                heads = [Has(x, head) for _, head in rule.heads]
+                if (values & rule.rest).is_empty:
+                    self._either([*heads], choices | more | others)
+                elif not heads:
+                    model.narrow(v, rule.rest, choices | more)
+                else:
+                    self._either([In(v, rule.rest), *heads], choices | more)
+
+    def _join_known(self, x: int) -> None:
+        """Make one of the values that are the same."""
+        model = self._model
+        known: dict[Value, int] = {}
+        for v in tuple(model.values[x]):
+            values, choices = model.sets[v]
+            if values.is_empty:
+                raise ClashError(choices)
+            if not values.decided:
+                self.gaps['whether values suit a pattern, a length or a moment'] = None
+            only = values.only
+            if only is None:
+                continue
+            first = known.setdefault(only, v)
+            if first != v:
+                model.same(first, v, choices | model.sets[first][1])
+
+    def _limit(self, x: int, limit: ValueCount, choices: Choices) -> None:
+        model = self._model
+        counted: list[int] = []
+        unsure: list[int] = []
+        for v in model.values[x]:
+            if limit.prop in model.props[v]:
+                values = model.sets[v][0]
+                if values.within(limit.values):
+                    counted.append(v)
+                elif not (values & limit.values).is_empty:
+                    unsure.append(v)
+        if len(counted) + len(unsure) <= limit.n:
+            return
+        for v in unsure:
+            self._either([In(v, ~limit.values), In(v, limit.values)], 0)
+        if len(counted) <= limit.n:
+            return
+        counted.sort(key=lambda v: (model.sets[v][0].size, v))
+        chosen = counted[: limit.n + 1]
+        for v in chosen:
+            choices |= model.props[v][limit.prop] | model.sets[v][1]
+        pairs: list[Same] = []
+        for v, w in combinations(chosen, 2):
+            apart = model.different(v, w)
+            if apart is not None:
+                choices |= apart
+            elif not (model.sets[v][0] & model.sets[w][0]).is_empty:
+                pairs.append(Same(v, w))
+        self._either([*pairs], choices)
+
+    def _assign(self, x: int) -> None:
+        """Tell whether values that differ can be chosen from small sets."""
+        model = self._model
+        others: dict[int, list[int]] = {}
+        for v, w in combinations(model.values[x], 2):
+            if model.different(v, w) is not None:
+                others.setdefault(v, []).append(w)
+                others.setdefault(w, []).append(v)
+        small = [v for v, found in others.items() if model.sets[v][0].size <= len(found)]
+        chosen: dict[int, Value] = {}
+
+        def extend(place: int) -> bool:
+            if place == len(small):
+                return True
+            v = small[place]
+            taken = {chosen[w] for w in others[v] if w in chosen}
+            for value in model.sets[v][0].members():
+                if value not in taken:
+                    chosen[v] = value
+                    if extend(place + 1):
+                        return True
+                    del chosen[v]
+            return False
+
+        if not extend(0):
+            choices = 0
+            for v in small:
+                choices |= model.sets[v][1] | model.differences(v)
+            raise ClashError(choices)

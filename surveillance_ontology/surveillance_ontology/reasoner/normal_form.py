@@ -1,0 +1,97 @@
+"""Class expressions in a normal form of few kinds.
+
+Complements stand only before names, single individuals and `ObjectHasSelf`. Every restriction is
+one of `min` (at least 1), `max` (at least 1; of values also 0) and `only`; an enumeration is a
+union of single individuals; owl:Thing and owl:Nothing stand only alone.
+"""
+
+from __future__ import annotations
+
+from surveillance_ontology.owl import expressions as ex
+from surveillance_ontology.owl.expressions import ClassExpression, PropertyExpression
+from surveillance_ontology.owl.vocabulary import NOTHING, THING
+
+
+def normal_form(one: ClassExpression, negate: bool = False) -> ClassExpression:
+    """Return a class expression, or its complement, in the normal form."""
+    if isinstance(one, str) and one in (THING, NOTHING):
+        return THING if (one == THING) != negate else NOTHING
+    if isinstance(one, str | ex.ObjectHasSelf):
+        return ex.ObjectComplementOf(one) if negate else one
+    if isinstance(one, ex.ObjectComplementOf):
+        return normal_form(one.operand, not negate)
+    if isinstance(one, ex.ObjectIntersectionOf | ex.ObjectUnionOf):
+        parts = [normal_form(operand, negate) for operand in one.operands]
+        return _joined(parts, isinstance(one, ex.ObjectUnionOf) != negate)
+    if isinstance(one, ex.ObjectOneOf):
+        singles = [ex.ObjectOneOf((name,)) for name in one.individuals]
+        return _joined([ex.ObjectComplementOf(s) if negate else s for s in singles], not negate)
+    return _restriction(one, negate)
+
+
+def _joined(parts: list[ClassExpression], is_union: bool) -> ClassExpression:
+    neutral, absorbing = (NOTHING, THING) if is_union else (THING, NOTHING)
+    kind = ex.ObjectUnionOf if is_union else ex.ObjectIntersectionOf
+    flat: dict[ClassExpression, None] = {}
+    for part in parts:
+        flat.update(dict.fromkeys(part.operands if isinstance(part, kind) else (part,)))
+    flat.pop(neutral, None)
+    if absorbing in flat:
+        return absorbing
+    return kind(tuple(flat)) if len(flat) > 1 else next(iter(flat), neutral)
+
+
+def _restriction(one: ClassExpression, negate: bool) -> ClassExpression:
+    if isinstance(one, ex.ObjectHasValue):
+        return _number(1, one.prop, ex.ObjectOneOf((one.individual,)), True, negate)
+    if isinstance(one, ex.ObjectSomeValuesFrom):
+        return _number(1, one.prop, one.filler, True, negate)
+    if isinstance(one, ex.ObjectAllValuesFrom):
+        return _number(0, one.prop, ex.ObjectComplementOf(one.filler), False, negate)
+    if isinstance(one, ex.ObjectMinCardinality | ex.ObjectMaxCardinality):
+        at_least = isinstance(one, ex.ObjectMinCardinality)
+        return _number(one.n, one.prop, one.filler, at_least, negate)
+    if isinstance(one, ex.ObjectExactCardinality):
+        bounds = [_number(one.n, one.prop, one.filler, low, negate) for low in (True, False)]
+        return _joined(bounds, negate)
+    if isinstance(one, ex.DataHasValue):
+        return _count(1, one.prop, ex.DataOneOf((one.literal,)), True, negate)
+    if isinstance(one, ex.DataSomeValuesFrom):
+        return _count(1, one.prop, one.range, True, negate)
+    if isinstance(one, ex.DataAllValuesFrom):
+        return _count(0, one.prop, ex.DataComplementOf(one.range), False, negate)
+    if isinstance(one, ex.DataMinCardinality | ex.DataMaxCardinality):
+        at_least = isinstance(one, ex.DataMinCardinality)
+        return _count(one.n, one.prop, one.range, at_least, negate)
+    assert isinstance(one, ex.DataExactCardinality)
+    counts = [_count(one.n, one.prop, one.range, low, negate) for low in (True, False)]
+    return _joined(counts, negate)
+
+
+def _number(
+    n: int, prop: PropertyExpression, filler: ClassExpression, at_least: bool, negate: bool
+) -> ClassExpression:
+    """Return a bound on the related individuals; not at least n is at most n - 1."""
+    if negate:
+        n, at_least = n - 1 if at_least else n + 1, not at_least
+    if not at_least and n == 0:
+        every = normal_form(filler, True)
+        return THING if every == THING else ex.ObjectAllValuesFrom(prop, every)
+    if n <= 0:
+        return THING if at_least else NOTHING
+    filler = normal_form(filler)
+    if filler == NOTHING:
+        return NOTHING if at_least else THING
+    kind = ex.ObjectMinCardinality if at_least else ex.ObjectMaxCardinality
+    return kind(n, prop, filler)
+
+
+def _count(
+    n: int, prop: str, values: ex.DataRange, at_least: bool, negate: bool
+) -> ClassExpression:
+    """Return a bound on the values."""
+    if negate:
+        n, at_least = n - 1 if at_least else n + 1, not at_least
+    if at_least:
+        return ex.DataMinCardinality(n, prop, values) if n > 0 else THING
+    return ex.DataMaxCardinality(n, prop, values) if n >= 0 else NOTHING
