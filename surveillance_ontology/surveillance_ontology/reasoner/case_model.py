@@ -8,10 +8,10 @@ here: new facts wait in `queue`, individuals whose relations or values are to be
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
 from itertools import count
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 from surveillance_ontology.reasoner.case_rules import ANYBODY, FRESH, CaseRules
 from surveillance_ontology.reasoner.clauses import StoppedError
@@ -63,7 +63,7 @@ class CaseModel:
         self._individuals: dict[str, int] = {}
         self._numbers = count(1)
         self._trail: list[tuple[dict[Any, Any], Any, Any]] = []
-        self.queue: list[tuple[int, ...]] = []
+        self.queue: deque[tuple[int, ...]] = deque()
         self.recount: dict[int, None] = {}
         self.revalue: dict[int, None] = {}
 
@@ -313,7 +313,9 @@ class CaseModel:
             self._prune(child, x, choices)
         for other in self.out[x]:
             if other != x:
+                # Who loses somebody may need another one.
                 self.drop(self.out[other], x)
+                self.queue.extend((other, concept) for concept in self.labels[other])
 
     def make_root(self, y: int, key: Any, choices: Choices) -> None:
         """Make an unnamed individual one of those that a named one counts."""
@@ -347,8 +349,7 @@ Left: TypeAlias = 'tuple[Alternative | None, Choices] | None'
 where it holds, or is about nobody that is there."""
 
 
-@dataclass(frozen=True, slots=True)
-class Has:
+class Has(NamedTuple):
     """An individual has a concept."""
 
     x: int
@@ -365,8 +366,7 @@ class Has:
         model.concept(self.x, self.concept, choices)
 
 
-@dataclass(frozen=True, slots=True)
-class Same:
+class Same(NamedTuple):
     """Two nodes are the same."""
 
     x: int
@@ -385,8 +385,7 @@ class Same:
         model.same(self.x, self.y, choices)
 
 
-@dataclass(frozen=True, slots=True)
-class Root:
+class Root(NamedTuple):
     """An unnamed individual is a certain one of those that a named one counts."""
 
     y: int
@@ -402,8 +401,7 @@ class Root:
         model.make_root(self.y, self.key, choices)
 
 
-@dataclass(frozen=True, slots=True)
-class In:
+class In(NamedTuple):
     """A value is in a set."""
 
     v: int

@@ -104,6 +104,7 @@ class CaseRules:
 
     Attributes:
         names: The classes and individuals of concepts: IRI by number, '' for the others.
+        always: Heads one of which everybody has.
         of_node: Node rules by each concept of the body.
         excluded: Sets of concepts with all of which a concept has no members.
         by_role, by_source, by_target: Edge rules by role, and by each concept of x and of y.
@@ -128,6 +129,7 @@ class CaseRules:
         self._numbers: dict[str, int] = {}
         self._roles: dict[str, int] = {}
         self.role_names: list[str] = ['']
+        self.always: list[Heads] = []
         self.of_node: dict[int, list[NodeRule]] = {}
         self.excluded: dict[int, list[frozenset[int]]] = {}
         self.by_role: dict[int, list[EdgeRule]] = {}
@@ -314,6 +316,9 @@ class CaseRules:
         """Add a rule about one individual."""
         body = body - _ALL or _ALL
         if any(concept == ANYBODY or concept in body for _, concept in heads):
+            return
+        if body == _ALL and len(heads) > 1:
+            self.always.append(heads)
             return
         rule = NodeRule(body, heads)
         for concept in body:

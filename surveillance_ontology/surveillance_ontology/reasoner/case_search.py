@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import combinations
-from typing import Any
+from typing import Any, NamedTuple
 
 from surveillance_ontology.reasoner.case_model import (
     Alternative,
@@ -28,6 +28,7 @@ from surveillance_ontology.reasoner.case_model import (
     total,
 )
 from surveillance_ontology.reasoner.case_rules import (
+    ANYBODY,
     CaseRules,
     Count,
     EdgeRule,
@@ -45,6 +46,20 @@ class _Choice:
     def __init__(self, mark: int, alternatives: list[Alternative], choices: Choices) -> None:
         self.mark, self.alternatives, self.place = mark, alternatives, 0
         self.stated = self.choices = choices
+
+
+class _Either(NamedTuple):
+    """A disjunction that was not tried yet."""
+
+    alternatives: tuple[Alternative, ...]
+    choices: Choices
+
+
+class _Always(NamedTuple):
+    """The disjunctions about everybody, for one individual, from a place on."""
+
+    x: int
+    place: int
 
 
 class CaseSearch:
@@ -72,11 +87,13 @@ class CaseSearch:
         self._failures: dict[int, int] = {}
         # Disjunctions by number; `_next` tells which was not looked at yet, `_put_off` has those
         # about individuals that needed no choice; for those in `_chosen` one was made.
-        self._open: dict[int, tuple[tuple[Alternative, ...], Choices]] = {}
+        self._open: dict[int, _Either | _Always] = {}
         self._next = {'first': 0, 'end': 0}
         self._put_off: dict[int, tuple[int, ...]] = {}
         self._chosen: dict[int, None] = {}
-        self._stated: dict[tuple[Alternative, ...], bool] = {}
+        # Individuals and the concepts for which they may need others.
+        self._needs: dict[tuple[int, int], None] = {}
+        self._stated: dict[tuple[type, tuple[Alternative, ...]], bool] = {}
         self._signs: dict[int, frozenset[int]] = {}
         self._functional: dict[int, Count] = {limit.role: limit for limit in rules.functional}
 
@@ -130,7 +147,7 @@ class CaseSearch:
         queue, recount, revalue, is_gone = model.queue, model.recount, model.revalue, model.is_gone
         while queue or recount or revalue:
             while queue:
-                event = queue.pop()
+                event = queue.popleft()
                 if is_gone(event[0]):
                     continue
                 if len(event) == 2:
@@ -155,10 +172,11 @@ class CaseSearch:
         if len(alternatives) == 1:
             alternatives[0].apply(self.model, choices)
             return
-        key = tuple(dict.fromkeys(alternatives))
+        distinct = tuple(dict.fromkeys(alternatives))
+        key = type(distinct[0]), distinct
         if key not in self._stated:
             self.model.put(self._stated, key, True)
-            self._append(key, choices)
+            self._append(_Either(distinct, choices))
 
     def _branch(self) -> bool:
         """Try the first open disjunction; whether something was added."""
@@ -179,30 +197,50 @@ class CaseSearch:
             if x not in self.blocked:
                 self.model.drop(self._put_off, x)
                 for number in numbers[1:]:
-                    self._append(*self._open[number])
+                    self._append(self._open[number])
                 self._decide(numbers[0])
                 return True
         return False
 
-    def _append(self, alternatives: tuple[Alternative, ...], choices: Choices) -> None:
+    def _append(self, disjunction: _Either | _Always) -> None:
         number = self._next['end']
-        self.model.put(self._open, number, (alternatives, choices))
+        self.model.put(self._open, number, disjunction)
         self.model.put(self._next, 'end', number + 1)
 
     def _subject(self, number: int) -> int | None:
         """Return the unnamed individual that a disjunction is about, where it is about one."""
-        first, *others = self._open[number][0]
-        if not isinstance(first, Has):
+        disjunction = self._open[number]
+        if isinstance(disjunction, _Always):
+            subjects = {disjunction.x}
+        else:
+            alternatives = disjunction.alternatives
+            subjects = {one.x if isinstance(one, Has) else 0 for one in alternatives}
+        if len(subjects) > 1 or 0 in subjects:
             return None
-        x, _ = self.model.find(first.x)
-        if x is None or self.model.parent[x] is None:
-            return None
-        alone = all(isinstance(other, Has) and other.x == first.x for other in others)
-        return x if alone else None
+        x, _ = self.model.find(subjects.pop())
+        return None if x is None or self.model.parent[x] is None else x
 
     def _decide(self, number: int) -> bool:
         """Try a disjunction; False where it holds, or is about nobody that is there."""
-        alternatives, choices = self._open[number]
+        disjunction = self._open[number]
+        if isinstance(disjunction, _Always):
+            return self._decide_always(number, *disjunction)
+        return self._try(*disjunction, self._subject(number))
+
+    def _decide_always(self, number: int, x: int, place: int) -> bool:
+        """Try the next disjunction of those that hold of everybody; the rest comes after it."""
+        labels, always = self.model.labels[x], self.rules.always
+        while not self.model.is_gone(x) and place < len(always):
+            heads = always[place]
+            place += 1
+            if not any(concept in labels for _, concept in heads):
+                self.model.put(self._open, number, _Always(x, place))
+                self.model.put(self._next, 'first', number)
+                return self._try(tuple(Has(x, concept) for _, concept in heads), 0, x)
+        return False
+
+    def _try(self, alternatives: tuple[Alternative, ...], choices: Choices, x: int | None) -> bool:
+        """Try alternatives, about one unnamed individual `x` where it is given."""
         left: list[Alternative] = []
         for alternative in alternatives:
             found = alternative.look(self.model)
@@ -218,7 +256,6 @@ class CaseSearch:
         if len(left) > 1:
             # What failed often is tried late, as HermiT does.
             left.sort(key=self._failures_of)
-            x = self._subject(number)
             if x is not None:
                 self.model.put(self._chosen, x, None)
             self._stack.append(_Choice(self.mark(), left, choices))
@@ -290,8 +327,12 @@ class CaseSearch:
             for y, roles in tuple(model.out[x].items()):
                 if -edge_rule.role in roles:
                     self._fire(edge_rule, y, x)
+        if concept == ANYBODY and rules.always:
+            self._append(_Always(x, 0))
         if concept in rules.loops:
             model.relate(x, rules.loops[concept], x, labels[concept])
+        if concept in rules.at_least:
+            model.put(self._needs, (x, concept), None)
         if concept in rules.at_most:
             model.recount[x] = None
         limits = rules.counted_by.get(concept)
@@ -419,18 +460,17 @@ class CaseSearch:
 
     def _expand(self) -> bool:
         """Add the individuals that are still needed; whether there were any."""
-        model, at_least = self.model, self.rules.at_least
+        model = self.model
         self.blocked = self._find_blocked()
         progress = False
-        for x in tuple(model.alive()):
+        for x, concept in tuple(self._needs):
             if x in self.blocked:
                 continue
-            for concept in at_least.keys() & model.labels[x].keys():
-                if model.is_gone(x):
-                    break
-                if not self._is_met(x, at_least[concept]):
-                    self._create(x, at_least[concept], model.labels[x][concept])
-                    progress = True
+            model.drop(self._needs, (x, concept))
+            needed = self.rules.at_least[concept]
+            if not model.is_gone(x) and not self._is_met(x, needed):
+                self._create(x, needed, model.labels[x][concept])
+                progress = True
         return progress
 
     def _create(self, x: int, needed: Count, choices: Choices) -> None:
@@ -486,7 +526,8 @@ class CaseSearch:
 
     def _core_blocker(self, x: int, blocked: dict[int, int]) -> int | None:
         """Return an earlier individual that is all that x is, and that x may be."""
-        for y in self._chosen:
+        known = self.blocked.get(x)
+        for y in self._chosen if known is None else (known, *self._chosen):
             if y < x and y not in blocked and y not in self._put_off and self._may_be(x, y):
                 return y
         return None
@@ -497,6 +538,7 @@ class CaseSearch:
         own, other = model.labels[x], model.labels[y]
         if model.is_gone(y) or not own.keys() <= other.keys():
             return False
+        model.step()
         parent = model.parent[x]
         assert parent is not None
         roles, above = model.out[parent][x], model.labels[parent]

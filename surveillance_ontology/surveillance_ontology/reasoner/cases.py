@@ -27,6 +27,8 @@ MOST_STEPS = 1_000_000
 """Facts that may be added in all searches for one answer; some ten seconds."""
 _QUESTION_STEPS = 200_000
 """The same for one axiom."""
+_MOST_KEPT = 200
+"""Individuals in models of classes that stay while other classes are looked at."""
 
 
 class CaseReasoner:
@@ -50,12 +52,12 @@ class CaseReasoner:
         self._individuals = [
             a.iri for a in axioms if isinstance(a, ax.Declaration) and a.kind == 'individual'
         ]
-        self._left = most_steps
+        self._most_steps = most_steps
         self.names_individuals = bool(self._rules.nominals)
         assertions = [axiom for axiom in axioms if isinstance(axiom, ax.Assertion)]
         # What makes concepts comes before the search.
         self._assertions = [(axiom, self._concept_of(axiom)) for axiom in assertions]
-        self._search = CaseSearch(self._rules, self._left)
+        self._search = CaseSearch(self._rules, most_steps)
         self._possible = self._search.attempt(self._begin)
         self._base = self._search.mark()
         self._consistent: bool | None = None
@@ -262,7 +264,8 @@ class CaseReasoner:
         if not self.consistent():
             return
         named = self.names_individuals
-        search = self._search if named else CaseSearch(self._rules, self._left)
+        left = self._most_steps - self._search.model.steps
+        search = self._search if named else CaseSearch(self._rules, left)
         models = _ClassModels(self._rules, search)
         wanted = [(cls,) for cls in classes if not known(cls, NOTHING)]
         for cls, *_ in self._impossible(wanted, models, search):
@@ -279,9 +282,11 @@ class CaseReasoner:
     ) -> Iterator[tuple[str, ...]]:
         """Yield the classes, alone or without another, that can have no members.
 
-        What contradicts one model of the individuals is asked for again without it.
+        What contradicts one model of the individuals is asked for again without it. Where there
+        are no individuals, the first models stay: those that come may be like them.
         """
-        base = self._base if search is self._search else 0
+        apart = search is not self._search
+        base = 0 if apart else self._base
         again: list[tuple[str, ...]] = []
         for model in (True, False):
             if model and self._is_possible(lambda: None, search):
@@ -294,6 +299,9 @@ class CaseReasoner:
                     continue
                 if self._is_possible(partial(models.state, *question), search):
                     models.look(*question)
+                    if apart and model and sum(1 for _ in search.model.alive()) < _MOST_KEPT:
+                        search.hold()
+                        start = search.mark()
                 elif search.depends:
                     again.append(question)
                 else:

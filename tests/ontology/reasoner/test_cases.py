@@ -251,3 +251,21 @@ def test_a_class_of_one_individual_is_empty_where_that_individual_is_no_member()
     kb.remove(ClassAssertion(C, i))
     kb.reason()
     assert not kb.holds(SubClassOf(A, NOTHING))
+
+
+def test_classes_that_everybody_is_in_or_out_of_are_decided_for_few() -> None:
+    """As the W3C's cases 661 to 664 state complements: by whether there is a value."""
+    axioms: list[Axiom] = []
+    for n in range(16):
+        inside, outside, prop = f'x:in{n}', f'x:out{n}', f'x:has{n}'
+        axioms += [
+            ax.EquivalentClasses((inside, ex.ObjectMaxCardinality(0, prop))),
+            ax.EquivalentClasses((outside, ex.ObjectMinCardinality(1, prop))),
+            SubClassOf(f'x:out{n}', ex.ObjectSomeValuesFrom(P, f'x:in{(n + 3) % 16}')),
+        ]
+    axioms.append(SubClassOf('x:in4', ex.ObjectAllValuesFrom(P, 'x:in5')))
+    reasoner = CaseReasoner([*axioms, ClassAssertion('x:in4', i)], 50_000)
+    assert reasoner.consistent()
+    assert not reasoner.stopped
+    both = ex.ObjectIntersectionOf(('x:in4', ex.ObjectSomeValuesFrom(P, 'x:out5')))
+    assert not CaseReasoner([*axioms, ClassAssertion(both, i)], 50_000).consistent()
