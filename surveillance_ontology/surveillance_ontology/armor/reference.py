@@ -6,7 +6,6 @@ A change is a value: it waits in a buffer, is applied, and goes into the journal
 from __future__ import annotations
 
 import contextlib
-import itertools
 import threading
 import time
 from collections.abc import Iterable, Iterator, Mapping
@@ -139,7 +138,6 @@ class Reference:
         heavy: Classes or properties changed since the last reasoning; the next takes longer.
         took: Seconds of processor time of the last reasoning that had something to do.
         revision: Counts what may have changed an answer, so that copies know when they are old.
-        serial: Tells this reference from any other of the same name.
         dropped: The name does not stand for it any more.
         history: What was asserted when.
     """
@@ -157,7 +155,6 @@ class Reference:
     revision: int = 0
     dropped: bool = False
     history: History = field(default_factory=History)
-    serial: int = field(default_factory=itertools.count().__next__)
     lock: threading.RLock = field(default_factory=threading.RLock)
 
     @contextlib.contextmanager

@@ -179,14 +179,9 @@ class Journal:
             JournalError: It could not be written; the journal goes on without it.
         """
         path = self._path('snapshot', number)
-        temporary = path.with_suffix('.tmp')
         try:
-            with temporary.open('wb') as file:
-                for record in records:
-                    file.write(_line(record))
-                file.flush()
-                os.fsync(file.fileno())
-                self.snapshot_size = file.tell()
+            temporary = _written(path, records)
+            self.snapshot_size = temporary.stat().st_size
             with self._parts_lock:
                 temporary.rename(path)
                 self._sync_directory()
@@ -242,14 +237,15 @@ class Journal:
         """Read a part; afterwards it holds whole records only."""
         contents = _Contents(self._bytes(path), last=last)
         if contents.damage:
-            first, count = contents.damage[0][0], len(contents.damage)
+            first, count = contents.damage[0], len(contents.damage)
             place = f'{path}: {count} damaged entr{"y" if count == 1 else "ies"}, from byte {first}'
             kept = f'{len(contents.records)} whole ones are kept'
             stamp = time.strftime('%Y%m%d-%H%M%S')
             aside = self._directory / f'damaged-{stamp}-{path.name}'
             try:
                 shutil.copyfile(path, aside)
-                self._rewrite(path, contents.records)
+                _written(path, contents.records).rename(path)
+                self._sync_directory()
             except OSError as error:
                 self.notes.append(f'{place}; {kept}; not put aside: {error.strerror}')
             else:
@@ -261,16 +257,6 @@ class Journal:
                 file.write(b'\n')
         return contents.records
 
-    def _rewrite(self, path: Path, records: Iterable[Any]) -> None:
-        temporary = path.with_suffix('.tmp')
-        with temporary.open('wb') as file:
-            for record in records:
-                file.write(_line(record))
-            file.flush()
-            os.fsync(file.fileno())
-        temporary.rename(path)
-        self._sync_directory()
-
 
 class _Contents:
     """What a part of a journal holds.
@@ -281,14 +267,14 @@ class _Contents:
 
     Attributes:
         records: The whole ones.
-        damage: Where what cannot be read begins and ends, bytes.
+        damage: Where each entry that cannot be read begins, bytes.
         end: Where a batch begins that was cut off; None: there is none.
         unended: All that is lacking is the last line's end.
     """
 
     def __init__(self, data: bytes, *, last: bool) -> None:
         self.records: list[Any] = []
-        self.damage: list[tuple[int, int]] = []
+        self.damage: list[int] = []
         self.end: int | None = None
         self.unended = False
         batch: list[Any] = []
@@ -306,9 +292,8 @@ class _Contents:
             if newline < 0 and last and _CUT_OFF.fullmatch(data, start):
                 self.end = begin
                 return
-            end = newline + 1 if newline >= 0 else len(data)
-            self.damage.append((start, end))
-            start = end
+            self.damage.append(start)
+            start = newline + 1 if newline >= 0 else len(data)
         self.unended = start > len(data)
         if batch and last and not self.damage:
             self.end = begin
@@ -324,6 +309,17 @@ def _line(record: Any, *, more: bool = False) -> bytes:
     text = json.dumps(record, separators=(',', ':')).encode()
     body = b'%d%s %s' % (len(text), b'+' if more else b'', text)
     return b'%08x %s\n' % (zlib.crc32(body), body)
+
+
+def _written(path: Path, records: Iterable[Any]) -> Path:
+    """Write what a part is to hold beside it; renamed, it takes the part's place as a whole."""
+    temporary = path.with_suffix('.tmp')
+    with temporary.open('wb') as file:
+        for record in records:
+            file.write(_line(record))
+        file.flush()
+        os.fsync(file.fileno())
+    return temporary
 
 
 def _entry(data: bytes, start: int) -> tuple[list[Any], bool, int] | None:

@@ -7,6 +7,7 @@ ontology is named in the description of an otherwise empty answer.
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from typing import Any
@@ -41,22 +42,12 @@ from surveillance_ontology.owl.axioms import (
 )
 from surveillance_ontology.owl.expressions import (
     ClassExpression,
-    DataAllValuesFrom,
-    DataExactCardinality,
     DataHasValue,
-    DataMaxCardinality,
-    DataMinCardinality,
     DataRange,
-    DataSomeValuesFrom,
-    ObjectAllValuesFrom,
     ObjectComplementOf,
-    ObjectExactCardinality,
     ObjectHasValue,
     ObjectIntersectionOf,
     ObjectInverseOf,
-    ObjectMaxCardinality,
-    ObjectMinCardinality,
-    ObjectSomeValuesFrom,
     ObjectUnionOf,
     PropertyExpression,
 )
@@ -338,20 +329,7 @@ def _full_fact(ref: Reference, text: str) -> Fact:
         raise DirectiveError(f'QUERY EXPLAIN: argument fact {error}') from None
 
 
-_VALUES = {
-    ObjectSomeValuesFrom: 'SOME_OBJECT',
-    ObjectAllValuesFrom: 'ALL_OBJECT',
-    DataSomeValuesFrom: 'SOME_DATA',
-    DataAllValuesFrom: 'ALL_DATA',
-}
-_CARDINALITIES = {
-    ObjectMinCardinality: 'MIN_OBJECT',
-    ObjectMaxCardinality: 'MAX_OBJECT',
-    ObjectExactCardinality: 'EXACT_OBJECT',
-    DataMinCardinality: 'MIN_DATA',
-    DataMaxCardinality: 'MAX_DATA',
-    DataExactCardinality: 'EXACT_DATA',
-}
+_RESTRICTION = re.compile('(Object|Data)(Some|All|Min|Max|Exact)(?:ValuesFrom|Cardinality)')
 
 
 def _described(cls: str, definition: ClassExpression) -> str:
@@ -377,19 +355,13 @@ def _atoms(name: str, part: Any) -> Iterator[str]:
         yield f'{head.format("SOME_OBJECT")}{_prop(part.prop)}({local_name(part.individual)})'
     elif isinstance(part, DataHasValue):
         yield f'{head.format("SOME_DATA")}{_prop(part.prop)}({part.literal.lexical})'
-    elif kind := _CARDINALITIES.get(type(part)):
-        filler = _filler(part)
-        yield f'{head.format(kind)}{_prop(part.prop)} {part.n}({_filler_text(filler)})'
-        yield from _nested(name, filler)
-    elif kind := _VALUES.get(type(part)):
-        filler = _filler(part)
-        yield f'{head.format(kind)}{_prop(part.prop)}({_filler_text(filler)})'
-        yield from _nested(name, filler)
-
-
-def _filler(part: object) -> ClassExpression | DataRange:
-    found: ClassExpression | DataRange = getattr(part, 'filler', None) or part.range  # type: ignore[attr-defined]
-    return found
+    elif found := _RESTRICTION.fullmatch(type(part).__name__):
+        kind = f'{found[2]}_{found[1]}'.upper()
+        number = f' {part.n}' if hasattr(part, 'n') else ''
+        filler = part.filler if hasattr(part, 'filler') else part.range
+        yield f'{head.format(kind)}{_prop(part.prop)}{number}({_filler_text(filler)})'
+        if found[1] == 'Object' and not type(filler).__name__.startswith('Data'):
+            yield from _atoms(name, filler)
 
 
 def _filler_text(filler: ClassExpression | DataRange) -> str:
@@ -399,17 +371,6 @@ def _filler_text(filler: ClassExpression | DataRange) -> str:
         word = ' and ' if isinstance(filler, ObjectIntersectionOf) else ' or '
         return word.join(_filler_text(operand) for operand in filler.operands)
     return type(filler).__name__
-
-
-def _nested(name: str, filler: ClassExpression | DataRange) -> Iterator[str]:
-    if not type(filler).__name__.startswith('Data') and not _is_datatype(filler):
-        yield from _atoms(name, filler)
-
-
-def _is_datatype(filler: ClassExpression | DataRange) -> bool:
-    return isinstance(filler, str) and filler.startswith(
-        ('http://www.w3.org/2001/XMLSchema#', 'http://www.w3.org/2000/01/rdf-schema#Literal')
-    )
 
 
 def _prop(prop: PropertyExpression) -> str:
