@@ -87,12 +87,14 @@ class Container(State):
         fsm_history: Where the next execution goes on, when the last one was put aside.
         fsm_raised: Interrupts that have been raised and have not begun.
         fsm_aside: The container was asked to be put aside in the moment before it began.
+        fsm_frame_type: How the container is executed.
         fsm_table: The nodes of states and interrupts by label, as they were last made.
         fsm_data: The dictionary behind the userdata, as it was then.
     """
 
     together = False
     """Whether all states run at the same time."""
+    fsm_frame_type: ClassVar[type[Frame]]
 
     fsm_frame: Frame | None = None
     fsm_history: History | None = None
@@ -100,7 +102,7 @@ class Container(State):
     fsm_aside = False
     fsm_table: Mapping[str, Node] = {}
     fsm_data: dict[str, Any]
-    _table_made_for: tuple[int, dict[str, Any], Clock, str] | None = None
+    _table_made_for: tuple[int, int, int, str] | None = None
     _control: Control | None = None
     _preempt_timeout: float | None = DEFAULT_PREEMPT_TIMEOUT
     fsm_of_execution: ClassVar[frozenset[str]] = State.fsm_of_execution | {
@@ -157,13 +159,17 @@ class Container(State):
         """Transitions inside, as (outcome, from label, to label)."""
         raise NotImplementedError
 
-    def check_consistency(self) -> None:
-        """Raise `InvalidTransitionError` when the container cannot run."""
+    def fsm_faults(self) -> list[str]:
+        """Return what keeps the container from running, but for its interrupts."""
         raise NotImplementedError
 
-    def fsm_make_frame(self, thread: ExecutionThread, path: str, parent_ud: Any) -> Frame:
-        """Make the frame of an execution that is about to begin."""
+    def fsm_make_table(self) -> dict[str, Node]:
+        """Make the nodes of the states by label, and say where their outcomes lead."""
         raise NotImplementedError
+
+    def fsm_first(self) -> Node | Exit:
+        """Return the node that an execution begins with."""
+        return self.fsm_table[self.get_initial_states()[0]]
 
     # States by label.
 
@@ -466,7 +472,7 @@ class Container(State):
     def fsm_node(self, label: str, state: State, priority: float = LOWEST) -> Node:
         """Make the node of one state; its targets are left to the container's kind."""
         node = Node(self, label, state, priority)
-        if isinstance(state, Container) and state.is_entered_directly():
+        if isinstance(state, Container) and state.fsm_entered_directly():
             node.enter = node.execute = state.fsm_enter
         clock = self.fsm_clock
         if state.fsm_clock is not clock:
@@ -478,12 +484,8 @@ class Container(State):
             node.execute = limited(node, limits)
         return node
 
-    def fsm_make_table(self) -> dict[str, Node]:
-        """Make the nodes of the states by label, and say where their outcomes lead."""
-        raise NotImplementedError
-
-    def fsm_current_table(self, path: str, clock: Clock) -> Mapping[str, Node]:
-        """Return the nodes of states and interrupts by label, made anew if anything has changed.
+    def fsm_update_table(self, path: str, clock: Clock) -> None:
+        """Make the nodes of states and interrupts anew if anything has changed.
 
         Args:
             path: The path at which the container is executed.
@@ -492,22 +494,14 @@ class Container(State):
         Raises:
             InvalidTransitionError: The container cannot run.
         """
-        made_for = self._table_made_for
         data = raw(self.userdata)
-        if (
-            made_for is None
-            or made_for[0] != structure_version.number
-            or made_for[1] is not data
-            or made_for[2] is not clock
-            or made_for[3] != path
-        ):
+        # A registration that comes meanwhile must not be taken for one that came before.
+        made_for = (structure_version.number, id(data), id(clock), path)
+        if made_for != self._table_made_for:
             self.check_consistency()
             self.fsm_path, self.fsm_clock, self.fsm_data = path, clock, data
-            # A registration that comes meanwhile must not be taken for one that came before.
-            version = structure_version.number
             self.fsm_table = self._with_branches(self.fsm_make_table())
-            self._table_made_for = (version, data, clock, path)
-        return self.fsm_table
+            self._table_made_for = made_for
 
     def _with_branches(self, table: dict[str, Node]) -> dict[str, Node]:
         """Add the nodes of interrupts to those of states."""
@@ -522,10 +516,10 @@ class Container(State):
                     node.targets[outcome] = states.get(name) or Exit(name)
         return table
 
-    def has_limits(self) -> bool:
+    def fsm_has_limits(self) -> bool:
         """Tell whether a state inside has limits that somebody must watch."""
         return bool(self.fsm_limits) or any(
-            isinstance(state, Container) and state.has_limits()
+            isinstance(state, Container) and state.fsm_has_limits()
             for state in self.fsm_children().values()
         )
 
@@ -553,7 +547,7 @@ class Container(State):
             return self._enter(thread, here.stack, parent_ud)
         return self._execute_as_root(parent_ud)
 
-    def is_entered_directly(self) -> bool:
+    def fsm_entered_directly(self) -> bool:
         """Tell whether nobody has put code of his own around `execute`."""
         return type(self).execute is Container.execute and 'execute' not in self.__dict__
 
@@ -571,9 +565,9 @@ class Container(State):
         def body() -> Any:
             return self._enter(thread, this_thread.stack, parent_ud)
 
-        control.begin(run)
+        control.fsm_begin(run)
         try:
-            if self._preempt_timeout is None and not self.has_limits():
+            if self._preempt_timeout is None and not self.fsm_has_limits():
                 return thread.run_here(body)
             thread.start(body)
             try:
@@ -587,7 +581,7 @@ class Container(State):
                 raise
         finally:
             self.fsm_frame = None
-            control.end(run)
+            control.fsm_end(run)
         if thread.error is not None:
             raise thread.error
         return thread.outcome
@@ -601,7 +595,8 @@ class Container(State):
         before = self.fsm_frame
         if before is not None and not before.ended:
             raise InvalidStateError(f"'{self.fsm_path}' is running already")
-        frame = self.fsm_make_frame(thread, path, parent_ud)
+        self.fsm_update_table(path, thread.run.clock)
+        frame = self.fsm_frame_type(self, thread, path, self.fsm_first(), parent_ud)
         with _entry_lock:
             if self.fsm_frame is not before:
                 raise InvalidStateError(f"'{self.fsm_path}' is running already")
@@ -754,12 +749,18 @@ class Container(State):
         for child in self.fsm_children().values():
             child.fsm_forget()
 
-    def _branch_faults(self) -> list[str]:
+    def check_consistency(self) -> None:
+        """Raise `InvalidTransitionError` naming all that keeps the container from running."""
         names = {*self.fsm_states, *self.get_registered_outcomes(), RESUME}
-        return [
+        faults = self.fsm_faults() + [
             f"outcome '{outcome}' of interrupt '{branch.label}' leads to '{target}', which is "
             f"neither a state, nor an outcome, nor '{RESUME}'"
             for branch in self.fsm_branches.values()
             for outcome, target in branch.transitions.items()
             if target not in names
         ]
+        if faults:
+            raise InvalidTransitionError(
+                f"{type(self).__name__} '{self.fsm_path}' cannot run: {'; '.join(faults)} (states: "
+                f'{sorted(self.fsm_states)}, outcomes: {sorted(self._outcomes)})'
+            )

@@ -201,8 +201,8 @@ class Control:
             left = self._run.left_behind if self._run is not None else []
             return [path for path, work in left if work.is_going_on()]
 
-    def begin(self, run: Run) -> None:
-        """Have `run` controlled until `end`.
+    def fsm_begin(self, run: Run) -> None:
+        """Have `run` controlled until `fsm_end`.
 
         Raises:
             InvalidStateError: Another run has not ended.
@@ -212,7 +212,7 @@ class Control:
                 raise InvalidStateError(f"'{self._container.get_name()}' is running already")
             self._run, self.steps = run, 0
 
-    def end(self, run: Run) -> None:
+    def fsm_end(self, run: Run) -> None:
         """Let go of a run that has ended."""
         with self.lock:
             run.ended = True

@@ -15,14 +15,13 @@ import contextvars
 import os
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from surveillance_fsm import log
 from surveillance_fsm.clock import WALL_CLOCK, Clock, Interrupt, elapsed_of
 from surveillance_fsm.exceptions import (
-    InvalidStateError,
     InvalidTransitionError,
     InvalidUserCodeError,
     SmachError,
@@ -300,14 +299,11 @@ class Frame:
         preempted: The node whose state was last asked to stop because of a preempt.
         cut: The node whose state was asked to stop because of an interrupt.
         suspending: The parent wants the container put aside.
-        saved: Where to go on after each of the interrupts under way.
         gone: The node whose state was left behind.
         forced: A node, and the outcome to take in place of the one that its state returns.
-        items: An iterator's items that are left.
-        index: How many items an iterator has begun.
-        repeat: An iterator's current item has not ended: it is not followed by the next one.
         ended: The execution is over. The container keeps the frame until its parent has taken note,
             so that a checkpoint taken in between does not take it for one that has not begun.
+        carried_over: The attributes that `successor` takes over.
     """
 
     # Class attributes: most executions of a container need none of them.
@@ -316,18 +312,10 @@ class Frame:
     preempted: Node | None = None
     cut: Node | None = None
     suspending = False
-    saved: tuple[Node | Exit, ...] = ()
     gone: Node | None = None
     forced: tuple[Node, str] | None = None
-    items: Any = None
-    index = 0
-    repeat = False
     ended = False
-
-    @property
-    def bounds_itself(self) -> bool:
-        """Whether the frame itself sees to it that what runs heeds a preempt in time."""
-        return False
+    carried_over: ClassVar[tuple[str, ...]] = ('preempted', 'cut', 'suspending', 'forced')
 
     def __init__(
         self,
@@ -396,41 +384,9 @@ class Frame:
     def successor(self) -> Frame:
         """Return a copy for the thread that takes this execution over."""
         frame = type(self)(self.container, self.thread, self.path, self.current, self.parent_ud)
-        for name in ('preempted', 'cut', 'suspending', 'forced', 'items', 'index', 'repeat'):
+        for name in self.carried_over:
             setattr(frame, name, getattr(self, name))
-        frame.saved = self.saved
         return frame
-
-    def history(self, target: Node | Exit) -> History:
-        """Return where to go on when the container is put aside before `target`."""
-        return History(
-            target.label,
-            target.is_exit,
-            [(node.label, node.is_exit) for node in self.saved],
-            self.index,
-            self.repeat,
-            items=self.items,
-        )
-
-    def go_on_from(self, history: History, table: Mapping[str, Node]) -> None:
-        """Begin where the container was put aside.
-
-        Raises:
-            InvalidStateError: It has no such state any more.
-        """
-
-        def place(label: str, leaving: bool) -> Node | Exit:
-            if leaving:
-                return Exit(label)
-            if label not in table:
-                raise InvalidStateError(
-                    f"'{self.path}' cannot go on in '{label}': its states are {sorted(table)}"
-                )
-            return table[label]
-
-        self.saved = tuple(place(*saved) for saved in history.saved)
-        self.current = place(history.current, history.leaving)
-        self.index, self.items, self.repeat = history.index, history.items, history.repeat
 
     @property
     def wanted(self) -> bool:

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 from surveillance_fsm import control, log
 from surveillance_fsm.container import Container
-from surveillance_fsm.exceptions import SmachError, describe
+from surveillance_fsm.exceptions import InvalidStateError, SmachError, describe
 from surveillance_fsm.execution import (
     LOWEST,
     NO_USERDATA,
@@ -52,12 +52,21 @@ class SequentialFrame(Frame):
         path: The container's path.
         current: The node it begins with.
         parent_ud: The parent's userdata.
+
+    Attributes:
+        saved: Where to go on after each of the interrupts under way.
+        stopped: Where the shutdown check ended the run.
+        items: An iterator's items that are left.
+        index: How many items an iterator has begun.
+        repeat: An iterator's current item has not ended: it is not followed by the next one.
     """
 
-    container: Container
-    current: Node | Exit
-    # Where the shutdown check ended the run.
+    saved: tuple[Node | Exit, ...] = ()
     stopped: Node | Exit = SHUTDOWN
+    items: Any = None
+    index = 0
+    repeat = False
+    carried_over = (*Frame.carried_over, 'saved', 'items', 'index', 'repeat')
 
     # From the beginning to the end.
 
@@ -67,7 +76,7 @@ class SequentialFrame(Frame):
         if history is None:
             container.fsm_copy_input_keys(self.parent_ud)
         else:
-            self.go_on_from(history, container.fsm_table)
+            self._go_on_from(history)
         if run.chatty:
             verb = 'starts in' if history is None else 'goes on in'
             log.loginfo(
@@ -102,6 +111,27 @@ class SequentialFrame(Frame):
         self.current = target = node.target(outcome)
         node.release()
         return self._run_from(self._attend(node, outcome, target))
+
+    def _go_on_from(self, history: History) -> None:
+        """Begin where the container was put aside.
+
+        Raises:
+            InvalidStateError: It has no such state any more.
+        """
+        table = self.container.fsm_table
+
+        def place(label: str, leaving: bool) -> Node | Exit:
+            if leaving:
+                return Exit(label)
+            if label not in table:
+                raise InvalidStateError(
+                    f"'{self.path}' cannot go on in '{label}': its states are {sorted(table)}"
+                )
+            return table[label]
+
+        self.saved = tuple(place(*saved) for saved in history.saved)
+        self.current = place(history.current, history.leaving)
+        self.index, self.items, self.repeat = history.index, history.items, history.repeat
 
     def _run_from(self, target: Any) -> Any:
         """Execute states from `target` on until one leads out of the container; the outcome."""
@@ -220,7 +250,7 @@ class SequentialFrame(Frame):
         if container.preempt_requested() and isinstance(target, Node):
             self._preempt_next(target)
         elif self.suspending and isinstance(target, Node):
-            container.fsm_history = self.history(target)
+            container.fsm_history = self._history(target)
             if moved and left is not None:
                 moves.append(_Move(left, outcome, target, kind))
             return ASIDE, moves
@@ -408,7 +438,18 @@ class SequentialFrame(Frame):
         """Return where the container would go on if its process ended now."""
         if self.current is ASIDE:
             return self.container.fsm_history
-        return self.history(self.stopped if self.current is SHUTDOWN else self.current)
+        return self._history(self.stopped if self.current is SHUTDOWN else self.current)
+
+    def _history(self, target: Node | Exit) -> History:
+        """Return where to go on when the container is put aside before `target`."""
+        return History(
+            target.label,
+            target.is_exit,
+            [(node.label, node.is_exit) for node in self.saved],
+            self.index,
+            self.repeat,
+            items=self.items,
+        )
 
     def active_labels(self) -> list[str]:
         """Return the label of the state that runs; empty when none does."""

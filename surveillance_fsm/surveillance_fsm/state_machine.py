@@ -12,13 +12,11 @@ from typing import Any, Unpack
 from surveillance_fsm.container import Container
 from surveillance_fsm.exceptions import (
     InvalidStateError,
-    InvalidTransitionError,
     InvalidUserCodeError,
     describe,
 )
 from surveillance_fsm.execution import (
     SUSPENDED,
-    ExecutionThread,
     Exit,
     Node,
 )
@@ -46,6 +44,8 @@ class StateMachine(Container):
     Attributes:
         userdata: What the states inside share.
     """
+
+    fsm_frame_type = SequentialFrame
 
     def __init__(
         self,
@@ -149,8 +149,8 @@ class StateMachine(Container):
         self._transitions[label] = {**transitions, **dict.fromkeys(free, target)}
         structure_version.changed()
 
-    def check_consistency(self) -> None:
-        """Raise `InvalidTransitionError` naming all that keeps the machine from running."""
+    def fsm_faults(self) -> list[str]:
+        """Return what keeps the machine from running."""
         faults = []
         outcomes = self.get_registered_outcomes()
         if self._initial_state_label is None:
@@ -170,12 +170,7 @@ class StateMachine(Container):
                         f"outcome '{outcome}' of state '{label}' leads to '{target}', which is "
                         'neither a state nor an outcome of the machine'
                     )
-        faults += self._branch_faults()
-        if faults:
-            raise InvalidTransitionError(
-                f"State machine '{self.fsm_path}' cannot run: {'; '.join(faults)} (states: "
-                f'{sorted(self.fsm_states)}, outcomes: {sorted(outcomes)})'
-            )
+        return faults
 
     # Running.
 
@@ -191,12 +186,6 @@ class StateMachine(Container):
                     target or outcome
                 ]
         return table
-
-    def fsm_make_frame(self, thread: ExecutionThread, path: str, parent_ud: Any) -> SequentialFrame:
-        """Make the frame of an execution that is about to begin."""
-        table = self.fsm_current_table(path, thread.run.clock)
-        first = table[self._initial_state_label]  # type: ignore[index]
-        return SequentialFrame(self, thread, path, first, parent_ud)
 
     # The container's interface.
 
@@ -272,17 +261,9 @@ class Sequence(StateMachine):
         sequence = Sequence._currently_opened_container()
         return sequence.add_state(label, state, transitions, remapping, constants, **limits)
 
-    def add_state(
-        self,
-        label: str,
-        state: State,
-        transitions: Mapping[str, str | None] | None = None,
-        remapping: Mapping[str, str] | None = None,
-        constants: Mapping[str, Any] | None = None,
-        **limits: Unpack[LimitOptions],
-    ) -> State:
+    def add_state(self, label: str, state: State, *args: Any, **kwargs: Any) -> State:
         """Add a state to a sequence at hand, open or not; for the arguments see `add`."""
-        super().add_state(label, state, transitions, remapping, constants, **limits)
+        super().add_state(label, state, *args, **kwargs)
         if self._last_label is not None:
             self._connect(self._last_label, [self.connector_outcome], label)
         self._last_label = label
@@ -299,6 +280,69 @@ class _Exhausted:
         return self._outcome
 
 
+class IteratorFrame(SequentialFrame):
+    """One execution of an iterator."""
+
+    container: Iterator
+
+    def draw(self) -> bool:
+        """Put the next item into userdata, or the current one again if it has not ended.
+
+        Returns:
+            Whether there is one.
+
+        Raises:
+            InvalidUserCodeError: The items raised.
+        """
+        if self.repeat and self.items is not None:
+            return True
+        iterator = self.container
+        begun = self.index
+        wanted = begun if self.repeat and begun else begun + 1
+        try:
+            if self.items is None:
+                items = iterator.items
+                self.items = iter(items() if callable(items) else items)
+                # Resumed in another process: the items before were dealt with.
+                skipped = wanted - 1
+            else:
+                skipped = 0
+            for _ in range(skipped):
+                next(self.items)
+            item = next(self.items)
+        except StopIteration:
+            return False
+        except Exception as error:
+            raise InvalidUserCodeError(
+                f"The items of iterator '{self.path}' raised {describe(error)} after {begun} items"
+            ) from error
+        self.index, self.repeat = wanted, True
+        data = raw(iterator.userdata)
+        if wanted > begun or iterator.items_label not in data:
+            data[iterator.items_label] = item
+        return True
+
+    def run_on(self, outcome: Any) -> Any:
+        """Take `outcome` for that of the current item, and run to the end."""
+        self.repeat = outcome is SUSPENDED
+        return super().run_on(outcome)
+
+    def _end_of_loop(self, outcome: Any, target: Node | Exit) -> Node | Exit:
+        """End the loop when a preempt came while it would go on.
+
+        The iterator ends with ``preempted``, or, if it has no such outcome, with what the state's
+        outcome stands for. If it has not that either, the request is not served: the iterator ends
+        as if no item were left, and the request goes to the next state of its container.
+        """
+        iterator = self.container
+        outcomes = iterator.get_registered_outcomes()
+        for ending in ('preempted', iterator.fsm_ending(outcome)):
+            if ending in outcomes:
+                iterator.service_preempt()
+                return Exit(ending)
+        return Exit(iterator.fsm_ending(iterator.exhausted_outcome))
+
+
 class Iterator(Container):
     """Executes its state once per item, until an outcome breaks the loop or no item is left.
 
@@ -310,6 +354,8 @@ class Iterator(Container):
         it_label: The userdata key that holds the current item.
         exhausted_outcome: What the iterator ends with when no item is left.
     """
+
+    fsm_frame_type = IteratorFrame
 
     def __init__(
         self,
@@ -393,14 +439,9 @@ class Iterator(Container):
         self.final_outcome_map = dict(final_outcome_map or {})
         return state
 
-    def check_consistency(self) -> None:
-        """Raise `InvalidTransitionError` when the iterator has no state or a wrong interrupt."""
-        faults = [] if self.fsm_states else ['it has no state']
-        faults += self._branch_faults()
-        if faults:
-            raise InvalidTransitionError(
-                f"Iterator '{self.fsm_path}' cannot run: {'; '.join(faults)}"
-            )
+    def fsm_faults(self) -> list[str]:
+        """Return what keeps the iterator from running."""
+        return [] if self.fsm_states else ['it has no state']
 
     # Running: the state leads back to itself until something breaks the loop.
 
@@ -410,9 +451,9 @@ class Iterator(Container):
         for outcome in self.loop_outcomes:
             node.targets[outcome] = node
         for outcome in self._break_outcomes:
-            node.targets[outcome] = Exit(self.ending(outcome))
+            node.targets[outcome] = Exit(self.fsm_ending(outcome))
         exhausted = _Exhausted(self.exhausted_outcome)
-        node.targets[exhausted] = Exit(self.ending(self.exhausted_outcome))
+        node.targets[exhausted] = Exit(self.fsm_ending(self.exhausted_outcome))
         within_limits = node.execute if node.limits is not None else None
 
         def execute_for_item(view: Any) -> Any:
@@ -427,12 +468,7 @@ class Iterator(Container):
         node.execute = execute_for_item
         return {self._state_label: node}
 
-    def fsm_make_frame(self, thread: ExecutionThread, path: str, parent_ud: Any) -> IteratorFrame:
-        """Make the frame of an execution that is about to begin."""
-        table = self.fsm_current_table(path, thread.run.clock)
-        return IteratorFrame(self, thread, path, table[self._state_label], parent_ud)
-
-    def ending(self, outcome: str) -> str:
+    def fsm_ending(self, outcome: str) -> str:
         """Return the iterator's outcome when its state's `outcome` ends the loop."""
         return self.final_outcome_map.get(outcome, outcome)
 
@@ -450,66 +486,3 @@ class Iterator(Container):
             *loops,
             *((outcome, label, endings.get(outcome)) for outcome in self._break_outcomes),
         ]
-
-
-class IteratorFrame(SequentialFrame):
-    """One execution of an iterator."""
-
-    container: Iterator
-
-    def draw(self) -> bool:
-        """Put the next item into userdata, or the current one again if it has not ended.
-
-        Returns:
-            Whether there is one.
-
-        Raises:
-            InvalidUserCodeError: The items raised.
-        """
-        if self.repeat and self.items is not None:
-            return True
-        iterator = self.container
-        begun = self.index
-        wanted = begun if self.repeat and begun else begun + 1
-        try:
-            if self.items is None:
-                items = iterator.items
-                self.items = iter(items() if callable(items) else items)
-                # Resumed in another process: the items before were dealt with.
-                skipped = wanted - 1
-            else:
-                skipped = 0
-            for _ in range(skipped):
-                next(self.items)
-            item = next(self.items)
-        except StopIteration:
-            return False
-        except Exception as error:
-            raise InvalidUserCodeError(
-                f"The items of iterator '{self.path}' raised {describe(error)} after {begun} items"
-            ) from error
-        self.index, self.repeat = wanted, True
-        data = raw(iterator.userdata)
-        if wanted > begun or iterator.items_label not in data:
-            data[iterator.items_label] = item
-        return True
-
-    def run_on(self, outcome: Any) -> Any:
-        """Take `outcome` for that of the current item, and run to the end."""
-        self.repeat = outcome is SUSPENDED
-        return super().run_on(outcome)
-
-    def _end_of_loop(self, outcome: Any, target: Node | Exit) -> Node | Exit:
-        """End the loop when a preempt came while it would go on.
-
-        The iterator ends with ``preempted``, or, if it has no such outcome, with what the state's
-        outcome stands for. If it has not that either, the request is not served: the iterator ends
-        as if no item were left, and the request goes to the next state of its container.
-        """
-        iterator = self.container
-        outcomes = iterator.get_registered_outcomes()
-        for ending in ('preempted', iterator.ending(outcome)):
-            if ending in outcomes:
-                iterator.service_preempt()
-                return Exit(ending)
-        return Exit(iterator.ending(iterator.exhausted_outcome))

@@ -68,7 +68,7 @@ class Structure:
             for outcome, source, target in container.get_internal_edges()
         ]
         if isinstance(container, IteratorContainer):
-            exhausted, ending = container.exhausted_outcome, container.ending
+            exhausted, ending = container.exhausted_outcome, container.fsm_ending
             self.edges += [Edge(label, exhausted, ending(exhausted), True) for label in self.states]
         for branch in branches:
             for outcome, name in sorted(branch.transitions.items()):

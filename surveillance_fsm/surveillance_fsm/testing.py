@@ -181,21 +181,21 @@ class Watched:
 
     def untaken(self) -> list[tuple[str, str, str]]:
         """Transitions never taken, as (path of the container, from, outcome)."""
-        taken = {(path, left, outcome) for path, left, outcome, _ in self.transitions}
+        taken = {transition[:3] for transition in self.transitions}
+        return [transition for transition in self._possible() if transition not in taken]
+
+    def coverage(self) -> float:
+        """Return the share of all transitions that were taken, 0 to 1."""
+        possible = self._possible()
+        return 1.0 - len(self.untaken()) / len(possible) if possible else 1.0
+
+    def _possible(self) -> list[tuple[str, str, str]]:
         return [
             (inner.path, edge.source, edge.outcome)
             for inner in self._structure.walk()
             if not inner.together
             for edge in inner.edges
-            if (inner.path, edge.source, edge.outcome) not in taken
         ]
-
-    def coverage(self) -> float:
-        """Return the share of all transitions that were taken, 0 to 1."""
-        everything = [
-            edge for inner in self._structure.walk() if not inner.together for edge in inner.edges
-        ]
-        return 1.0 - len(self.untaken()) / len(everything) if everything else 1.0
 
     def assert_covered(self, *, except_for: Iterable[tuple[str, str, str]] = ()) -> None:
         """Hold that every transition was taken, but for those named.

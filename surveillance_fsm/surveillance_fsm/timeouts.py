@@ -247,8 +247,10 @@ def _due(thread: ExecutionThread) -> tuple[float | None, float | None]:
 
 
 def _bounds_itself(thread: ExecutionThread) -> bool:
+    """Tell whether a thread is in a concurrence, which watches its states' threads."""
+    # A copy: the thread itself changes its stack at any moment.
     stack = tuple(thread.stack)
-    return bool(stack) and stack[-1].bounds_itself
+    return bool(stack) and stack[-1].container.together and stack[-1].current.is_exit
 
 
 def _enforce(thread: ExecutionThread) -> None:

@@ -160,7 +160,7 @@ def _endings(view: _View) -> set[str]:
     structure, container = view.structure, view.structure.container
     endings = {edge.target for label in view.reached for edge in view.edges[label] if edge.leaving}
     if isinstance(container, Concurrence):
-        endings = container.possible_outcomes()
+        endings = container.fsm_possible_outcomes()
     if isinstance(container, Concurrence | IteratorContainer):
         # Both end with it when they are preempted.
         endings |= {'preempted'} & set(structure.outcomes)

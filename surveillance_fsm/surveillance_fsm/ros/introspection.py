@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from typing import Any
 
 from rclpy.node import Node
@@ -120,7 +121,7 @@ class IntrospectionServer:
             ('resume', control.resume),
             ('step', control.step),
         ):
-            node.create_service(Trigger, f'{prefix}/{name}', self._trigger(action))
+            node.create_service(Trigger, f'{prefix}/{name}', partial(self._trigger, action))
         node.create_service(ForceOutcome, f'{prefix}/force_outcome', self._force_outcome)
         node.create_service(SetInitialState, f'{prefix}/set_initial_state', self._set_initial_state)
 
@@ -190,11 +191,8 @@ class IntrospectionServer:
         container.set_initial_state(list(labels), userdata_from(userdata))
         return container
 
-    def _trigger(self, action: Callable[[], object]) -> Callable[[Any, Any], Any]:
-        def serve(_request: Any, response: Any) -> Any:
-            return self._answer(response, action)
-
-        return serve
+    def _trigger(self, action: Callable[[], object], _request: Any, response: Any) -> Any:
+        return self._answer(response, action)
 
     def _force_outcome(self, request: Any, response: Any) -> Any:
         return self._answer(
