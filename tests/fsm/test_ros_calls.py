@@ -376,6 +376,16 @@ def test_server_that_goes_away_in_the_middle_is_noticed(graph, server):
     runs[0].interrupt.set()
 
 
+def test_server_that_takes_the_place_of_one_that_was_killed_is_noticed(graph, server):
+    runs = waiting_server(server)  # as one that was killed: the middleware still knows it
+    caller = GoalCaller(graph.node, FollowPath, 'follow_path')
+    end = in_thread(lambda: caller.run(follow(1), accept_timeout=60.0))
+    graph.until(lambda: runs)
+    waiting_server(graph.add(PatrolNode, name='restarted'))
+    with pytest.raises(UnavailableError, match='action follow_path: another server took the place'):
+        end()
+
+
 def test_no_action_server(graph):
     with pytest.raises(UnavailableError, match='action nowhere: no server'):
         GoalCaller(graph.node, FollowPath, 'nowhere').run(follow(1), accept_timeout=0.05)

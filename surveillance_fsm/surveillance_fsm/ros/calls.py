@@ -22,9 +22,7 @@ from action_msgs.msg import GoalStatus
 from rclpy.action import ActionClient
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
-from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
-from rclpy.qos import qos_profile_action_status_default
 from rclpy.task import Future
 
 from surveillance_fsm.clock import Interrupt
@@ -108,6 +106,54 @@ class RoundTrips:
         return min(self._doubled * max(timeout, usual), MOST_GROWTH * timeout)
 
 
+class _Servers:
+    """The servers behind the name of a service, as the middleware knows them.
+
+    Args:
+        node: A node.
+        service: The service's name, fully resolved.
+        is_ready: Tells whether a server is there.
+        what: Names the server in errors.
+    """
+
+    def __init__(self, node: Node, service: str, is_ready: Callable[[], bool], what: str) -> None:
+        self._node = node
+        self._topic = f'rq{service}Request'  # as every ROS on DDS calls it
+        self._is_ready = is_ready
+        self._what = what
+
+    def look_for_loss(self, doubtful_seconds: float = math.inf) -> Callable[[], None]:
+        """Return a look that raises `UnavailableError` once the server will never answer.
+
+        Args:
+            doubtful_seconds: How long an answer is waited for where several servers are known.
+        """
+        asked, lost = self._known(), ''
+        doubtful = time.monotonic() + doubtful_seconds if len(asked) > 1 else math.inf
+
+        def look() -> None:
+            nonlocal lost
+            if lost:
+                raise UnavailableError(f'{self._what}: {lost}')
+            # Not before the next look: an answer may be under way.
+            if not self._is_ready():
+                lost = 'the server went away before it answered'
+            elif self._known() - asked:
+                lost = 'another server took the place of the one that was asked'
+            elif time.monotonic() > doubtful:
+                lost = f'no answer, and one of {len(asked)} servers may be gone'
+
+        return look
+
+    def _known(self) -> frozenset[tuple[int, ...]]:
+        """Return the known servers, by the identifiers that DDS gives their readers.
+
+        Their number does not tell that another came: one that was killed may go meanwhile.
+        """
+        readers = self._node.get_subscriptions_info_by_topic(self._topic, no_mangle=True)
+        return frozenset(tuple(reader.endpoint_gid) for reader in readers)
+
+
 class ServiceCaller:
     """Calls one service.
 
@@ -123,6 +169,8 @@ class ServiceCaller:
             srv_type, name, callback_group=ReentrantCallbackGroup(), qos_profile=CLIENT_QOS
         )
         self._checks: _PeriodicChecks | None = None
+        self._what = f'service {name}'
+        self._servers = _Servers(node, self._client.service_name, self.is_ready, self._what)
         self.name = name
         self.round_trips = RoundTrips()
 
@@ -161,47 +209,19 @@ class ServiceCaller:
         """
         deadline = time.monotonic() + timeout
         found_by = deadline if discovery is None else time.monotonic() + min(discovery, timeout)
-        what = f'service {self.name}'
-        await_ready(self.is_ready, found_by, interrupt, what)
+        await_ready(self.is_ready, found_by, interrupt, self._what)
         if discovery is None:
             deadline += self.round_trips.deadline(timeout) - timeout
+        look = self._servers.look_for_loss(DOUBTFUL_SECONDS)
         future = self._client.call_async(request)
         try:
             with nullcontext() if discovery is not None else self.round_trips.measured():
-                answer = block_on(future, deadline, interrupt, what, self._look_for_loss())
+                answer = block_on(future, deadline, interrupt, self._what, look)
         except CallError:
             self._client.remove_pending_request(future)
             raise
         _show(self._node, self.name, self.round_trips)
         return answer
-
-    def _look_for_loss(self) -> Callable[[], None]:
-        """Return a look that raises `UnavailableError` once the server will never answer."""
-        asked, lost = self._servers(), ''
-        doubtful = time.monotonic() + DOUBTFUL_SECONDS if len(asked) > 1 else math.inf
-
-        def look() -> None:
-            nonlocal lost
-            if lost:
-                raise UnavailableError(f'service {self.name}: {lost}')
-            # Not before the next look: an answer may be under way.
-            if not self.is_ready():
-                lost = 'the server went away before it answered'
-            elif self._servers() - asked:
-                lost = 'another server took the place of the one that was asked'
-            elif time.monotonic() > doubtful:
-                lost = f'no answer, and one of {len(asked)} servers may be gone'
-
-        return look
-
-    def _servers(self) -> frozenset[tuple[int, ...]]:
-        """Return the known servers, by the identifiers that DDS gives their readers.
-
-        Their number does not tell that another came: one that was killed may go meanwhile.
-        """
-        topic = f'rq{self._client.service_name}Request'  # as every ROS on DDS calls it
-        readers = self._node.get_subscriptions_info_by_topic(topic, no_mangle=True)
-        return frozenset(tuple(reader.endpoint_gid) for reader in readers)
 
     async def call_async(self, request: Any, timeout: float) -> Any:
         """Call from a callback with `await`; otherwise as `call`.
@@ -212,16 +232,16 @@ class ServiceCaller:
             CallTimeoutError: No answer within the time.
         """
         if not self.is_ready():
-            raise UnavailableError(f'service {self.name}: no server')
+            raise UnavailableError(f'{self._what}: no server')
         timeout = self.round_trips.deadline(timeout)
         deadline = time.monotonic() + timeout
+        look, failure = self._servers.look_for_loss(DOUBTFUL_SECONDS), []
         future = self._client.call_async(request)
-        look, failure = self._look_for_loss(), []
 
         def check() -> None:
             try:
                 if time.monotonic() > deadline:
-                    raise CallTimeoutError(f'service {self.name}: no answer within {timeout:g} s')
+                    raise CallTimeoutError(f'{self._what}: no answer within {timeout:g} s')
                 look()
             except CallError as error:
                 if not future.done():
@@ -354,13 +374,6 @@ def _show(node: Node, name: str, round_trips: RoundTrips) -> None:
         health.figure(f'{name}_ms', f'{1e3 * round_trips.smoothed:.1f}')
 
 
-PROBE_PERIOD = 0.5
-"""Seconds between two questions to a server that came or went while a goal runs."""
-
-DOUBT_SECONDS = 5.0
-"""How long such a server is asked: its services are discovered one by one."""
-
-
 @dataclass(frozen=True)
 class GoalEnd:
     """How a goal ended.
@@ -415,8 +428,7 @@ class _ActionClient(ActionClient):  # type: ignore[misc]
 class GoalCaller:
     """Sends goals to one action server, one at a time.
 
-    A server that dies or restarts in the middle is noticed: its status topic comes or goes, and
-    the server that is there then is asked whether it knows the goal.
+    A server that dies or restarts in the middle is noticed, as `ServiceCaller.call` does.
 
     Args:
         node: The node that calls; an executor must spin it.
@@ -429,28 +441,14 @@ class GoalCaller:
         self, node: Node, action_type: Any, name: str, cancel_timeout: float = 2.0
     ) -> None:
         self._node = node
-        group = ReentrantCallbackGroup()
         self._client = _ActionClient(
-            node, action_type, name, callback_group=group, **ACTION_CLIENT_QOS
+            node, action_type, name, callback_group=ReentrantCallbackGroup(), **ACTION_CLIENT_QOS
         )
         own(node, self._client)
-        self._action_type = action_type
         self._cancel_timeout = cancel_timeout
-        self._watch: _ServerWatch | None = None
-        self._probe = node.create_client(
-            action_type.Impl.GetResultService,
-            f'{name}/_action/get_result',
-            callback_group=group,
-            qos_profile=CLIENT_QOS,
-        )
-        self._status = node.create_subscription(
-            action_type.Impl.GoalStatusMessage,
-            f'{name}/_action/status',
-            lambda _message: None,
-            qos_profile_action_status_default,
-            callback_group=group,
-            event_callbacks=SubscriptionEventCallbacks(matched=self._on_matched),
-        )
+        self._what = f'action {name}'
+        results = node.resolve_service_name(f'{name}/_action/get_result')
+        self._servers = _Servers(node, results, self.is_ready, self._what)
         self.name = name
         self.round_trips = RoundTrips()
 
@@ -487,15 +485,12 @@ class GoalCaller:
         deadline = time.monotonic() + accept_timeout
         await_ready(self.is_ready, deadline, interrupt, self._what)
         # From before the goal is sent: a server that goes right after its yes is seen going.
-        watch = self._watch = _ServerWatch(Interrupt())
-        try:
-            deadline += self.round_trips.deadline(accept_timeout) - accept_timeout
-            handle = self._send(goal, deadline, interrupt, on_feedback)
-            if not handle.accepted:
-                return GoalEnd('rejected', None)
-            return self._await_end(handle, watch, result_timeout, interrupt)
-        finally:
-            self._watch = None
+        look = self._servers.look_for_loss()
+        deadline += self.round_trips.deadline(accept_timeout) - accept_timeout
+        handle = self._send(goal, deadline, interrupt, on_feedback)
+        if not handle.accepted:
+            return GoalEnd('rejected', None)
+        return self._await_end(handle, look, result_timeout, interrupt)
 
     def _send(
         self,
@@ -526,94 +521,30 @@ class GoalCaller:
     def _await_end(
         self,
         handle: Any,
-        watch: _ServerWatch,
+        look: Callable[[], None],
         result_timeout: float | None,
         interrupt: Interrupt | None,
     ) -> GoalEnd:
         """Wait for the end of a goal that was accepted."""
-        wake, ended = watch.wake, handle.get_result_async()
-        ended.add_done_callback(lambda _future: wake.set())
-        remove = interrupt.subscribe(wake.set) if interrupt is not None else None
+        ended = handle.get_result_async()
+        deadline = math.inf if result_timeout is None else time.monotonic() + result_timeout
         try:
-            lost = self._wait_for_end(handle, ended, watch, result_timeout, interrupt)
-        finally:
-            if remove is not None:
-                remove()
-        if not ended.done():
-            if lost:
-                raise UnavailableError(f'{self._what}: the server went away before the goal ended')
+            response = block_on(ended, deadline, interrupt, self._what, look)
+        except CallTimeoutError:
             self._cancel(handle, ended)
-            if interrupt is not None and interrupt.is_set():
-                raise CallInterruptedError(f'{self._what}: interrupted')
-            raise CallTimeoutError(f'{self._what}: no result within {result_timeout:g} s')
-        response = ended.result()
+            raise CallTimeoutError(f'{self._what}: no result within {result_timeout:g} s') from None
+        except CallInterruptedError:
+            self._cancel(handle, ended)
+            raise
         if response.status not in _STATUS:
             raise UnavailableError(f'{self._what}: the server does not know the goal any more')
         return GoalEnd(_STATUS[response.status], response.result)
-
-    @property
-    def _what(self) -> str:
-        return f'action {self.name}'
 
     def _cancel(self, handle: Any, ended: Future) -> None:
         done = threading.Event()
         ended.add_done_callback(lambda _future: done.set())
         handle.cancel_goal_async()
         done.wait(self._cancel_timeout)
-
-    def _on_matched(self, info: Any) -> None:
-        watch = self._watch
-        if watch is not None:
-            watch.servers = info.current_count
-            watch.doubt_until = time.monotonic() + DOUBT_SECONDS
-            watch.wake.set()
-
-    def _wait_for_end(
-        self,
-        handle: Any,
-        ended: Future,
-        watch: _ServerWatch,
-        result_timeout: float | None,
-        interrupt: Interrupt | None,
-    ) -> bool:
-        """Wait for the goal's end, its deadline or the interrupt; True when the server is lost."""
-        deadline = math.inf if result_timeout is None else time.monotonic() + result_timeout
-        while not ended.done() and not (interrupt is not None and interrupt.is_set()):
-            now = time.monotonic()
-            if watch.servers == 0 or watch.forgotten:
-                return True
-            if now >= deadline:
-                break
-            in_doubt = now < watch.doubt_until
-            if in_doubt:
-                self._ask_for(handle, watch)
-            limit = min(deadline, now + PROBE_PERIOD if in_doubt else math.inf)
-            watch.wake.wait(None if limit == math.inf else limit - now)
-            watch.wake.clear()
-        return False
-
-    def _ask_for(self, handle: Any, watch: _ServerWatch) -> None:
-        """Ask for the goal's result once more: a server that does not know it says so at once."""
-        request = self._action_type.Impl.GetResultService.Request()
-        request.goal_id = handle.goal_id
-
-        def answered(future: Future) -> None:
-            response = future.result()
-            if response is not None and response.status == GoalStatus.STATUS_UNKNOWN:
-                watch.forgotten = True
-                watch.wake.set()
-
-        self._probe.call_async(request).add_done_callback(answered)
-
-
-class _ServerWatch:
-    """What is known of the server while a goal runs; `wake` is raised on each change."""
-
-    def __init__(self, wake: Interrupt) -> None:
-        self.wake = wake
-        self.servers: int | None = None
-        self.doubt_until = 0.0
-        self.forgotten = False
 
 
 def _cancel_when_accepted(sent: Future) -> None:
