@@ -13,13 +13,15 @@ step for as long as a straight one, so that its ways are longer and ignore the r
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import dijkstra
 from skimage.graph import MCP_Geometric
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 SMALL = 100_000
 """A grid of fewer cells is searched as it is."""
@@ -102,6 +104,8 @@ class GridSearch:
     def _among(self, near: NDArray[np.bool_], start: Cell, goal: Cell) -> Cells | None:
         """Search the cells of some blocks; None where they have no way."""
         size, columns = self._block, self._cost.shape[1]
+        from scipy.sparse.csgraph import dijkstra  # takes 0.2 s: only where a grid is large
+
         inside = np.arange(size)
         at = np.argwhere(near)
         rows = (at[:, :1] * size + inside)[:, :, None]
@@ -127,6 +131,8 @@ class GridSearch:
 
 def _graph(cells: Cells, cost: NDArray[np.float64], columns: int) -> csr_array:
     """Return the steps between neighbouring cells (flat, in order) with what they cost."""
+    from scipy.sparse import csr_array  # see above
+
     origins, ends, prices = [], [], []
     for offset, length in ((1, 1.0), (columns - 1, 2**0.5), (columns, 1.0), (columns + 1, 2**0.5)):
         there = np.minimum(np.searchsorted(cells, cells + offset), len(cells) - 1)

@@ -11,7 +11,6 @@ from collections.abc import Callable
 
 import numpy as np
 import numpy.typing as npt
-from scipy.special import ndtr
 
 Scene = npt.NDArray[np.float32]
 
@@ -32,6 +31,8 @@ def lit(scene: Scene, lighting: str, rng: np.random.Generator) -> Scene:
 
 
 def _shadow(scene: Scene, rng: np.random.Generator, softness: float) -> Scene:
+    from scipy.special import ndtr  # takes 0.1 s, which a simulator in even light does without
+
     x, y = _pixels(scene)
     direction = rng.uniform(0.0, 2.0 * math.pi)
     through = rng.uniform(0.25, 0.75, 2) * (scene.shape[1], scene.shape[0])
