@@ -40,6 +40,7 @@ from surveillance_runtime.yaml_file import (
     UNREADABLE,
     YamlFile,
     YamlFileError,
+    parameters_of,
     read_yaml_file,
     with_exponent,
 )
@@ -195,28 +196,10 @@ def file_layer(path: str | Path) -> Layer:
     file = read_yaml_file(path)
     origins = _noted_origins(file)
     entries = []
-    for pattern, section in file.values.items():
-        if not isinstance(section, Mapping) or not isinstance(
-            section.get('ros__parameters'), Mapping
-        ):
-            raise file.error_at(
-                (pattern,), f"expected 'ros__parameters:' with a mapping in '{pattern}'"
-            )
-        for key in section:
-            if key != 'ros__parameters':
-                raise file.error_at(
-                    (pattern, key), f"expected 'ros__parameters:' below '{pattern}', got '{key}'"
-                )
-        start = (pattern, 'ros__parameters')
-        seen: dict[str, int] = {}
-        for where, name, value in _flattened(section['ros__parameters'], start, ''):
+    for section in file.values:
+        for where, name, value in parameters_of(file, section):
             line = file.lines[where]
-            if name in seen:
-                raise file.error_at(
-                    where, f"duplicate key '{name}', first given in line {seen[name]}"
-                )
-            seen[name] = line
-            entries.append(Entry(pattern, name, value, origins.get(line, f'{path}:{line}')))
+            entries.append(Entry(section, name, value, origins.get(line, f'{path}:{line}')))
     return Layer(str(path), tuple(entries))
 
 
@@ -228,19 +211,6 @@ def _noted_origins(file: YamlFile) -> dict[int, str]:
         return {}
     found = ((number, _ORIGIN.search(line)) for number, line in enumerate(lines, start=1))
     return {number: match[1] for number, match in found if match}
-
-
-def _flattened(
-    body: Mapping[str, Any], where: tuple[str, ...], prefix: str
-) -> Iterator[tuple[tuple[str, ...], str, Any]]:
-    for key, value in body.items():
-        name = f'{prefix}{key}'
-        if isinstance(value, Mapping) and value:
-            yield from _flattened(value, (*where, key), name + '.')
-        elif isinstance(value, Mapping):
-            continue
-        else:
-            yield (*where, key), name, value
 
 
 def argument_layer(assignments: Iterable[str]) -> Layer:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 import stat
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -204,12 +204,46 @@ def _kind(node: yaml.Node | None) -> str:
     return 'a list' if isinstance(node, yaml.SequenceNode) else 'a value'
 
 
-def read_parameter_file(path: str | Path, node: str = '/**') -> YamlFile:
-    """Read the parameters that a file gives to ``node``.
+def parameters_of(file: YamlFile, section: str) -> Iterator[tuple[KeyPath, str, Any]]:
+    """Yield the parameters below one of the top-level keys: key path, name, value.
 
-    Args:
-        path: A ROS 2 parameter file (YAML).
-        node: The top-level key whose parameters are wanted; ``/**`` are those for every node.
+    The names of nested keys are joined with dots.
+
+    Raises:
+        YamlFileError: It is not of a parameter file's form, or gives a parameter twice.
+    """
+    below = file.values[section]
+    if not isinstance(below, Mapping) or not isinstance(below.get('ros__parameters'), Mapping):
+        raise file.error_at(
+            (section,), f"expected 'ros__parameters:' with a mapping in '{section}'"
+        )
+    for key in below:
+        if key != 'ros__parameters':
+            raise file.error_at(
+                (section, key), f"expected 'ros__parameters:' below '{section}', got '{key}'"
+            )
+    seen: dict[str, int] = {}
+    start = (section, 'ros__parameters')
+    for where, name, value in _flattened(below['ros__parameters'], start, ''):
+        line = file.lines[where]
+        if name in seen:
+            raise twice(file.path, (name,), line, seen[name])
+        seen[name] = line
+        yield where, name, value
+
+
+def _flattened(
+    body: Mapping[str, Any], where: KeyPath, prefix: str
+) -> Iterator[tuple[KeyPath, str, Any]]:
+    for key, value in body.items():
+        if isinstance(value, Mapping):
+            yield from _flattened(value, (*where, key), f'{prefix}{key}.')
+        else:
+            yield (*where, key), prefix + key, value
+
+
+def read_parameter_file(path: str | Path) -> YamlFile:
+    """Read the parameters that a file gives to every node, below `/**`.
 
     Returns:
         The parameters below ``ros__parameters``; dots in keys are resolved into nesting.
@@ -219,53 +253,23 @@ def read_parameter_file(path: str | Path, node: str = '/**') -> YamlFile:
             parameter twice.
     """
     file = read_yaml_file(path)
-    if node not in file.values:
+    if '/**' not in file.values:
         found = ', '.join(file.values) or 'nothing'
-        raise file.error((), f"expected the top-level key '{node}', got {found}")
-    section = file.values[node]
-    if not isinstance(section, Mapping) or 'ros__parameters' not in section:
-        raise file.error_at((node,), f"expected 'ros__parameters:' below '{node}'")
-    start = (node, 'ros__parameters')
-    body = section['ros__parameters']
-    if not isinstance(body, Mapping):
-        raise file.error_at(start, "expected parameters below 'ros__parameters'")
-    nesting = _Nesting(file, start)
-    nesting.collect(body, start, nesting.values, ())
-    return YamlFile(file.path, nesting.values, nesting.lines)
-
-
-class _Nesting:
-    """Puts ``map.R1`` where ``map: {R1: ...}`` would stand."""
-
-    def __init__(self, file: YamlFile, start: KeyPath) -> None:
-        self.values: dict[str, Any] = {}
-        self.lines: dict[KeyPath, int] = {(): file.lines[start]}
-        self._file = file
-
-    def collect(
-        self, body: Mapping[str, Any], source: KeyPath, into: dict[str, Any], prefix: KeyPath
-    ) -> None:
-        for name, value in body.items():
-            line = self._file.lines[(*source, name)]
-            target, path = into, prefix
-            for part in name.split('.')[:-1]:
-                path = (*path, part)
-                target = self._below(target, path, line)
-            path = (*path, name.rpartition('.')[2])
-            if isinstance(value, Mapping):
-                self.collect(value, (*source, name), self._below(target, path, line), path)
-            elif path[-1] in target:
-                raise self._twice(path, line)
-            else:
-                self.lines[path] = line
-                target[path[-1]] = value
-
-    def _below(self, target: dict[str, Any], path: KeyPath, line: int) -> dict[str, Any]:
-        self.lines.setdefault(path, line)
-        inner = target.setdefault(path[-1], {})
-        if not isinstance(inner, dict):
-            raise self._twice(path, line)
-        return inner
-
-    def _twice(self, path: KeyPath, line: int) -> Exception:
-        return twice(self._file.path, path, line, self.lines[path])
+        raise file.error((), f"expected the top-level key '/**', got {found}")
+    values: dict[str, Any] = {}
+    for where, name, value in parameters_of(file, '/**'):
+        *above, last = name.split('.')
+        inner = values
+        for part in above:
+            inner = inner.setdefault(part, {})
+            if not isinstance(inner, dict):
+                raise file.error_at(where, f"'{name}': '{part}' has a value already")
+        if last in inner:
+            raise file.error_at(where, f"'{name}' has parameters below it already")
+        inner[last] = value
+    lines = {
+        tuple('.'.join(where[2:]).split('.')) if where[2:] else (): line
+        for where, line in file.lines.items()
+        if where[:2] == ('/**', 'ros__parameters')
+    }
+    return YamlFile(file.path, values, lines)
