@@ -25,15 +25,8 @@ from typing import Any
 import yaml
 
 from surveillance_runtime.parameters import Check, ParameterError, ParameterSpec
-from surveillance_runtime.place.floor_plan import FloorPlan
-from surveillance_runtime.place.regions import Regions, check_passable
-from surveillance_runtime.place.rooms import (
-    GEOMETRY_KEYS,
-    PLACE_KEYS,
-    Place,
-    PlaceError,
-    make_place,
-)
+from surveillance_runtime.place import Place, PlaceError, checked_place
+from surveillance_runtime.place.rooms import GEOMETRY_KEYS, PLACE_KEYS
 from surveillance_runtime.robot_base import ROBOT_RADIUS
 from surveillance_runtime.suggestions import nearest
 from surveillance_runtime.yaml_file import (
@@ -338,21 +331,12 @@ class Configuration:
                 parameters[table] = setting.value
         if not parameters.keys() & {'map', 'room_positions'}:
             return None
+        radius = settings.get('robot_radius', Setting(ROBOT_RADIUS, '')).value
+        walls = bool(parameters.keys() & {'walls', 'doors'})
         try:
-            place = make_place(
-                parameters.get('map'),
-                parameters.get('room_positions'),
-                parameters.get('robot_room'),
-                parameters.get('recharge_rooms', []),
-            )
-            if parameters.keys() & {'walls', 'doors'}:
-                plan = FloorPlan.from_parameters(parameters)
-                Regions(plan)
-                radius = settings.get('robot_radius', Setting(ROBOT_RADIUS, '')).value
-                check_passable(plan, float(radius))
+            return checked_place(parameters, walls=walls, radius=float(radius))[0]
         except PlaceError as error:
             raise ParameterError(f'{self._origin(settings, error)}: {error}') from None
-        return place
 
     def _origin(self, settings: Mapping[str, Setting], error: PlaceError) -> str:
         for depth in range(len(error.where), 0, -1):

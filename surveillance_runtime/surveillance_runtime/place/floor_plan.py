@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from surveillance_runtime.place.rooms import Place, PlaceError, make_place
+from surveillance_runtime.place.rooms import Place, PlaceError, place_from
 
 Point = tuple[float, float]
 Pose = tuple[float, float, float]
@@ -123,7 +123,7 @@ class FloorPlan:
             markers[name] = Marker(name, int(row[0]), row[1], row[2], row[3], row[4], size)
         station = _row(parameters.get('station'), ('x', 'y', 'yaw'), 'station')
         plan = cls(
-            place=_place(parameters),
+            place=place_from(parameters),
             walls=walls,
             doors=doors,
             markers=markers,
@@ -282,12 +282,3 @@ def _name(value: object, *where: str) -> str:
     if not isinstance(value, str) or not value:
         raise PlaceError(where, f'{value!r}: expected a name')
     return value
-
-
-def _place(parameters: Mapping[str, Any]) -> Place:
-    return make_place(
-        parameters.get('map'),
-        parameters.get('room_positions'),
-        parameters.get('robot_room'),
-        parameters.get('recharge_rooms', ()),
-    )

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from surveillance_runtime.place.floor_plan import FloorPlan
 from surveillance_runtime.place.regions import Regions, check_passable
@@ -12,7 +14,7 @@ from surveillance_runtime.place.rooms import (
     PLACE_KEYS,
     Place,
     PlaceError,
-    make_place,
+    place_from,
 )
 from surveillance_runtime.robot_base import ROBOT_RADIUS
 from surveillance_runtime.suggestions import nearest
@@ -54,20 +56,33 @@ def read_place_file(path: str | Path, *, walls: bool = False) -> PlaceFile:
         if key not in file.values:
             raise file.error((), f"parameter '{key}' is missing")
     try:
-        place = make_place(
-            file.values['map'],
-            file.values['room_positions'],
-            file.values['robot_room'],
-            file.values.get('recharge_rooms', []),
+        place, plan = checked_place(
+            file.values, walls=walls or any(key in file.values for key in GEOMETRY_KEYS)
         )
-        plan = None
-        if walls or any(key in file.values for key in GEOMETRY_KEYS):
-            plan = FloorPlan.from_parameters(file.values)
-            Regions(plan)
-            check_passable(plan, ROBOT_RADIUS)
     except PlaceError as error:
         raise file.error(error.where, error.problem) from None
     return PlaceFile(file, place, plan)
+
+
+def checked_place(
+    parameters: Mapping[str, Any], *, walls: bool, radius: float = ROBOT_RADIUS
+) -> tuple[Place, FloorPlan | None]:
+    """Make the place that parameters describe, with all checks.
+
+    Args:
+        parameters: As a place's file has them.
+        walls: Whether walls and doors are described, too.
+        radius: Of the robot that has to get through the doors, metres.
+
+    Raises:
+        PlaceError: What is described is no sound place.
+    """
+    if not walls:
+        return place_from(parameters), None
+    plan = FloorPlan.from_parameters(parameters)
+    Regions(plan)
+    check_passable(plan, radius)
+    return plan.place, plan
 
 
 def read_place(path: str | Path) -> Place:

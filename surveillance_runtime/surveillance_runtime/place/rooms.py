@@ -202,6 +202,16 @@ def make_place(rooms: Any, room_positions: Any, robot_room: Any, recharge_rooms:
     return place
 
 
+def place_from(parameters: Mapping[str, Any]) -> Place:
+    """Check what a place's file says of its rooms, and make the `Place` of it; see `make_place`."""
+    return make_place(
+        parameters.get('map'),
+        parameters.get('room_positions'),
+        parameters.get('robot_room'),
+        parameters.get('recharge_rooms', ()),
+    )
+
+
 def _rooms(rooms: Any) -> dict[str, tuple[str, ...]]:
     if not isinstance(rooms, Mapping) or not rooms:
         raise PlaceError(('map',), f'expected rooms with their doors, got {_shown(rooms)}')
