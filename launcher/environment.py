@@ -18,7 +18,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from launcher import system
-from launcher.fingerprint import INTERFACES, Fingerprint, Journal, current, requirements
+from launcher.fingerprint import INTERFACES, Journal, complete, requirements
 from launcher.progress import Output, Step
 from launcher.system import LaunchError
 
@@ -67,7 +67,7 @@ class Environment:
         milliseconds.
         """
         journal = Journal.read(self.venv)
-        return self.python.exists() and journal.fits(current(self.checkout, self._extras(journal)))
+        return self.python.exists() and journal == complete(self.checkout, self._extras(journal))
 
     def prepare(self) -> None:
         """Bring the environment up to date; do nothing when it is.
@@ -114,15 +114,15 @@ class Environment:
 
     def _set_up(self, lock: int) -> None:
         journal = Journal.read(self.venv)
-        python = current(self.checkout, ()).python
+        python = complete(self.checkout, ()).python
         fresh = not self._usable(journal, python)
         if fresh:
             journal = Journal()
         journal.extras = self._extras(journal)
-        wanted = current(self.checkout, journal.extras)
+        wanted = complete(self.checkout, journal.extras)
         journal.python, journal.checkout = wanted.python, wanted.checkout
         titles = [VENV_STEP] if fresh else []
-        if journal.packages != wanted.requirements or journal.working == PACKAGES_STEP:
+        if journal.packages != wanted.packages or journal.working == PACKAGES_STEP:
             titles.append(PACKAGES_STEP)
         if journal.interfaces != wanted.interfaces or journal.working == INTERFACES_STEP:
             titles.append(INTERFACES_STEP)
@@ -140,7 +140,7 @@ class Environment:
         journal.write(self.venv)
 
     def _carry_out(
-        self, titles: Sequence[str], journal: Journal, wanted: Fingerprint, lock: int
+        self, titles: Sequence[str], journal: Journal, wanted: Journal, lock: int
     ) -> None:
         steps = {title: Step(i, len(titles), title) for i, title in enumerate(titles, 1)}
         wheels = self.venv / 'wheels'
@@ -164,7 +164,7 @@ class Environment:
                 with step:
                     needed = requirements(self.checkout, journal.extras)
                     start(self._pip('install', *needed)).watch(step)
-                journal.packages = wanted.requirements
+                journal.packages = wanted.packages
             if step := steps.get(INTERFACES_STEP):
                 journal.working = INTERFACES_STEP
                 journal.write(self.venv)

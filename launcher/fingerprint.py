@@ -15,28 +15,13 @@ JOURNAL = 'surveillance-setup.json'
 INTERFACES = 'surveillance_interfaces'
 
 
-@dataclass(frozen=True)
-class Fingerprint:
-    """Everything that a set-up depends on.
-
-    Attributes:
-        python: version and home of the interpreter that the virtual environment stands on.
-        checkout: the folder whose packages the environment imports.
-        requirements: hash of the dependency lists in use.
-        interfaces: hash of the interface package's sources.
-    """
-
-    python: str
-    checkout: str
-    requirements: str
-    interfaces: str
-
-
 @dataclass
 class Journal:
-    """How far the set-up of one environment came.
+    """How far the set-up of one environment came, and what it was made for.
 
     Attributes:
+        python: version and home of the interpreter that the environment stands on.
+        checkout: the folder whose packages the environment imports.
         extras: groups of optional dependencies that are installed.
         packages: hash of the dependency lists that were installed completely.
         interfaces: hash of the interface sources that were installed completely.
@@ -65,11 +50,6 @@ class Journal:
         draft.write_text(json.dumps(asdict(self), indent=1) + '\n', encoding='utf-8')
         os.replace(draft, target)
 
-    def fits(self, wanted: Fingerprint) -> bool:
-        return not self.working and wanted == Fingerprint(
-            self.python, self.checkout, self.packages, self.interfaces
-        )
-
 
 def requirements(checkout: Path, extras: Iterable[str]) -> list[str]:
     """Return the project's dependencies with those of the named extras, as pip takes them."""
@@ -80,12 +60,13 @@ def requirements(checkout: Path, extras: Iterable[str]) -> list[str]:
     return wanted
 
 
-def current(checkout: Path, extras: Iterable[str]) -> Fingerprint:
-    """Return the fingerprint of this checkout under this interpreter."""
-    return Fingerprint(
+def complete(checkout: Path, extras: Iterable[str]) -> Journal:
+    """Return the journal of a set-up that fits this checkout and this interpreter."""
+    return Journal(
         python=f'{sys.version_info.major}.{sys.version_info.minor} {sys.base_prefix}',
         checkout=str(checkout),
-        requirements=_hash(line.encode() for line in requirements(checkout, extras)),
+        extras=sorted(extras),
+        packages=_hash(line.encode() for line in requirements(checkout, extras)),
         interfaces=_hash(_sources(checkout / INTERFACES)),
     )
 

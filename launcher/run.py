@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shlex
 import shutil
@@ -143,12 +144,7 @@ def page_address(text: str) -> tuple[str, int]:
 
 def options_of(run: Run) -> dict[str, Any]:
     """Return what a run is asked for, as JSON holds it."""
-    options: dict[str, Any] = {}
-    for name, value in vars(run).items():
-        sequence = isinstance(value, list | tuple)
-        options[name] = (
-            str(value) if isinstance(value, Path) else list(value) if sequence else value
-        )
+    options: dict[str, Any] = json.loads(json.dumps(vars(run), default=str))
     return options
 
 

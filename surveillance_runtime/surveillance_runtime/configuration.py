@@ -24,6 +24,7 @@ from typing import Any
 
 import yaml
 
+from surveillance_runtime.node_table import LOG_LEVELS
 from surveillance_runtime.parameters import Check, ParameterError, ParameterSpec
 from surveillance_runtime.place import Place, PlaceError, checked_place
 from surveillance_runtime.place.rooms import GEOMETRY_KEYS, PLACE_KEYS
@@ -53,7 +54,7 @@ _VALUED = (
     *('-r', '--remap', '--log-level', '--log-config-file'),
     *('--log-file-name', '-e', '--enclave'),
 )
-_LEVELS = 'debug|info|warn|error|fatal'
+_LEVELS = '|'.join(LOG_LEVELS)
 _FORMS = dict.fromkeys(
     ('-r', '--remap'), (re.compile(r'([^:=]+:)?[^:=]+:=[^:=]+'), 'FROM:=TO or NODE:FROM:=TO')
 ) | {'--log-level': (re.compile(f'([^:=]+:=)?({_LEVELS})', re.IGNORECASE), f'one of {_LEVELS}')}

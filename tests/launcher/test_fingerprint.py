@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from launcher.fingerprint import INTERFACES, Fingerprint, Journal, current, requirements
+from launcher.fingerprint import INTERFACES, Journal, complete, requirements
 
 PROJECT = """
 [project]
@@ -27,45 +27,41 @@ def test_requirements_are_the_projects_with_those_of_the_extras(checkout):
 
 
 def test_a_change_of_an_interface_shows(checkout):
-    before = current(checkout, ['test'])
+    before = complete(checkout, ['test'])
     (checkout / INTERFACES / 'msg' / 'A.msg').write_text('int64 a\n')
-    after = current(checkout, ['test'])
+    after = complete(checkout, ['test'])
     assert after.interfaces != before.interfaces
-    assert after.requirements == before.requirements
+    assert after.packages == before.packages
 
 
 def test_a_renamed_interface_shows(checkout):
-    before = current(checkout, ['test'])
+    before = complete(checkout, ['test'])
     (checkout / INTERFACES / 'msg' / 'A.msg').rename(checkout / INTERFACES / 'msg' / 'B.msg')
-    assert current(checkout, ['test']).interfaces != before.interfaces
+    assert complete(checkout, ['test']).interfaces != before.interfaces
 
 
 def test_a_change_of_a_dependency_shows_and_one_elsewhere_does_not(checkout):
-    before = current(checkout, ['test'])
+    before = complete(checkout, ['test'])
     file = checkout / 'pyproject.toml'
     file.write_text(file.read_text() + '[tool.x]\ny = 1\n')
-    assert current(checkout, ['test']) == before
+    assert complete(checkout, ['test']) == before
     file.write_text(file.read_text().replace('one==1', 'one==2'))
-    assert current(checkout, ['test']).requirements != before.requirements
+    assert complete(checkout, ['test']).packages != before.packages
 
 
 def test_what_a_build_leaves_behind_does_not_show(checkout):
-    before = current(checkout, ['test'])
+    before = complete(checkout, ['test'])
     (checkout / INTERFACES / 'build').mkdir()
     (checkout / INTERFACES / 'build' / 'made').write_text('x')
-    assert current(checkout, ['test']) == before
+    assert complete(checkout, ['test']) == before
 
 
-def test_a_journal_fits_only_the_sources_it_was_made_for_and_only_when_finished(tmp_path):
-    journal = Journal('3.12 /usr', '/here', ['test'], 'p', 'i', '')
-    fingerprint = Fingerprint('3.12 /usr', '/here', 'p', 'i')
+def test_a_journal_is_kept_and_complete_only_when_nothing_is_under_way(tmp_path, checkout):
+    journal = complete(checkout, ['test'])
     journal.write(tmp_path)
     assert Journal.read(tmp_path) == journal
-    assert journal.fits(fingerprint)
-    assert not journal.fits(Fingerprint('3.13 /usr', '/here', 'p', 'i'))
-    assert not journal.fits(Fingerprint('3.12 /usr', '/there', 'p', 'i'))
     journal.working = 'packages'
-    assert not journal.fits(fingerprint)
+    assert journal != complete(checkout, ['test'])
 
 
 @pytest.mark.parametrize('content', ['', '{', '[]', '{"unknown": 1}', '\x00'])
