@@ -62,9 +62,9 @@ from surveillance_runtime.discovery import prefer_quick_discovery  # noqa: E402
 from surveillance_runtime.place import read_place_file  # noqa: E402
 from surveillance_runtime.place.regions import Regions  # noqa: E402
 from surveillance_runtime.qos import STATE_QOS  # noqa: E402
+from surveillance_runtime.run_parameters import PLACES  # noqa: E402
 from surveillance_runtime.testing import claim_domain  # noqa: E402
 
-PLACES = {'surveillance': 'seven_rooms.yaml', 'patrol': 'patrol_world.yaml'}
 ENVIRON = dict(os.environ)
 """Of whoever began the campaign: the watcher chooses its own way of discovery later."""
 STARTED = re.compile(r'started (\w+) \(process (\d+)\)')

@@ -8,9 +8,10 @@ import re
 import shutil
 import sys
 import textwrap
-import time
 from collections.abc import Callable, Sequence
 from datetime import datetime
+from logging import LogRecord, makeLogRecord
+from logging.handlers import RotatingFileHandler
 from pathlib import Path
 from typing import TextIO
 
@@ -24,8 +25,6 @@ _NODE_COLOURS = ('36', '32', '35', '34', '96', '92', '95', '94')
 LAUNCHER = 'launch'
 LOG_BYTES = 10_000_000
 """Size of a log file from which on another one is begun; two are kept."""
-RETRY_SECONDS = 10.0
-"""After how long a log file that could not be written is tried again."""
 LONGEST_LINE = 4000
 """Characters of a line that are kept."""
 _LEAST_TEXT = 40
@@ -145,7 +144,7 @@ class MergedLog:
             _discard(stream)
 
 
-class LogFile:
+class LogFile(RotatingFileHandler):
     """A log of bounded size: the older half is in a second file, whose name ends with `.1`.
 
     A disk that is full costs the lines until there is space again.
@@ -160,38 +159,26 @@ class LogFile:
     """
 
     def __init__(self, path: Path, warn: Callable[[str], None], most: int = LOG_BYTES) -> None:
-        self._path = path
+        super().__init__(path, maxBytes=most, backupCount=1, encoding='utf-8')
         self._warn = warn
-        self._most = most
-        self._retry_at = 0.0
-        self._file: TextIO | None = path.open('a', encoding='utf-8')
+        self._told = False
 
     def write(self, line: str) -> None:
         """Append a line, if that is possible now."""
-        if self._file is None and time.monotonic() < self._retry_at:
-            return
-        try:
-            if self._file is None:
-                self._file = self._path.open('a', encoding='utf-8')
-                self._retry_at = 0.0
-            self._file.write(line + '\n')
-            self._file.flush()
-            if self._file.tell() >= self._most:
-                self._file.close()
-                os.replace(self._path, f'{self._path}.1')
-                self._file = self._path.open('a', encoding='utf-8')
-        except OSError as error:
-            first, self._retry_at = not self._retry_at, time.monotonic() + RETRY_SECONDS
-            self.close()
-            if first:
-                self._warn(f'{self._path}: {error.strerror}: the log goes on here only')
+        self.emit(makeLogRecord({'msg': line}))
+        if self.stream is not None:
+            self._told = False
 
-    def close(self) -> None:
-        """Write no more."""
-        full, self._file = self._file, None
-        if full is not None:
-            with contextlib.suppress(OSError):
-                full.close()
+    def handleError(self, record: LogRecord) -> None:  # noqa: N802 - logging's name
+        """Let go of a file that cannot be written; the next line opens it again."""
+        error = sys.exc_info()[1]
+        with contextlib.suppress(OSError):
+            self.close()
+        self.stream = None
+        if not self._told:
+            self._told = True
+            why = getattr(error, 'strerror', None) or error
+            self._warn(f'{self.baseFilename}: {why}: the log goes on here only')
 
 
 def bounded(text: str) -> str:

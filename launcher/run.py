@@ -18,6 +18,7 @@ from surveillance_runtime import node_table
 from surveillance_runtime.configuration import Configuration, file_layer
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.place import read_place_file
+from surveillance_runtime.testing import LAST_DOMAIN
 from surveillance_runtime.yaml_file import YamlFileError
 
 NOT_RECORDED = 'off'
@@ -25,8 +26,6 @@ RECORDER, MARKERS, PAGE = 'mission_recorder', 'mission_markers', 'mission_page'
 MEMORY = 2048
 """Megabytes that a node may hold, unless the command line says otherwise."""
 _NAMESPACE = re.compile(r'/?[A-Za-z]\w*(/[A-Za-z]\w*)*\Z', re.ASCII)
-MAX_DOMAIN = 101
-"""The highest ROS domain whose ports lie below those that Linux gives to clients."""
 
 
 @dataclass(frozen=True)
@@ -87,8 +86,8 @@ class Run:
             raise LaunchError(
                 f'--namespace {self.namespace!r}: expected letters, digits and _ like robot1'
             )
-        if self.domain is not None and not 0 <= self.domain <= MAX_DOMAIN:
-            raise LaunchError(f'--domain {self.domain}: expected a number from 0 to {MAX_DOMAIN}')
+        if self.domain is not None and not 0 <= self.domain <= LAST_DOMAIN:
+            raise LaunchError(f'--domain {self.domain}: expected a number from 0 to {LAST_DOMAIN}')
         if self.place is not None:
             try:
                 read_place_file(self.place)

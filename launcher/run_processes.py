@@ -9,12 +9,13 @@ from dataclasses import replace
 from pathlib import Path
 
 from launcher.log_merge import ROS_FORMAT
-from launcher.run import MARKERS, MAX_DOMAIN, PAGE, RECORDER, Run
+from launcher.run import MARKERS, PAGE, RECORDER, Run
 from launcher.supervisor import Program
 from launcher.system import LaunchError
 from surveillance_runtime import node_table
 from surveillance_runtime.discovery import launched_nodes
 from surveillance_runtime.run_parameters import BEHAVIOUR_NODE
+from surveillance_runtime.testing import LAST_DOMAIN
 
 CHILD = Path(__file__).with_name('child.py')
 COMPOSED = 'composed'
@@ -30,10 +31,10 @@ def ros_domain(run: Run) -> str:
     if run.domain is not None:
         return str(run.domain)
     given = os.environ.get('ROS_DOMAIN_ID') or '0'
-    if not given.isdecimal() or int(given) > MAX_DOMAIN:
+    if not given.isdecimal() or int(given) > LAST_DOMAIN:
         raise LaunchError(
             f'environment variable ROS_DOMAIN_ID: got {given!r}, '
-            f'expected a number from 0 to {MAX_DOMAIN}'
+            f'expected a number from 0 to {LAST_DOMAIN}'
         )
     return str(int(given))
 
