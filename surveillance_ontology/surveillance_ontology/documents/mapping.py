@@ -12,7 +12,7 @@ from functools import partial
 from typing import TypeAlias
 
 from surveillance_ontology.documents.rdf_xml import Graph, Node
-from surveillance_ontology.documents.xml_reading import IllFormedError, OntologyFileError
+from surveillance_ontology.documents.xml_reading import IllFormedError
 from surveillance_ontology.owl import axioms as ax
 from surveillance_ontology.owl import expressions as ex
 from surveillance_ontology.owl.axioms import Axiom
@@ -142,13 +142,10 @@ class Mapping:
     def _report(self, node: str, what: str) -> None:
         self.unsupported.append(self._where(node) + what)
 
-    def _fail(self, node: str, message: str) -> OntologyFileError:
-        place = self._places.get(node) or self._places.get(self._subject_read, (0, 0))
-        return OntologyFileError(message, *place)
-
     def _ill_formed(self, node: str, message: str) -> IllFormedError:
         self._open.clear()
-        return IllFormedError(message, *self._places.get(node, (0, 0)))
+        place = self._places.get(node) or self._places.get(self._subject_read, (0, 0))
+        return IllFormedError(message, *place)
 
     # --- reading parts ---
 
@@ -159,7 +156,9 @@ class Mapping:
     def _resource(self, node: str, predicate: str) -> str:
         value = self._one(node, predicate)
         if not isinstance(value, str):
-            raise self._fail(node, f'expected a resource as {local_name(predicate)}, got {value!r}')
+            raise self._ill_formed(
+                node, f'expected a resource as {local_name(predicate)}, got {value!r}'
+            )
         return value
 
     def _list(self, head: Node) -> list[Node]:
@@ -168,13 +167,13 @@ class Mapping:
         node = head
         while node != RDF + 'nil':
             if not isinstance(node, str) or node in seen:
-                raise self._fail(str(head), 'expected a list that ends in rdf:nil')
+                raise self._ill_formed(str(head), 'expected a list that ends in rdf:nil')
             seen.add(node)
             properties = self._nodes.get(node, {})
             firsts = set(properties.get(RDF + 'first', ()))
             rests = set(properties.get(RDF + 'rest', ()))
             if len(firsts) != 1 or len(rests) != 1:
-                raise self._fail(node, 'expected one rdf:first and one rdf:rest in a list')
+                raise self._ill_formed(node, 'expected one rdf:first and one rdf:rest in a list')
             items.append(firsts.pop())
             node = rests.pop()
         return items
@@ -183,7 +182,7 @@ class Mapping:
         items = self._list(head)
         for item in items:
             if not isinstance(item, str):
-                raise self._fail(
+                raise self._ill_formed(
                     str(head), f'expected resources in a list, got the literal {item.lexical!r}'
                 )
         return items  # type: ignore[return-value]
@@ -218,7 +217,7 @@ class Mapping:
             number = -1
         if number < 0:
             shown = value.lexical if isinstance(value, Literal) else value
-            raise self._fail(
+            raise self._ill_formed(
                 node, f'expected a whole number as {local_name(predicate)}, got {shown[:40]!r}'
             )
         return number
@@ -281,7 +280,7 @@ class Mapping:
         if known is not None:
             return known
         if node in self._open:
-            raise self._fail(node, 'a class expression contains itself')
+            raise self._ill_formed(node, 'a class expression contains itself')
         self._open.add(node)
         expression = self._expressions[node] = self._expression(node)
         self._open.discard(node)
@@ -375,7 +374,7 @@ class Mapping:
         self._add(ax.EquivalentClasses((subject, self._restriction(subject, properties))))
 
     def _attempt(self, subject: str, read: Callable[..., None], *arguments: object) -> None:
-        """Read one statement; an ill-formed class in it costs the statement alone."""
+        """Read one statement; what is ill-formed in it costs the statement alone."""
         try:
             read(*arguments)
         except IllFormedError as error:
@@ -393,7 +392,7 @@ class Mapping:
             elif axiom := handler(self, subject, value):
                 self._add(axiom)
         else:
-            raise self._fail(
+            raise self._ill_formed(
                 subject,
                 f'{local_name(predicate)} of {local_name(subject)} has the literal'
                 f' {value.lexical!r}, expected a resource',
@@ -433,14 +432,14 @@ class Mapping:
             self._report(subject, f'{predicate} on {subject} is not understood')
         elif isinstance(value, Literal):
             if 'object_property' in kinds and 'data_property' not in kinds:
-                raise self._fail(
+                raise self._ill_formed(
                     subject,
                     f'object property {local_name(predicate)} of {local_name(subject)}'
                     f' has the literal {value.lexical!r}, expected an individual',
                 )
             self._add(ax.DataPropertyAssertion(predicate, subject, value))
         elif 'data_property' in kinds and 'object_property' not in kinds:
-            raise self._fail(
+            raise self._ill_formed(
                 subject,
                 f'data property {local_name(predicate)} of {local_name(subject)}'
                 f' has the resource {value}, expected a literal',
@@ -591,7 +590,7 @@ class Mapping:
 
     def _argument(self, value: Node | None, atom: str) -> str | ex.Variable | Literal:
         if value is None:
-            raise self._fail(atom, 'a rule atom lacks an argument')
+            raise self._ill_formed(atom, 'a rule atom lacks an argument')
         if isinstance(value, str) and value in self._variables:
             return ex.Variable(value)
         return value
@@ -621,7 +620,7 @@ class Mapping:
             return ex.SameIndividualAtom(one, two)  # type: ignore[arg-type]
         if kind == SWRL + 'DifferentIndividualsAtom':
             return ex.DifferentIndividualsAtom(one, two)  # type: ignore[arg-type]
-        raise self._fail(node, f'rule atom of type {kind} is not understood')
+        raise self._ill_formed(node, f'rule atom of type {kind} is not understood')
 
 
 _BETWEEN: dict[str, tuple[Callable[..., Axiom], Callable[..., Axiom]]] = {

@@ -40,7 +40,7 @@ class OntologyFileError(ValueError):
 
 
 class IllFormedError(OntologyFileError):
-    """A class expression or data range that says nothing: its axiom is left out, and reported."""
+    """A statement that says nothing: it is left out, and reported."""
 
 
 def resolve(base: str, reference: str) -> str:

@@ -98,6 +98,22 @@ def test_datatypes_are_kept_exactly() -> None:
         (document('<owl:Class rdf:about="#A">\n<owl:Class>'), 4, 'mismatched tag'),
         (document('<owl:Class rdf:about="a b"/>'), 2, "contains ' '"),
         (document('<owl:Class rdf:about="#A">\nstray</owl:Class>'), 3, "text 'stray'"),
+        (document('<owl:Class rdf:ID="A"/>\n<owl:Class rdf:ID="A"/>'), 3, 'stands twice'),
+    ],
+)
+def test_errors_name_line_and_column(text: bytes, line: int, words: str) -> None:
+    with pytest.raises(OntologyFileError) as caught:
+        read_ontology(text, IRI)
+    error = caught.value
+    assert error.line == line
+    assert error.column >= 1
+    assert words in error.message
+    assert '\n' not in str(error)
+
+
+@pytest.mark.parametrize(
+    ('text', 'line', 'words'),
+    [
         (
             document(
                 '<owl:Class rdf:about="#A"><rdfs:subClassOf>\n<owl:Restriction>'
@@ -107,7 +123,6 @@ def test_datatypes_are_kept_exactly() -> None:
             3,
             "whole number as minCardinality, got 'two'",
         ),
-        (document('<owl:Class rdf:ID="A"/>\n<owl:Class rdf:ID="A"/>'), 3, 'stands twice'),
         (
             document('\n<owl:Thing rdf:about="#a"><owl:sameAs>b</owl:sameAs></owl:Thing>'),
             3,
@@ -126,16 +141,40 @@ def test_datatypes_are_kept_exactly() -> None:
             2,
             'rdf:first',
         ),
+        (
+            document(
+                '<owl:Class rdf:about="#A"><owl:equivalentClass><owl:Class><owl:oneOf>\n<rdf:List>'
+                f'<rdf:first>v</rdf:first><rdf:rest rdf:resource="{RDF}nil"/></rdf:List>'
+                '</owl:oneOf></owl:Class></owl:equivalentClass></owl:Class>'
+            ),
+            3,
+            "expected resources in a list, got the literal 'v'",
+        ),
+        (
+            document(
+                '<owl:ObjectProperty rdf:about="#p"/>\n'
+                '<owl:Thing rdf:about="#a"><p>b</p></owl:Thing>'
+            ),
+            3,
+            "object property p of a has the literal 'b'",
+        ),
+        (
+            document(
+                '<owl:DatatypeProperty rdf:about="#p"/>\n'
+                '<owl:Thing rdf:about="#a"><p rdf:resource="#b"/></owl:Thing>'
+            ),
+            3,
+            'data property p of a has the resource',
+        ),
     ],
 )
-def test_errors_name_line_and_column(text: bytes, line: int, words: str) -> None:
-    with pytest.raises(OntologyFileError) as caught:
-        read_ontology(text, IRI)
-    error = caught.value
-    assert error.line == line
-    assert error.column >= 1
-    assert words in error.message
-    assert '\n' not in str(error)
+def test_an_ill_formed_statement_is_left_out_alone(text: bytes, line: int, words: str) -> None:
+    text = text.replace(b'</rdf:RDF>', b'<owl:Thing rdf:about="#kept"/></rdf:RDF>')
+    found = read_ontology(text, IRI)
+    assert ClassAssertion(OWL + 'Thing', f'{IRI}#kept') in found.axioms
+    (report,) = found.unsupported
+    assert report.startswith(f'line {line}: a statement about ')
+    assert words in report
 
 
 def test_a_missing_or_large_file(tmp_path: Path) -> None:
