@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations
 
 from surveillance_ontology.reasoner.case_model import (
@@ -162,14 +163,29 @@ class CaseValues:
                 others.setdefault(v, []).append(w)
                 others.setdefault(w, []).append(v)
         small = [v for v, found in others.items() if model.sets[v][0].size <= len(found)]
+        for group in _joined(small, others):
+            if not self._have_values(group, others):
+                choices = 0
+                for v in group:
+                    choices |= model.sets[v][1] | model.differences(v)
+                raise ClashError(choices)
+
+    def _have_values(self, group: list[int], others: dict[int, list[int]]) -> bool:
+        """Tell whether each of a group can have a value that no other it differs from has."""
+        sets = self._model.sets
+        members = {v: tuple(sets[v][0].members()) for v in group}
+        if all(len(set(others[v]) & members.keys()) == len(group) - 1 for v in group):
+            return _all_matched(members)
+        group.sort(key=lambda v: len(members[v]))
         chosen: dict[int, Value] = {}
 
         def extend(place: int) -> bool:
-            if place == len(small):
+            self._model.step()
+            if place == len(group):
                 return True
-            v = small[place]
+            v = group[place]
             taken = {chosen[w] for w in others[v] if w in chosen}
-            for value in model.sets[v][0].members():
+            for value in members[v]:
                 if value not in taken:
                     chosen[v] = value
                     if extend(place + 1):
@@ -177,8 +193,37 @@ class CaseValues:
                     del chosen[v]
             return False
 
-        if not extend(0):
-            choices = 0
-            for v in small:
-                choices |= model.sets[v][1] | model.differences(v)
-            raise ClashError(choices)
+        return extend(0)
+
+
+def _joined(values: list[int], others: dict[int, list[int]]) -> Iterator[list[int]]:
+    """Give the groups of values that are linked by differences."""
+    left = dict.fromkeys(values)
+    while left:
+        group = [left.popitem()[0]]
+        for v in group:  # Grows on the way.
+            for w in others[v]:
+                if w in left:
+                    del left[w]
+                    group.append(w)
+        yield group
+
+
+def _all_matched(members: Mapping[int, Sequence[Value]]) -> bool:
+    """Tell whether all can have different values: a bipartite matching by augmenting paths."""
+    owner: dict[Value, int] = {}
+
+    def place(v: int, tried: set[Value]) -> bool:
+        free = next((value for value in members[v] if value not in owner), None)
+        if free is not None:
+            owner[free] = v
+            return True
+        for value in members[v]:
+            if value not in tried:
+                tried.add(value)
+                if place(owner[value], tried):
+                    owner[value] = v
+                    return True
+        return False
+
+    return all(place(v, set()) for v in members)

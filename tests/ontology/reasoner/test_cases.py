@@ -9,7 +9,7 @@ from surveillance_ontology.owl import axioms as ax
 from surveillance_ontology.owl import expressions as ex
 from surveillance_ontology.owl.axioms import Axiom, ClassAssertion, SubClassOf
 from surveillance_ontology.owl.expressions import Literal
-from surveillance_ontology.owl.vocabulary import NOTHING, THING, XSD
+from surveillance_ontology.owl.vocabulary import NOTHING, THING, TOP_LITERAL, XSD
 from surveillance_ontology.reasoner.cases import CaseReasoner, UnsupportedError, entails
 from tests.ontology.reasoner.wide_ontologies import INDIVIDUALS, WideOntology
 
@@ -130,6 +130,21 @@ def test_values_in_cases() -> None:
         ClassAssertion(ex.DataSomeValuesFrom(S, XSD + 'integer'), i),
     )
     assert kb.types(i) == {B}
+
+
+def test_as_many_values_as_there_are_take_no_search() -> None:
+    numbers = ex.DataOneOf(tuple(whole(number) for number in range(40)))
+    kb = reasoned(
+        ax.DataPropertyRange(S, numbers),
+        ClassAssertion(ex.DataMinCardinality(40, S, TOP_LITERAL), i),
+    )
+    assert kb.consistent
+    excluded = ax.NegativeDataPropertyAssertion(S, i, whole(5))
+    kb.add(excluded)
+    assert not kb.reason()
+    kb.remove(excluded)
+    assert kb.reason()
+    assert kb.unsupported == ()
 
 
 def test_any_axiom_can_be_asked_for() -> None:
