@@ -46,6 +46,7 @@ def page(behaviour: str, speed: float) -> Iterator[Viewer]:
 def main() -> None:
     """Draw all pictures."""
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / 'docs/images'
+    folder.mkdir(parents=True, exist_ok=True)
     with page('patrol', 1.0) as viewer:
         viewer.until(lambda: viewer.count('[data-marker]'), WAIT)
         viewer.js("document.querySelector('#camera-section').scrollIntoView()")

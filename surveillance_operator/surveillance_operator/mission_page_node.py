@@ -19,7 +19,6 @@ from surveillance_operator.mission_feed import MissionFeed
 from surveillance_operator.page.hub import Hub
 from surveillance_operator.page.server import Action, Page
 from surveillance_operator.polled_subscription import PolledSubscription
-from surveillance_operator.snapshot import Change, Snapshot
 from surveillance_runtime.node import PatrolNode, StartError
 from surveillance_runtime.process import run_node
 
@@ -66,7 +65,9 @@ class MissionPage(PatrolNode):
             )
         except OSError as error:
             raise StartError(str(error)) from error
-        self._feed = MissionFeed(self, self._period, self._on_news, streams=True)
+        self._feed = MissionFeed(
+            self, self._period, lambda new, _told: self._hub.show(new), streams=True
+        )
         self._hub.show(self._feed.snapshot)
         self.page.start()
         self.get_logger().info(f'the mission is shown at {self.page.address}')
@@ -78,9 +79,6 @@ class MissionPage(PatrolNode):
 
     def _period(self) -> float:
         return POLL_PERIOD if self._hub.viewers else IDLE_PERIOD
-
-    def _on_news(self, new: Snapshot, _told: Sequence[Change]) -> None:
-        self._hub.show(new)
 
     def _tick(self) -> None:
         while not self.stopping.wait(1.0):

@@ -33,6 +33,8 @@ METADATA = 'metadata.yaml'
 PROFILE, ENCODING, SCHEMA_ENCODING = 'ros2', 'cdr', 'ros2msg'
 LIBRARY = 'surveillance_operator'
 CHUNK_BYTES = 1_000_000
+MAGIC = b'\x89MCAP0\r\n'
+"""The first and the last bytes of a whole file."""
 INFINITE = {'sec': 9223372036, 'nsec': 854775807}
 """rosbag2's way to write a duration without end."""
 
@@ -365,13 +367,12 @@ def _scanned(paths: Iterable[Path]) -> list[_Segment]:
 
 def _is_whole(path: Path) -> bool:
     """Tell whether a file ends as a finished one does."""
-    magic = b'\x89MCAP0\r\n'
     with open(path, 'rb') as file:
         size = file.seek(0, os.SEEK_END)
-        if size < 2 * len(magic):
+        if size < 2 * len(MAGIC):
             return False
-        file.seek(-len(magic), os.SEEK_END)
-        return file.read() == magic
+        file.seek(-len(MAGIC), os.SEEK_END)
+        return file.read() == MAGIC
 
 
 def _rewrite(path: Path) -> None:

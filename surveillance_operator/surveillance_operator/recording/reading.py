@@ -25,10 +25,9 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, Schema
 from mcap.stream_reader import get_chunk_data_stream
 
-from surveillance_operator.recording.bag import ENCODING, RecordingError
+from surveillance_operator.recording.bag import ENCODING, MAGIC, RecordingError
 
 SUFFIX = '.mcap'
-MAGIC = b'\x89MCAP0\r\n'
 FIRST_SPANS = 20
 """So many chunks tell of the topics that a recording begins with."""
 RUN_BYTES = 1_000_000
