@@ -155,12 +155,12 @@ def _service_rows(label: str, store: Any, rounds: int) -> list[Row]:
     from surveillance_ontology.armor.client import ArmorClient, InProcessTransport
     from surveillance_ontology.armor.service import ArmorService
     from surveillance_ontology.patrol_ontology import PatrolOntology
-    from surveillance_runtime.place import read_place
+    from surveillance_runtime.place import read_place_file
 
     service = ArmorService(store=store)
     client = ArmorClient('benchmark', 'map', InProcessTransport(service))
     ontology = PatrolOntology(client)
-    ontology.build(read_place(PLACE), str(DATA / 'surveillance.owl'), IRI, 2_000_000_000)
+    ontology.build(read_place_file(PLACE).place, str(DATA / 'surveillance.owl'), IRI, 2_000_000_000)
     ontology.record_place('E', 2_000_000_000)
     corridors = f'SELECT ?x WHERE {{ ?x a <{IRI}#CORRIDOR> }}'
     calls = {'one visit (7 directives)': Visit(client), **single_calls(client)}

@@ -51,7 +51,7 @@ from surveillance_behaviour.policy.simulation import (  # noqa: E402
     PatrolRun,
     SimulatedBattery,
 )
-from surveillance_runtime.place import read_place  # noqa: E402
+from surveillance_runtime.place import read_place_file  # noqa: E402
 
 DAY = 86400.0
 SPEED, DWELL = 0.6, 2.0
@@ -79,8 +79,11 @@ class Map:
 
 def place_map(name: str, path: Path) -> Map:
     """Return a place of config/."""
-    place = read_place(path)
-    neighbours = {room: list(place.neighbours(room)) for room in place.rooms}
+    place = read_place_file(path).place
+    neighbours = {
+        room: list(dict.fromkeys(o for door in doors for o in place.doors[door] if o != room))
+        for room, doors in place.rooms.items()
+    }
     return Map(name, graph_of_places(neighbours, place.positions, SPEED, DWELL), place.start)
 
 

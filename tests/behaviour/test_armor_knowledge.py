@@ -17,9 +17,9 @@ from surveillance_ontology.armor.client import (
 )
 from surveillance_ontology.armor.service import ArmorService
 from surveillance_ontology.patrol_ontology import PatrolOntology, Snapshot
-from surveillance_runtime.place import read_place
+from surveillance_runtime.place import read_place_file
 
-PLACE = read_place(Path(__file__).parents[2] / 'config' / 'seven_rooms.yaml')
+PLACE = read_place_file(Path(__file__).parents[2] / 'config' / 'seven_rooms.yaml').place
 RULES = ('URGENT', 'CORRIDOR', 'ROOM')
 NOBODY = Interrupt()
 

@@ -19,11 +19,11 @@ from surveillance_ontology.patrol_ontology import (
     OntologyNotReadyError,
     PatrolOntology,
 )
-from surveillance_runtime.place import read_place
+from surveillance_runtime.place import read_place_file
 
 from .seven_rooms import IRI, ONTOLOGY
 
-PLACE = read_place(Path(__file__).parents[2] / 'config' / 'seven_rooms.yaml')
+PLACE = read_place_file(Path(__file__).parents[2] / 'config' / 'seven_rooms.yaml').place
 RULES = ('URGENT', 'CORRIDOR', 'ROOM')
 
 

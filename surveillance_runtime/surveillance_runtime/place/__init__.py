@@ -9,7 +9,6 @@ regular ones; `surveillance_runtime.place.drawing` draws them.
 from surveillance_runtime.place.floor_plan import FloorPlan as FloorPlan
 from surveillance_runtime.place.place_file import PlaceFile as PlaceFile
 from surveillance_runtime.place.place_file import checked_place as checked_place
-from surveillance_runtime.place.place_file import read_place as read_place
 from surveillance_runtime.place.place_file import read_place_file as read_place_file
 from surveillance_runtime.place.regions import Regions as Regions
 from surveillance_runtime.place.regions import check_passable as check_passable

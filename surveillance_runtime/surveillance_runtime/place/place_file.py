@@ -83,12 +83,3 @@ def checked_place(
     Regions(plan)
     check_passable(plan, radius)
     return plan.place, plan
-
-
-def read_place(path: str | Path) -> Place:
-    """Read the rooms and doors of a place's file, with all checks of `read_place_file`.
-
-    Raises:
-        YamlFileError: See `read_place_file`.
-    """
-    return read_place_file(path).place

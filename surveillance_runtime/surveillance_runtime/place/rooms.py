@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 import re
-from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -69,45 +68,14 @@ class Place:
         """The rooms on the sides of each door."""
         return self._sides
 
-    def neighbours(self, room: str, *, through_closed: bool = False) -> dict[str, str]:
-        """Return rooms next to ``room``, each with the (first open) door that leads there."""
-        found: dict[str, str] = {}
-        for door in self.rooms[room]:
-            if door in self.closed and not through_closed:
-                continue
-            for other in self._sides[door]:
-                if other != room:
-                    found.setdefault(other, door)
-        return found
-
-    def route(self, start: str, goal: str, *, through_closed: bool = False) -> list[str] | None:
-        """Return rooms from ``start`` to ``goal`` over the fewest doors, both included; None: no
-        way.
-        """
-        came_from: dict[str, str | None] = {start: None}
-        queue = deque([start])
-        while queue:
-            room = queue.popleft()
-            if room == goal:
-                way = [room]
-                while (previous := came_from[way[-1]]) is not None:
-                    way.append(previous)
-                return way[::-1]
-            for other in self.neighbours(room, through_closed=through_closed):
-                if other not in came_from:
-                    came_from[other] = room
-                    queue.append(other)
-        return None
-
-    def reachable(self, start: str, *, through_closed: bool = False) -> set[str]:
-        """Return rooms that can be reached from ``start``, itself included."""
+    def reachable(self, start: str) -> set[str]:
+        """Return the rooms that doors join with ``start``, itself included, also closed doors."""
         seen = {start}
         queue = [start]
         while queue:
-            for other in self.neighbours(queue.pop(), through_closed=through_closed):
-                if other not in seen:
-                    seen.add(other)
-                    queue.append(other)
+            beside = {other for door in self.rooms[queue.pop()] for other in self._sides[door]}
+            queue += beside - seen
+            seen |= beside
         return seen
 
     def with_room(self, name: str, position: Iterable[float], doors: Sequence[str]) -> Place:
@@ -157,8 +125,8 @@ class Place:
         positions = {room: point for room, point in self.positions.items() if room != name}
         anchor = self.start if self.start != name else next(iter(rooms))
         left = replace(self, rooms=rooms, positions=positions, start=anchor)
-        before = self.reachable(anchor, through_closed=True)
-        cut_off = sorted(before - {name} - left.reachable(anchor, through_closed=True))
+        before = self.reachable(anchor)
+        cut_off = sorted(before - {name} - left.reachable(anchor))
         if cut_off:
             raise PlaceError(where, f'is the only way to {", ".join(cut_off)}')
         return replace(left, closed=left.closed & frozenset(left.doors))
