@@ -17,8 +17,8 @@ from surveillance_behaviour.decision import (
     DecisionSettings,
     NowhereToGoError,
     WhyNot,
+    check_place,
     decide,
-    known_place,
     stations_within_reach,
     tour_warning,
     why_charge,
@@ -310,7 +310,7 @@ class Decider:
             if not within:
                 raise ValueError('no charging place can be reached')
             place = min(within, key=lambda station: within[station])
-        known_place(place, world.graph.places)
+        check_place(place, world)
         if place == self.model.place and self._leg is None:
             return f'the robot is in {place} already'
         self.experience.requested = place

@@ -255,14 +255,17 @@ class WhyNot:
     premises: tuple[str, ...] = ()
 
 
-def known_place(place: str, places: Sequence[str]) -> str:
-    """Return ``place`` when it is on the map.
+def check_place(place: str, world: World) -> None:
+    """Check that a place is on the map, and that an open door leads to it.
 
     Raises:
-        ValueError: It is not.
+        ValueError: It is not, or none does.
     """
+    places = world.graph.places
     if place in places:
-        return place
+        return
+    if place in world.classes:
+        raise ValueError(f'{place} cannot be reached: no open door leads to it')
     raise ValueError(f'there is no place {place!r} on the map, expected {nearest(place, places)}')
 
 
@@ -270,9 +273,9 @@ def why_not(place: str, world: World, battery: Battery, settings: DecisionSettin
     """Tell why `decide` would not send the robot to ``place`` now; changes nothing of that.
 
     Raises:
-        ValueError: There is no such place.
+        ValueError: There is no such place, or no open door leads to it.
     """
-    known_place(place, world.graph.places)
+    check_place(place, world)
     if place == world.place:
         return WhyNot(f'the robot is in {place} already')
     try:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from dataclasses import replace
 
 import pytest
 
@@ -145,6 +146,9 @@ def test_why_not_says_what_comes_before_the_rules() -> None:
     assert told.sentence.startswith('it goes to E [recharge]: the battery is low')
     with pytest.raises(ValueError, match="no place 'R22' on the map, expected"):
         why_not('R22', world(), Battery(), DecisionSettings())
+    shut = replace(world(), classes={**world().classes, 'R9': frozenset({'URGENT'})})
+    with pytest.raises(ValueError, match='R9 cannot be reached: no open door leads to it'):
+        why_not('R9', shut, Battery(), DecisionSettings())
 
 
 def test_a_threshold_below_the_tour_is_warned_of() -> None:
