@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import random
 from functools import cache
 
@@ -194,3 +195,27 @@ def test_what_was_learned_outlives_its_process() -> None:
     assert again.spread == times.spread
     with pytest.raises(ValueError, match='times of A to B: expected finite and positive'):
         again.restore({'legs': [['A', 'B', 8.0, [-1.0]]], 'errors': []})
+
+
+def town(count: int, seed: int) -> PatrolGraph:
+    """Return places at random, each with a way to the nearest one before it and some more."""
+    draw = random.Random(seed)
+    at = [(draw.uniform(0.0, 60.0), draw.uniform(0.0, 60.0)) for _ in range(count)]
+    legs: dict[str, dict[str, float]] = {f'P{number:02}': {} for number in range(count)}
+    for number in range(1, count):
+        nearest = sorted(range(number), key=lambda other: math.dist(at[number], at[other]))
+        for other in nearest[: draw.choice((1, 1, 2))]:
+            seconds = math.dist(at[number], at[other])
+            legs[f'P{number:02}'][f'P{other:02}'] = legs[f'P{other:02}'][f'P{number:02}'] = seconds
+    return PatrolGraph(legs, 2.0)
+
+
+@pytest.mark.parametrize('seed', [5, 22])
+def test_the_plan_of_a_large_map_gets_better_on_the_way(seed: int) -> None:
+    """Later choices look for a better course, and take none that was looked at in part only."""
+    graph = town(50, seed)
+    threshold = 2.0 * graph.tour.length
+    patrol = Patrol(graph, Rules(), 'tour', threshold, 'P00')
+    for _ in patrol.until(10.0 * threshold):
+        pass
+    assert patrol.run.settled <= 1.02 * simple_bound(graph, threshold)

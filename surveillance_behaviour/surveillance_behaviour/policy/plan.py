@@ -47,7 +47,7 @@ FULL_UP_TO = 100.0
 """Larger maps, in places, have less work before the first choice: knowing them takes its time."""
 MOST_SECONDS = 2.0
 """Time of the processor for one choice at most; only a machine that is very slow comes to it."""
-MOST_WORK = 3_000.0
+MOST_WORK = 12_000.0
 """Work of simulations at one later choice at most; larger maps keep the first course."""
 WARM_WORK = 50_000.0
 """Work before the first choice of a plan that takes the place of another."""
@@ -217,6 +217,11 @@ class Plan:
         """The longest wait that cannot be helped, as far as is known, seconds."""
         return max(self._search.best.length, 1e-6)
 
+    @property
+    def _accepted(self) -> float:
+        """The longest wait from visit to visit that is accepted for shorter first waits."""
+        return min(ACCEPTED * self._bound, self._simple)
+
     def _observe(self, world: World) -> None:
         """Take where the patrol stands."""
         graph, met, seen = world.graph, self._state.met, []
@@ -301,8 +306,10 @@ class Plan:
 
     def _try(self, course: Course) -> None:
         """Take a course if it is better from here."""
-        outcome = self._followed(course, 1.01 * self._outcome.settled)
-        if self._grade(outcome) < self._grade(self._outcome):
+        stop = max(1.01 * self._outcome.settled, self._accepted)
+        outcome = self._followed(course, stop)
+        # Of one that was stopped it is not known how long the wait would become.
+        if outcome.settled <= stop and self._grade(outcome) < self._grade(self._outcome):
             self._course, self._outcome = course, outcome
             self._state.position = 0
 
@@ -319,8 +326,7 @@ class Plan:
         longer than what is accepted. Then the first waits do, which come once.
         """
         bound = self._bound
-        accepted = min(ACCEPTED * bound, self._simple)
-        lasting = max(0, round(100.0 * (outcome.settled - accepted) / bound))
+        lasting = max(0, round(100.0 * (outcome.settled - self._accepted) / bound))
         return lasting, round(100.0 * outcome.first / bound), outcome.settled
 
     def _entered(self, phase: int) -> Course:
