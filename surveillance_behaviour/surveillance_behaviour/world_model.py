@@ -32,7 +32,7 @@ from surveillance_behaviour.peers.ports import (
 )
 from surveillance_behaviour.policy.battery_reserve import DrawEstimate
 from surveillance_behaviour.policy.graph import GraphError, PatrolGraph
-from surveillance_behaviour.policy.leg_times import LegTimes, graph_of_places
+from surveillance_behaviour.policy.leg_times import LegTimes
 from surveillance_behaviour.policy.world import PolicyMemory, World
 from surveillance_fsm import Interrupt
 from surveillance_ontology.patrol_ontology import Snapshot
@@ -249,21 +249,19 @@ class WorldModel:
             raise PeerError('ontology', f'the robot is in {found.place}, which is not on the map')
         times, dwell = self.experience.leg_times, self.settings.exploration_seconds
         times.forget_fit(self.settings.speed)
-        connections = {
-            place: tuple(other for other in others if other in positions)
+        legs = {
+            place: {
+                other: times.used(place, other, _distance(positions[place], positions[other]))
+                for other in others
+                if other in positions
+            }
             for place, others in found.connections.items()
             if place in positions
         }
-        used = {
-            (place, other): times.used(place, other, _distance(positions[place], positions[other]))
-            for place, others in connections.items()
-            for other in others
-        }
-        key = (found.place in self.graph.index, connections, used, dwell)
+        key = (found.place in self.graph.index, legs, dwell)
         if key != self._graph_key:
             try:
-                whole = graph_of_places(connections, positions, times, dwell)
-                self.graph = whole.connected(found.place)
+                self.graph = PatrolGraph(legs, dwell).connected(found.place)
             except GraphError as error:
                 raise PeerError('ontology', str(error)) from None
             self._graph_key = (True, *key[1:])

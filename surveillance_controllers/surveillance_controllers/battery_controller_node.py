@@ -195,10 +195,8 @@ class RobotBattery:
         return self._use.why_not_charging()
 
     def _on_pose(self, message: PoseWithCovarianceStamped) -> None:
-        try:
+        with conversions.refusing(self._node, 'amcl_pose'):
             self._use.see_pose(conversions.pose_from(message.pose.pose), self._wait.elapsed())
-        except ValueError as error:
-            self._node.get_logger().error(f'amcl_pose: {error}')
 
     def _on_joints(self, message: JointState) -> None:
         self._use.see_joints(message.position)

@@ -137,17 +137,14 @@ class CollisionMonitor(PatrolNode):
         self._base.command(self._allowed())
 
     def _on_scan(self, message: LaserScan) -> None:
-        try:
+        with conversions.refusing(self, 'scan'):
             mount = self._mount or self._frames.mount_of(message.header.frame_id)
             self._scan = conversions.scan_from(message, mount)
-        except ValueError as error:
-            self.get_logger().error(f'scan: {error}')
-            return
-        self._base.hear('scan')
-        allowed_now = self._allowed()
-        # Only what cannot wait for the next command.
-        if abs(allowed_now.speed) < abs(self._base.wanted.speed):
-            self._base.command(allowed_now)
+            self._base.hear('scan')
+            allowed_now = self._allowed()
+            # Only what cannot wait for the next command.
+            if abs(allowed_now.speed) < abs(self._base.wanted.speed):
+                self._base.command(allowed_now)
 
     def _allowed(self) -> Velocity:
         if self._scan is None:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from geometry_msgs.msg import (
 from geometry_msgs.msg import Pose as PoseMessage
 from nav_msgs.msg import OccupancyGrid
 from nav_msgs.msg import Path as PathMessage
+from rclpy.node import Node
 from sensor_msgs.msg import BatteryState, LaserScan
 
 from surveillance_controllers.battery.model import Battery
@@ -26,6 +28,15 @@ from surveillance_controllers.geometry import Points, Pose, Scan
 if TYPE_CHECKING:
     from surveillance_controllers.motion.path_following import Velocity
     from surveillance_controllers.planning.grid_map import GridMap
+
+
+@contextmanager
+def refusing(node: Node, topic: str) -> Iterator[None]:
+    """Let a message that is not sound cost one line in the node's log, and nothing else."""
+    try:
+        yield
+    except ValueError as error:
+        node.get_logger().error(f'{topic}: {error}')
 
 
 def array_from_points(points: Iterable[Point]) -> Points:

@@ -17,7 +17,7 @@ from surveillance_controllers.motion.path_following import Velocity
 from surveillance_controllers.motion.place_regions import PlaceRegions, door_segment
 from surveillance_controllers.planning.door_watch import DoorWatch
 from surveillance_controllers.planning.grid_planning import NoPathError
-from surveillance_controllers.planning.route_planning import route
+from surveillance_controllers.planning.map_planner import route
 
 
 @pytest.fixture

@@ -13,11 +13,9 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
-
-from surveillance_behaviour.policy.graph import GraphError, PatrolGraph
 
 DRIVES_REMEMBERED = 20
 """How many of the last drives of a leg count."""
@@ -154,34 +152,3 @@ class LegTimes:
             self.drives[leg] = deque(seconds, maxlen=DRIVES_REMEMBERED)
         self.errors.extend(float(value) for value in kept['errors'])
         self._fit = None
-
-
-def graph_of_places(
-    connections: Mapping[str, Iterable[str]],
-    positions: Mapping[str, Sequence[float]],
-    times: LegTimes,
-    dwell: float,
-) -> PatrolGraph:
-    """Return the map with expected times.
-
-    Args:
-        connections: For each place, its neighbours.
-        positions: A point in each place, metres.
-        times: What was learned.
-        dwell: Seconds spent in each place.
-
-    Raises:
-        GraphError: A position is missing, or the connections do not fit together.
-    """
-    for place in connections:
-        if place not in positions:
-            raise GraphError(f'{place} has no position')
-    legs = {
-        place: {
-            other: times.used(place, other, math.dist(positions[place][:2], positions[other][:2]))
-            for other in others
-            if other in positions
-        }
-        for place, others in connections.items()
-    }
-    return PatrolGraph(legs, dwell)

@@ -111,50 +111,42 @@ def _real(text: str) -> float:
 
 
 def _read_points(text: str) -> tuple[Point3, ...]:
-    tokens = re.findall(r'\[|\]|,|[^\[\],\s]+', text)
-    position = 0
+    tokens = [*re.findall(r'\[|\]|,|[^\[\],\s]+', text), '']
 
-    def take(wanted: str) -> bool:
-        nonlocal position
-        if position < len(tokens) and tokens[position] == wanted:
-            position += 1
-            return True
-        return False
-
-    def need(wanted: str, place: str) -> None:
-        if not take(wanted):
-            found = repr(tokens[position]) if position < len(tokens) else 'the end of the line'
-            raise ValueError(f'{found} {place}, where {wanted!r} belongs')
+    def take(place: str, *wanted: str) -> str:
+        found = tokens.pop(0)
+        if found not in wanted:
+            raise ValueError(f'{_found(found)} {place}, where {wanted[-1]!r} belongs')
+        return found
 
     def coordinate(place: str) -> float:
-        nonlocal position
-        word = tokens[position] if position < len(tokens) else ''
-        position += 1
+        found = tokens.pop(0)
         try:
-            return _real(word)
+            return _real(found)
         except ValueError:
-            found = repr(word) if word else 'the end of the line'
-            raise ValueError(f'{found} {place}, where a number belongs') from None
+            raise ValueError(f'{_found(found)} {place}, where a number belongs') from None
 
     result: list[Point3] = []
-    need('[', 'at the start')
-    if not take(']'):
-        while True:
-            place = f'in point {len(result) + 1}'
-            need('[', place)
-            x = coordinate(place)
-            need(',', place)
-            y = coordinate(place)
-            need(',', place)
-            z = coordinate(place)
-            need(']', place)
-            result.append((x, y, z))
-            if not take(','):
-                break
-        need(']', f'after point {len(result)}')
-    if position < len(tokens):
-        raise ValueError(f'{tokens[position]!r} after the list')
+    take('at the start', '[')
+    more = tokens[0] != ']' or take('', ']') == ','
+    while more:
+        place = f'in point {len(result) + 1}'
+        take(place, '[')
+        x = coordinate(place)
+        take(place, ',')
+        y = coordinate(place)
+        take(place, ',')
+        z = coordinate(place)
+        take(place, ']')
+        result.append((x, y, z))
+        more = take(f'after point {len(result)}', ',', ']') == ','
+    if tokens[0]:
+        raise ValueError(f'{tokens[0]!r} after the list')
     return tuple(result)
+
+
+def _found(token: str) -> str:
+    return repr(token) if token else 'the end of the line'
 
 
 HELP = Command(('help',), (), 'List the commands.')

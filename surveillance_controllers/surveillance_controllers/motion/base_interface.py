@@ -196,7 +196,7 @@ class RobotBase:
             self._stepped.notify_all()
 
     def _on_map(self, message: OccupancyGrid) -> None:
-        with self._refusing('map'):
+        with conversions.refusing(self._node, 'map'):
             grid = conversions.grid_from(message)
             with self._lock:
                 self._navigator.set_map(grid)
@@ -206,21 +206,21 @@ class RobotBase:
             self._navigator.set_closed(message.closed)
 
     def _on_odometry(self, message: Odometry) -> None:
-        with self._refusing('odom'):
+        with conversions.refusing(self._node, 'odom'):
             pose = conversions.pose_from(message.pose.pose)
             with self._lock:
                 self._base.hear('odom')
                 self._navigator.move(pose)
 
     def _on_initial_pose(self, message: PoseWithCovarianceStamped) -> None:
-        with self._refusing('initialpose'):
+        with conversions.refusing(self._node, 'initialpose'):
             pose = conversions.pose_from(message.pose.pose)
             self._node.get_logger().info(f'told to be at ({pose[0]:.2f}, {pose[1]:.2f})')
             with self._lock:
                 self._navigator.believe(pose)
 
     def _on_scan(self, message: LaserScan) -> None:
-        with self._refusing('scan'):
+        with conversions.refusing(self._node, 'scan'):
             mount = self._mount or self._tf.mount_of(message.header.frame_id)
             self._see(conversions.scan_from(message, mount), message.header.stamp)
 
@@ -241,14 +241,6 @@ class RobotBase:
             if self._navigator.task is not None and self._awaited():
                 self._stepped.notify_all()
         self._tell(stamp)
-
-    @contextmanager
-    def _refusing(self, topic: str) -> Iterator[None]:
-        """Let a message that is not sound cost one line, and nothing else."""
-        try:
-            yield
-        except ValueError as error:
-            self._node.get_logger().error(f'{topic}: {error}')
 
     def _warn_of_silence(self, topic: str) -> None:
         self._node.get_logger().warn(f'nothing on the topic {topic}: the robot stands')

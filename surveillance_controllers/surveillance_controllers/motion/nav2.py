@@ -17,7 +17,7 @@ from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
 
 from surveillance_controllers import conversions
 from surveillance_controllers.controller_parameters import MotionSettings
-from surveillance_controllers.geometry import Points, equally_spaced
+from surveillance_controllers.geometry import Points, equally_spaced, point_of
 from surveillance_controllers.map_knowledge import MapKnowledge
 from surveillance_controllers.motion.arrival import MotionFailedError, place_reached
 from surveillance_controllers.motion.place_recording import PlaceRecorder
@@ -128,13 +128,10 @@ class Nav2Motion:
         now = float(self._node.get_clock().now().nanoseconds) / 1e9
         if 0.0 <= now - self._tracked < TRACK_PERIOD:
             return
-        try:
-            x, y, _ = conversions.pose_from(message.pose.pose)
-        except ValueError as error:
-            self._node.get_logger().error(f'amcl_pose: {error}')
-            return
-        self._tracked = now
-        self._recorder.tell_point(np.array([x, y, 0.0]), passing=True)
+        with conversions.refusing(self._node, 'amcl_pose'):
+            point = point_of(conversions.pose_from(message.pose.pose))
+            self._tracked = now
+            self._recorder.tell_point(point, passing=True)
 
     def place_reached(self, _goal: Points, end: Points, run: GoalRun) -> str:
         """Return the place nearest to where the robot is, shape (3,).

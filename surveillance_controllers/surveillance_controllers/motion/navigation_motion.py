@@ -43,9 +43,9 @@ class NavigationMotion:
         self._settings = settings
         self._knowledge = knowledge
         self._recorder = recorder
-        self._wait_for_peer = settings.peer_timeout
+        self._wait_for_peer = settings.motion.peer_timeout
         self._planner = GoalCaller(node, ComputePath, 'compute_path')
-        navigator = Navigator(settings.doors, guesses=[settings.station])
+        navigator = Navigator(settings.doors, guesses=[settings.motion.station])
         tell = recorder.tell if settings.track_place else lambda _place, _stamp: None
         self._base = RobotBase(
             node,
@@ -75,7 +75,7 @@ class NavigationMotion:
 
         def on_step(pose: Pose) -> None:
             nonlocal told
-            if not 0 <= run.now() - told < self._settings.feedback_period:
+            if not 0 <= run.now() - told < self._settings.motion.feedback_period:
                 told = run.now()
                 report(point_of(pose))
 

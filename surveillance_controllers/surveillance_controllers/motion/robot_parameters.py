@@ -86,13 +86,11 @@ def planning_parameters(node: PatrolNode) -> PlanningParameters:
 class RobotSettings:
     """What `motion_controller` is told about the robot and its place in SIMULATED mode."""
 
+    motion: MotionSettings
     drive: DriveParameters
-    station: Pose
     doors: dict[str, Segment]
     positions: dict[str, Points]
-    feedback_period: float
     sensor_timeout: float
-    peer_timeout: float
     track_place: bool
     spin: bool
     lidar_mount: Pose | None
@@ -105,11 +103,10 @@ def robot_settings(node: PatrolNode, motion: MotionSettings) -> RobotSettings:
         ParameterError: A value is of the wrong type or out of range.
     """
     return RobotSettings(
+        motion=motion,
         drive=declare_fields(node, DriveParameters(), _DRIVE, prefix='drive.'),
-        station=motion.station,
         doors=door_segments(node),
         positions=place_positions(node),
-        feedback_period=motion.feedback_period,
         sensor_timeout=node.parameter(
             'sensor_timeout',
             5.0,
@@ -118,7 +115,6 @@ def robot_settings(node: PatrolNode, motion: MotionSettings) -> RobotSettings:
             maximum=3600.0,
             read_only=True,
         ),
-        peer_timeout=motion.peer_timeout,
         track_place=node.parameter(
             'track_place',
             True,

@@ -10,7 +10,7 @@ as the free space allows. A door or an obstacle that comes or goes changes the c
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -220,16 +220,9 @@ class GridPlanner:
             return row, column
         if not self.grid.free[row, column]:
             raise NoPathError(f'the start {_shown(start)} {self._why_not_free(start)}')
-        reach = int(np.ceil(self.parameters.escape / self.grid.resolution))
-        first_row, first_column = max(0, row - reach), max(0, column - reach)
-        window = self._regions[first_row : row + reach + 1, first_column : column + reach + 1]
-        found = np.argwhere(window > 0) + np.array([first_row, first_column])
-        gaps = np.hypot(*(found - (row, column)).T)
-        for index in np.argsort(gaps, kind='stable'):
-            if gaps[index] > reach:
-                break
-            if self._can_escape(start, self.grid.centres_of(found[index])[0]):
-                return int(found[index, 0]), int(found[index, 1])
+        for cell in self._cells_around((row, column), self.parameters.escape, self._regions > 0):
+            if self._can_escape(start, self.grid.centres_of(cell)[0]):
+                return cell
         raise NoPathError(f'the start {_shown(start)} {self._why_not_free(start)}')
 
     def _cell_beside(
@@ -240,18 +233,24 @@ class GridPlanner:
         """
         needed = self.parameters.radius + self.parameters.margin
         if self._static[cell] >= needed:
-            reach = int(self.parameters.goal_shift / self.grid.resolution)
-            first_row, first_column = max(0, cell[0] - reach), max(0, cell[1] - reach)
-            window = self._regions[
-                first_row : cell[0] + reach + 1, first_column : cell[1] + reach + 1
-            ]
-            found = np.argwhere(window == self._regions[start])
-            found += np.array([first_row, first_column])
-            gaps = np.hypot(*(found - np.array(cell)).T)
-            if len(gaps) and gaps.min() <= reach:
-                nearest = found[int(np.argmin(gaps))]
-                return int(nearest[0]), int(nearest[1])
+            region = self._regions == self._regions[start]
+            for nearest in self._cells_around(cell, self.parameters.goal_shift, region):
+                return nearest
         raise NoPathError(f'the goal {_shown(goal)} {self._why_not_free(goal)}')
+
+    def _cells_around(
+        self, cell: tuple[int, int], reach: float, wanted: NDArray[np.bool_]
+    ) -> Iterator[tuple[int, int]]:
+        """Yield the wanted cells within reach of a cell, metres, the nearest ones first."""
+        steps = math.ceil(reach / self.grid.resolution)
+        low = np.maximum(np.array(cell) - steps, 0)
+        window = wanted[low[0] : cell[0] + steps + 1, low[1] : cell[1] + steps + 1]
+        found = np.argwhere(window) + low
+        gaps = np.hypot(*(found - cell).T)
+        for index in np.argsort(gaps, kind='stable'):
+            if gaps[index] > steps:
+                return
+            yield int(found[index, 0]), int(found[index, 1])
 
     def _can_escape(self, start: Points, end: Points) -> bool:
         """Tell whether the way out only leads away from what is near: it must never come closer."""

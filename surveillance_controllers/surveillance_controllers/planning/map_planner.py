@@ -1,26 +1,25 @@
-"""Paths for `planner_controller` in SIMULATED mode, over the map, doors and obstacles it hears
-of."""
+"""Paths for `planner_controller` in SIMULATED mode: a route over doors between two places, and the
+way on the map, around closed doors and the obstacles that the robot has seen."""
 
 from __future__ import annotations
 
+import math
 import threading
+from collections.abc import Collection, Iterable, Mapping
+from itertools import combinations, pairwise
 
 import numpy as np
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
+from numpy.typing import ArrayLike
 from sensor_msgs.msg import PointCloud2
 
 from surveillance_controllers import conversions
-from surveillance_controllers.geometry import Points, Pose
+from surveillance_controllers.geometry import Points, Pose, point_of
 from surveillance_controllers.map_knowledge import MapKnowledge
 from surveillance_controllers.motion.robot_parameters import door_segments, planning_parameters
 from surveillance_controllers.planning.door_watch import DoorWatch
-from surveillance_controllers.planning.grid_planning import (
-    GridPlanner,
-    NoPathError,
-    PlanningParameters,
-)
-from surveillance_controllers.planning.route_planning import route
+from surveillance_controllers.planning.grid_planning import GridPlanner, NoPathError
 from surveillance_fsm import Interrupt
 from surveillance_fsm.ros import GoalAbortedError, GoalRun
 from surveillance_runtime.conversions import points_from_cloud
@@ -28,85 +27,8 @@ from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import STATE_QOS
 
 
-class MapPlanner:
-    """Plans on the latest map.
-
-    Args:
-        node: The planner's node.
-        parameters: The robot's size, margins and costs.
-        doors: Which doors there are, and which are closed.
-
-    Attributes:
-        pose: Where the robot is, as the motion controller says; None until it does.
-    """
-
-    def __init__(self, node: PatrolNode, parameters: PlanningParameters, doors: DoorWatch) -> None:
-        self._node = node
-        self._parameters = parameters
-        self._doors = doors
-        self._lock = threading.Lock()
-        self._has_map = Interrupt()
-        self._planner: GridPlanner | None = None
-        self._obstacles: Points = np.zeros((0, 2))
-        self.pose: Pose | None = None
-        node.create_subscription(OccupancyGrid, 'map', self._on_map, STATE_QOS)
-        node.create_subscription(PointCloud2, 'obstacles', self._on_obstacles, STATE_QOS)
-        node.create_subscription(PoseWithCovarianceStamped, 'amcl_pose', self._on_pose, STATE_QOS)
-
-    def plan(self, start: Points, goal: Points, timeout: float, interrupt: Interrupt) -> Points:
-        """Find the path between two points, shape (3,) each, metres.
-
-        Args:
-            start: Where it begins.
-            goal: Where it ends.
-            timeout: How long to wait for the first map, seconds of steady time.
-            interrupt: Ends that wait.
-
-        Returns:
-            The path, shape (n, 3); its height goes evenly from the start's to the goal's.
-
-        Raises:
-            NoPathError: There is none, or no map; the text says why.
-        """
-        unsubscribe = interrupt.subscribe(self._has_map.set)
-        self._has_map.wait(timeout)
-        unsubscribe()
-        if self._planner is None:
-            self._has_map.clear()
-            raise NoPathError(f'no map came on the topic map within {timeout:g} s')
-        closed = self._doors.closed_segments(interrupt)
-        with self._lock:
-            self._planner.set_closed(closed)
-            self._planner.set_obstacles(self._obstacles)
-            path = self._planner.plan(start, goal)
-        heights = np.linspace(start[2], goal[2], len(path))
-        return np.column_stack([path, heights])
-
-    def _on_map(self, message: OccupancyGrid) -> None:
-        try:
-            planner = GridPlanner(conversions.grid_from(message), self._parameters)
-        except ValueError as error:
-            self._node.get_logger().error(f'map: {error}')
-            return
-        with self._lock:
-            self._planner = planner
-        self._has_map.set()
-
-    def _on_obstacles(self, message: PointCloud2) -> None:
-        try:
-            self._obstacles = points_from_cloud(message)
-        except ValueError as error:
-            self._node.get_logger().error(f'obstacles: {error}')
-
-    def _on_pose(self, message: PoseWithCovarianceStamped) -> None:
-        try:
-            self.pose = conversions.pose_from(message.pose.pose)
-        except ValueError as error:
-            self._node.get_logger().error(f'amcl_pose: {error}')
-
-
 class NavigationPlanning:
-    """Plans for one robot.
+    """Plans for one robot on the latest map.
 
     Args:
         node: The planner's node.
@@ -118,8 +40,16 @@ class NavigationPlanning:
         self._node = node
         self._knowledge = knowledge
         self._timeout = peer_timeout
+        self._parameters = planning_parameters(node)
         self._doors = DoorWatch(node, door_segments(node), knowledge, peer_timeout)
-        self._map = MapPlanner(node, planning_parameters(node), self._doors)
+        self._lock = threading.Lock()
+        self._has_map = Interrupt()
+        self._planner: GridPlanner | None = None
+        self._obstacles: Points = np.zeros((0, 2))
+        self._pose: Pose | None = None
+        node.create_subscription(OccupancyGrid, 'map', self._on_map, STATE_QOS)
+        node.create_subscription(PointCloud2, 'obstacles', self._on_obstacles, STATE_QOS)
+        node.create_subscription(PoseWithCovarianceStamped, 'amcl_pose', self._on_pose, STATE_QOS)
 
     def start(self, target: str, run: GoalRun) -> Points:
         """Return where the robot is, shape (3,), once there is a route over doors from there to a
@@ -139,16 +69,101 @@ class NavigationPlanning:
         self._node.get_logger().info(
             f'{place} to {target}: through {", ".join(doors) or "no door"}'
         )
-        pose = self._map.pose
-        return positions[place] if pose is None else np.array([pose[0], pose[1], 0.0])
+        return positions[place] if self._pose is None else point_of(self._pose)
 
     def path(self, start: Points, goal: Points, run: GoalRun, what: str) -> Points:
-        """Return the path between two points, shape (n, 3).
+        """Return the path between two points of shape (3,); waits for the first map.
+
+        Returns:
+            Shape (n, 3); the height goes evenly from the start's to the goal's.
 
         Raises:
             GoalAbortedError: There is none; the text says what blocks it.
         """
+        unsubscribe = run.interrupt.subscribe(self._has_map.set)
+        self._has_map.wait(self._timeout)
+        unsubscribe()
+        if self._planner is None:
+            self._has_map.clear()
+            raise GoalAbortedError(
+                f'{what}: no map came on the topic map within {self._timeout:g} s'
+            )
+        closed = self._doors.closed_segments(run.interrupt)
+        with self._lock:
+            self._planner.set_closed(closed)
+            self._planner.set_obstacles(self._obstacles)
+            try:
+                path = self._planner.plan(start, goal)
+            except NoPathError as error:
+                raise GoalAbortedError(f'{what}: {error}') from error
+        return np.column_stack([path, np.linspace(start[2], goal[2], len(path))])
+
+    def _on_map(self, message: OccupancyGrid) -> None:
+        with conversions.refusing(self._node, 'map'):
+            planner = GridPlanner(conversions.grid_from(message), self._parameters)
+            with self._lock:
+                self._planner = planner
+            self._has_map.set()
+
+    def _on_obstacles(self, message: PointCloud2) -> None:
+        with conversions.refusing(self._node, 'obstacles'):
+            self._obstacles = points_from_cloud(message)
+
+    def _on_pose(self, message: PoseWithCovarianceStamped) -> None:
+        with conversions.refusing(self._node, 'amcl_pose'):
+            self._pose = conversions.pose_from(message.pose.pose)
+
+
+def route(
+    rooms_of: Mapping[str, Collection[str]],
+    closed: Collection[str],
+    start: str,
+    goal: str,
+    positions: Mapping[str, ArrayLike],
+) -> list[str]:
+    """Return the doors to go through by the shortest way, in order; none when start and goal are
+    one place.
+
+    Places are the nodes of a graph; a door that leads into two places joins them, unless it is
+    closed.
+
+    Args:
+        rooms_of: The places that each door leads into.
+        closed: Doors that are closed.
+        start: A place.
+        goal: A place.
+        positions: A point in each place, metres; the way through a place is measured by them.
+
+    Raises:
+        NoPathError: No open doors lead there; the text names the closed doors that would.
+    """
+
+    import networkx as nx  # takes its time: a planner comes up without it
+
+    def doors_through(doors: Iterable[str]) -> list[str] | None:
+        graph = nx.Graph()
+        graph.add_nodes_from([start, goal])
+        for door in sorted(doors):
+            for first, second in combinations(sorted(rooms_of[door]), 2):
+                at = [
+                    np.asarray(positions[place], float)[:2]
+                    for place in (first, second)
+                    if place in positions
+                ]
+                length = math.dist(*at) if len(at) == 2 else 1.0
+                if length < graph.get_edge_data(first, second, {}).get('length', math.inf):
+                    graph.add_edge(first, second, length=length, door=door)
         try:
-            return self._map.plan(start, goal, self._timeout, run.interrupt)
-        except NoPathError as error:
-            raise GoalAbortedError(f'{what}: {error}') from error
+            places = nx.shortest_path(graph, start, goal, weight='length')
+        except nx.NetworkXNoPath:
+            return None
+        return [graph[first][second]['door'] for first, second in pairwise(places)]
+
+    doors = doors_through(door for door in rooms_of if door not in closed)
+    if doors is not None:
+        return doors
+    shut = [door for door in doors_through(rooms_of) or () if door in closed]
+    if not shut:
+        raise NoPathError(f'no route from {start} to {goal}: no doors lead there')
+    which = f'doors {", ".join(shut)} are' if len(shut) > 1 else f'door {shut[0]} is'
+    raise NoPathError(f'no route from {start} to {goal}: the {which} closed')
