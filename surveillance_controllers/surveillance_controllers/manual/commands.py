@@ -111,7 +111,7 @@ def _real(text: str) -> float:
 
 
 def _read_points(text: str) -> tuple[Point3, ...]:
-    tokens = [*re.findall(r'\[|\]|,|[^\[\],\s]+', text), '']
+    tokens: list[str] = [*re.findall(r'\[|\]|,|[^\[\],\s]+', text), '']
 
     def take(place: str, *wanted: str) -> str:
         found = tokens.pop(0)

@@ -65,7 +65,8 @@ class ObstacleMemory:
         # Most points are the map's: within a cell the distance changes by its diagonal at most.
         row, column = cells[unknown].T
         unknown[unknown] = self._known[row, column] > apart - 2.0 * self._grid.resolution
-        unknown[unknown] = self._grid.interpolated(self._known, points[unknown]) > apart
+        if unknown.any():
+            unknown[unknown] = self._grid.interpolated(self._known, points[unknown]) > apart
         return unknown
 
     def update(
