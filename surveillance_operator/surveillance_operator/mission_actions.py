@@ -9,7 +9,6 @@ import math
 import re
 import time
 from collections.abc import Callable, Sequence
-from functools import partial
 from typing import Any
 
 from geometry_msgs.msg import Point
@@ -46,10 +45,6 @@ _DISCOVERY = 2.0
 ARM_SECONDS = 60.0
 """Deadline of a movement of the arm, whose answer comes when it has arrived."""
 _NAME = re.compile(r'[A-Za-z]\w{0,63}\Z', re.ASCII)
-
-
-def _facts_like(query: str, armor: Any) -> Any:
-    return armor.query.facts_by_origin(query)
 
 
 class ActionError(ValueError):
@@ -187,12 +182,9 @@ class MissionActions:
 
     def facts(self, place: str) -> list[tuple[str, bool]]:
         """Return what the ontology knows of a place: facts, and whether each is asserted."""
-        name = _name(place)
-        found: list[tuple[str, bool]] = []
-        for query in facts_of(name):
-            every, asserted = self._ask(partial(_facts_like, query))
-            found += [(str(fact), fact in asserted) for fact in every]
-        return found
+        queries = facts_of(_name(place))
+        found = self._ask(lambda armor: [armor.query.facts_by_origin(each) for each in queries])
+        return [(str(fact), fact in asserted) for every, asserted in found for fact in every]
 
     def explain(self, fact: str) -> list[tuple[int, str]]:
         """Return the proof of a fact: lines with their depth, each following from those below."""
