@@ -26,6 +26,8 @@ _KIND_TYPES = {
 }
 _CLASS, _RESTRICTION, _DATATYPE = OWL + 'Class', OWL + 'Restriction', RDFS + 'Datatype'
 _ON = (OWL + 'onProperty', 'prop')
+_PROPERTY = (SWRL + 'propertyPredicate', 'prop')
+_ARGUMENT, _ARGUMENTS = (SWRL + 'argument1', 'argument'), (SWRL + 'arguments', 'arguments')
 _ONE, _TWO = (SWRL + 'argument1', 'first'), (SWRL + 'argument2', 'second')
 _NEGATIVE = (
     OWL + 'NegativePropertyAssertion',
@@ -51,30 +53,13 @@ _NODES: dict[type, tuple[Any, ...]] = {
     ex.DataComplementOf: (_DATATYPE, (OWL + 'datatypeComplementOf', 'operand')),
     ex.DataOneOf: (_DATATYPE, (OWL + 'oneOf', 'literals')),
     ex.DatatypeRestriction: (_DATATYPE, (OWL + 'onDatatype', 'datatype')),
-    ex.ClassAtom: (
-        SWRL + 'ClassAtom',
-        (SWRL + 'classPredicate', 'cls'),
-        (SWRL + 'argument1', 'argument'),
-    ),
-    ex.DataRangeAtom: (
-        SWRL + 'DataRangeAtom',
-        (SWRL + 'dataRange', 'range'),
-        (SWRL + 'argument1', 'argument'),
-    ),
-    ex.ObjectPropertyAtom: (
-        *(SWRL + 'IndividualPropertyAtom', (SWRL + 'propertyPredicate', 'prop')),
-        *(_ONE, _TWO),
-    ),
-    ex.DataPropertyAtom: (
-        *(SWRL + 'DatavaluedPropertyAtom', (SWRL + 'propertyPredicate', 'prop')),
-        *(_ONE, _TWO),
-    ),
+    ex.ClassAtom: (SWRL + 'ClassAtom', (SWRL + 'classPredicate', 'cls'), _ARGUMENT),
+    ex.DataRangeAtom: (SWRL + 'DataRangeAtom', (SWRL + 'dataRange', 'range'), _ARGUMENT),
+    ex.ObjectPropertyAtom: (SWRL + 'IndividualPropertyAtom', _PROPERTY, _ONE, _TWO),
+    ex.DataPropertyAtom: (SWRL + 'DatavaluedPropertyAtom', _PROPERTY, _ONE, _TWO),
     ex.SameIndividualAtom: (SWRL + 'SameIndividualAtom', _ONE, _TWO),
     ex.DifferentIndividualsAtom: (SWRL + 'DifferentIndividualsAtom', _ONE, _TWO),
-    ex.BuiltinAtom: (
-        *(SWRL + 'BuiltinAtom', (SWRL + 'builtin', 'builtin')),
-        (SWRL + 'arguments', 'arguments'),
-    ),
+    ex.BuiltinAtom: (SWRL + 'BuiltinAtom', (SWRL + 'builtin', 'builtin'), _ARGUMENTS),
     ax.NegativeObjectPropertyAssertion: (*_NEGATIVE, (OWL + 'targetIndividual', 'object')),
     ax.NegativeDataPropertyAssertion: (*_NEGATIVE, (OWL + 'targetValue', 'literal')),
 }
@@ -101,16 +86,11 @@ _EQUALS: dict[type, tuple[str, str]] = {
     ax.SameIndividual: ('individuals', OWL + 'sameAs'),
 }
 """Axioms that are a triple for each member but one."""
+_DISJOINT = (OWL + 'propertyDisjointWith', OWL + 'AllDisjointProperties')
 _APART: dict[type, tuple[str, str, str]] = {
     ax.DisjointClasses: ('classes', OWL + 'disjointWith', OWL + 'AllDisjointClasses'),
-    ax.DisjointObjectProperties: (
-        *('props', OWL + 'propertyDisjointWith'),
-        OWL + 'AllDisjointProperties',
-    ),
-    ax.DisjointDataProperties: (
-        *('props', OWL + 'propertyDisjointWith'),
-        OWL + 'AllDisjointProperties',
-    ),
+    ax.DisjointObjectProperties: ('props', *_DISJOINT),
+    ax.DisjointDataProperties: ('props', *_DISJOINT),
     ax.DifferentIndividuals: ('individuals', OWL + 'differentFrom', OWL + 'AllDifferent'),
 }
 """Axioms that are a triple for two members, and a node for more."""
