@@ -71,7 +71,8 @@ def test_cells_of_the_other_colour_are_counted():
 
 
 def test_markers_of_another_dictionary_are_not_read_as_ids():
-    detector = MarkerDetector(DetectorSettings('DICT_5X5_100', None))
-    for kind, image in without_markers((458, 539, 557, 728)):  # each was read as an id once
+    detector = MarkerDetector(DetectorSettings('DICT_5X5_100', frozenset(range(11, 18))))
+    # each was read as an id once
+    for kind, image in without_markers((458, 539, 557, 728, 2771, 8900)):
         assert kind == 'other dictionaries'
         assert detector.detect(image) == []

@@ -52,8 +52,8 @@ class CellReadings(NamedTuple):
     lead: Patches
     error: Array
 
-    def chosen(self, which: npt.NDArray[np.bool_]) -> CellReadings:
-        """Return the readings of some of the candidates (m,)."""
+    def chosen(self, which: npt.NDArray[np.bool_] | Indices) -> CellReadings:
+        """Return the readings of some of the candidates, by a mask (m,) or their indices."""
         return CellReadings(
             self.entries[which], self.correlation[which], self.lead[which], self.error[which]
         )

@@ -30,6 +30,7 @@ from surveillance_perception.detection.candidates import (
     distinct,
     quads_around,
 )
+from surveillance_perception.detection.cell_differences import CellReadings
 from surveillance_perception.detection.decoding import MarkerReader, Readings
 from surveillance_perception.detection.dictionaries import MarkerCodes, dictionary_named
 from surveillance_perception.detection.image_sampling import (
@@ -45,16 +46,11 @@ from surveillance_perception.detection.template_fit import Indices
 _SAME_QUAD = 2.0
 _LARGE_CELL = 8.0
 _BATCH = 64
-_CAREFUL = 400
 _COVER = 0.7
-_CLEAR, _CLEAR_KNOWN = 1.8, 1.3
-_WRONG, _AGREED = 0.2, 0.12
-_WRONG_BORDER = 0.3
-_CONTRADICTED = 0.6
+# share of the cells that may rather have the other colour: cells a pixel wide show little
+_CONTRADICTED = 0.4
 _FEW_SPARE_BITS = 12.0
 _STRICT_BITS = 4.0
-# correlation of cells' differences above which softer blur need not be tried
-_SHARP = 0.9
 # wrong ids that may be expected of one candidate
 _LARGEST_ERROR = 1e-5
 
@@ -74,7 +70,8 @@ class DetectorSettings:
             no further neighbourhood or bridge is tried.
         max_candidates: Bound of an image's work: quadrilaterals that are read, the likeliest first.
         blur: Standard deviation in pixels of the lens's blur.
-        least_correlation: Correlation with the image that a reading needs, 0 to 1.
+        least_correlation: Correlation with the image that a reading needs, 0 to 1: of its cells'
+            differences, or of the whole marker.
         least_inner_correlation: The same over the code's own cells.
         known_lead: How many times less than the second best code the best one must leave
             unexplained, when its id is known.
@@ -169,36 +166,29 @@ class MarkerDetector:
             quads = np.concatenate([np.asarray(expected, dtype=float), quads])
         if not len(quads):
             return []
-        found, blurred = self._read_cells(pyramid, quads, prepared.grey)
-        quads = quads[~_covered(quads, found)]
-        self.left_out += max(0, len(quads) - _CAREFUL)
-        for start in range(0, min(len(quads), _CAREFUL), _BATCH):
-            homographies = homographies_of(quads[start : min(start + _BATCH, _CAREFUL)])
-            cells = self._reader.read_cells(pyramid, homographies)
-            readings = self._reader.read(pyramid, homographies, cells)
-            if readings is not None:
-                found += self._accepted(readings, prepared.grey)
-        found += [each for each in blurred if not _covered(each.corners[None], found).any()]
-        return _best(found)
-
-    def _read_cells(
-        self, pyramid: ImagePyramid, quads: Quads, grey: Grey
-    ) -> tuple[list[Detection], list[Detection]]:
-        """Return markers whose cells show their codes: the sharp ones, and the others."""
         homographies = homographies_of(quads)
         cells = self._reader.read_cells(pyramid, homographies)
-        plain = cells.error < _LARGEST_ERROR
-        if not plain.any():
-            return [], []
-        cells = cells.chosen(plain)
-        homographies = self._reader.aligned(pyramid, homographies[plain], cells)
+        found = self._shown_by_cells(pyramid, homographies, cells, prepared.grey)
+        unread = np.flatnonzero(~_covered(quads, found))
+        for start in range(0, len(unread), _BATCH):
+            part = unread[start : start + _BATCH]
+            readings = self._reader.read(pyramid, homographies[part], cells.chosen(part))
+            if readings is not None:
+                found += self._accepted(readings, prepared.grey)
+        return _best(found)
+
+    def _shown_by_cells(
+        self, pyramid: ImagePyramid, homographies: Array, cells: CellReadings, grey: Grey
+    ) -> list[Detection]:
+        """Return the markers whose cells alone show their codes."""
+        shown = cells.error < _LARGEST_ERROR
+        shown &= cells.correlation > self.settings.least_correlation
+        if not shown.any():
+            return []
+        cells = cells.chosen(shown)
+        homographies = self._reader.aligned(pyramid, homographies[shown], cells)
         confidence = cells.correlation * (1.0 - 1.0 / cells.lead)
-        found = self._detections(homographies, cells.entries, confidence, grey)
-        sharp = (cells.correlation > _SHARP).tolist()
-        return (
-            [each for each, is_sharp in zip(found, sharp, strict=True) if is_sharp],
-            [each for each, is_sharp in zip(found, sharp, strict=True) if not is_sharp],
-        )
+        return self._detections(homographies, cells.entries, confidence, grey)
 
     def _candidates(self, prepared: PreparedImage, pyramid: ImagePyramid) -> Quads:
         settings = self.settings
@@ -230,22 +220,15 @@ class MarkerDetector:
         spare = codes.bits**2 - np.log2(len(codes.ids))
         # print looks like some code where a dictionary uses a large part of all there are
         lead = lead * max(1.0, (_FEW_SPARE_BITS - spare) / _STRICT_BITS)
-        plausible = (readings.wrong <= _WRONG * codes.bits**2) & (
-            readings.wrong_border <= _WRONG_BORDER * 4 * (codes.side - 1)
-        )
-        # where nearly all cells are the code's, they alone may speak for a short lead
-        agreed = (readings.wrong <= _AGREED * codes.bits**2) & (spare >= _FEW_SPARE_BITS)
-        joint_lead = np.sqrt(readings.lead * np.maximum(readings.inner_lead, readings.lead))
-        shown = readings.inner > settings.least_inner_correlation
-        correlated = (
+        matched = (
             (readings.correlation > settings.least_correlation)
-            & shown
-            & (np.where(agreed, joint_lead, readings.lead) > lead)
+            & (np.minimum(readings.lead, readings.inner_lead) > lead)
+            & (readings.wrong <= _CONTRADICTED * codes.bits**2)
+            & (readings.wrong_border <= _CONTRADICTED * 4 * (codes.side - 1))
         )
-        clear = readings.lead > np.where(listed, _CLEAR_KNOWN, _CLEAR) * lead
-        # cells a pixel wide show little, but nearly all of them are not wrong by chance
-        clear &= readings.wrong_border <= _CONTRADICTED * 4 * (codes.side - 1)
-        accepted = correlated & (plausible | clear) | shown & (readings.error < _LARGEST_ERROR)
+        accepted = (matched | (readings.error < _LARGEST_ERROR)) & (
+            readings.inner > settings.least_inner_correlation
+        )
         confidence = readings.correlation * (1.0 - 1.0 / np.maximum(readings.lead, 1.0))
         return self._detections(
             readings.homographies[accepted],
