@@ -169,7 +169,7 @@ class Container(State):
 
     def fsm_first(self) -> Node | Exit:
         """Return the node that an execution begins with."""
-        return self.fsm_table[self.get_initial_states()[0]]
+        raise NotImplementedError
 
     # States by label.
 
@@ -560,7 +560,7 @@ class Container(State):
         """Begin a run of its own, and watch it to its end."""
         control, wakeup = self.control, Interrupt()
         run = Run(control, self.fsm_clock, self._preempt_timeout)
-        thread = ExecutionThread(run, self.fsm_path, wakeup, self)
+        thread = ExecutionThread(run, self.fsm_path, wakeup)
 
         def body() -> Any:
             return self._enter(thread, this_thread.stack, parent_ud)

@@ -99,7 +99,7 @@ class Control:
                 except Exception as error:
                     logerr(f'Trace {trace!r} raised {describe(error)}')
 
-        self.trace = None if not traces else traces[0] if len(traces) == 1 else tell_all
+        self.trace = tell_all if traces else None
         self._call_attention()
 
     def pause(self) -> None:

@@ -399,14 +399,10 @@ class Frame:
         )
 
     def note(self, raw: RawTransition) -> None:
-        """Tell the run's trace of a transition; what that raises is logged."""
+        """Tell the run's trace of a transition."""
         trace = self.run.control.trace
-        if trace is None:
-            return
-        try:
+        if trace is not None:
             trace(raw)
-        except Exception as error:
-            log.logerr(f"Trace {trace!r} of '{self.path}' raised {describe(error)}")
 
 
 # Threads.
@@ -468,7 +464,6 @@ class ExecutionThread:
     Attributes:
         run: The execution it belongs to.
         path: Path of the state it was started for.
-        root: The container it executes, when it is a root's; None for a concurrence's child.
         leaf: The node of a concurrence's child that it executes; None for a root.
         stack: Frames of the containers it is in, outermost first. A thread of the interpreter is
             the present one as long as this is the list that it began with.
@@ -484,17 +479,9 @@ class ExecutionThread:
         forced: `leaf`, and the outcome to take in place of the one that it returns.
     """
 
-    def __init__(
-        self,
-        run: Run,
-        path: str,
-        wakeup: Interrupt,
-        root: State | None = None,
-        leaf: Node | None = None,
-    ) -> None:
+    def __init__(self, run: Run, path: str, wakeup: Interrupt, leaf: Node | None = None) -> None:
         self.run = run
         self.path = path
-        self.root = root
         self.leaf = leaf
         self.wakeup = wakeup
         self.stack: list[Frame] = []
@@ -513,12 +500,8 @@ class ExecutionThread:
 
     def executes_next(self, container: State, stack: list[Frame]) -> bool:
         """Tell whether `container` is what the engine executes next, not some user code."""
-        if stack:
-            current = stack[-1].current
-            return isinstance(current, Node) and current.state is container
-        if self.leaf is not None:
-            return self.leaf.state is container
-        return self.root is container
+        current = stack[-1].current if stack else self.leaf
+        return isinstance(current, Node) and current.state is container
 
     def path_inside(self) -> str:
         """Return the path of the state that is being executed."""

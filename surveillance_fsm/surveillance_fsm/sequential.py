@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 from surveillance_fsm import control, log
 from surveillance_fsm.container import Container
-from surveillance_fsm.exceptions import InvalidStateError, SmachError, describe
+from surveillance_fsm.exceptions import InvalidStateError, SmachError
 from surveillance_fsm.execution import (
     LOWEST,
     NO_USERDATA,
@@ -164,10 +164,7 @@ class SequentialFrame(Frame):
                     self.current = told = target = SHUTDOWN
                     break
                 if trace is not None:
-                    try:
-                        trace((node, outcome, now(), data.copy() if data else NO_USERDATA))
-                    except Exception as error:
-                        log.logerr(f"Trace {trace!r} of '{self.path}' raised {describe(error)}")
+                    trace((node, outcome, now(), data.copy() if data else NO_USERDATA))
                 if chatty:
                     self._log(node, outcome, target)
                 if callbacks and not target.is_exit:

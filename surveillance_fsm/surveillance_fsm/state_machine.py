@@ -187,6 +187,10 @@ class StateMachine(Container):
                 ]
         return table
 
+    def fsm_first(self) -> Node | Exit:
+        """Return the node of the initial state."""
+        return self.fsm_table[self._initial_state_label]  # type: ignore[index]
+
     # The container's interface.
 
     def get_initial_states(self) -> list[str]:
@@ -471,6 +475,10 @@ class Iterator(Container):
     def fsm_ending(self, outcome: str) -> str:
         """Return the iterator's outcome when its state's `outcome` ends the loop."""
         return self.final_outcome_map.get(outcome, outcome)
+
+    def fsm_first(self) -> Node | Exit:
+        """Return the node of the state."""
+        return self.fsm_table[self._state_label]
 
     # The container's interface.
 

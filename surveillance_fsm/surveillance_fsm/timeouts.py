@@ -2,7 +2,7 @@
 
 Whoever executes a machine watches its threads (`supervise`). When a state neither returns within
 its deadline nor heeds a preempt within its bound, the watcher leaves its thread behind, has another
-one go on where the state would have ended (`abandon_thread`), and names the state in the log.
+one go on where the state would have ended (`_abandon`), and names the state in the log.
 """
 
 from __future__ import annotations
@@ -260,8 +260,10 @@ def _enforce(thread: ExecutionThread) -> None:
         if thread.done:
             return
         for watch in tuple(thread.watches):
-            if watch.hard is not None and now >= watch.hard:
-                _enforce_deadline(thread, watch)
+            limits = watch.node.limits
+            if watch.hard is not None and now >= watch.hard and limits is not None:
+                reason = f'did not return within its deadline of {limits.deadline:g} s'
+                _abandon(thread, watch.depth, watch.node, limits.late_outcome, reason)
                 return
             if watch.soft is not None and now >= watch.soft:
                 watch.soft, watch.asked = None, True
@@ -269,13 +271,6 @@ def _enforce(thread: ExecutionThread) -> None:
         _, steady = _due(thread)
         if steady is not None and time.monotonic() >= steady:
             _abandon_unpreemptible(thread)
-
-
-def _enforce_deadline(thread: ExecutionThread, watch: Watch) -> None:
-    limits = watch.node.limits
-    assert limits is not None
-    reason = f'did not return within its deadline of {limits.deadline:g} s'
-    abandon_thread(thread, watch.depth, watch.node, limits.late_outcome, reason)
 
 
 # Going on without a state.
@@ -286,10 +281,7 @@ STOPPED = ('preempted', 'aborted')
 
 def stopped_outcome(node: Node) -> str | None:
     """Return the outcome that a state is taken to have ended with, if it has one for that."""
-    for outcome in STOPPED:
-        if outcome in node.targets:
-            return outcome
-    return None
+    return next((outcome for outcome in STOPPED if outcome in node.targets), None)
 
 
 def _abandon_unpreemptible(thread: ExecutionThread) -> None:
@@ -297,44 +289,32 @@ def _abandon_unpreemptible(thread: ExecutionThread) -> None:
 
     Under the run's condition.
     """
-    bound = thread.run.preempt_timeout
-    reason = f'ignored a preempt for {bound:g} s'
-    culprit = thread.path_inside()
-    for depth in range(len(thread.stack) - 1, -1, -1):
-        node = thread.stack[depth].current
+    reason = f'ignored a preempt for {thread.run.preempt_timeout:g} s'
+    places = [(depth, frame.current, frame.forced) for depth, frame in enumerate(thread.stack)]
+    if thread.leaf is not None:
+        places.insert(0, (-1, thread.leaf, thread.forced))
+    for depth, node, forced in reversed(places):
         if not isinstance(node, Node):
             return  # It is ending by itself.
-        forced = thread.stack[depth].forced
         outcome = forced[1] if forced is not None else stopped_outcome(node)
         if outcome is not None:
-            abandon_thread(thread, depth, node, outcome, reason, culprit)
+            _abandon(thread, depth, node, outcome, reason)
             return
-    leaf, forced = thread.leaf, thread.forced
-    if leaf is not None:
-        outcome = forced[1] if forced is not None else stopped_outcome(leaf)
-        if outcome is not None:
-            abandon_thread(thread, -1, leaf, outcome, reason, culprit)
-            return
-    root = thread.stack[0].container if thread.stack else None
-    outcomes = root.get_registered_outcomes() if root is not None else ()
-    for ending in STOPPED:
-        if ending in outcomes:
-            abandon_thread(thread, -1, None, ending, reason, culprit)
-            return
+    outcomes = thread.stack[0].container.get_registered_outcomes() if thread.stack else ()
+    ending = next((outcome for outcome in STOPPED if outcome in outcomes), None)
     error = InvalidTransitionError(
-        f"State '{culprit}' {reason}, and no container around it can "
-        f"end with 'preempted' or 'aborted'"
+        f"State '{thread.path_inside()}' {reason}, and no container around it can end with "
+        "'preempted' or 'aborted'"
     )
-    abandon_thread(thread, -1, None, error, reason, culprit)
+    _abandon(thread, -1, None, error if ending is None else ending, reason)
 
 
-def abandon_thread(
+def _abandon(
     thread: ExecutionThread,
     depth: int,
     node: Node | None,
     outcome: str | BaseException,
     reason: str,
-    culprit: str | None = None,
 ) -> None:
     """Abandon the present thread, and go on as if the state in frame `depth` had ended.
 
@@ -346,25 +326,15 @@ def abandon_thread(
         node: The state to go on without, whose userdata is taken away.
         outcome: What it is taken to have returned, or the error to end with.
         reason: What it did wrong, for the log.
-        culprit: Its path.
     """
     assert thread.work is not None
-    culprit = culprit or thread.path_inside()
+    culprit = thread.path_inside()
     leaf = thread.stack[-1].current if thread.stack else thread.leaf
     ended = f"with '{outcome}'" if isinstance(outcome, str) else 'with an error'
     logerr(f"State '{culprit}' {reason}: the machine goes on without it, {ended}")
     thread.run.left_behind.append((culprit, thread.work))
     old = thread.stack
-    frames = [frame.successor() for frame in old[: depth + 1]]
-    for frame in old:
-        frame.stale = frame.attention = True
-        frame.container.fsm_frame = None
-    for frame in old[depth + 1 :]:
-        frame.container.recall_preempt()
-    for frame in frames:
-        frame.container.fsm_frame = frame
-    if frames:
-        frames[-1].gone = node
+    frames = _successors(old, depth, node)
     if isinstance(leaf, Node):
         # The request stays with the state, so that the thread left behind ends some time.
         leaf.state.request_preempt()
@@ -378,15 +348,32 @@ def abandon_thread(
     thread.run.condition.notify_all()
     for frame in old:
         frame.woken()
-    if not frames:
-        thread.without_leaf = leaf is thread.leaf
-        if isinstance(outcome, str):
-            thread.end(outcome, None)
-        else:
-            thread.end(None, outcome)
-        thread.wakeup.set()
+    if frames:
+        thread.start(lambda: _go_on(thread, frames, outcome))
         return
-    thread.start(lambda: _go_on(thread, frames, outcome))
+    thread.without_leaf = leaf is thread.leaf
+    error = None if isinstance(outcome, str) else outcome
+    thread.end(outcome if error is None else None, error)
+    thread.wakeup.set()
+
+
+def _successors(old: list[Frame], depth: int, node: Node | None) -> list[Frame]:
+    """Take containers away from the frames of a thread left behind.
+
+    Returns:
+        Frames in place of those up to `depth`, whose containers go on without `node`.
+    """
+    frames = [frame.successor() for frame in old[: depth + 1]]
+    for frame in old:
+        frame.stale = frame.attention = True
+        frame.container.fsm_frame = None
+    for frame in old[depth + 1 :]:
+        frame.container.recall_preempt()
+    for frame in frames:
+        frame.container.fsm_frame = frame
+    if frames:
+        frames[-1].gone = node
+    return frames
 
 
 def _go_on(thread: ExecutionThread, frames: list[Frame], outcome: Any) -> Any:

@@ -52,21 +52,13 @@ INITIAL_STATE_SET = 'initial state set'
 CONTAINERS = 1000
 """Containers of which SMACH's topics keep the last message for a viewer that comes late."""
 
-_LATCHED = QoSProfile(
-    depth=1,
-    reliability=ReliabilityPolicy.RELIABLE,
-    durability=DurabilityPolicy.TRANSIENT_LOCAL,
-)
-_TRANSITIONS = QoSProfile(
-    depth=HISTORY,
-    reliability=ReliabilityPolicy.RELIABLE,
-    durability=DurabilityPolicy.TRANSIENT_LOCAL,
-)
-_CONTAINERS = QoSProfile(
-    depth=CONTAINERS,
-    reliability=ReliabilityPolicy.RELIABLE,
-    durability=DurabilityPolicy.TRANSIENT_LOCAL,
-)
+
+def _latched(depth: int) -> QoSProfile:
+    return QoSProfile(
+        depth=depth,
+        reliability=ReliabilityPolicy.RELIABLE,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL,
+    )
 
 
 class IntrospectionServer:
@@ -93,37 +85,37 @@ class IntrospectionServer:
         self._root = state
         if path.strip('/'):
             state.set_name(path.strip('/'))
-        prefix = f'{server_name.rstrip("/")}/fsm' if server_name else 'fsm'
+        server = server_name.rstrip('/')
+        fsm_names = f'{server}/fsm' if server else 'fsm'
         self._feed: TransitionFeed | None = None
         self._sequence = 0
-        self._transitions = node.create_publisher(
-            FsmTransition, f'{prefix}/transition', _TRANSITIONS
-        )
-        self._status = node.create_publisher(FsmStatus, f'{prefix}/status', _LATCHED)
-        self._structure = node.create_publisher(FsmStructure, f'{prefix}/structure', _LATCHED)
-        smach = server_name.rstrip('/') if server_name else ''
-        self._smach_structure = node.create_publisher(
-            SmachContainerStructure, f'{smach}{STRUCTURE_TOPIC}'.lstrip('/'), _CONTAINERS
-        )
-        self._smach_status = node.create_publisher(
-            SmachContainerStatus, f'{smach}{STATUS_TOPIC}'.lstrip('/'), _CONTAINERS
-        )
-        self._smach_init = node.create_subscription(
-            SmachContainerInitialStatusCmd,
-            f'{smach}{INIT_STATUS_TOPIC}'.lstrip('/'),
-            self._on_initial_state,
-            10,
-        )
         self._containers: dict[str, Structure] = {}
+
+        def publisher(kind: Any, name: str, depth: int) -> Any:
+            return node.create_publisher(kind, name, _latched(depth))
+
+        self._transitions = publisher(FsmTransition, f'{fsm_names}/transition', HISTORY)
+        self._status = publisher(FsmStatus, f'{fsm_names}/status', 1)
+        self._structure = publisher(FsmStructure, f'{fsm_names}/structure', 1)
+        structure, status, init = (
+            f'{server}{topic}' if server else topic.lstrip('/')
+            for topic in (STRUCTURE_TOPIC, STATUS_TOPIC, INIT_STATUS_TOPIC)
+        )
+        self._smach_structure = publisher(SmachContainerStructure, structure, CONTAINERS)
+        self._smach_status = publisher(SmachContainerStatus, status, CONTAINERS)
+        node.create_subscription(SmachContainerInitialStatusCmd, init, self._on_initial_state, 10)
         control = state.control
         for name, action in (
             ('pause', control.pause),
             ('resume', control.resume),
             ('step', control.step),
         ):
-            node.create_service(Trigger, f'{prefix}/{name}', partial(self._trigger, action))
-        node.create_service(ForceOutcome, f'{prefix}/force_outcome', self._force_outcome)
-        node.create_service(SetInitialState, f'{prefix}/set_initial_state', self._set_initial_state)
+            node.create_service(Trigger, f'{fsm_names}/{name}', partial(self._trigger, action))
+        for kind, name, serve in (
+            (ForceOutcome, 'force_outcome', self._force_outcome),
+            (SetInitialState, 'set_initial_state', self._set_initial_state),
+        ):
+            node.create_service(kind, f'{fsm_names}/{name}', serve)
 
     def start(self) -> None:
         """Draw the machine in the log, on level debug, and begin to publish."""
