@@ -7,7 +7,7 @@ import math
 import pytest
 
 from surveillance_controllers.battery.model import Battery, BatteryParameters
-from surveillance_controllers.battery.use import BatteryInUse, MotionMeter
+from surveillance_controllers.battery.use import BatteryInUse
 
 PARAMETERS = BatteryParameters(
     capacity=1.0,
@@ -33,11 +33,13 @@ def test_way_and_turn_are_paid_for() -> None:
 
 
 def test_a_correction_of_the_estimate_is_no_way_driven() -> None:
-    meter = MotionMeter(top_speed=1.0, top_turn=1.0)
-    meter.see((0.0, 0.0, 0.0), 0.0)
-    meter.see((5.0, 0.0, math.pi), 0.1)
-    assert meter.take() == pytest.approx((0.1, 0.1))
-    assert meter.take() == (0.0, 0.0)
+    battery, use = in_use()
+    use.see_pose((3.0, 0.0, 0.0), 0.0)
+    use.see_pose((8.0, 0.0, math.pi), 0.1)
+    use.advance(0.1)
+    assert battery.energy == pytest.approx(0.5 - (36 * 0.2 + 18 * 0.3) / 3600)
+    use.advance(0.2)
+    assert battery.energy == pytest.approx(0.5 - (36 * 0.2 + 18 * 0.3) / 3600)
 
 
 def test_the_arm_is_paid_for_while_it_moves() -> None:

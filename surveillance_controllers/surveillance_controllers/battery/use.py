@@ -17,40 +17,8 @@ LONGEST_AWAY = 86_400.0
 """A longer time between two steps is none, but a jump of the clock, seconds."""
 
 
-class MotionMeter:
-    """Adds up way and turn between two readings.
-
-    Args:
-        top_speed: What the robot can drive, m/s.
-        top_turn: What it can turn, rad/s.
-
-    Attributes:
-        pose: The last pose seen.
-    """
-
-    def __init__(self, top_speed: float = 2.0, top_turn: float = 3.0) -> None:
-        self.pose: Pose | None = None
-        self._top_speed = top_speed
-        self._top_turn = top_turn
-        self._at = 0.0
-        self._metres = 0.0
-        self._radians = 0.0
-
-    def see(self, pose: Pose, now: float) -> None:
-        """Take a new pose, seen at `now` (seconds)."""
-        if self.pose is not None and now > self._at:
-            passed = now - self._at
-            step = math.hypot(pose[0] - self.pose[0], pose[1] - self.pose[1])
-            self._metres += min(step, self._top_speed * passed)
-            turn = abs(angle_between(self.pose[2], pose[2]))
-            self._radians += min(turn, self._top_turn * passed)
-        self.pose, self._at = pose, now
-
-    def take(self) -> tuple[float, float]:
-        """Return the way (m) and turn (rad) since the last call."""
-        taken = self._metres, self._radians
-        self._metres = self._radians = 0.0
-        return taken
+TOP_SPEED, TOP_TURN = 2.0, 3.0
+"""No robot is faster, m/s and rad/s: what is more is a correction of the estimate."""
 
 
 class BatteryInUse:
@@ -61,6 +29,9 @@ class BatteryInUse:
         station: Where the charging station is.
         dock_reach: Distance from the station within which the robot charges, metres.
         since: When the battery had its level, seconds; None: when time first passes.
+
+    Attributes:
+        pose: Where the robot was last; None until it reports.
     """
 
     def __init__(
@@ -70,27 +41,28 @@ class BatteryInUse:
         self._station = station
         self._dock_reach = dock_reach
         self._last = since
-        self._meter = MotionMeter()
+        self.pose: Pose | None = None
+        self._seen_at = 0.0
+        self._metres = self._radians = 0.0
         self._joints: tuple[float, ...] | None = None
         self._arm_moved = False
 
     @property
-    def pose(self) -> Pose | None:
-        """Where the robot was last; None until it reports."""
-        return self._meter.pose
-
-    @property
     def docked(self) -> bool:
         """Whether the robot stands at the station."""
-        pose = self._meter.pose
-        if pose is None:
-            return False
-        gap = math.hypot(pose[0] - self._station[0], pose[1] - self._station[1])
-        return gap <= self._dock_reach
+        return (
+            self.pose is not None
+            and math.dist(self.pose[:2], self._station[:2]) <= self._dock_reach
+        )
 
     def see_pose(self, pose: Pose, now: float) -> None:
         """Take where the robot is at `now` (seconds)."""
-        self._meter.see(pose, now)
+        if self.pose is not None and now > self._seen_at:
+            passed = now - self._seen_at
+            self._metres += min(math.dist(pose[:2], self.pose[:2]), TOP_SPEED * passed)
+            turn = abs(angle_between(self.pose[2], pose[2]))
+            self._radians += min(turn, TOP_TURN * passed)
+        self.pose, self._seen_at = pose, now
 
     def see_joints(self, positions: Sequence[float]) -> None:
         """Take the joints of the arm, radians."""
@@ -104,9 +76,9 @@ class BatteryInUse:
         self._last = now
         if not 0.0 <= passed <= LONGEST_AWAY:
             passed = 0.0  # Another clock.
-        metres, radians = self._meter.take()
-        moved, self._arm_moved = self._arm_moved, False
-        self._battery.draw(passed, metres, radians, passed if moved else 0.0)
+        self._battery.draw(passed, self._metres, self._radians, passed if self._arm_moved else 0.0)
+        self._metres = self._radians = 0.0
+        self._arm_moved = False
         if self.docked:
             self._battery.charge(passed)
 

@@ -91,6 +91,9 @@ _STANDS = 0.004
 _MOVER_RIM = 0.15
 """Points this near to something that moves are its own, metres."""
 
+SPIN_SPEED, SPIN_ACCELERATION = 1.0, 3.0
+"""Of one turn on the spot, rad/s and rad/s^2."""
+
 _RECOVERIES = (
     (State.WAITING, State.ASKING),
     (State.BACKING, State.ASKING),
@@ -109,7 +112,6 @@ class Drive:
     Attributes:
         state: What the drive is doing.
         reason: Why it recovers or failed.
-        recoveries: How many recoveries were begun.
     """
 
     def __init__(
@@ -124,7 +126,6 @@ class Drive:
         self._local = SampledPlanner(self._robot)
         self.state = State.DRIVING
         self.reason = ''
-        self.recoveries = 0
         self._plan: list[State] = []
         self._level = 0
         self._paths = 0
@@ -314,7 +315,6 @@ class Drive:
                 self.state = State.FAILED
                 return
             self._level = 1
-        self.recoveries += 1
         self._plan = list(_RECOVERIES[self._level])
         self._level += 1
         self._next(now)
@@ -326,7 +326,6 @@ class Drive:
             self._paths = 0
             self._recover(now, reason)
             return
-        self.recoveries += 1
         self._plan = [State.ASKING]
         self._next(now)
 
@@ -348,16 +347,9 @@ class Drive:
 
 
 class Spin:
-    """One turn on the spot.
+    """One turn on the spot."""
 
-    Args:
-        turn: Turning speed, rad/s.
-        acceleration: Of the turning speed, rad/s^2.
-    """
-
-    def __init__(self, turn: float = 1.0, acceleration: float = 3.0) -> None:
-        self._top = turn
-        self._acceleration = acceleration
+    def __init__(self) -> None:
         self._turned = 0.0
         self._last: float | None = None
 
@@ -374,4 +366,4 @@ class Spin:
         if self.done:
             return Velocity()
         left = math.tau - self._turned
-        return Velocity(0.0, min(self._top, math.sqrt(2 * self._acceleration * left)))
+        return Velocity(0.0, min(SPIN_SPEED, math.sqrt(2 * SPIN_ACCELERATION * left)))
