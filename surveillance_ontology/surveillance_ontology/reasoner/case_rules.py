@@ -284,7 +284,8 @@ class CaseRules:
             define(name, expression)
         return known[expression]
 
-    def _counted(self, table: dict[int, _Counted], count: _Counted) -> int:
+    def counted(self, table: dict[int, _Counted], count: _Counted) -> int:
+        """Return the concept of whoever has so many."""
         key = (id(table), count)
         known = self._counts.get(key)
         if known is None:
@@ -417,7 +418,7 @@ class CaseRules:
             self._below(role, turned(role))
             self._chains.imply((role, role), role)
             somebody = Count(1, self.role(TOP), self.nominal(self.fresh()))
-            self.node_rule(_ALL, ((_X, self._counted(self.at_least, somebody)),))
+            self.node_rule(_ALL, ((_X, self.counted(self.at_least, somebody)),))
         if BOTTOM in used:
             self.edge_rule(EdgeRule(_ALL, self.role(BOTTOM), _ALL, ()))
         if _BOTTOM_DATA in used:
@@ -553,24 +554,40 @@ class _Clause:
             self._both.append(one)
         elif isinstance(one, ex.ObjectAllValuesFrom):
             self._every.append(one)
-        elif isinstance(one, ex.ObjectMinCardinality | ex.ObjectMaxCardinality):
-            self._take_number(one)
-        elif isinstance(one, ex.DataMaxCardinality) and one.n == 0:
-            self._never.append((one.prop, rules.values(one.range)))
+        elif isinstance(one, ex.ObjectMaxCardinality):
+            self._count(rules.at_most, one.n, one.prop, rules.recognised(one.filler))
+        elif isinstance(one, ex.ObjectMinCardinality):
+            self._count(rules.at_least, one.n, one.prop, rules.positive(one.filler))
+        elif isinstance(one, ex.ObjectSomeValuesFrom):
+            self._count(rules.at_least, 1, one.prop, rules.positive(one.filler))
+        elif isinstance(one, ex.ObjectHasValue):
+            self._count(rules.at_least, 1, one.prop, rules.nominal(one.individual))
+        elif isinstance(one, ex.DataAllValuesFrom):
+            self._never.append((one.prop, ~rules.values(one.range)))
+        elif isinstance(one, ex.DataMaxCardinality):
+            self._count_values(rules.values_at_most, one.n, one.prop, one.range)
+        elif isinstance(one, ex.DataMinCardinality):
+            self._count_values(rules.values_at_least, one.n, one.prop, one.range)
+        elif isinstance(one, ex.DataSomeValuesFrom):
+            self._count_values(rules.values_at_least, 1, one.prop, one.range)
         else:
-            assert isinstance(one, ex.DataMinCardinality | ex.DataMaxCardinality)
-            few = isinstance(one, ex.DataMaxCardinality)
-            table = rules.values_at_most if few else rules.values_at_least
-            count = ValueCount(one.n, one.prop, rules.values(one.range))
-            self._heads.append(rules._counted(table, count))
+            assert isinstance(one, ex.DataHasValue)
+            only = ex.DataOneOf((one.literal,))
+            self._count_values(rules.values_at_least, 1, one.prop, only)
 
-    def _take_number(self, one: ex.ObjectMinCardinality | ex.ObjectMaxCardinality) -> None:
-        rules, few = self._rules, isinstance(one, ex.ObjectMaxCardinality)
-        if (few or one.n > 1) and rules.complex_role(one.prop):
+    def _count(
+        self, table: dict[int, Count], n: int, prop: PropertyExpression, concept: int
+    ) -> None:
+        rules = self._rules
+        if (table is rules.at_most or n > 1) and rules.complex_role(prop):
             raise UnsupportedError('a property with chains is counted')
-        concept = rules.recognised(one.filler) if few else rules.positive(one.filler)
-        count = Count(one.n, rules.role(one.prop), concept)
-        self._heads.append(rules._counted(rules.at_most if few else rules.at_least, count))
+        self._heads.append(rules.counted(table, Count(n, rules.role(prop), concept)))
+
+    def _count_values(
+        self, table: dict[int, ValueCount], n: int, prop: str, data_range: ex.DataRange
+    ) -> None:
+        count = ValueCount(n, prop, self._rules.values(data_range))
+        self._heads.append(self._rules.counted(table, count))
 
     # --- relations: at most one is spelt out, the others become concepts ---
 
@@ -654,6 +671,4 @@ def _is_negative(one: ClassExpression) -> bool:
         return all(map(_is_negative, one.operands))
     if isinstance(one, ex.ObjectAllValuesFrom):
         return _is_negative(one.filler)
-    if isinstance(one, ex.DataMaxCardinality):
-        return one.n == 0
-    return one == NOTHING or isinstance(one, ex.ObjectComplementOf)
+    return one == NOTHING or isinstance(one, ex.ObjectComplementOf | ex.DataAllValuesFrom)

@@ -94,13 +94,13 @@ class Classification:
     def _report_partial(self) -> None:
         """Report what is defined by expressions whose members are not all recognised.
 
-        Nothing is lost where what membership implies follows from less than membership anyway.
+        Nothing is lost where the rest of a clause implies its head anyway.
         """
         program = self.program
         if not program.partial:
             return
         contexts = Contexts(program)
-        for label, weaker, sentence in program.partial:
+        for label, sentence in program.partial:
             for clause in program.clauses:
                 atoms = [atom for atom in clause.body if isinstance(atom, PredicateAtom)]
                 if not any(atom.predicate is label for atom in atoms):
@@ -111,8 +111,8 @@ class Classification:
                 if len(atoms) == len(clause.body) and all(
                     atom.predicate.kind == 'class' and atom.terms == (_X,) for atom in atoms
                 ):
-                    tokens = {atom.predicate for atom in atoms} - {label, program.thing} | {weaker}
-                    context = contexts.context(tokens - {program.thing})
+                    tokens = {atom.predicate for atom in atoms} - {label, program.thing}
+                    context = contexts.context(tokens)
                     if context.clash or head.predicate in context.tokens:
                         continue
                 if sentence not in program.unsupported:

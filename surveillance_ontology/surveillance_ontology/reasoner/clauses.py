@@ -267,8 +267,8 @@ class Program:
             to.
         thing, nothing, different, same: The predicates with fixed meaning; `same` only ever names a
             premise.
-        partial: Labels whose members are not all recognised, each with a label that all its members
-            have, and the sentence that reports it.
+        partial: Labels whose members are not all recognised, each with the sentence that reports
+            it.
         meetings: Existentials whose individuals or values a lower bound counts.
         uses_thing: Whether the extension of owl:Thing must be kept.
         interacting: Whether several classes of one individual together imply more than each of
@@ -289,7 +289,7 @@ class Program:
     disjoint_properties: list[tuple[Predicate, bool, Predicate, bool]] = field(default_factory=list)
     negatives: dict[Predicate, Predicate] = field(default_factory=dict)
     unsupported: list[str] = field(default_factory=list)
-    partial: list[tuple[Predicate, Predicate, str]] = field(default_factory=list)
+    partial: list[tuple[Predicate, str]] = field(default_factory=list)
     meetings: list[tuple[Existential, AtLeast]] = field(default_factory=list)
     uses_thing: bool = False
     interacting: bool = False

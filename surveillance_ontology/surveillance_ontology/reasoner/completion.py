@@ -13,7 +13,7 @@ from surveillance_ontology.reasoner.cases import CaseReasoner, entails
 from surveillance_ontology.reasoner.classification import Classification
 from surveillance_ontology.reasoner.clauses import BodyAtom, Constant, Program, SameAtom
 from surveillance_ontology.reasoner.engine import Engine, FactView
-from surveillance_ontology.reasoner.translation import is_positive
+from surveillance_ontology.reasoner.normal_form import is_positive
 
 _MOST_ASSERTIONS = 20_000
 

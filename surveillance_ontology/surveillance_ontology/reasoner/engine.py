@@ -252,17 +252,21 @@ class Engine:
             predicate.on_insert.append(lambda x, y: touch(y))
             predicate.on_delete.append(lambda x, y: forget(y))
 
-    def _related_by_difference(self, individual: str) -> list[str]:
-        """Return the individual and those whose difference from others may rest on its own."""
-        found = [individual]
-        if self._network.touch_related:
-            for one in found:
-                for related in self._network.touch_related:
-                    found += [other for other in related(one) if other not in found]
+    def _related_by_difference(self, individuals: Iterable[str]) -> dict[str, None]:
+        """Return the individuals and those whose difference from others may rest on theirs."""
+        found = dict.fromkeys(individuals)
+        pending = list(found) if self._network.touch_related else []
+        while pending:
+            one = pending.pop()
+            for related in self._network.touch_related:
+                for other in related(one):
+                    if other not in found:
+                        found[other] = None
+                        pending.append(other)
         return found
 
-    def _touch_before_removal(self, individual: str) -> None:
-        for one in self._related_by_difference(individual):
+    def _touch_before_removal(self, *individuals: str) -> None:
+        for one in self._related_by_difference(individuals):
             for touch in self._network.touch_delete:
                 touch(one)
             if self.conflicts:
@@ -575,8 +579,7 @@ class Engine:
             best = max(heirs, key=lambda heir: len(heir & axiom.individuals), default=frozenset())
             for individual in sorted(axiom.individuals - best):
                 touched[equality.find(individual)] = None
-        for individual in touched:
-            self._touch_before_removal(individual)
+        self._touch_before_removal(*touched)
         for axiom in gone:
             difference.withdraw(axiom)
         for axiom in come:
@@ -695,16 +698,11 @@ class Engine:
             self.program.unsupported.append(text)
 
     def _run_touched(self) -> None:
-        pending = tuple(self._touched)
+        pending = self._related_by_difference(self._touched)
         self._touched.clear()
-        done: set[str] = set()
-        touch_insert = self._network.touch_insert
-        for individual in pending:
-            for one in self._related_by_difference(individual):
-                if one not in done:
-                    done.add(one)
-                    for touch in touch_insert:
-                        touch(one)
+        for one in pending:
+            for touch in self._network.touch_insert:
+                touch(one)
 
 
 def individuals_of(axiom: Axiom) -> set[str]:

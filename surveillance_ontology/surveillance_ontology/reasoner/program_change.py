@@ -39,7 +39,7 @@ class ProgramChange:
         removed: Clauses of the running program that go.
         clauses: All that it is to have afterwards, in its own predicates.
         added: Those of them that come.
-        existentials, meetings, partial: As in `Program`, in the running program's predicates.
+        existentials, meetings: As in `Program`, in the running program's predicates.
         predicate: Gives the running program's predicate for one of the other's.
     """
 
@@ -49,7 +49,6 @@ class ProgramChange:
     added: list[Clause]
     existentials: list[Existential]
     meetings: list[Any]
-    partial: list[Any]
     predicate: Callable[[Predicate], Predicate]
 
     def apply(self, running: Program) -> None:
@@ -60,8 +59,7 @@ class ProgramChange:
         running.datas = self._table(running.datas, wanted.datas)
         running.labels = self._table(running.labels, wanted.labels)
         running.clauses, running.existentials = self.clauses, self.existentials
-        running.meetings, running.partial = self.meetings, self.partial
-        running.unsupported = wanted.unsupported
+        running.meetings, running.unsupported = self.meetings, wanted.unsupported
 
     def _table(self, mine: dict[_N, Predicate], wanted: dict[_N, Predicate]) -> dict[_N, Predicate]:
         filled = {name: one for name, one in mine.items() if one.members or one.succ}
@@ -95,10 +93,6 @@ def program_change(running: Program, wanted: Program) -> ProgramChange | None:
         added,
         [of_running.record(existential) for existential in wanted.existentials],
         [tuple(map(of_running.record, pair)) for pair in wanted.meetings],
-        [
-            (of_running.predicate(label), of_running.predicate(weaker), text)
-            for label, weaker, text in wanted.partial
-        ],
         of_running.predicate,
     )
 

@@ -47,106 +47,9 @@ from surveillance_ontology.reasoner.clauses import (
     turned,
 )
 from surveillance_ontology.reasoner.datatypes import Test, range_test, unfolded, value_of
+from surveillance_ontology.reasoner.normal_form import is_positive, normal_form
 from surveillance_ontology.reasoner.swrl_builtins import builtin
 from surveillance_ontology.reasoner.value_sets import EVERY, ValueSet, value_set
-
-_POSITIVE = (
-    ex.ObjectSomeValuesFrom,
-    ex.ObjectMinCardinality,
-    ex.ObjectHasValue,
-    ex.ObjectHasSelf,
-    ex.ObjectOneOf,
-    ex.DataSomeValuesFrom,
-    ex.DataMinCardinality,
-    ex.DataHasValue,
-)
-
-
-def negated(expression: ClassExpression) -> ClassExpression:
-    """Return the complement, with negation pushed inwards."""
-    if isinstance(expression, str):
-        if expression == THING:
-            return NOTHING
-        return THING if expression == NOTHING else ex.ObjectComplementOf(expression)
-    if isinstance(expression, ex.ObjectComplementOf):
-        return normal(expression.operand)
-    if isinstance(expression, ex.ObjectIntersectionOf):
-        return ex.ObjectUnionOf(tuple(map(negated, expression.operands)))
-    if isinstance(expression, ex.ObjectUnionOf):
-        return ex.ObjectIntersectionOf(tuple(map(negated, expression.operands)))
-    if isinstance(expression, ex.ObjectSomeValuesFrom):
-        return ex.ObjectAllValuesFrom(expression.prop, negated(expression.filler))
-    if isinstance(expression, ex.ObjectAllValuesFrom):
-        return ex.ObjectSomeValuesFrom(expression.prop, negated(expression.filler))
-    if isinstance(expression, ex.ObjectMinCardinality):
-        if expression.n == 0:
-            return NOTHING
-        return ex.ObjectMaxCardinality(expression.n - 1, expression.prop, expression.filler)
-    if isinstance(expression, ex.ObjectMaxCardinality):
-        return ex.ObjectMinCardinality(expression.n + 1, expression.prop, expression.filler)
-    if isinstance(expression, ex.DataSomeValuesFrom):
-        return ex.DataMaxCardinality(0, expression.prop, expression.range)
-    if isinstance(expression, ex.DataAllValuesFrom):
-        return ex.DataSomeValuesFrom(expression.prop, ex.DataComplementOf(expression.range))
-    if isinstance(expression, ex.DataMinCardinality):
-        if expression.n == 0:
-            return NOTHING
-        return ex.DataMaxCardinality(expression.n - 1, expression.prop, expression.range)
-    if isinstance(expression, ex.DataMaxCardinality):
-        return ex.DataMinCardinality(expression.n + 1, expression.prop, expression.range)
-    if isinstance(expression, ex.ObjectExactCardinality):
-        few = ex.ObjectMinCardinality(expression.n + 1, expression.prop, expression.filler)
-        if expression.n == 0:
-            return few
-        less = ex.ObjectMaxCardinality(expression.n - 1, expression.prop, expression.filler)
-        return ex.ObjectUnionOf((few, less))
-    if isinstance(expression, ex.DataExactCardinality):
-        more = ex.DataMinCardinality(expression.n + 1, expression.prop, expression.range)
-        if expression.n == 0:
-            return more
-        fewer = ex.DataMaxCardinality(expression.n - 1, expression.prop, expression.range)
-        return ex.ObjectUnionOf((more, fewer))
-    return ex.ObjectComplementOf(expression)
-
-
-def normal(expression: ClassExpression) -> ClassExpression:
-    """Return the expression with complements pushed inwards and no nested intersections or
-    unions.
-    """
-    if isinstance(expression, ex.ObjectComplementOf):
-        pushed = negated(expression.operand)
-        return pushed if pushed == expression else normal(pushed)
-    if isinstance(expression, (ex.ObjectIntersectionOf, ex.ObjectUnionOf)):
-        kind = type(expression)
-        flat: list[ClassExpression] = []
-        for operand in map(normal, expression.operands):
-            flat += operand.operands if isinstance(operand, kind) else (operand,)
-        flat = list(dict.fromkeys(flat))
-        return flat[0] if len(flat) == 1 else kind(tuple(flat))
-    return expression
-
-
-def bounds(
-    exactly: ex.ObjectExactCardinality | ex.DataExactCardinality,
-) -> tuple[ClassExpression, ClassExpression]:
-    """Return the lower and the upper bound that an exact number consists of."""
-    if isinstance(exactly, ex.ObjectExactCardinality):
-        parts = (exactly.n, exactly.prop, exactly.filler)
-        return ex.ObjectMinCardinality(*parts), ex.ObjectMaxCardinality(*parts)
-    counted = (exactly.n, exactly.prop, exactly.range)
-    return ex.DataMinCardinality(*counted), ex.DataMaxCardinality(*counted)
-
-
-def is_positive(expression: ClassExpression) -> bool:
-    """Tell whether facts that hold can show membership, so that a clause body can state it."""
-    if isinstance(expression, str):
-        return True
-    if isinstance(expression, (ex.ObjectIntersectionOf, ex.ObjectUnionOf)):
-        return all(map(is_positive, expression.operands))
-    if isinstance(expression, (ex.ObjectSomeValuesFrom, ex.ObjectMinCardinality)):
-        return is_positive(normal(expression.filler))
-    return isinstance(expression, _POSITIVE)
-
 
 _Directed = tuple[str, bool]
 
@@ -202,10 +105,8 @@ _NEGATIVE = (
     ex.ObjectComplementOf,
     ex.ObjectAllValuesFrom,
     ex.ObjectMaxCardinality,
-    ex.ObjectExactCardinality,
     ex.DataAllValuesFrom,
     ex.DataMaxCardinality,
-    ex.DataExactCardinality,
 )
 _RELATING = (
     ex.ObjectSomeValuesFrom,
@@ -383,7 +284,7 @@ class Translation:
         return label
 
     def _filler(self, expression: ClassExpression) -> Predicate | None:
-        expression = normal(expression)
+        expression = normal_form(expression)
         return None if expression == THING else self._recognise(expression)
 
     def _direction(self, prop: ex.PropertyExpression) -> tuple[Predicate, bool]:
@@ -412,7 +313,7 @@ class Translation:
 
     def bodies(self, expression: ClassExpression, x: Term) -> list[Body]:
         """Return the bodies each of which makes `x` a member."""
-        expression = normal(expression)
+        expression = normal_form(expression)
         if isinstance(expression, str):
             if expression == THING:
                 return [()]
@@ -452,7 +353,7 @@ class Translation:
         So every clause speaks of one individual and what it is directly related to, which is what
         `classification` needs.
         """
-        expression = normal(expression)
+        expression = normal_form(expression)
         if isinstance(expression, (str, ex.ObjectOneOf)):
             return self.bodies(expression, y)
         if isinstance(expression, ex.ObjectIntersectionOf) and all(
@@ -490,30 +391,15 @@ class Translation:
     def _labelled_bodies(self, expression: ClassExpression, x: Term) -> list[Body]:
         """Return the bodies for an expression that needs a label beside them."""
         functional = self.hierarchy.is_functional
-        if isinstance(expression, ex.ObjectMinCardinality):
-            if expression.n == 0:
-                return [()]
-            if expression.n == 1:
-                return self._related(expression.prop, expression.filler, x)
-        elif isinstance(expression, ex.DataMinCardinality):
-            if expression.n == 0:
-                return [()]
-            if expression.n == 1:
-                return [self._valued(expression.prop, expression.range, x)]
-        elif isinstance(expression, (ex.ObjectMaxCardinality, ex.DataMaxCardinality)) and (
-            expression.n >= 1 and functional(expression.prop)
+        if isinstance(expression, (ex.ObjectMaxCardinality, ex.DataMaxCardinality)) and (
+            functional(expression.prop)
         ):
             return [()]
         label = self._label(expression)
         bodies: list[Body] = [(PredicateAtom(label, (x,)),)]
         if isinstance(expression, (ex.ObjectMinCardinality, ex.DataMinCardinality)):
             self._count(label, expression)
-        elif isinstance(expression, (ex.ObjectExactCardinality, ex.DataExactCardinality)):
-            if expression.n >= 1 and functional(expression.prop):
-                return bodies + self.bodies(bounds(expression)[0], x)
         elif isinstance(expression, ex.ObjectAllValuesFrom):
-            if normal(expression.filler) == THING:
-                return [()]
             if functional(expression.prop):
                 return bodies + self._related(expression.prop, expression.filler, x)
         elif isinstance(expression, ex.DataAllValuesFrom):
@@ -522,21 +408,10 @@ class Translation:
         elif isinstance(expression, ex.ObjectComplementOf) and isinstance(expression.operand, str):
             self._complements[expression.operand] = label
         if isinstance(expression, _NEGATIVE):
-            self._note_partial(label, expression)
+            subject = self._context if self._origin is None else axiom_text(self._origin)
+            text = f'{subject}: not all members of {expression_text(expression)} are recognised'
+            self.program.partial.append((label, text))
         return bodies
-
-    def _note_partial(self, label: Predicate, expression: ClassExpression) -> None:
-        """Note an expression whose members cannot all be recognised.
-
-        An exact number has members that are in more than what is asked for: enough related ones.
-        """
-        weaker: ClassExpression = THING
-        exact = (ex.ObjectExactCardinality, ex.DataExactCardinality)
-        if isinstance(expression, exact) and expression.n:
-            weaker = bounds(expression)[0]
-        subject = self._context if self._origin is None else axiom_text(self._origin)
-        text = f'{subject}: not all members of {expression_text(expression)} are recognised'
-        self.program.partial.append((label, self.required(weaker), text))
 
     def _count(
         self, label: Predicate, expression: ex.ObjectMinCardinality | ex.DataMinCardinality
@@ -559,7 +434,7 @@ class Translation:
 
     def imply(self, body: Body, expression: ClassExpression, x: Term) -> None:
         """Add the clauses by which the body makes `x` a member."""
-        expression = normal(expression)
+        expression = normal_form(expression)
         if isinstance(expression, str):
             if expression == NOTHING:
                 self.contradict(body, x)
@@ -571,10 +446,6 @@ class Translation:
         elif isinstance(expression, ex.ObjectUnionOf):
             self._imply_union(body, expression, x)
         elif isinstance(expression, ex.ObjectOneOf):
-            if len(expression.individuals) != 1:
-                raise UnsupportedError(
-                    'which of several individuals it is would need reasoning by cases'
-                )
             self.clause(body, SameAtom((x, Constant(expression.individuals[0]))))
         elif isinstance(expression, ex.ObjectHasValue):
             self.clause(body, self.property(expression.prop, x, Constant(expression.individual)))
@@ -597,7 +468,7 @@ class Translation:
     def _imply_union(self, body: Body, expression: ex.ObjectUnionOf, x: Term) -> None:
         positive: list[ClassExpression] = []
         for operand in expression.operands:
-            opposite = negated(operand)
+            opposite = normal_form(operand, True)
             if is_positive(opposite) and not is_positive(operand):
                 body = (*body, PredicateAtom(self._recognise(opposite), (x,)))
             else:
@@ -608,39 +479,26 @@ class Translation:
 
     def _describe(self, label: Predicate, expression: ClassExpression) -> None:
         """Add what membership in a labelled expression implies."""
-        x, body = _X, (PredicateAtom(label, (_X,)),)
+        body = (PredicateAtom(label, (_X,)),)
         if isinstance(expression, (ex.ObjectSomeValuesFrom, ex.ObjectMinCardinality)):
-            self._describe_some(label, expression)
+            n = expression.n if isinstance(expression, ex.ObjectMinCardinality) else 1
+            filler = expression.filler
+            required = None if filler == THING else self.required(filler)
+            self._exist(label, n, self._direction(expression.prop), required)
         elif isinstance(expression, (ex.DataSomeValuesFrom, ex.DataMinCardinality)):
             n = expression.n if isinstance(expression, ex.DataMinCardinality) else 1
-            if n > 0:
-                admitted = self.test(expression.range)
-                every = EVERY if admitted is None else admitted[1]
-                self._exist(label, n, (self.program.data(expression.prop), False), every)
+            admitted = self.test(expression.range)
+            every = EVERY if admitted is None else admitted[1]
+            self._exist(label, n, (self.program.data(expression.prop), False), every)
         elif isinstance(expression, ex.ObjectAllValuesFrom):
             y = self.fresh()
-            self.imply((*body, self.property(expression.prop, x, y)), expression.filler, y)
+            self.imply((*body, self.property(expression.prop, _X, y)), expression.filler, y)
         elif isinstance(expression, ex.DataAllValuesFrom):
             self.only(body, expression.prop, expression.range)
         elif isinstance(expression, (ex.ObjectMaxCardinality, ex.DataMaxCardinality)):
             self._describe_most(label, expression)
-        elif isinstance(expression, (ex.ObjectExactCardinality, ex.DataExactCardinality)):
-            for bound in bounds(expression):
-                self.imply(body, bound, x)
         elif isinstance(expression, ex.ObjectComplementOf):
             self._describe_complement(label, expression.operand)
-
-    def _describe_some(
-        self, label: Predicate, expression: ex.ObjectSomeValuesFrom | ex.ObjectMinCardinality
-    ) -> None:
-        n = expression.n if isinstance(expression, ex.ObjectMinCardinality) else 1
-        filler = normal(expression.filler)
-        if n == 1 and isinstance(filler, ex.ObjectOneOf) and len(filler.individuals) == 1:
-            known = Constant(filler.individuals[0])
-            self.clause((PredicateAtom(label, (_X,)),), self.property(expression.prop, _X, known))
-        elif n > 0:
-            required = None if filler == THING else self.required(filler)
-            self._exist(label, n, self._direction(expression.prop), required)
 
     def _exist(
         self,
@@ -655,26 +513,15 @@ class Translation:
     def _describe_most(
         self, label: Predicate, expression: ex.ObjectMaxCardinality | ex.DataMaxCardinality
     ) -> None:
-        x, body, n = _X, (PredicateAtom(label, (_X,)),), expression.n
+        n, origin = expression.n, self._origin
         if isinstance(expression, ex.DataMaxCardinality):
-            if n == 0:
-                self.contradict((*body, *self._valued(expression.prop, expression.range, x)), x)
-            else:
-                test, values = self.test(expression.range) or (None, None)
-                data = self.program.data(expression.prop)
-                most = AtMost(label, n, data, False, test, self._origin, values)
-                self.program.at_most.append(most)
-        elif n:
-            filler = self._filler(expression.filler)
-            direction = self._direction(expression.prop)
-            self.program.at_most.append(AtMost(label, n, *direction, filler, self._origin))
-        elif isinstance(normal(expression.filler), str | ex.ObjectOneOf):
-            y = self.fresh()
-            link = self.property(expression.prop, x, y)
-            self.imply((*body, link), negated(normal(expression.filler)), y)
+            test, values = self.test(expression.range) or (None, None)
+            data = self.program.data(expression.prop)
+            most = AtMost(label, n, data, False, test, origin, values)
         else:
-            for related in self._related(expression.prop, expression.filler, x):
-                self.contradict((*body, *related), x)
+            filler = self._filler(expression.filler)
+            most = AtMost(label, n, *self._direction(expression.prop), filler, origin)
+        self.program.at_most.append(most)
 
     def _describe_complement(self, label: Predicate, operand: ClassExpression) -> None:
         if isinstance(operand, str):
@@ -769,7 +616,7 @@ class Translation:
             self._property_axiom(axiom)
 
     def _sub_class(self, sub: ClassExpression, sup: ClassExpression) -> None:
-        sub, sup = normal(sub), normal(sup)
+        sub, sup = normal_form(sub), normal_form(sup)
         if isinstance(sub, ex.ObjectUnionOf):
             for operand in sub.operands:
                 self._attempt(self._sub_class, operand, sup)
@@ -781,7 +628,7 @@ class Translation:
             self.imply(body, sup, _X)
 
     def _all_disjoint(self, classes: tuple[ClassExpression, ...]) -> None:
-        for first, second in ax.pairs_of(map(normal, classes)):
+        for first, second in ax.pairs_of(map(normal_form, classes)):
             self._disjoint(self._recognise(first), self._recognise(second))
 
     def _key(self, axiom: ax.HasKey) -> None:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import gc
 import random
+from collections.abc import Iterable
 
 import pytest
 from hypothesis import given, settings
@@ -19,6 +20,7 @@ from surveillance_ontology.owl.axioms import (
     DataPropertyAssertion,
     Declaration,
     EquivalentClasses,
+    FunctionalObjectProperty,
     SubDataPropertyOf,
     SymmetricObjectProperty,
     TransitiveObjectProperty,
@@ -181,6 +183,23 @@ def test_a_fact_derived_twice_survives_the_loss_of_one() -> None:
     kb.remove(link('hasDoor', 'R1', 'D2'))
     kb.reason()
     assert n('C1') not in kb.object_values(n('connectedTo'), n('R1'))
+
+
+def test_a_long_chain_of_functional_values_is_walked_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Who differs may rest on whom they are related to, and so on, round a ring."""
+    walked: list[int] = []
+    walk = engine.Engine._related_by_difference
+
+    def counted(self: engine.Engine, individuals: Iterable[str]) -> dict[str, None]:
+        found = walk(self, individuals)
+        walked.append(len(found))
+        return found
+
+    monkeypatch.setattr(engine.Engine, '_related_by_difference', counted)
+    ring = [link('p', f'r{place}', f'r{(place + 1) % 300}') for place in range(300)]
+    kb = KnowledgeBase(IRI, [FunctionalObjectProperty(n('p')), *ring])
+    assert kb.reason()
+    assert sum(walked) <= 2 * len(ring)
 
 
 def test_facts_that_support_each_other_go_together() -> None:
