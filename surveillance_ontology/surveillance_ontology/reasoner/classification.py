@@ -13,7 +13,11 @@ from collections.abc import Iterable
 from surveillance_ontology.owl import axioms as ax
 from surveillance_ontology.owl.axiom_text import axiom_text
 from surveillance_ontology.owl.axioms import Axiom
-from surveillance_ontology.owl.expressions import ClassExpression
+from surveillance_ontology.owl.expressions import (
+    ClassExpression,
+    DataMinCardinality,
+    ObjectMinCardinality,
+)
 from surveillance_ontology.owl.vocabulary import NOTHING, THING
 from surveillance_ontology.reasoner.clauses import (
     AtMost,
@@ -25,6 +29,7 @@ from surveillance_ontology.reasoner.clauses import (
     Predicate,
     PredicateAtom,
     RangeAtom,
+    Term,
     closure,
     turned,
 )
@@ -37,7 +42,7 @@ from surveillance_ontology.reasoner.contexts import (
 )
 from surveillance_ontology.reasoner.property_chains import spell_out_chains
 from surveillance_ontology.reasoner.simplify import drop_implied_atoms, simplify
-from surveillance_ontology.reasoner.translation import Translation
+from surveillance_ontology.reasoner.translation import Translation, directed
 from surveillance_ontology.reasoner.value_sets import ValueSet
 
 _X, _Y = 0, 1
@@ -108,15 +113,38 @@ class Classification:
                 head = clause.head
                 if not isinstance(head, PredicateAtom) or _is_part(head.predicate, label):
                     continue
-                if len(atoms) == len(clause.body) and all(
-                    atom.predicate.kind == 'class' and atom.terms == (_X,) for atom in atoms
-                ):
-                    tokens = {atom.predicate for atom in atoms} - {label, program.thing}
-                    context = contexts.context(tokens)
+                if head.predicate.kind == 'class':
+                    context = contexts.context(self._implied(atoms, head.terms[0]) - {label})
                     if context.clash or head.predicate in context.tokens:
                         continue
                 if sentence not in program.unsupported:
                     program.unsupported.append(sentence)
+
+    def _implied(self, atoms: list[PredicateAtom], x: Term) -> set[Predicate]:
+        """Return classes that an individual is in by some atoms, and by domains and ranges."""
+        program = self.program
+        found: set[Predicate] = set()
+        places: set[tuple[Predicate, int]] = set()
+        for atom in atoms:
+            counted = atom.predicate.expression
+            if atom.predicate.kind != 'class':
+                places |= {(atom.predicate, at) for at, term in enumerate(atom.terms) if term == x}
+            elif atom.terms[0] == x:
+                found.add(atom.predicate)
+                if isinstance(counted, ObjectMinCardinality):
+                    iri, inverted = directed(counted.prop)
+                    places.add((program.object(iri), int(inverted)))
+                elif isinstance(counted, DataMinCardinality):
+                    places.add((program.data(counted.prop), 0))
+        for clause in program.clauses:
+            head = clause.head
+            if len(clause.body) == 1 and isinstance(head, PredicateAtom):
+                (only,), (y, *_) = clause.body, head.terms
+                if isinstance(only, PredicateAtom) and head.predicate.kind == 'class':
+                    at = only.terms.index(y) if y in only.terms else -1
+                    if (only.predicate, at) in places:
+                        found.add(head.predicate)
+        return found - {program.thing}
 
     # --- class hierarchy ---
 
