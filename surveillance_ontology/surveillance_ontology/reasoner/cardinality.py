@@ -41,6 +41,18 @@ class _Counter:
         filler = condition.filler
         self.filler = filler if isinstance(filler, Predicate) else None
         self.test = None if isinstance(filler, Predicate) else filler
+        self._hooks: list[tuple[list[Any], Any]] = []
+
+    def hook(self, place: list[Any], what: Any) -> None:
+        """Add to a list what `detach` takes out of it."""
+        place.append(what)
+        self._hooks.append((place, what))
+
+    def detach(self) -> None:
+        """Count no more."""
+        for place, what in self._hooks:
+            place.remove(what)
+        self._hooks.clear()
 
     def related(self, z: str) -> list[Any]:
         """Return what counts for `z`."""
@@ -81,9 +93,6 @@ class _Counter:
             for place, one in enumerate(values)
             for other in values[place + 1 :]
         )
-
-    def on_link(self, act: Callable[[str], None]) -> None:
-        raise NotImplementedError
 
     def _subjects(self, act: Callable[[str], None]) -> Callable[..., None]:
         return (lambda y, z: act(z)) if self.inverse else (lambda z, y: act(z))
@@ -150,19 +159,20 @@ class AtMostCounter(_Counter):
         merge: MergeRequest,
     ) -> None:
         super().__init__(condition, difference)
+        self.condition = condition
         self.label = condition.label
         self._nothing = nothing
         self._enqueue, self._overdelete, self._merge = enqueue, overdelete, merge
         self.recheck: set[str] = set()
-        self.prop.on_insert.append(self._subjects(self.gain))
-        self.prop.on_delete.append(self._subjects(self.lose))
+        self.hook(self.prop.on_insert, self._subjects(self.gain))
+        self.hook(self.prop.on_delete, self._subjects(self.lose))
         if self.label is not None:
-            self.label.on_insert.append(self.gain)
-            self.label.on_delete.append(self.lose)
+            self.hook(self.label.on_insert, self.gain)
+            self.hook(self.label.on_delete, self.lose)
         if self.filler is not None:
-            self.filler.on_insert.append(self._each_subject(self.gain))
-            self.filler.on_delete.append(self._each_subject(self.lose))
-        nothing.supports.append((self.supports, self.origin))
+            self.hook(self.filler.on_insert, self._each_subject(self.gain))
+            self.hook(self.filler.on_delete, self._each_subject(self.lose))
+        self.hook(nothing.supports, (self.supports, self.origin))
         self.touch_insert = self._each_subject(self.gain)
         self.touch_delete = self._each_subject(self.lose)
 

@@ -176,10 +176,10 @@ class DisjointClassEvidence:
     """Members of disjoint classes differ."""
 
     def __init__(self, predicates: Iterable[Predicate]) -> None:
-        self._marked = [predicate for predicate in predicates if predicate.disjoint]
+        self._predicates = predicates
 
     def premises(self, x: str, y: str) -> Iterator[Premises]:
-        for predicate in self._marked:
+        for predicate in self._predicates:
             if x in predicate.members:
                 for other in predicate.disjoint:
                     if y in other.members:

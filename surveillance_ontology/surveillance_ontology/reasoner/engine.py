@@ -27,7 +27,7 @@ from surveillance_ontology.owl.axioms import (
 from surveillance_ontology.owl.entities import entities_of
 from surveillance_ontology.owl.expressions import ClassExpression, Literal
 from surveillance_ontology.owl.vocabulary import NOTHING, THING, local_name
-from surveillance_ontology.reasoner.clauses import Fact, Predicate, Premises, Program
+from surveillance_ontology.reasoner.clauses import AtMost, Fact, Predicate, Premises, Program
 from surveillance_ontology.reasoner.datatypes import Value, literal_of, value_of
 from surveillance_ontology.reasoner.difference import Difference
 from surveillance_ontology.reasoner.equality import Equality, Merge
@@ -516,11 +516,46 @@ class Engine:
             network.detach(clause)
         for clause in change.added:
             network.attach(clause)
+        kept = {id(limit) for limit in change.limits}
+        for counter in [one for one in network.counters if id(one.condition) not in kept]:
+            network.counters.remove(counter)
+            self._touch_before_removal(*counter.succ)
+            counter.detach()
+        for first, second in change.joined:
+            self._touch_before_removal(*first.members, *second.members)
+            first.disjoint.discard(second)
+            second.disjoint.discard(first)
         self._overdelete([])
         change.apply(program)
+        for pair in change.parted:
+            self._part(*pair)
+        known = {id(one.condition) for one in network.counters}
+        for limit in change.limits:
+            if id(limit) not in known:
+                self._limit(limit)
         for clause in change.added:
             network.instances(clause, holding=False)
         self._propagate()
+
+    def _limit(self, condition: AtMost) -> None:
+        """Run an upper bound on the facts that are there."""
+        counter = self._network.limit(condition)
+        for predicate in (counter.prop, counter.label, counter.filler):
+            if predicate is not None:
+                self._attach_touching(predicate)
+        self._touched.update(dict.fromkeys(counter.succ))
+        for x in tuple(counter.succ):
+            counter.gain(x)
+
+    def _part(self, first: Predicate, second: Predicate) -> None:
+        """Run the disjointness of two classes on the facts that are there."""
+        first.disjoint.add(second)
+        second.disjoint.add(first)
+        for one in (first, second):
+            if self._network.watch_disjoint(one):
+                self._attach_touching(one)
+            self._touched.update(dict.fromkeys(one.members))
+        self._queue += [(self._nothing, x) for x in first.members & second.members]
 
     def take_from_cases(self, facts: Iterable[Axiom] | None) -> None:
         """Add facts that reasoning by cases found; they hold until the next `update`.

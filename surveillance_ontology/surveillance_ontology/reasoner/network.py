@@ -10,6 +10,7 @@ from typing import Any
 from surveillance_ontology.owl.axioms import Axiom
 from surveillance_ontology.reasoner.cardinality import AtLeastCounter, AtMostCounter, KeyWatcher
 from surveillance_ontology.reasoner.clauses import (
+    AtMost,
     BodyAtom,
     Clause,
     Constant,
@@ -78,7 +79,6 @@ class Network:
         self.touch_related: list[Callable[[str], list[str]]] = []
         self.thresholds: list[ThresholdIndex] = []
         self._hooks: dict[Clause, list[tuple[list[Any], Any]]] = {}
-        self.counters: list[AtMostCounter] = []
         program.different.supports.append((difference.premises, None))
         self.lower: list[AtLeastCounter] = []
         for at_least in program.at_least:
@@ -87,19 +87,17 @@ class Network:
             if not counter.is_data:
                 self.touch_insert.append(counter.touch_insert)
                 self.touch_delete.append(counter.touch_delete)
+        self.counters: list[AtMostCounter] = []
         for at_most in sorted(program.at_most, key=lambda condition: condition.label is not None):
-            watcher = AtMostCounter(
-                at_most, difference, program.nothing, enqueue, overdelete, merge
-            )
-            self.counters.append(watcher)
-            if not watcher.is_data:
-                self.touch_insert.append(watcher.touch_insert)
-                self.touch_delete.append(watcher.touch_delete)
+            self.limit(at_most)
         for key in program.keys:
             KeyWatcher(key, merge)
         for clause in program.clauses:
             self.attach(clause)
-        self._attach_disjoint()
+        self._disjoint: dict[Predicate, None] = {}
+        for predicate in tuple(program.predicates()):
+            if predicate.disjoint:
+                self.watch_disjoint(predicate)
         self._attach_evidence()
 
     # --- clauses ---
@@ -198,61 +196,68 @@ class Network:
             if not triggered:
                 self.initial.append(run)
 
+    # --- bounds ---
+
+    def limit(self, condition: AtMost) -> AtMostCounter:
+        """Watch an upper bound, which may also tell individuals apart, from now on."""
+        difference, nothing = self._difference, self._program.nothing
+        counter = AtMostCounter(
+            condition, difference, nothing, self._enqueue, self._overdelete, self._merge
+        )
+        self.counters.append(counter)
+        if not counter.is_data:
+            counter.hook(self.touch_insert, counter.touch_insert)
+            counter.hook(self.touch_delete, counter.touch_delete)
+        if counter.is_data:
+            counter.hook(difference.evidence, counter)
+            counter.prop.touching = (1,)
+        elif counter.n == 1:
+            counter.hook(difference.through, counter)
+            _also_touches(counter.prop, 2 if counter.inverse else 1)
+            if counter.filler is not None:
+                counter.filler.touching = (1,)
+            counter.hook(self.touch_related, lambda y: list(counter.pred.get(y, ())))
+        if counter.label is not None and (counter.is_data or counter.n == 1):
+            counter.label.touching = (1,)
+        return counter
+
     # --- disjoint classes ---
 
-    def _attach_disjoint(self) -> None:
-        program = self._program
-        marked = [predicate for predicate in program.predicates() if predicate.disjoint]
-        marked = list(dict.fromkeys(marked))
-        if not marked:
-            return
-        nothing, enqueue, overdelete = program.nothing, self._enqueue, self._overdelete
-        for predicate in marked:
-            others = sorted(predicate.disjoint, key=lambda other: other.name)
+    def watch_disjoint(self, predicate: Predicate) -> bool:
+        """Watch a class for members of classes disjoint with it; False where that is done."""
+        if predicate in self._disjoint:
+            return False
+        nothing, enqueue, overdelete = self._program.nothing, self._enqueue, self._overdelete
+        if not self._disjoint:
+            nothing.supports.append((self._in_disjoint, 'these classes are disjoint'))
+            self._difference.evidence.append(DisjointClassEvidence(self._disjoint))
+        self._disjoint[predicate] = None
+        predicate.touching = (1,)
 
-            def gain(x: str, others: list[Predicate] = others) -> None:
-                for other in others:
+        def gain(x: str) -> None:
+            for other in predicate.disjoint:
+                if x in other.members:
+                    enqueue((nothing, x))
+
+        def lose(x: str) -> None:
+            if x in nothing.members:
+                overdelete((nothing, x))
+
+        predicate.on_insert.append(gain)
+        predicate.on_delete.append(lose)
+        return True
+
+    def _in_disjoint(self, x: str) -> Iterator[Premises]:
+        for predicate in self._disjoint:
+            if x in predicate.members:
+                for other in predicate.disjoint:
                     if x in other.members:
-                        enqueue((nothing, x))
-
-            def lose(x: str) -> None:
-                if x in nothing.members:
-                    overdelete((nothing, x))
-
-            predicate.on_insert.append(gain)
-            predicate.on_delete.append(lose)
-
-        def supports(x: str) -> Iterator[Premises]:
-            for predicate in marked:
-                if x in predicate.members:
-                    for other in predicate.disjoint:
-                        if x in other.members:
-                            yield ((predicate, x), (other, x))
-
-        nothing.supports.append((supports, 'these classes are disjoint'))
-        self._difference.evidence.append(DisjointClassEvidence(marked))
-        for predicate in marked:
-            predicate.touching = (1,)
+                        yield ((predicate, x), (other, x))
 
     # --- difference ---
 
     def _attach_evidence(self) -> None:
         program, evidence = self._program, self._difference.evidence
-        for counter in self.counters:
-            if counter.is_data:
-                evidence.append(counter)
-                counter.prop.touching = (1,)
-                if counter.label is not None:
-                    counter.label.touching = (1,)
-            elif counter.n == 1:
-                self._difference.through.append(counter)
-                _also_touches(counter.prop, 2 if counter.inverse else 1)
-                if counter.label is not None:
-                    counter.label.touching = (1,)
-                if counter.filler is not None:
-                    counter.filler.touching = (1,)
-                pred = counter.pred
-                self.touch_related.append(lambda y, pred=pred: list(pred.get(y, ())))  # type: ignore[misc]
         for predicate in program.irreflexive:
             evidence.append(IrreflexiveEvidence(predicate))
             predicate.touching = (1, 2)

@@ -1,8 +1,9 @@
 """From a running program to another one: which clauses come and go, where nothing else differs.
 
 An engine that holds 100,000 facts need not derive them anew because one class came below another.
-What is more than clauses (a bound on a number, a key, disjoint classes, ...) is watched by objects
-that count what they saw from the beginning; where such a part differs, the engine is made anew.
+Classes may become disjoint, and upper bounds may come, or cease to be. What is more than that (a
+lower bound, a key, ...) is watched by objects that count what they saw from the beginning; where
+such a part differs, the engine is made anew.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from dataclasses import dataclass, fields, replace
 from typing import Any, TypeVar
 
 from surveillance_ontology.reasoner.clauses import (
+    AtMost,
     BodyAtom,
     Clause,
     ComputedAtom,
@@ -27,6 +29,7 @@ from surveillance_ontology.reasoner.clauses import (
 from surveillance_ontology.reasoner.threshold_rules import split_rule
 
 _Key = Hashable
+_Pair = tuple[Predicate, Predicate]
 _N = TypeVar('_N')
 
 
@@ -39,6 +42,9 @@ class ProgramChange:
         removed: Clauses of the running program that go.
         clauses: All that it is to have afterwards, in its own predicates.
         added: Those of them that come.
+        parted, joined: Pairs of classes, in the running program's predicates, that come to be
+            disjoint, or cease to be.
+        limits: The upper bounds that there are afterwards; those that stay are the same objects.
         existentials, meetings: As in `Program`, in the running program's predicates.
         predicate: Gives the running program's predicate for one of the other's.
     """
@@ -47,6 +53,9 @@ class ProgramChange:
     removed: list[Clause]
     clauses: list[Clause]
     added: list[Clause]
+    parted: list[_Pair]
+    joined: list[_Pair]
+    limits: list[AtMost]
     existentials: list[Existential]
     meetings: list[Any]
     predicate: Callable[[Predicate], Predicate]
@@ -59,6 +68,7 @@ class ProgramChange:
         running.datas = self._table(running.datas, wanted.datas)
         running.labels = self._table(running.labels, wanted.labels)
         running.clauses, running.existentials = self.clauses, self.existentials
+        running.at_most = self.limits
         running.meetings, running.unsupported = self.meetings, wanted.unsupported
 
     def _table(self, mine: dict[_N, Predicate], wanted: dict[_N, Predicate]) -> dict[_N, Predicate]:
@@ -86,11 +96,21 @@ def program_change(running: Program, wanted: Program) -> ProgramChange | None:
     removed = [clause for gone in present.values() for clause in gone]
     if any(isinstance(c.head, SameAtom) or split_rule(c) is not None for c in (*removed, *added)):
         return None
+    kept = {old.record(limit): limit for limit in running.at_most}
+    limits = [kept.get(new.record(limit)) or of_running.record(limit) for limit in wanted.at_most]
+    before = _disjoint(running, lambda one: one)
+    after = _disjoint(wanted, of_running.predicate)
+    for one in wanted.predicates():
+        if of_running.predicate(one) is one:
+            one.disjoint = set()  # The running engine fills it, in its own predicates.
     return ProgramChange(
         wanted,
         removed,
         clauses,
         added,
+        [pair for pair in after if pair not in before and pair[::-1] not in before],
+        [pair for pair in before if pair not in after and pair[::-1] not in after],
+        limits,
         [of_running.record(existential) for existential in wanted.existentials],
         [tuple(map(of_running.record, pair)) for pair in wanted.meetings],
         of_running.predicate,
@@ -140,21 +160,16 @@ class _Keys:
         program, predicate = self._program, self.predicate
         return (
             program.uses_thing,
-            tuple(map(self._record, program.at_least)),
-            tuple(map(self._record, program.at_most)),
-            tuple(map(self._record, program.keys)),
+            tuple(map(self.record, program.at_least)),
+            tuple(map(self.record, program.keys)),
             tuple(map(predicate, program.irreflexive)),
             tuple(map(predicate, program.asymmetric)),
             tuple(map(self._value, program.disjoint_properties)),
             frozenset(map(predicate, program.negatives.values())),
-            frozenset(
-                (predicate(one), frozenset(map(predicate, one.disjoint)))
-                for one in program.predicates()
-                if one.disjoint
-            ),
         )
 
-    def _record(self, record: Any) -> _Key:
+    def record(self, record: Any) -> _Key:
+        """Return a condition by its parts."""
         return tuple(self._value(getattr(record, entry.name)) for entry in fields(record))
 
     def _value(self, value: Any) -> _Key:
@@ -189,6 +204,17 @@ class _Translation:
             elif entry.name == 'head':
                 changed['head'] = self.record(value)
         return replace(record, **changed) if changed else record
+
+
+def _disjoint(program: Program, predicate: Callable[[Predicate], Predicate]) -> dict[_Pair, None]:
+    """Return each pair of disjoint classes once."""
+    found: dict[_Pair, None] = {}
+    for one in program.predicates():
+        for other in one.disjoint:
+            pair = predicate(one), predicate(other)
+            if pair[::-1] not in found:
+                found[pair] = None
+    return found
 
 
 def _all(program: Program) -> Iterable[Predicate]:

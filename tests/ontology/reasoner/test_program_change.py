@@ -12,7 +12,10 @@ from surveillance_ontology.owl.axioms import (
     Axiom,
     ClassAssertion,
     Declaration,
+    DifferentIndividuals,
+    DisjointClasses,
     EquivalentClasses,
+    FunctionalObjectProperty,
     ObjectPropertyAssertion,
     ObjectPropertyDomain,
     SubClassOf,
@@ -169,4 +172,39 @@ def test_a_definition_recognises_those_that_are_there(made: list[Engine]) -> Non
     kb.remove(ClassAssertion(B, IRI + 'y'))
     kb.reason()
     assert kb.instances(A) == frozenset()
+    assert len(made) == 1
+
+
+def test_classes_become_disjoint_on_the_facts_that_are_there(made: list[Engine]) -> None:
+    kb = KnowledgeBase(IRI, [ClassAssertion(A, IRI + 'x'), ClassAssertion(B, IRI + 'y')])
+    kb.reason()
+    differ = DifferentIndividuals(frozenset((IRI + 'x', IRI + 'y')))
+    assert not kb.holds(differ)
+    kb.add(DisjointClasses((A, B)))
+    assert kb.reason()
+    assert kb.holds(differ)
+    kb.remove(DisjointClasses((A, B)))
+    kb.reason()
+    assert not kb.holds(differ)
+    assert len(made) == 1
+    kb.add(ClassAssertion(B, IRI + 'x'))
+    kb.reason()
+    kb.add(DisjointClasses((A, B)))
+    assert not kb.reason()
+
+
+def test_a_property_becomes_functional_on_the_facts_that_are_there(made: list[Engine]) -> None:
+    links = [ObjectPropertyAssertion(P, IRI + 'x', IRI + name) for name in 'yz']
+    kb = KnowledgeBase(IRI, [*links, ClassAssertion(A, IRI + 'y')])
+    kb.reason()
+    kb.add(FunctionalObjectProperty(P))
+    kb.reason()
+    assert kb.instances(A) == {IRI + 'y', IRI + 'z'}
+    assert len(made) == 1
+    kb.remove(links[1])
+    kb.reason()
+    kb.remove(FunctionalObjectProperty(P))
+    kb.add(links[1])
+    kb.reason()
+    assert kb.instances(A) == {IRI + 'y'}
     assert len(made) == 1
