@@ -192,8 +192,11 @@ def test_nodes_share_the_clock_that_one_of_them_hears(spun: Spun) -> None:
     spun.until(lambda: teller.get_subscription_count() == len(nodes))
 
     def tell(seconds: int) -> None:
-        teller.publish(Clock(clock=Time(sec=seconds)))
-        spun.until(lambda: clocks() == [seconds] * len(nodes))
+        def told() -> bool:
+            teller.publish(Clock(clock=Time(sec=seconds)))
+            return clocks() == [seconds] * len(nodes)
+
+        spun.until(told)
 
     def clocks() -> list[int]:
         return [node.get_clock().now().nanoseconds // 10**9 for node in nodes]

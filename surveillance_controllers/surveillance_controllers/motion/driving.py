@@ -112,6 +112,7 @@ class Drive:
     Attributes:
         state: What the drive is doing.
         reason: Why it recovers or failed.
+        recoveries: How many recoveries were begun.
     """
 
     def __init__(
@@ -126,6 +127,7 @@ class Drive:
         self._local = SampledPlanner(self._robot)
         self.state = State.DRIVING
         self.reason = ''
+        self.recoveries = 0
         self._plan: list[State] = []
         self._level = 0
         self._paths = 0
@@ -315,6 +317,7 @@ class Drive:
                 self.state = State.FAILED
                 return
             self._level = 1
+        self.recoveries += 1
         self._plan = list(_RECOVERIES[self._level])
         self._level += 1
         self._next(now)
@@ -326,6 +329,7 @@ class Drive:
             self._paths = 0
             self._recover(now, reason)
             return
+        self.recoveries += 1
         self._plan = [State.ASKING]
         self._next(now)
 
