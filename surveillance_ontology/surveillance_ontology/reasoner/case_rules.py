@@ -239,6 +239,10 @@ class CaseRules:
         """Tell whether a chain implies the property."""
         return self._chains.is_complex((prop, False))
 
+    def complex_props(self) -> list[str]:
+        """Return the properties that chains imply."""
+        return [prop for prop, inverse in self._chains.complex_roles() if not inverse]
+
     def steps(self, prop: str) -> list[tuple[int, int | None, int]]:
         """Return the automaton of a property, from state 0 to state 1."""
         try:

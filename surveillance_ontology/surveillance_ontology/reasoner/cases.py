@@ -219,8 +219,8 @@ class CaseReasoner:
                 for role, choices in roles.items():
                     if role > 0 and not rules.is_complex(rules.role_names[role]):
                         yield rules.role_names[role], y, choices
-        for prop in rules.role_names[1:]:
-            if prop != TOP and rules.is_complex(prop):
+        for prop in rules.complex_props():
+            if prop != TOP:
                 yield from self._along(x, prop)
 
     def _along(self, x: int, prop: str) -> Iterator[tuple[str, int, Choices]]:

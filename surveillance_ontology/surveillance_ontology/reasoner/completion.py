@@ -14,6 +14,7 @@ from surveillance_ontology.reasoner.classification import Classification
 from surveillance_ontology.reasoner.clauses import BodyAtom, Constant, Program, SameAtom
 from surveillance_ontology.reasoner.engine import Engine, FactView
 from surveillance_ontology.reasoner.normal_form import is_positive
+from surveillance_ontology.reasoner.property_chains import chains_turn_back
 
 _MOST_ASSERTIONS = 20_000
 
@@ -85,8 +86,8 @@ class Completion:
         """Tell whether the clauses may leave something out without saying so.
 
         They do not where nothing unnamed must exist, nor where each class that requires somebody
-        says all by itself and nothing is counted or excluded, or rules, which take no part in
-        cases, do the rest.
+        says all by itself, no chain comes back from somebody unnamed, and nothing is counted or
+        excluded, or rules, which take no part in cases, do the rest.
         """
         if program.unsupported or program.interacting:
             return True
@@ -96,6 +97,8 @@ class Completion:
         if not program.existentials:
             return False
         if any(_names(atom) for clause in clauses for atom in (*clause.body, clause.head)):
+            return True
+        if chains_turn_back(program):
             return True
         if self._has_rules:
             return False

@@ -41,6 +41,39 @@ def spell_out_chains(program: Program) -> None:
     _Spelling(program).run()
 
 
+def chains_turn_back(program: Program) -> bool:
+    """Tell whether a chain may lead over somebody unnamed and back to where it came from.
+
+    Then it may join two named individuals, which steps from one to the next do not find.
+    """
+    chains = _Spelling(program).chains
+    roles = {(each.prop, each.inverse) for each in program.existentials}
+    try:
+        return any(_turns(chains, chains.steps(role), roles) for role in chains)
+    except UnsupportedError:
+        return True  # Reasoning by cases names it.
+
+
+def _turns(chains: Chains, steps: list[Step], roles: set[AnyRole]) -> bool:
+    silent: dict[int, list[int]] = {}
+    for before, role, after in steps:
+        if role is None:
+            silent.setdefault(before, []).append(after)
+    for _, out, here in steps:
+        if out is None:
+            continue
+        ways = {turned(each) for each in roles.intersection(chains.roles_below(out))}
+        states = set(closure(here, lambda state: silent.get(state, ())))
+        for before, back, _ in steps:
+            if (
+                back is not None
+                and before in states
+                and ways.intersection(chains.roles_below(back))
+            ):
+                return True
+    return False
+
+
 class Chains:
     """The chains that imply each role; a role is a property's key and whether it is turned."""
 
@@ -67,6 +100,10 @@ class Chains:
     def roles_below(self, role: AnyRole) -> list[AnyRole]:
         """Return the role and every role that implies it by itself."""
         return list(closure(role, lambda one: self._below.get(one, ())))
+
+    def complex_roles(self) -> list[AnyRole]:
+        """Return the roles that a chain implies."""
+        return [role for role in {**self._chains, **self._below} if self.is_complex(role)]
 
     def is_complex(self, role: AnyRole) -> bool:
         """Whether a chain implies the role."""
@@ -144,7 +181,7 @@ class Chains:
 class _Spelling:
     def __init__(self, program: Program) -> None:
         self._program = program
-        self._chains = Chains()
+        self.chains = Chains()
         self._numbers = count(1)
         for clause in program.clauses:
             if not clause.named_only:
@@ -171,12 +208,12 @@ class _Spelling:
             here = step.terms[0] if backwards else step.terms[1]
         if here != end or start == end:
             return
-        self._chains.imply(tuple(chain), (head.predicate, False))
+        self.chains.imply(tuple(chain), (head.predicate, False))
 
     # --- clauses ---
 
     def run(self) -> None:
-        if not self._chains:
+        if not self.chains:
             return
         for clause in tuple(self._program.clauses):
             if not clause.named_only:
@@ -196,7 +233,7 @@ class _Spelling:
         if one == other or (isinstance(one, Constant) and isinstance(other, Constant)):
             return
         role = (link.predicate, False)
-        if not self._chains.is_complex(role):
+        if not self.chains.is_complex(role):
             return
         rest = [atom for atom in clause.body if atom is not link]
         used = {t for atom in (*rest, clause.head) for t in atom.terms}
@@ -224,7 +261,7 @@ class _Spelling:
         clause: Clause,
     ) -> None:
         try:
-            steps = self._chains.steps(role)
+            steps = self.chains.steps(role)
         except UnsupportedError as reason:
             text = 'the ontology' if clause.origin is None else axiom_text(clause.origin)
             sentence = f'{text}: {reason}'
@@ -273,7 +310,7 @@ class _Spelling:
             if isinstance(term, Constant) and not term.is_value
         }
         for name in names:
-            for role in self._chains:
+            for role in self.chains:
                 constant = Constant(name)
                 terms = (constant, _X) if role[1] else (_X, constant)
                 head = PredicateAtom(role[0], terms)

@@ -132,6 +132,25 @@ def test_values_in_cases() -> None:
     assert kb.types(i) == {B}
 
 
+@pytest.mark.parametrize(
+    'chain',
+    [
+        (ax.SymmetricObjectProperty(P), ax.TransitiveObjectProperty(P)),
+        (ax.SubPropertyChainOf((P, ex.ObjectInverseOf(P)), Q), ax.SubObjectPropertyOf(Q, R)),
+    ],
+)
+def test_a_chain_over_somebody_unnamed_and_back_joins_the_named(chain: tuple[Axiom, ...]) -> None:
+    last = R if isinstance(chain[1], ax.SubObjectPropertyOf) else P
+    kb = reasoned(*chain, SubClassOf(A, ex.ObjectSomeValuesFrom(P, THING)), ClassAssertion(A, i))
+    assert kb.object_values(last, i) == {i}
+    assert kb.unsupported == ()
+    denied = ax.NegativeObjectPropertyAssertion(last, i, i)
+    kb.add(denied)
+    assert not kb.reason()
+    kb.change([], [denied])
+    assert kb.reason()
+
+
 def test_as_many_values_as_there_are_take_no_search() -> None:
     numbers = ex.DataOneOf(tuple(whole(number) for number in range(40)))
     kb = reasoned(
