@@ -451,11 +451,12 @@ class Supervisor:
         def nothing(_number: int, _frame: object) -> None:
             pass
 
+        # First, so that no signal falls between the handlers before and these.
+        wakeup = signal.set_wakeup_fd(writer.fileno(), warn_on_full_buffer=False)
+        self._selector.register(reader, selectors.EVENT_READ, on_signal)
         before = signal.signal(signal.SIGCHLD, nothing)
         for number in _STOP_SIGNALS:
             signal.signal(number, nothing)
-        wakeup = signal.set_wakeup_fd(writer.fileno(), warn_on_full_buffer=False)
-        self._selector.register(reader, selectors.EVENT_READ, on_signal)
         try:
             yield
         finally:
