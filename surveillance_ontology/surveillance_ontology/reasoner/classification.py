@@ -226,8 +226,8 @@ class Classification:
             for head in heads:
                 self._add_clause((label,), head)
         relevant = self._relevant(labels)
-        if not labels or not relevant:
-            return
+        if not labels or not relevant or program.unsupported:
+            return  # What is left out is found by cases in any event.
         everything = contexts.context(relevant, bare=True)
         if everything.clash or not self._follow_alone(relevant, alone):
             program.interacting = True

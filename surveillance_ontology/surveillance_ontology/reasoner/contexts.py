@@ -42,6 +42,7 @@ from surveillance_ontology.reasoner.value_sets import EVERY, ValueSet, point
 Token: TypeAlias = 'Predicate | tuple[Any, ...]'
 Tokens: TypeAlias = frozenset[Token]
 Role: TypeAlias = tuple[Predicate, bool]
+_Gap: TypeAlias = tuple[Axiom | None, str]
 _CASES = 'which of the related individuals are the same would need reasoning by cases'
 _DATES = 'whether its values suit another range is not decided'
 _NOMINALS = 'facts about the individual are not used for classes and unnamed individuals'
@@ -186,7 +187,7 @@ class Contexts:
 
     def __init__(self, program: Program) -> None:
         self._program = program
-        self._gaps: dict[Context, dict[str, AtLeast | AtMost | None]] = {}
+        self._gaps: dict[Context, dict[_Gap, AtLeast | AtMost | None]] = {}
         self._known: dict[tuple[Tokens, bool], Context] = {}
         self._opened: list[Context] = []
         self._waiting: dict[Context, None] = {}
@@ -356,10 +357,11 @@ class Contexts:
                 reached.update(closure(start, lambda one: [edge.target for edge in one.edges]))
         for context in reached:
             if not context.clash:
-                for sentence, condition in self._gaps.get(context, {}).items():
+                for (origin, what), condition in self._gaps.get(context, {}).items():
                     known = isinstance(condition, AtLeast) and condition.head in context.tokens
                     if not known:
-                        found[sentence] = None
+                        subject = 'an assertion' if origin is None else axiom_text(origin)
+                        found[f'{subject}: {what}'] = None
         return found
 
     def roles_above(self, role: Role) -> frozenset[Role]:
@@ -744,8 +746,7 @@ class Contexts:
         condition: AtLeast | AtMost | None = None,
     ) -> None:
         """Note an axiom some of whose consequences in a context may be missing."""
-        subject = 'an assertion' if origin is None else axiom_text(origin)
-        self._gaps.setdefault(context, {})[f'{subject}: {what}'] = condition
+        self._gaps.setdefault(context, {})[origin, what] = condition
 
     # --- values ---
 

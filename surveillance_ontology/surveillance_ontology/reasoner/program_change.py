@@ -87,8 +87,8 @@ def program_change(running: Program, wanted: Program) -> ProgramChange | None:
     of_running = _Translation(running, old, new)
     clauses: list[Clause] = []
     added: list[Clause] = []
-    for clause in wanted.clauses:
-        same = present.pop(new.clause(clause), None)
+    for key, clause in {new.clause(clause): clause for clause in wanted.clauses}.items():
+        same = present.pop(key, None)
         if same is None:
             same = [of_running.record(clause)]
             added += same

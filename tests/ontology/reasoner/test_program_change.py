@@ -16,6 +16,7 @@ from surveillance_ontology.owl.axioms import (
     DisjointClasses,
     EquivalentClasses,
     FunctionalObjectProperty,
+    InverseObjectProperties,
     ObjectPropertyAssertion,
     ObjectPropertyDomain,
     SubClassOf,
@@ -208,3 +209,15 @@ def test_a_property_becomes_functional_on_the_facts_that_are_there(made: list[En
     kb.reason()
     assert kb.instances(A) == {IRI + 'y'}
     assert len(made) == 1
+
+
+def test_what_an_axiom_says_twice_goes_with_it() -> None:
+    twice = InverseObjectProperties(P, P)
+    kb = KnowledgeBase(IRI, [twice, ObjectPropertyAssertion(P, IRI + 'x', IRI + 'y')])
+    for change in (SubClassOf(A, B), SubClassOf(B, C)):
+        kb.add(change)
+        kb.reason()
+        assert kb.object_values(P, IRI + 'y') == {IRI + 'x'}
+    kb.remove(twice)
+    kb.reason()
+    assert kb.object_values(P, IRI + 'y') == set()
