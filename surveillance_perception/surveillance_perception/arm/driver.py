@@ -23,6 +23,9 @@ PATIENCE = 5.0
 REST_SPEED = 0.01
 """Speed of every joint below which the arm rests, rad/s."""
 
+# how near to its goal each joint must come, rad
+_TOLERANCE = 0.02
+
 
 class ArmDriver:
     """Moves one arm, one motion at a time; the newest wins.
@@ -32,7 +35,6 @@ class ArmDriver:
         send: Hands a motion to the arm's hardware or simulation.
         now: Time in seconds of the clock by which motions run.
         on_rest: Told whenever the arm comes to rest (True) or begins to move (False).
-        tolerance: How near to its goal each joint must come, rad.
         patience: Seconds of steady time for which an arm that does not move is waited for.
     """
 
@@ -42,14 +44,12 @@ class ArmDriver:
         send: Callable[[ArmTrajectory], None],
         now: Callable[[], float],
         on_rest: Callable[[bool], None] = lambda _resting: None,
-        tolerance: float = 0.02,
         patience: float = PATIENCE,
     ) -> None:
         self.arm = arm
         self._send = send
         self._now = now
         self._on_rest = on_rest
-        self._tolerance = tolerance
         self._patience = patience
         self._changed = threading.Condition(threading.RLock())
         self._measured: ArmState | None = None
@@ -187,7 +187,7 @@ class ArmDriver:
     def _arrived(self, motion: ArmTrajectory) -> bool:
         if self._measured is None or self._now() - self._began < motion.duration:
             return False
-        near = np.abs(self._measured.positions - motion.goal).max() <= self._tolerance
+        near = np.abs(self._measured.positions - motion.goal).max() <= _TOLERANCE
         return bool(near and np.abs(self._measured.speeds).max() <= REST_SPEED)
 
     def _settle(self) -> None:

@@ -32,6 +32,7 @@ Indices = npt.NDArray[np.int64]
 
 _MAX_HULL_CORNERS = 8
 _MIN_AREA = 12.0
+_LEAST_WIDTH = 2.0
 _QUAD_SCATTER, _MOST_SCATTER = 1.35, 8.0
 _MAX_GROWTH = 1.6
 _WIDE_WINDOW = 21
@@ -104,7 +105,6 @@ def quads_around(
     masks: Iterable[tuple[Grey, int]],
     *,
     min_length: float = 8.0,
-    min_width: float = 2.0,
     limit: int = 10**9,
 ) -> Quads:
     """Quadrilaterals around the blobs of masks.
@@ -113,7 +113,6 @@ def quads_around(
         masks: Images (height, width), blobs are not 0, and by how much each is smaller than the
             image itself. A blob with the same upright box as one before is left out.
         min_length: Longer side in pixels of the smallest blob's upright box.
-        min_width: Shorter side of it.
         limit: Once so many blobs were looked at, only those that are nearly quadrilaterals are,
             and no further mask.
 
@@ -125,7 +124,7 @@ def quads_around(
     for mask, scale in masks:
         if len(seen) > limit:
             break
-        contours = _outlines_in(mask, min_length / scale, max(2.0, min_width / scale))
+        contours = _outlines_in(mask, min_length / scale, _LEAST_WIDTH)
         if not contours:
             continue
         boxes, scatter = _measured(contours)

@@ -98,14 +98,12 @@ class MarkerCodes:
         ids: (k,) marker id of each entry.
         turns: (k,) quarter turns clockwise by which the entry's image is turned.
         cells: (k, bits + 4, bits + 4) +1 white, -1 black, with border and margin.
-        correction: Wrong cells that the dictionary can correct.
     """
 
     bits: int
     ids: npt.NDArray[np.int64]
     turns: npt.NDArray[np.int64]
     cells: Cells
-    correction: int
 
     @property
     def side(self) -> int:
@@ -138,4 +136,4 @@ class MarkerCodes:
                 cells[index * 4 + turn, 2:-2, 2:-2] = np.rot90(code, -turn)
         ids = np.repeat(np.array(list(chosen), np.int64), 4)
         turns = np.tile(np.arange(4), len(chosen))
-        return cls(bits, ids, turns, cells, max(0, int(dictionary.maxCorrectionBits)))
+        return cls(bits, ids, turns, cells)

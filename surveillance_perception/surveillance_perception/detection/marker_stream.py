@@ -14,6 +14,9 @@ from surveillance_perception.detection.detector import Detection, DetectorSettin
 from surveillance_perception.detection.pose import MarkerPose, pose_of
 from surveillance_perception.stream.image_files import ImageArray
 
+# images that count, as a multiple of those that must show an id: half of them may miss it
+_WINDOW = 2
+
 
 def sizes_from(entries: Sequence[str]) -> dict[int, float]:
     """Marker sizes by id from entries such as '14:0.3' (metres).
@@ -84,8 +87,6 @@ class Confirmation:
     Args:
         known_frames: Images that must show an id of the known list.
         unknown_frames: Images that must show any other id.
-        window: The images that count, as a multiple of those that must show the id: 2 means that
-            half of them may miss it.
         confirmed: Ids that are believed from the start.
     """
 
@@ -93,11 +94,9 @@ class Confirmation:
         self,
         known_frames: int,
         unknown_frames: int,
-        window: int = 2,
         confirmed: Iterable[int] = (),
     ) -> None:
         self._needed = {True: known_frames, False: unknown_frames}
-        self._window = window
         self._frame = 0
         self._seen: defaultdict[int, deque[int]] = defaultdict(deque)
         self._confirmed: set[int] = set(confirmed)
@@ -122,7 +121,7 @@ class Confirmation:
             needed = self._needed[known]
             frames = self._seen[marker_id]
             frames.append(self._frame)
-            while frames[0] <= self._frame - needed * self._window:
+            while frames[0] <= self._frame - _WINDOW * needed:
                 frames.popleft()
             if len(frames) >= needed and marker_id not in self._confirmed:
                 self._confirmed.add(marker_id)

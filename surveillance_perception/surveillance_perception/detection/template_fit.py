@@ -94,13 +94,13 @@ class TemplateFit:
         middle = parts[:, :, step // 2, :, step // 2]
         return np.asarray((middle + parts.mean(axis=(2, 4))) / 2.0)
 
-    def footprint(self, homographies: Array, levels: Indices, blur: float | Array) -> Footprint:
+    def footprint(self, homographies: Array, levels: Indices, blur: Array) -> Footprint:
         """Blur of each candidate.
 
         Args:
             homographies: (m, 3, 3).
             levels: (m,) how often the image was halved.
-            blur: Standard deviation of the lens's blur in pixels: one, or (m, 2) across and down
+            blur: Standard deviation of the lens's blur in pixels, (2,) or (m, 2) across and down
                 the marker.
         """
         scale = 2.0 ** levels[:, None]
@@ -164,7 +164,7 @@ class TemplateFit:
         pyramid: ImagePyramid,
         homographies: Array,
         entries: Indices,
-        blur: float | Array,
+        blur: Array,
         iterations: int,
     ) -> Array:
         """Homographies (m, 3, 3) aligned so that the codes lie on the image."""

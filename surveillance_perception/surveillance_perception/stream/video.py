@@ -16,8 +16,6 @@ from surveillance_perception.stream.image_files import (
     read_image,
 )
 
-_SILENT = 0
-
 
 class FrameSource(Protocol):
     """Where images come from.
@@ -75,14 +73,7 @@ class _Files:
 
 class _Capture:
     def __init__(self, source: int | str, what: str) -> None:
-        # what cannot be opened is said here in one line, not by OpenCV's backends in many
-        # OpenCV 4 has the function at the top, OpenCV 5 in a module
-        set_level = (
-            cv2.setLogLevel if hasattr(cv2, 'setLogLevel') else cv2.utils.logging.setLogLevel
-        )
-        level = set_level(_SILENT)
         self._capture = cv2.VideoCapture(source)
-        set_level(level)
         if not self._capture.isOpened():
             raise ImageError(f'{what} cannot be opened')
         self.rate = float(self._capture.get(cv2.CAP_PROP_FPS))
