@@ -358,8 +358,6 @@ def point(value: Value) -> ValueSet:
     space = value[0]
     if space in ('float', 'double') and len(value) == 2 and value[1] != 'NaN':
         return ValueSet({space: ((_End(key, -1), _End(key, 1)),)}, {})
-    if space == 'ill-formed':
-        return NONE
     return ValueSet({}, {space if space in _PLAIN else 'other': _listed([value])})
 
 

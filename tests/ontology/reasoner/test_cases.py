@@ -151,6 +151,22 @@ def test_a_chain_over_somebody_unnamed_and_back_joins_the_named(chain: tuple[Axi
     assert kb.reason()
 
 
+def test_an_ill_formed_literal_is_a_value_in_no_datatype_for_clauses_and_cases() -> None:
+    wrong = Literal('4a', XSD + 'int')
+    kb = reasoned(ax.DataPropertyAssertion(S, i, wrong))
+    assert kb.consistent
+    assert not kb.entails(ClassAssertion(B, i))
+    kb.change([SubClassOf(A, B_OR_C), ClassAssertion(A, i)])
+    assert kb.reason()
+    assert not kb.entails(ClassAssertion(B, i))
+    for datatype in ('int', 'string'):
+        of_type = ax.DataPropertyRange(S, XSD + datatype)
+        kb.add(of_type)
+        assert not kb.reason()
+        kb.change([], [of_type])
+    assert kb.reason()
+
+
 def test_as_many_values_as_there_are_take_no_search() -> None:
     numbers = ex.DataOneOf(tuple(whole(number) for number in range(40)))
     kb = reasoned(
