@@ -21,6 +21,7 @@ DISTRIBUTIONS = {
     'skimage': 'scikit-image',
     'yaml': 'pyyaml',
     'PIL': 'pillow',
+    're2': 'google-re2',
 }
 # Looked for at run time and done without when absent: an installed ROS has them.
 OPTIONAL = {'tf2_msgs', 'nav2_msgs', 'opennav_docking_msgs', 'mujoco', 'launch', 'launch_ros'}
