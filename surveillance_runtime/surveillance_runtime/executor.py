@@ -246,6 +246,9 @@ class PatrolExecutor(SingleThreadedExecutor):  # type: ignore[misc]  # rclpy has
         for each in [each for each in free['subscription'] if _sets_clock(each)]:
             if each.topic_name in seen:
                 free['subscription'].remove(each)
+                # Its events would end each wait, since nobody takes its messages.
+                for event in each.event_handlers:
+                    free['waitable'].remove(event)
             seen.add(each.topic_name)
         busy = {kind: each if kind in _BUSY_KINDS else [] for kind, each in free.items()}
         return (

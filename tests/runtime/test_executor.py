@@ -201,7 +201,13 @@ def test_nodes_share_the_clock_that_one_of_them_hears(spun: Spun) -> None:
     def clocks() -> list[int]:
         return [node.get_clock().now().nanoseconds // 10**9 for node in nodes]
 
+    def rests() -> bool:
+        begun = time.monotonic()
+        spun.executor.spin_once(timeout_sec=0.1)
+        return time.monotonic() - begun >= 0.05
+
     tell(5)
+    assert any(rests() for _ in range(20)), 'messages that nobody takes wake the executor'
     gate, begun = Future(), []
 
     async def slow(message: Int32) -> None:
