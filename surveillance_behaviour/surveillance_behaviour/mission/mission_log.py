@@ -291,9 +291,10 @@ class Summary:
         if not self.visits:
             return 'Mission: nothing was recorded.'
         visited = [place for place, times in self.visits.items() if times]
+        visits = self.visits.total()
         lines = [
             f'Mission: {_duration(self.seconds)}, {len(visited)} of {len(self.visits)} places '
-            f'visited, {sum(self.visits.values())} visits, {self.distance:.1f} m'
+            f'visited, {visits} visit{"" if visits == 1 else "s"}, {self.distance:.1f} m'
         ]
         width = max(len('place'), *(len(place) for place in self.visits))
         lines.append(f'  {"place":<{width}}  visits  longest unvisited')
