@@ -21,6 +21,7 @@ from surveillance_runtime.place.floor_plan import (
     Marker,
 )
 from surveillance_runtime.place.regions import Regions
+from surveillance_runtime.suggestions import nearest
 from surveillance_runtime.yaml_file import read_parameter_file
 
 MARKER_STATES = ('whole', 'broken', 'covered')
@@ -228,8 +229,8 @@ class World:
     @staticmethod
     def _known(name: str, names: Mapping[str, object], kind: str) -> None:
         if name not in names:
-            known = ', '.join(names) or 'none'
-            raise PlaceError((), f"there is no {kind} '{name}': expected one of {known}")
+            known = f': expected {nearest(name, names)}' if names else ', nor any other'
+            raise PlaceError((), f"there is no {kind} '{name}'{known}")
 
 
 def read_world(path: str | Path) -> World:
