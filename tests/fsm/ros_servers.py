@@ -48,6 +48,27 @@ class SilentServer(PatrolNode):
         return response
 
 
+class LossyActionServer(ActionServer):
+    """An action server that loses requests.
+
+    Attributes:
+        loses: What it loses the next request of: ``goal``, ``cancel``, ``result``.
+        asked: What it was asked for, what was lost included.
+    """
+
+    def __init__(self, *args, **kwargs):
+        self.loses = set()
+        self.asked = set()
+        super().__init__(*args, **kwargs)
+
+    async def execute(self, taken_data):
+        self.asked |= set(taken_data)
+        for kind in self.loses & set(taken_data):
+            self.loses.remove(kind)
+            del taken_data[kind]
+        await super().execute(taken_data)
+
+
 class ScriptedActionServer(PatrolNode):
     """An action server that accepts, refuses or drops as it is told."""
 
@@ -58,8 +79,8 @@ class ScriptedActionServer(PatrolNode):
         super().__init__('scripted', **options)
         self.began = threading.Event()
         self.cancelled = threading.Event()
-        self._hold = Future()
-        self._server = ActionServer(
+        self.hold = Future()
+        self.server = LossyActionServer(
             self,
             FollowPath,
             'follow_path',
@@ -67,7 +88,7 @@ class ScriptedActionServer(PatrolNode):
             goal_callback=lambda _: GoalResponse.ACCEPT if self.accept else GoalResponse.REJECT,
             cancel_callback=self._cancel,
         )
-        self.own(self._server)
+        self.own(self.server)
 
     def _cancel(self, _handle):
         self.cancelled.set()
@@ -75,7 +96,8 @@ class ScriptedActionServer(PatrolNode):
 
     async def _execute(self, handle):
         self.began.set()
-        await self._hold
+        await self.hold
+        handle.succeed()
         return FollowPath.Result()
 
 

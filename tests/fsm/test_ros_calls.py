@@ -26,6 +26,8 @@ from surveillance_fsm.ros.calls import RoundTrips
 from surveillance_interfaces.action import FollowPath
 from surveillance_runtime.node import PatrolNode
 
+from .ros_servers import ScriptedActionServer, Stubborn
+
 
 def in_thread(work):
     """Run work on a thread; returns a function that waits for it and gives or raises its end."""
@@ -376,14 +378,65 @@ def test_server_that_goes_away_in_the_middle_is_noticed(graph, server):
     runs[0].interrupt.set()
 
 
-def test_server_that_takes_the_place_of_one_that_was_killed_is_noticed(graph, server):
-    runs = waiting_server(server)  # as one that was killed: the middleware still knows it
+def test_server_that_takes_the_place_of_one_that_was_killed_is_noticed(graph):
+    server = graph.add(ScriptedActionServer)  # as one that was killed: it is still known
     caller = GoalCaller(graph.node, FollowPath, 'follow_path')
     end = in_thread(lambda: caller.run(follow(1), accept_timeout=60.0))
-    graph.until(lambda: runs)
+    graph.until(lambda: 'result' in server.server.asked)
     waiting_server(graph.add(PatrolNode, name='restarted'))
     # Either the new server is asked first, or it is recognised by its identifiers.
     with pytest.raises(UnavailableError, match=r'another server took|does not know the goal'):
+        end()
+    assert server.cancelled.wait(60.0), 'if it lives after all, the goal must not run on unseen'
+
+
+def test_a_result_that_is_lost_is_asked_for_again(graph, monkeypatch):
+    monkeypatch.setattr(calls, 'RESULT_PERIOD', 0.1)
+    server = graph.add(ScriptedActionServer)
+    server.server.loses = {'result'}
+    caller = GoalCaller(graph.node, FollowPath, 'follow_path')
+    end = in_thread(lambda: caller.run(follow(1), accept_timeout=60.0))
+    graph.until(lambda: 'result' in server.server.asked)
+    server.hold.set_result(None)
+    assert end().status == 'succeeded'
+
+
+def test_a_cancel_that_is_lost_is_sent_again(graph, monkeypatch):
+    monkeypatch.setattr(calls, 'CANCEL_PERIOD', 0.1)
+    server = graph.add(ScriptedActionServer)
+    server.server.loses = {'cancel'}
+    caller = GoalCaller(graph.node, FollowPath, 'follow_path', cancel_timeout=60.0)
+    interrupt = Interrupt()
+    end = in_thread(lambda: caller.run(follow(1), accept_timeout=60.0, interrupt=interrupt))
+    graph.until(lambda: 'result' in server.server.asked)
+    interrupt.set()
+    assert server.cancelled.wait(60.0)
+    server.hold.set_result(None)
+    with pytest.raises(CallInterruptedError):
+        end()
+
+
+def test_server_that_goes_away_before_its_yes_is_noticed(graph):
+    server = graph.add(ScriptedActionServer)
+    server.server.loses = {'goal'}
+    caller = GoalCaller(graph.node, FollowPath, 'follow_path')
+    end = in_thread(lambda: caller.run(follow(1), accept_timeout=60.0))
+    graph.until(lambda: 'goal' in server.server.asked)
+    graph.drop(server)
+    with pytest.raises(UnavailableError, match='went away'):
+        end()
+
+
+def test_server_that_goes_away_while_it_cancels_is_not_waited_for(graph):
+    server = graph.add(Stubborn)
+    caller = GoalCaller(graph.node, FollowPath, 'follow_path', cancel_timeout=1000.0)
+    interrupt = Interrupt()
+    end = in_thread(lambda: caller.run(follow(1), accept_timeout=60.0, interrupt=interrupt))
+    graph.until(lambda: 'result' in server.server.asked)
+    interrupt.set()
+    assert server.cancelled.wait(60.0)
+    graph.drop(server)
+    with pytest.raises(CallInterruptedError):
         end()
 
 

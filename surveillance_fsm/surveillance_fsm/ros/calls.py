@@ -14,7 +14,7 @@ import math
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -43,6 +43,14 @@ MOST_GROWTH = 4.0
 
 SERVER_PERIOD = 0.1
 """Seconds between two looks whether a server that has not answered yet is still there."""
+
+RESULT_PERIOD = 5.0
+"""Seconds after which a goal's result is asked for again: the answer may have been lost.
+
+Servers answer each request when the goal has ended, and may forget the result 10 s later."""
+
+CANCEL_PERIOD = 0.5
+"""Seconds after which a cancel that was not answered is sent again."""
 
 
 class CallError(Exception):
@@ -428,7 +436,8 @@ class _ActionClient(ActionClient):  # type: ignore[misc]
 class GoalCaller:
     """Sends goals to one action server, one at a time.
 
-    A server that dies or restarts in the middle is noticed, as `ServiceCaller.call` does.
+    A server that dies or restarts in the middle is noticed, as `ServiceCaller.call` does; an answer
+    that is lost is asked for again.
 
     Args:
         node: The node that calls; an executor must spin it.
@@ -490,7 +499,18 @@ class GoalCaller:
         handle = self._send(goal, deadline, interrupt, on_feedback)
         if not handle.accepted:
             return GoalEnd('rejected', None)
-        return self._await_end(handle, look, result_timeout, interrupt)
+        running = _RunningGoal(handle, look, self._what)
+        try:
+            return running.await_end(result_timeout, interrupt)
+        except UnavailableError:
+            running.abandon()
+            raise
+        except CallTimeoutError:
+            running.cancel(self._cancel_timeout)
+            raise CallTimeoutError(f'{self._what}: no result within {result_timeout:g} s') from None
+        except CallInterruptedError:
+            running.cancel(self._cancel_timeout)
+            raise
 
     def _send(
         self,
@@ -507,10 +527,11 @@ class GoalCaller:
             def feedback(message: Any) -> None:
                 told(message.feedback)
 
+        look = self._servers.look_for_loss(DOUBTFUL_SECONDS)
         sent = self._client.send_goal_async(goal, feedback_callback=feedback)
         try:
             with self.round_trips.measured():
-                handle = block_on(sent, deadline, interrupt, self._what)
+                handle = block_on(sent, deadline, interrupt, self._what, look)
         except CallError:
             # The goal may be accepted yet; it must not run on unseen.
             sent.add_done_callback(_cancel_when_accepted)
@@ -518,36 +539,76 @@ class GoalCaller:
         _show(self._node, self.name, self.round_trips)
         return handle
 
-    def _await_end(
-        self,
-        handle: Any,
-        look: Callable[[], None],
-        result_timeout: float | None,
-        interrupt: Interrupt | None,
-    ) -> GoalEnd:
-        """Wait for the end of a goal that was accepted."""
-        ended = handle.get_result_async()
-        deadline = math.inf if result_timeout is None else time.monotonic() + result_timeout
-        try:
-            response = block_on(ended, deadline, interrupt, self._what, look)
-        except CallTimeoutError:
-            self._cancel(handle, ended)
-            raise CallTimeoutError(f'{self._what}: no result within {result_timeout:g} s') from None
-        except CallInterruptedError:
-            self._cancel(handle, ended)
-            raise
-        if response.status not in _STATUS:
-            raise UnavailableError(f'{self._what}: the server does not know the goal any more')
-        return GoalEnd(_STATUS[response.status], response.result)
-
-    def _cancel(self, handle: Any, ended: Future) -> None:
-        done = threading.Event()
-        ended.add_done_callback(lambda _future: done.set())
-        handle.cancel_goal_async()
-        done.wait(self._cancel_timeout)
-
 
 def _cancel_when_accepted(sent: Future) -> None:
     handle = sent.result()
     if handle is not None and handle.accepted:
         handle.cancel_goal_async()
+
+
+class _RunningGoal:
+    """A goal that its server has accepted, until its end is known.
+
+    Args:
+        handle: rclpy's handle of the goal.
+        look_for_loss: Raises `UnavailableError` once the server is lost.
+        what: Names the server in errors.
+    """
+
+    def __init__(self, handle: Any, look_for_loss: Callable[[], None], what: str) -> None:
+        self._handle = handle
+        self._look_for_loss = look_for_loss
+        self._what = what
+        self._ended = Future()
+        self._requests: list[Future] = []
+        self._cancelling = False
+        self._ask()
+
+    def await_end(self, timeout: float | None, interrupt: Interrupt | None) -> GoalEnd:
+        """Wait for the end.
+
+        Raises:
+            UnavailableError: The server went away, or does not know the goal any more.
+            CallTimeoutError: The goal did not end in time.
+            CallInterruptedError: The interrupt was raised.
+        """
+        deadline = math.inf if timeout is None else time.monotonic() + timeout
+        response = block_on(self._ended, deadline, interrupt, self._what, self._look)
+        if response.status not in _STATUS:
+            raise UnavailableError(f'{self._what}: the server does not know the goal any more')
+        return GoalEnd(_STATUS[response.status], response.result)
+
+    def cancel(self, timeout: float) -> None:
+        """Have the server end the goal, and give it some time for that."""
+        self._cancelling = True
+        self._ask()
+        with suppress(CallError):
+            self.await_end(timeout, None)
+
+    def abandon(self) -> None:
+        """Expect nothing more from the server; if it is there after all, it ends the goal."""
+        for request in self._requests:
+            request.cancel()
+        self._handle.cancel_goal_async()
+
+    def _look(self) -> None:
+        self._look_for_loss()
+        period = CANCEL_PERIOD if self._cancelling else RESULT_PERIOD
+        if time.monotonic() > self._asked + period:
+            self._ask()
+
+    def _ask(self) -> None:
+        self._asked = time.monotonic()
+        if self._cancelling:
+            self._handle.cancel_goal_async().add_done_callback(self._on_cancel_answered)
+        request = self._handle.get_result_async()
+        request.add_done_callback(self._on_result)
+        self._requests.append(request)
+
+    def _on_cancel_answered(self, _answer: Future) -> None:
+        # Whatever the answer is, the server has heard of it.
+        self._cancelling = False
+
+    def _on_result(self, answer: Future) -> None:
+        if answer.done() and not self._ended.done():
+            self._ended.set_result(answer.result())
