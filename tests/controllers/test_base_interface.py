@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import threading
 from types import SimpleNamespace
 from typing import Any
 
@@ -20,6 +21,7 @@ from surveillance_controllers.motion.base_interface import (
 from surveillance_controllers.motion.driving import Drive, Spin
 from surveillance_controllers.motion.localisation import Localiser
 from surveillance_controllers.motion.path_following import Velocity
+from surveillance_fsm import Interrupt
 from surveillance_runtime.qos import SENSOR_QOS
 
 
@@ -73,6 +75,22 @@ def test_without_scans_or_odometry_the_robot_is_told_to_stand(
     graph.until(lambda: drives(*both))
     graph.until(lambda: not drives((scans, scan())), timeout=5.0)
     assert 'nothing on the topic' in capfd.readouterr().err
+
+
+def test_a_drive_begins_and_ends_with_a_command_whether_a_scan_comes_or_not(
+    graph: Any, steersman: Steersman
+) -> None:
+    navigator: Any = steersman
+    base = RobotBase(graph.node, navigator, 60.0, lambda _place, _stamp: None)
+    told = graph.listen(Twist, 'cmd_vel', 10)
+    interrupt = Interrupt()
+    driving = threading.Thread(target=lambda: base.spin(Spin(), interrupt))
+    driving.start()
+    graph.until(lambda: told)  # which a simulator in lockstep waits for
+    interrupt.set()
+    driving.join(60.0)
+    graph.until(lambda: len(told) == 2)
+    assert [message.linear.x for message in told] == [0.0, 0.0]
 
 
 @pytest.mark.parametrize('doubt', ['ambiguous', 'lost'])

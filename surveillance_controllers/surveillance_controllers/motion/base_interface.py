@@ -160,9 +160,12 @@ class RobotBase:
         interrupt: Interrupt,
         on_step: Callable[[Pose], None] = lambda _pose: None,
     ) -> Iterator[None]:
-        """Hands a task to the navigator; afterwards the robot stands."""
+        """Hands a task to the navigator; before and afterwards the robot stands."""
         with self._lock:
             self._navigator.task, self._on_step = task, on_step
+            # A simulator in lockstep waits for a command from the moment the goal is executed on,
+            # and the scan of that moment may have come before the task.
+            self._base.command(Velocity())
         unsubscribe = interrupt.subscribe(self._wake)
         try:
             yield
