@@ -521,8 +521,10 @@ class PatrolOntology:
             chunk = requests[start : start + size]
             found = self._armor.batch(chunk).responses
             if len(found) != len(chunk):
+                why = found[-1].error_description if found else ''
                 raise ArmorServiceInternalError(
-                    f'{len(found)} answers to {len(chunk)} directives', ExitCode.INVALID_COMMAND
+                    f'{len(found)} answers to {len(chunk)} directives: {why or "no reason given"}',
+                    ExitCode.INVALID_COMMAND,
                 )
             for wanted, answer in zip(chunk, found, strict=True):
                 if not answer.success:

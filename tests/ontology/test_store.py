@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 
+from surveillance_ontology.armor import store as store_module
 from surveillance_ontology.armor.access import Settings
 from surveillance_ontology.armor.protocol import DirectiveRequest
 from surveillance_ontology.armor.reference import Reference
@@ -34,13 +35,19 @@ class Server:
         self._files = directory.parent / 'files'
         self._files.mkdir(exist_ok=True)
         self.notes: list[str] = []
+        self.written = threading.Event()
         self.start()
 
     def start(self) -> None:
         store = Store(self._directory, self._compact_from)
         settings = Settings(ontologies_folder=self._files, history=20)
-        self.service = ArmorService(settings, print, self.notes.append, store)
+        self.service = ArmorService(settings, print, self._note, store)
         self.ask: Ask = asker(self.service)
+
+    def _note(self, text: str) -> None:
+        self.notes.append(text)
+        if 'can be written again' in text:
+            self.written.set()
 
     def restart(self) -> None:
         self.service.close()
@@ -102,54 +109,75 @@ def test_an_inconsistent_ontology_comes_back_as_such(server: Server) -> None:
     assert server.ask('REMOVE DATAPROP IND', 'visitedAt', 'R1', 'LONG', '1').is_consistent
 
 
-def test_a_batch_is_there_as_a_whole_or_not_at_all(
+def full(*_: object) -> None:
+    raise OSError(28, 'No space left on device')
+
+
+def door(name: str) -> DirectiveRequest:
+    return DirectiveRequest('c', 'map', 'ADD', 'IND', 'CLASS', (name, 'DOOR'))
+
+
+def test_a_full_disk_takes_no_knowledge_and_is_caught_up_with(
     server: Server, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    batch = [DirectiveRequest('c', 'map', 'ADD', 'IND', 'CLASS', (name, 'DOOR')) for name in 'ABC']
-
-    def full(_: int) -> None:
-        raise OSError(28, 'No space left on device')
-
+    monkeypatch.setattr(store_module, 'RETRY_SECONDS', 0.01)
+    load = (ONTOLOGY, IRI, 'false', '', 'false')
     with monkeypatch.context() as patch:
         patch.setattr(os, 'fdatasync', full)
-        failed = server.service.execute_list(batch)
-        single = server.ask('ADD IND CLASS', 'D', 'DOOR')
-        load = (ONTOLOGY, IRI, 'false', '', 'false')
-        lifecycle = server.service.execute_list(
-            [
-                DirectiveRequest('c', 'map', 'DROP'),
-                DirectiveRequest('c', 'other', 'LOAD', 'FILE', '', load),
-            ]
-        )
-    assert not lifecycle.success
+        answer = server.service.execute_list([door(name) for name in 'ABC'])
+        assert server.ask('ADD IND CLASS', 'D', 'DOOR').success
+        lifecycle = [
+            DirectiveRequest('c', 'other', 'LOAD', 'FILE', '', load),
+            DirectiveRequest('c', 'other', 'DROP'),
+            DirectiveRequest('c', 'map', 'QUERY', 'IND', 'CLASS', ('DOOR',)),
+        ]
+        assert [each.success for each in server.service.execute_list(lifecycle).responses] == [
+            True
+        ] * 3
+    assert [each.success for each in answer.responses] == [True] * 3
+    assert names(server.ask('QUERY IND CLASS', 'DOOR')) == ['A', 'B', 'C', 'D']
+    assert server.written.wait(60.0)
+    assert [note.partition('store: ')[2] for note in server.notes] == [
+        'No space left on device: until it can be written, changes are lost at a restart',
+        'can be written again, every change is kept',
+    ]
+    server.ask('ADD IND CLASS', 'E', 'DOOR')
+    server.restart()
+    assert names(server.ask('QUERY IND CLASS', 'DOOR')) == ['A', 'B', 'C', 'D', 'E']
     assert server.ask('GET ALL REFS').queried_objects == ['map']
-    assert not failed.success
-    assert 'No space left' in failed.responses[0].error_description
-    assert (single.success, single.exit_code) == (False, 205)
-    assert 'nothing was done' in single.error_description
-    assert names(server.ask('QUERY IND CLASS', 'DOOR')) == []
-    assert server.service.execute_list(batch).success
-    assert names(server.ask('QUERY IND CLASS', 'DOOR')) == ['A', 'B', 'C']
+
+
+def test_what_cannot_be_written_is_there_as_a_whole_or_not_at_all(
+    server: Server, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    server.ask('ADD IND CLASS', 'A', 'DOOR')
+    with monkeypatch.context() as patch:
+        patch.setattr(os, 'fdatasync', full)
+        server.service.execute_list([door('B'), door('C')])
+        server.service.close()
+        assert server.notes[-1].endswith('2 changes are not kept')
+    server.start()
+    assert names(server.ask('QUERY IND CLASS', 'DOOR')) == ['A']
+    with monkeypatch.context() as patch:
+        patch.setattr(os, 'fdatasync', full)
+        server.service.execute_list([door('B'), door('C')])
     server.restart()
     assert names(server.ask('QUERY IND CLASS', 'DOOR')) == ['A', 'B', 'C']
 
 
-def test_a_batch_on_a_broken_disk_is_answered_all_the_same(
+def test_changes_are_refused_one_by_one_where_too_many_wait(
     server: Server, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    batch = [DirectiveRequest('c', 'map', 'ADD', 'IND', 'CLASS', ('A', 'DOOR'))]
-
-    def broken(*_: object) -> None:
-        raise OSError(5, 'Input/output error')
-
+    monkeypatch.setattr(store_module, 'MOST_WAITING', 1)
+    query = DirectiveRequest('c', 'map', 'QUERY', 'IND', 'CLASS', ('DOOR',))
     with monkeypatch.context() as patch:
-        patch.setattr(os, 'fdatasync', broken)
-        patch.setattr(Path, 'read_bytes', broken)
-        answer = server.service.execute_list(batch)
-    assert not answer.success
-    assert answer.responses[0].error_description.startswith('done, but lost at the next start: ')
-    assert len(server.notes) == 1
-    assert server.service.execute_list(batch).success
+        patch.setattr(os, 'fdatasync', full)
+        server.service.execute_list([door('A'), door('B')])
+        answers = server.service.execute_list([door('C'), query]).responses
+    assert not answers[0].success
+    assert 'nothing was done' in answers[0].error_description
+    assert '2 changes wait to be written' in answers[0].error_description
+    assert names(answers[1]) == ['A', 'B']
 
 
 def test_snapshots_keep_the_journal_short(tmp_path: Path) -> None:
@@ -170,6 +198,7 @@ def test_one_snapshot_is_written_at_a_time(tmp_path: Path) -> None:
     store = Store(tmp_path / 'store', compact_from=0)
     entered: list[str] = []
     failures: list[str] = []
+    store.warn = failures.append
     asked, may_go = threading.Barrier(9), threading.Event()
 
     @contextmanager
@@ -180,7 +209,7 @@ def test_one_snapshot_is_written_at_a_time(tmp_path: Path) -> None:
 
     def ask() -> None:
         asked.wait(60.0)
-        store.compact_if_large(hold_all, failures.append)
+        store.compact_if_large(hold_all)
 
     callers = [threading.Thread(target=ask) for _ in range(8)]
     for caller in callers:

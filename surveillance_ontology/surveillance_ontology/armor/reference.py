@@ -221,14 +221,6 @@ class Reference:
             self.revision += 1
         return self._derive()
 
-    def restore(self, other: Reference) -> None:
-        """Take over the state of another reference of the same name."""
-        self.kb, self.queue, self.mounted = other.kb, other.queue, other.mounted
-        self.buffered_manipulation = other.buffered_manipulation
-        self.history = other.history
-        self.backlog = len(other.queue)
-        self.revision += 1
-
     @property
     def is_slow(self) -> bool:
         """Whether the next reasoning may take long."""

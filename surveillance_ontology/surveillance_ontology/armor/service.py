@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from surveillance_ontology import memory
@@ -63,6 +63,7 @@ class ArmorService:
         self.session = Session(self._settings, screen, warn, store, clock)
         self._store = store
         if store:
+            store.warn = self.session.warn
             with memory.uncollected():
                 for ref in store.recover(self._settings.history):
                     self.session.register(ref)
@@ -144,13 +145,8 @@ class ArmorService:
                 with self._store.batch() if self._store else contextlib.nullcontext():
                     responses = [self.execute(request) for request in requests]
             except JournalError as error:
-                problem = f'nothing was done: {error}'
-                try:
-                    self._undo(names)
-                except JournalError as worse:
-                    problem = f'done, but lost at the next start: {error}; going back: {worse}'
-                    self.session.warn(problem)
-                return ListResponse(False, False, [_refusal(problem)])
+                problem = f'lost at the next start: {error}'
+                return ListResponse(False, False, [_refusal(problem) for _ in requests])
         return ListResponse(
             success=all(response.success for response in responses),
             is_consistent=responses[-1].is_consistent if responses else False,
@@ -160,21 +156,6 @@ class ArmorService:
     def close(self) -> None:
         """End helper processes and close files."""
         self.session.close()
-
-    def _undo(self, names: Iterable[str]) -> None:
-        """Bring references back to what the store has of them."""
-        assert self._store is not None
-        durable = {ref.name: ref for ref in self._store.recover(self._settings.history)}
-        for name in names:
-            kept, ref = durable.get(name), self.references.get(name)
-            if kept is not None and ref is not None:
-                ref.restore(kept)
-                self.session.follow(ref)
-            elif kept is not None:
-                self.session.register(kept)
-            elif ref is not None:
-                self.references.remove(ref)
-            self.session.tell(name, None)
 
     def _execute(self, request: DirectiveRequest) -> DirectiveResponse:
         if not request.reference_name:
@@ -200,9 +181,7 @@ class ArmorService:
                 return _response(directive.run(ref, *self._values(directive, request, ref)))
             remark = self._change(directive, request, ref)
         if self._store:
-            self._store.compact_if_large(
-                lambda: self.references.held(self.references.names()), self.session.warn
-            )
+            self._store.compact_if_large(lambda: self.references.held(self.references.names()))
         return DirectiveResponse(error_description=remark)
 
     def _change(self, directive: Directive, request: DirectiveRequest, ref: Reference) -> str:

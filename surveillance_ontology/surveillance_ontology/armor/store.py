@@ -2,7 +2,8 @@
 
 Every change goes into a `Journal` before it is answered. What is written are the axioms that come
 and go, not the directives, so that recovery gives the same ontology whatever the reasoner says by
-then. Now and then a snapshot takes the place of the records before it.
+then. Now and then a snapshot takes the place of the records before it. While the journal cannot be
+written, as on a full disk, changes wait in memory and are answered all the same.
 
 A journal is a directory with numbered segments, ``journal-<n>.log``, and at most one snapshot in
 use, ``snapshot-<n>.log``, which stands for everything before segment n. Each record is a line,
@@ -53,6 +54,10 @@ COMPACT_FROM = 1 << 20
 """Bytes of journal from which on a snapshot is written, if the last one is not larger."""
 CLOSING = 1.0
 """Seconds for which a store that is closed waits for the snapshot that is being written."""
+RETRY_SECONDS = 1.0
+"""Seconds between two attempts to write what waits."""
+MOST_WAITING = 200_000
+"""Records that wait at most, some 120 MB; further changes are refused."""
 _NAME = re.compile(r'(journal|snapshot)-(\d+)\.log\Z')
 
 
@@ -137,7 +142,7 @@ class Journal:
         Raises:
             JournalError: They could not be written; none of them is there.
         """
-        self._check_open()
+        self.check_open()
         self._found = None
         *first, last = records
         lines = b''.join([*(_line(record, more=True) for record in first), _line(last)])
@@ -161,7 +166,7 @@ class Journal:
         Returns:
             What `finish_snapshot` is to be called with.
         """
-        self._check_open()
+        self.check_open()
         number = self._number + 1
         try:
             file = self._segment(number)
@@ -189,6 +194,8 @@ class Journal:
                 self._parts = [path, *self._parts[current:]]
                 self._remove_before(number)
         except OSError as error:
+            # It may hold the last space that there was.
+            path.with_suffix('.tmp').unlink(missing_ok=True)
             raise JournalError(f'{self._directory}: {error.strerror}') from None
 
     def close(self) -> None:
@@ -196,7 +203,12 @@ class Journal:
         self._file.close()
         self._lock.close()
 
-    def _check_open(self) -> None:
+    def check_open(self) -> None:
+        """Check that records can be appended.
+
+        Raises:
+            JournalError: The journal was closed.
+        """
         if self._file.closed:
             raise JournalError(f'{self._directory}: closed')
 
@@ -402,10 +414,12 @@ class Store:
     Attributes:
         directory: Where the journal is.
         notes: One line for each thing that was found damaged.
+        warn: Told in one line when something cannot be written, and when it is; set by its user.
     """
 
     def __init__(self, directory: Path, compact_from: int = COMPACT_FROM) -> None:
         self.directory = directory
+        self.warn: Callable[[str], None] = print
         self._journal = Journal(directory)
         self.notes = list(self._journal.notes)
         self._compact_from = compact_from
@@ -414,6 +428,8 @@ class Store:
         self._snapshot: threading.Thread | None = None
         self._beginning = threading.Lock()
         self._names: set[str] = set()
+        self._waiting: list[Record] = []
+        self._closed = threading.Event()
 
     def recover(self, history: int = 0) -> list[Reference]:
         """Make the references as they were answered for; their derived facts are up to date.
@@ -472,7 +488,7 @@ class Store:
         """Make what is written inside durable at the end, all of it or nothing.
 
         Raises:
-            JournalError: At the end: nothing of it could be written.
+            JournalError: At the end: the store was closed meanwhile.
         """
         records: list[Record] = []
         self._batch.records = records
@@ -484,32 +500,31 @@ class Store:
                 self._append(records)
 
     def compact_if_large(
-        self,
-        hold_all: Callable[[], AbstractContextManager[list[Reference]]],
-        failed: Callable[[str], None],
+        self, hold_all: Callable[[], AbstractContextManager[list[Reference]]]
     ) -> None:
         """Write a snapshot on a thread of its own if the journal has grown.
 
         Args:
             hold_all: Context manager under which no reference changes; gives all of them.
-            failed: Told in one line when it could not be written.
         """
         journal = self._journal
-        if journal.size < max(self._compact_from, journal.snapshot_size):
+        if self._waiting or journal.size < max(self._compact_from, journal.snapshot_size):
             return
 
         def write() -> None:
             try:
                 with hold_all() as references, self._lock:
                     kept = [ref for ref in references if not ref.dropped]
-                    if {ref.name for ref in kept} != self._names:
-                        return  # One came or went meanwhile; the next change tries again.
+                    if self._waiting or {ref.name for ref in kept} != self._names:
+                        # What waits is in the references already. Or one of them came or went
+                        # meanwhile. The next change tries again.
+                        return
                     number = journal.begin_snapshot()
                     states = [_state(ref) for ref in kept]
                 records = (record for state in states for record in _records(*state))
                 journal.finish_snapshot(number, records)
             except JournalError as error:
-                failed(str(error))
+                self.warn(str(error))
 
         with self._beginning:
             if self._snapshot is not None and self._snapshot.is_alive():
@@ -523,14 +538,25 @@ class Store:
         A snapshot that is being written has `CLOSING` seconds to end; after that the store stays
         this process's until that dies, and its journal says all.
         """
+        self._closed.set()
         if self._snapshot is not None:
             self._snapshot.join(CLOSING)
             if self._snapshot.is_alive():
                 return
         with self._lock:
+            if not self._written_at_last():
+                self.warn(f'{self.directory}: {len(self._waiting)} changes are not kept')
             self._journal.close()
 
     def _write(self, *records: Record) -> None:
+        """Make records durable, now or with the batch.
+
+        Raises:
+            JournalError: The store was closed, or too much waits to be written.
+        """
+        self._journal.check_open()
+        if len(self._waiting) > MOST_WAITING:
+            raise JournalError(f'{self.directory}: {len(self._waiting)} changes wait to be written')
         pending: list[Record] | None = getattr(self._batch, 'records', None)
         if pending is not None:
             pending += records
@@ -539,12 +565,39 @@ class Store:
 
     def _append(self, records: Sequence[Record]) -> None:
         with self._lock:
-            self._journal.append(records)
+            self._journal.check_open()
             for what, name, *_ in records:
                 if what == 'load':
                     self._names.add(name)
                 elif what == 'drop':
                     self._names.discard(name)
+            if self._waiting:
+                self._waiting += records
+                return
+            try:
+                self._journal.append(records)
+            except JournalError as error:
+                self._waiting += records
+                self.warn(f'{error}: until it can be written, changes are lost at a restart')
+                threading.Thread(target=self._catch_up, name='store', daemon=True).start()
+
+    def _catch_up(self) -> None:
+        """Write what waits as soon as that is possible."""
+        while not self._closed.wait(RETRY_SECONDS):
+            with self._lock:
+                if self._written_at_last():
+                    self.warn(f'{self.directory}: can be written again, every change is kept')
+                    return
+
+    def _written_at_last(self) -> bool:
+        """Write what waits, as one; tell whether nothing waits any more."""
+        if self._waiting:
+            try:
+                self._journal.append(self._waiting)
+            except JournalError:
+                return False
+            self._waiting = []
+        return True
 
 
 _State = tuple[str, dict[str, Any], list[Axiom], list[Change], list[PastChange]]
