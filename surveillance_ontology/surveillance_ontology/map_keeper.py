@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from surveillance_ontology.armor.client import ArmorServiceCallError, ArmorServiceInternalError
 from surveillance_ontology.map_building import RoomNote, extended
-from surveillance_ontology.patrol_ontology import NEVER, PatrolOntology
+from surveillance_ontology.patrol_ontology import NEVER, PatrolOntology, is_gone
 from surveillance_runtime.place import Place, PlaceError
 
 MOST_REPLACED = 10
@@ -104,7 +104,7 @@ class MapKeeper:
                     told = True
             except ArmorServiceInternalError as error:
                 replaced += 1
-                if not _has_gone(error) or replaced >= MOST_REPLACED:
+                if not is_gone(error) or replaced >= MOST_REPLACED:
                     self._reports.failed(f'cannot build the map: {error}')
                     return
                 # It was loaded, so this is another server, or somebody dropped it.
@@ -208,7 +208,3 @@ class MapKeeper:
         if name in self._ontology.robot_places():
             raise PlaceError(('map', name), 'the robot is in it, it cannot be removed')
         return left
-
-
-def _has_gone(error: ArmorServiceInternalError) -> bool:
-    return 'unknown reference' in str(error)

@@ -118,6 +118,7 @@ class PatrolOntology:
         self._robot = robot
         self._places: tuple[str, ...] = ()
         self._last: Snapshot | None = None
+        self._threshold: int | None = None
 
     @property
     def reference(self) -> str:
@@ -299,12 +300,9 @@ class PatrolOntology:
             ArmorServiceCallError: The server does not answer.
             ArmorServiceInternalError: It refuses.
         """
-        self._carry_out(
-            [
-                self._set_value('urgencyThreshold', self._robot, int(seconds)),
-                self._request('REASON'),
-            ]
-        )
+        self._threshold = int(seconds)
+        told = self._set_value('urgencyThreshold', self._robot, self._threshold)
+        self._carry_out([told, self._request('REASON')])
 
     def snapshot(
         self,
@@ -331,8 +329,8 @@ class PatrolOntology:
             visits: When the robot visited places, seconds; the ontology is told what it does not
                 know of that. Somebody else's later visit stays, unless it lies ahead: then the
                 clock was set back. A place that was taken away does not come back.
-            patience: How long to wait for an ontology that is consistent and knows where the
-                robot is, seconds of steady time.
+            patience: How long to wait for an ontology that is there, is consistent and knows where
+                the robot is, seconds of steady time. One that is built anew is gone meanwhile.
             interrupt: Ends the wait early.
 
         Raises:
@@ -361,7 +359,9 @@ class PatrolOntology:
                     )
                 self._last = replace(snapshot, contradiction=why)
                 return self._last
-            except OntologyNotReadyError:
+            except (ArmorServiceInternalError, OntologyNotReadyError) as error:
+                if isinstance(error, ArmorServiceInternalError) and not is_gone(error):
+                    raise
                 if is_over or pause.wait(RETRY_PERIOD):
                     raise
 
@@ -417,6 +417,8 @@ class PatrolOntology:
         """Tell visits and the time, and ask about the robot and some places, in one batch."""
         request, robot = self._request, self._robot
         told = [self._set_value('visitedAt', place, int(at)) for place, at in visits.items()]
+        if self._threshold is not None:  # an ontology that was built anew does not know it
+            told.append(self._set_value('urgencyThreshold', robot, self._threshold))
         told += [self._set_value('now', robot, int(now)), request('REASON')]
         questions = [
             request('QUERY OBJECTPROP IND', 'isIn', robot),
@@ -549,6 +551,11 @@ def facts_of(place: str) -> tuple[str, ...]:
         f'hasDoor({place}, ?)',
         f'connectedTo({place}, ?)',
     )
+
+
+def is_gone(error: ArmorServiceInternalError) -> bool:
+    """Tell whether the server refused something because it does not have the ontology."""
+    return 'unknown reference' in str(error)
 
 
 def _names(answer: DirectiveResponse) -> tuple[str, ...]:

@@ -294,6 +294,39 @@ def test_several_robots_share_an_ontology(transport: Counting) -> None:
     assert one.snapshot(60.0, RULES).visited_at == {'C1': 50.0}
 
 
+def test_a_snapshot_waits_for_an_ontology_that_is_built_anew(
+    ontology: PatrolOntology, transport: Counting
+) -> None:
+    builder = PatrolOntology(ArmorClient('builder', 'map', transport))
+    steps = iter(
+        (
+            lambda: None,
+            lambda: ArmorClient('builder', 'map', transport).utils.load_ref_from_file(
+                ONTOLOGY, IRI, False, 'PELLET', True
+            ),
+            lambda: builder.build(PLACE, ONTOLOGY, IRI),
+            lambda: builder.record_place('C1', 120),
+        )
+    )
+
+    class Pause:
+        """What happens while the snapshot waits."""
+
+        def wait(self, timeout: float) -> bool:
+            next(steps)()
+            return False
+
+    before = ontology.snapshot(120.0, RULES, visits={'E': 100.0})
+    builder.forget()
+    found = ontology.snapshot(
+        121.0, RULES, visits={'E': 100.0, 'C1': 120.0}, patience=60.0, interrupt=Pause()
+    )
+    assert next(steps, None) is None, 'no step of the building was taken for the whole'
+    assert (found.place, found.visited_at) == ('C1', {'E': 100.0, 'C1': 120.0})
+    assert found.connections == before.connections
+    assert 'URGENT' not in found.classes['E'], 'it knows the threshold again'
+
+
 def test_an_ontology_that_is_not_there_is_refused_with_its_name(transport: Counting) -> None:
     ontology = PatrolOntology(ArmorClient('one', 'none', transport))
     with pytest.raises(ArmorServiceInternalError, match="unknown reference 'none'"):

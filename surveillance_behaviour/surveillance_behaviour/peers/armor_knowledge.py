@@ -94,8 +94,8 @@ class ArmorKnowledge:
         wake: Ends the transport's call when it is raised.
         reference: Waits until the map is built and gives the ontology's reference name.
         whereabouts: Where the robot is.
-        patience: How long an ontology that was just built, or contradicts itself, may take until it
-            knows where the robot is, seconds of steady time.
+        patience: How long an ontology that is built (anew), or contradicts itself, may take until
+            it knows where the robot is, seconds of steady time.
         is_back: Whether a server that was away is there again; None: nobody can tell.
     """
 
@@ -172,15 +172,14 @@ class ArmorKnowledge:
         forget = interrupt.subscribe(self._wake.set)
         try:
             yield
-        except (ArmorServiceCallError, OntologyNotReadyError) as error:
+        except (ArmorServiceCallError, ArmorServiceInternalError, OntologyNotReadyError) as error:
+            if isinstance(error, ArmorServiceInternalError):
+                # A server that was started anew does not know the ontology yet.
+                self._armor.reference_name = ''
             if interrupt.is_set():
                 raise InterruptedWaitError from None
             if isinstance(error, ArmorServiceCallError):
                 raise AwayError('armor', str(error), self._is_back) from None
-            raise PeerError('armor', str(error)) from None
-        except ArmorServiceInternalError as error:
-            # A server that was started anew does not know the ontology yet.
-            self._armor.reference_name = ''
             raise PeerError('armor', str(error)) from None
         finally:
             forget()
