@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import combinations
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 from surveillance_ontology.reasoner.case_model import (
     Alternative,
@@ -36,6 +36,8 @@ from surveillance_ontology.reasoner.case_rules import (
     KeyRule,
 )
 from surveillance_ontology.reasoner.case_values import CaseValues
+
+_Conditions: TypeAlias = 'tuple[frozenset[int], list[tuple[frozenset[int], frozenset[int]]]]'
 
 
 class _Choice:
@@ -95,6 +97,7 @@ class CaseSearch:
         self._needs: dict[tuple[int, int], None] = {}
         self._stated: dict[tuple[type, tuple[Alternative, ...]], bool] = {}
         self._signs: dict[int, frozenset[int]] = {}
+        self._known_conditions: dict[tuple[frozenset[int], tuple[int, ...]], _Conditions] = {}
         self._functional: dict[int, Count] = {limit.role: limit for limit in rules.functional}
 
     # --- asking for a model ---
@@ -526,32 +529,47 @@ class CaseSearch:
 
     def _core_blocker(self, x: int, blocked: dict[int, int]) -> int | None:
         """Return an earlier individual that is all that x is, and that x may be."""
-        known = self.blocked.get(x)
+        model, put_off = self.model, self._put_off
+        own, known = model.labels[x].keys(), self.blocked.get(x)
+        parent = model.parent[x]
+        assert parent is not None
+        unwanted, conditions = self._conditions(self._sign(parent), tuple(model.out[parent][x]))
         for y in self._chosen if known is None else (known, *self._chosen):
-            if y < x and y not in blocked and y not in self._put_off and self._may_be(x, y):
+            if y in blocked or y in put_off or y >= x or model.is_gone(y):
+                continue
+            other = model.labels[y].keys()
+            if not own <= other:
+                continue
+            model.step()
+            if not unwanted & other <= own:
+                continue
+            for body, heads in conditions:
+                if body <= other and heads.isdisjoint(other):
+                    break
+            else:
                 return y
         return None
 
-    def _may_be(self, x: int, y: int) -> bool:
-        """Tell whether an unnamed individual may be what another one is."""
-        model, rules = self.model, self.rules
-        own, other = model.labels[x], model.labels[y]
-        if model.is_gone(y) or not own.keys() <= other.keys():
-            return False
-        model.step()
-        parent = model.parent[x]
-        assert parent is not None
-        roles, above = model.out[parent][x], model.labels[parent]
-        for concept in rules.at_most.keys() & above.keys():
-            limit = rules.at_most[concept]
-            if limit.role in roles and limit.concept in other and limit.concept not in own:
-                return False
-        return all(
-            any(head in (other if place else above) for place, head in rule.heads)
-            for role in roles
-            for rule in rules.by_role.get(role, ())
-            if rule.xs <= above.keys() and rule.ys <= other.keys()
-        )
+    def _conditions(self, above: frozenset[int], roles: tuple[int, ...]) -> _Conditions:
+        """Return what is asked of whoever is related, by these roles, to one with these concepts.
+
+        Returns:
+            Concepts that are counted, of which there may be no more; and pairs: who has all these
+            concepts must have one of those.
+        """
+        found = self._known_conditions.get((above, roles))
+        if found is None:
+            limits = [limit for one, limit in self.rules.at_most.items() if one in above]
+            pairs = [
+                (rule.ys, frozenset(head for place, head in rule.heads if place))
+                for role in roles
+                for rule in self.rules.by_role.get(role, ())
+                if rule.xs <= above
+                and not any(head in above for place, head in rule.heads if not place)
+            ]
+            unwanted = frozenset(limit.concept for limit in limits if limit.role in roles)
+            found = self._known_conditions[above, roles] = unwanted, pairs
+        return found
 
     def _sign(self, x: int) -> frozenset[int]:
         """Return the concepts of an individual, which only grow until something is taken back."""

@@ -16,7 +16,7 @@ import struct
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cache
+from functools import cache, cached_property
 from typing import Any, TypeAlias
 
 from surveillance_ontology.owl import expressions as ex
@@ -171,12 +171,9 @@ def _impossible(tests: frozenset[tuple[DataRange, bool]]) -> bool:
 class ValueSet:
     """A set of values; where it has tests, `is_empty`, `within` and `size` err towards more."""
 
-    __slots__ = ('_complement', 'intervals', 'parts')
-
     def __init__(self, intervals: dict[str, _Intervals], parts: dict[str, _Part]) -> None:
         self.intervals = {name: found for name, found in intervals.items() if found}
         self.parts = {name: found for name, found in parts.items() if found}
-        self._complement: ValueSet | None = None
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, ValueSet):
@@ -189,6 +186,8 @@ class ValueSet:
     # --- algebra ---
 
     def __and__(self, other: ValueSet) -> ValueSet:
+        if other is self or other is EVERY:
+            return self
         return ValueSet(
             {
                 name: _common(found, other.intervals[name])
@@ -215,11 +214,10 @@ class ValueSet:
         )
 
     def __invert__(self) -> ValueSet:
-        if self._complement is None:
-            self._complement = self._all_others()
         return self._complement
 
-    def _all_others(self) -> ValueSet:
+    @cached_property
+    def _complement(self) -> ValueSet:
         parts = {name: _not(self.parts.get(name, ())) for name in _PLAIN}
         parts['boolean'] = _both(parts['boolean'], _listed(_BOOLEANS))
         intervals = {name: _outside(self.intervals.get(name, ())) for name in _ORDERED}
@@ -236,7 +234,7 @@ class ValueSet:
         """Whether no value is in the set."""
         return not self.size
 
-    @property
+    @cached_property
     def decided(self) -> bool:
         """Whether the answers about the set are exact."""
         return not any(one.tests for part in self.parts.values() for one in part)
@@ -259,7 +257,7 @@ class ValueSet:
             for low, high in intervals:
                 yield from _between(layer, low, high)
 
-    @property
+    @cached_property
     def size(self) -> float:
         """The number of values."""
         total: float = 0
