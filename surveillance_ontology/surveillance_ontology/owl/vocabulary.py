@@ -11,6 +11,8 @@ SWRLB = 'http://www.w3.org/2003/11/swrlb#'
 
 THING = OWL + 'Thing'
 NOTHING = OWL + 'Nothing'
+TOP, BOTTOM = OWL + 'topObjectProperty', OWL + 'bottomObjectProperty'
+TOP_DATA, BOTTOM_DATA = OWL + 'topDataProperty', OWL + 'bottomDataProperty'
 TOP_LITERAL = RDFS + 'Literal'
 
 

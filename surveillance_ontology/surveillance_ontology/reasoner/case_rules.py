@@ -20,7 +20,15 @@ from surveillance_ontology.owl.axiom_text import axiom_text
 from surveillance_ontology.owl.axioms import Axiom
 from surveillance_ontology.owl.entities import entities_of
 from surveillance_ontology.owl.expressions import ClassExpression, PropertyExpression
-from surveillance_ontology.owl.vocabulary import NOTHING, OWL, THING, TOP_LITERAL
+from surveillance_ontology.owl.vocabulary import (
+    BOTTOM,
+    BOTTOM_DATA,
+    NOTHING,
+    THING,
+    TOP,
+    TOP_DATA,
+    TOP_LITERAL,
+)
 from surveillance_ontology.reasoner.clauses import UnsupportedError, closure, turned
 from surveillance_ontology.reasoner.datatypes import unfolded
 from surveillance_ontology.reasoner.normal_form import normal_form
@@ -33,8 +41,6 @@ Heads = tuple[tuple[int, int], ...]
 """Alternatives: pairs of place (0: the individual, 1: the related one) and concept."""
 FRESH = 'urn:case:'
 """Names that begin so are no ontology's; an individual with one is unnamed."""
-TOP, BOTTOM = OWL + 'topObjectProperty', OWL + 'bottomObjectProperty'
-_BOTTOM_DATA = OWL + 'bottomDataProperty'
 _MOST = 300
 ANYBODY = 0
 """The concept of owl:Thing."""
@@ -343,9 +349,25 @@ class CaseRules:
 
     def value_rule(self, prop: str, xs: frozenset[int], values: ValueSet, heads: Heads) -> None:
         """Add a rule about values."""
-        if not values.is_empty:
+        if prop == TOP_DATA:
+            self.node_rule(xs, heads if self._size(values) else ((_X, ANYBODY),))
+        elif not values.is_empty:
             self.by_prop.setdefault(prop, []).append(ValueRule(xs, values, ~values, heads))
             self.of_values |= xs - _ALL
+
+    def value_count(self, table: dict[int, ValueCount], count: ValueCount) -> int:
+        """Return the concept of whoever has so many values."""
+        if count.prop != TOP_DATA:
+            return self.counted(table, count)
+        size = self._size(count.values)
+        is_met = size <= count.n if table is self.values_at_most else size >= count.n
+        return ANYBODY if is_met else self.concept(NOTHING)
+
+    def _size(self, values: ValueSet) -> float:
+        """Return how many values owl:topDataProperty has in a set: everybody has every value."""
+        if not values.decided:
+            raise UnsupportedError('owl:topDataProperty has values of a range that is not counted')
+        return values.size
 
     def universal(self, concept: int, prop: PropertyExpression, target: int) -> None:
         """Add the rules by which whoever a member is related to has another concept."""
@@ -380,6 +402,8 @@ class CaseRules:
 
     def mark(self, prop: PropertyExpression) -> int:
         """Return a concept of whoever is related to itself by the role."""
+        if directed(prop)[0] == TOP:
+            return ANYBODY
         if self.complex_role(prop):
             raise UnsupportedError('a property with chains is asked for itself')
         found = self.marks.setdefault(abs(self.role(prop)), [])
@@ -402,6 +426,8 @@ class CaseRules:
         data = isinstance(axiom, (ax.SubDataPropertyOf, ax.EquivalentDataProperties))
         for sub, sup in inclusions(axiom):
             if data:
+                if sub[0] == TOP_DATA:
+                    raise UnsupportedError('owl:topDataProperty is below another property')
                 self._data_inclusions.setdefault(sub[0], set()).add(sup[0])
             else:
                 self._below(sub, sup)
@@ -425,8 +451,8 @@ class CaseRules:
             self.node_rule(_ALL, ((_X, self.counted(self.at_least, somebody)),))
         if BOTTOM in used:
             self.edge_rule(EdgeRule(_ALL, self.role(BOTTOM), _ALL, ()))
-        if _BOTTOM_DATA in used:
-            self.value_rule(_BOTTOM_DATA, _ALL, EVERY, ())
+        if BOTTOM_DATA in used:
+            self.value_rule(BOTTOM_DATA, _ALL, EVERY, ())
 
     def _below(self, sub: AnyRole, sup: AnyRole) -> None:
         for role in (sub, sup):
@@ -497,6 +523,8 @@ class CaseRules:
         elif isinstance(axiom, ax.DataPropertyRange):
             self.include(THING, ex.DataAllValuesFrom(axiom.prop, axiom.range))
         elif isinstance(axiom, ax.FunctionalDataProperty):
+            if axiom.prop == TOP_DATA:
+                self.node_rule(_ALL, ())
             self.functional_values.append(ValueCount(1, axiom.prop, EVERY))
         elif isinstance(axiom, ax.DisjointDataProperties):
             for name, other in ax.pairs_of(axiom.props):
@@ -591,7 +619,7 @@ class _Clause:
         self, table: dict[int, ValueCount], n: int, prop: str, data_range: ex.DataRange
     ) -> None:
         count = ValueCount(n, prop, self._rules.values(data_range))
-        self._heads.append(self._rules.counted(table, count))
+        self._heads.append(self._rules.value_count(table, count))
 
     # --- relations: at most one is spelt out, the others become concepts ---
 

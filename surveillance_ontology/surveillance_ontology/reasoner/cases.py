@@ -14,9 +14,9 @@ from surveillance_ontology.owl import axioms as ax
 from surveillance_ontology.owl import expressions as ex
 from surveillance_ontology.owl.axioms import Axiom
 from surveillance_ontology.owl.expressions import Literal
-from surveillance_ontology.owl.vocabulary import NOTHING, THING
+from surveillance_ontology.owl.vocabulary import NOTHING, THING, TOP
 from surveillance_ontology.reasoner.case_model import Choices
-from surveillance_ontology.reasoner.case_rules import ANYBODY, TOP, CaseRules
+from surveillance_ontology.reasoner.case_rules import ANYBODY, CaseRules
 from surveillance_ontology.reasoner.case_search import CaseSearch
 from surveillance_ontology.reasoner.clauses import StoppedError, UnsupportedError
 from surveillance_ontology.reasoner.datatypes import literal_of, value_of

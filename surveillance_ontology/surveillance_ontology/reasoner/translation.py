@@ -17,6 +17,8 @@ from surveillance_ontology.owl.axiom_text import axiom_text, expression_text
 from surveillance_ontology.owl.axioms import Axiom
 from surveillance_ontology.owl.expressions import ClassExpression, Literal, PropertyExpression
 from surveillance_ontology.owl.vocabulary import (
+    BOTTOM,
+    BOTTOM_DATA,
     NOTHING,
     OWL,
     SWRLB,
@@ -550,12 +552,14 @@ class Translation:
             second.disjoint.add(first)
 
     def _top_and_bottom(self) -> None:
-        """Add the properties that OWL itself gives a meaning."""
+        """Add the properties that OWL itself gives a meaning.
+
+        What relates nothing is always there: an assertion with it may come at any time.
+        """
         program = self.program
+        for bottom in (program.object(BOTTOM), program.data(BOTTOM_DATA)):
+            self.contradict((PredicateAtom(bottom, (_X, _Y)),), _X)
         for name, table in (('ObjectProperty', program.objects), ('DataProperty', program.datas)):
-            bottom = table.get(f'{OWL}bottom{name}')
-            if bottom is not None:
-                self.contradict((PredicateAtom(bottom, (_X, _Y)),), _X)
             if f'{OWL}top{name}' in table:
                 text = f'owl:top{name}: it is used like any other property'
                 program.unsupported.append(text)

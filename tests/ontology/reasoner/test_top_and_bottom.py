@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+from surveillance_ontology import KnowledgeBase
 from surveillance_ontology.owl import axioms as ax
 from surveillance_ontology.owl import expressions as ex
-from surveillance_ontology.owl.vocabulary import NOTHING, OWL, THING
+from surveillance_ontology.owl.expressions import Literal
+from surveillance_ontology.owl.vocabulary import (
+    BOTTOM,
+    BOTTOM_DATA,
+    NOTHING,
+    THING,
+    TOP,
+    TOP_DATA,
+    TOP_LITERAL,
+)
 from tests.ontology.reasoner.small_ontologies import A, B, C, P, base, i, is_a, j, rel
-
-TOP, BOTTOM = OWL + 'topObjectProperty', OWL + 'bottomObjectProperty'
 
 
 def test_everybody_is_related_to_everybody_by_the_top_property() -> None:
@@ -30,6 +38,31 @@ def test_nobody_is_related_by_the_bottom_property() -> None:
     base(inside, rel(P, i, j), consistent=False)
     some = ax.SubClassOf(A, ex.ObjectSomeValuesFrom(P, THING))
     assert base(inside, some, is_a(B, i)).holds(ax.SubClassOf(A, NOTHING))
+
+
+def test_an_assertion_with_a_bottom_property_contradicts() -> None:
+    kb = base(is_a(A, i))
+    value = Literal('y')
+    for wrong in (rel(BOTTOM, i, j), ax.DataPropertyAssertion(BOTTOM_DATA, i, value)):
+        kb.add(wrong)
+        assert not kb.reason()
+        kb.remove(wrong)
+        assert kb.reason()
+
+
+def test_the_top_properties_relate_everybody_to_itself_and_to_every_value() -> None:
+    value = Literal('y')
+    kb = base(is_a(A, i))
+    assert kb.entails(ax.ReflexiveObjectProperty(TOP))
+    assert kb.entails(ax.DataPropertyAssertion(TOP_DATA, i, value))
+    assert kb.entails(ax.SubClassOf(A, ex.DataMinCardinality(9, TOP_DATA, TOP_LITERAL)))
+    assert not kb.entails(ax.FunctionalDataProperty(TOP_DATA))
+    denied = ax.NegativeDataPropertyAssertion(TOP_DATA, i, value)
+    for wrong in (denied, ax.FunctionalDataProperty(TOP_DATA)):
+        assert not KnowledgeBase('x:', [wrong]).reason()
+    below = KnowledgeBase('x:', [ax.SubDataPropertyOf(TOP_DATA, P), is_a(A, i)])
+    assert below.reason()
+    assert any('topDataProperty' in sentence for sentence in below.unsupported)
 
 
 def test_a_class_of_everybody_has_everything_below() -> None:
