@@ -27,6 +27,8 @@ MOST_STEPS = 1_000_000
 """Facts that may be added in all searches for one answer; some ten seconds."""
 _QUESTION_STEPS = 200_000
 """The same for one axiom."""
+_UNSURE = ~0
+"""All choices: those of a fact that a model only hints at, so that it is asked for."""
 _MOST_KEPT = 200
 """Individuals in models of classes that stay while other classes are looked at."""
 
@@ -202,14 +204,22 @@ class CaseReasoner:
                 yield cls, choices
 
     def _literals(self, x: int) -> Iterator[tuple[str, Literal, Choices]]:
-        """Return the values of an individual that are known: (property, literal, choices)."""
+        """Return the values of an individual that are known: (property, literal, choices).
+
+        Where there are as many as their set has, each of the set may follow, and is asked for.
+        """
         model = self._search.model
-        for v in model.values[x]:
+        there = model.values[x]
+        for v in there:
             values, choices = model.sets[v]
             only = values.only
-            if only is not None:
-                for prop, more in model.props[v].items():
+            for prop, more in model.props[v].items():
+                if only is not None:
                     yield prop, literal_of(only), choices | more
+                elif values.size <= len(there):
+                    alike = [w for w in there if model.sets[w][0].within(values)]
+                    if sum(prop in model.props[w] for w in alike) >= values.size:
+                        yield from ((prop, literal_of(one), _UNSURE) for one in values.members())
 
     def _relations(self, x: int) -> Iterator[tuple[str, int, Choices]]:
         """Return named individuals that one is related to: (property, individual, choices)."""
@@ -224,7 +234,11 @@ class CaseReasoner:
                 yield from self._along(x, prop)
 
     def _along(self, x: int, prop: str) -> Iterator[tuple[str, int, Choices]]:
-        """Follow a property that chains imply through the model."""
+        """Follow a property that chains imply through the model.
+
+        A blocked individual has the neighbours of the one in whose place it is, but not its parent:
+        what is reached through these is asked for.
+        """
         search, model = self._search, self._search.model
         steps: dict[int, list[tuple[int | None, int]]] = {}
         for before, step, after in self._rules.steps(prop):
@@ -242,7 +256,7 @@ class CaseReasoner:
                     following = [(y, 0)]
                 else:
                     following = [
-                        (z, roles[step])
+                        (z, roles[step] if one == y else _UNSURE)
                         for one in {y, search.blocked.get(y, y)}
                         for z, roles in model.out[one].items()
                         if step in roles

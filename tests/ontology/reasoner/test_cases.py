@@ -151,6 +151,24 @@ def test_a_chain_over_somebody_unnamed_and_back_joins_the_named(chain: tuple[Axi
     assert kb.reason()
 
 
+def test_a_chain_over_somebody_unnamed_and_back_reaches_nobody_else() -> None:
+    chained = (ax.SymmetricObjectProperty(P), ax.TransitiveObjectProperty(P))
+    some = SubClassOf(A, ex.ObjectSomeValuesFrom(P, THING))
+    above = ax.SubObjectPropertyOf(P, Q)
+    kb = reasoned(*chained, some, above, ClassAssertion(A, i), ClassAssertion(A, j))
+    assert kb.object_values(Q, i) == {i}
+    assert kb.object_values(Q, j) == {j}
+
+
+def test_as_many_values_as_a_range_has_are_all_of_them() -> None:
+    some = ex.DataOneOf((whole(1), whole(2), whole(3)))
+    all_three = SubClassOf(A, ex.DataMinCardinality(3, P, some))
+    two = SubClassOf(B, ex.DataMinCardinality(2, P, some))
+    kb = reasoned(all_three, two, ClassAssertion(A, i), ClassAssertion(B, j))
+    assert kb.data_values(P, i) == {whole(1), whole(2), whole(3)}
+    assert not kb.data_values(P, j)
+
+
 def test_an_ill_formed_literal_is_a_value_in_no_datatype_for_clauses_and_cases() -> None:
     wrong = Literal('4a', XSD + 'int')
     kb = reasoned(ax.DataPropertyAssertion(S, i, wrong))
