@@ -229,7 +229,6 @@ class Supervisor:
             self._start(self._to_start.pop(0))
 
     def _start(self, child: Child) -> None:
-        child.restart_at = None
         child.finished, child.ended_for = False, ''
         with self._pipe(self._when_up(child)) as up, self._pipe(self._when_it_beats(child)) as beat:
             process = self._spawn(child, {UP: up, BEAT: beat})
@@ -281,7 +280,8 @@ class Supervisor:
             if chunk and child.heartbeats is heartbeats:
                 heartbeats.beat(time.monotonic())
                 child.finished = child.finished or FINISHED in chunk
-                if SLEPT in chunk:
+                # Who is alone has nobody who could have forgotten it.
+                if SLEPT in chunk and len(self.children) > 1:
                     self._end(child, 'slept so long that its peers may have forgotten it')
 
         return beat
@@ -422,7 +422,8 @@ class Supervisor:
             self.stop()
         for child in self.children.values():
             if child.restart_at is not None and now >= child.restart_at:
-                self._start(child)
+                child.restart_at = None
+                self._to_start.append(child)
         self._start_next()
         if self._stopping_since is None:
             self._watch(now)

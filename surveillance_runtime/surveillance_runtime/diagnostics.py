@@ -36,7 +36,8 @@ HEARTBEAT = 'LAUNCH_HEARTBEAT'
 BEAT_PERIOD = 0.25
 """Seconds of real time between two heartbeats."""
 SLEPT_AFTER = 18.0
-"""Seconds without a beat after which this process says that it slept, as on a machine that froze.
+"""Seconds for which no thread ran after which this process says that it slept, as on a machine
+that froze. An executor alone that is late says nothing: DDS has threads of its own.
 
 After 20 s DDS forgets a silent peer. Of two that were frozen together sometimes only one forgets
 the other, and then they do not find each other any more (Fast DDS 155, 457)."""
@@ -44,6 +45,8 @@ the other, and then they do not find each other any more (Fast DDS 155, 457)."""
 
 class Heartbeat:
     """Notes that the executor goes round, and tells the launcher where it asked to be told.
+
+    `take_lateness` is to be called once a second by a thread that does not need the executor.
 
     Args:
         nodes: The nodes of the process; a timer of the first one beats.
@@ -58,7 +61,7 @@ class Heartbeat:
         self._pipe = int(given) if given is not None else None
         if self._pipe is not None:
             os.set_blocking(self._pipe, False)
-        self._last = now()
+        self._last = self._asked = now()
         self._late = 0.0
         nodes[0].create_timer(
             BEAT_PERIOD,
@@ -70,13 +73,17 @@ class Heartbeat:
     def _beat(self) -> None:
         now = self._now()
         self._late = max(self._late, now - self._last - BEAT_PERIOD)
-        self._write(b'S' if now - self._last > SLEPT_AFTER else b'.')
         self._last = now
+        self._write(b'.')
 
     def take_lateness(self) -> float:
         """Return by how much a beat came late at most since this was asked last, seconds."""
+        now = self._now()
+        if now - self._asked > SLEPT_AFTER:
+            self._write(b'S')
+        self._asked = now
         late, self._late = self._late, 0.0
-        return max(0.0, late, self._now() - self._last - BEAT_PERIOD)
+        return max(0.0, late, now - self._last - BEAT_PERIOD)
 
     def say_finished(self) -> None:
         """Say that the process ends on purpose, and is not to be started again."""
