@@ -3,9 +3,8 @@
 rclpy's `SingleThreadedExecutor` gathers every entity of every node anew before each wait, and makes
 a task and two coroutines for each callback: half of the processor time of a process with all the
 patrol's nodes (230 entities, 30 waits for each simulated second). Here the entities are gathered
-when one came or went, and a callback is simply called. Where several nodes listen to simulated
-time, one of their subscriptions is waited for and sets the clocks of all. While messages and timers
-alone keep the process busy, the rest (most of the entities) is looked at in every fourth wait.
+when one came or went, and a callback is simply called. While messages and timers alone keep the
+process busy, the rest (most of the entities) is looked at in every fourth wait.
 
 rclpy's own `EventsExecutor` waits for no set at all, but in Jazzy it leaves asynchronous service
 callbacks unanswered (rclpy 1613), asks a waiting coroutine again without pause, and may end the
@@ -15,7 +14,7 @@ process where a publisher with event callbacks is destroyed (rclpy 1644).
 from __future__ import annotations
 
 import inspect
-from collections import defaultdict, deque
+from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from typing import Any
@@ -30,7 +29,6 @@ from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.node import Node
 from rclpy.subscription import Subscription
 from rclpy.task import Task
-from rclpy.time_source import TimeSource
 from rclpy.utilities import timeout_sec_to_nsec
 from rclpy.waitable import NumberOfEntities
 
@@ -139,14 +137,13 @@ class PatrolExecutor(SingleThreadedExecutor):  # type: ignore[misc]  # rclpy has
         # Tasks that wait, and the entity whose callback group they hold, if any.
         self._waiting: dict[Task, Any] = {}
         self._entities: dict[str, list[Any]] = {}
-        self._clocks: dict[str, list[Subscription]] = {}
         # By the groups that coroutines hold: what keeps a process busy, and everything.
         self._wait_lists: dict[frozenset[CallbackGroup], tuple[_WaitList, _WaitList]] = {}
         self._busy_waits = 0
         self._changed = True
         self._take: dict[str, Callable[[Any], Any]] = {
             'timer': _call_timer,
-            'subscription': self._call_subscription,
+            'subscription': _call_subscription,
             'guard_condition': self._take_guard_condition,
             'client': self._take_client,
             'service': self._take_service,
@@ -200,16 +197,21 @@ class PatrolExecutor(SingleThreadedExecutor):  # type: ignore[misc]  # rclpy has
             if entity is not None and not entity.callback_group.can_execute(entity)
         )
         if held not in self._wait_lists:
+            if len(self._wait_lists) >= _MOST_LISTS:
+                self._close_wait_lists()
             self._wait_lists[held] = self._both_wait_lists()
         busy, everything = self._wait_lists[held]
         self._busy_waits = (self._busy_waits + 1) % (_MOST_BUSY_WAITS + 1)
-        if self._busy_waits:
-            self._ready.extend(busy.wait(0))
-        if not self._ready:
-            self._busy_waits = 0
-            for kind, entity in everything.wait(timeout):
-                if entity.callback_group is not None:  # as the executor's own guard conditions have
-                    self._ready.append((kind, entity))
+        try:
+            if self._busy_waits:
+                self._ready.extend(busy.wait(0))
+            if not self._ready:
+                self._busy_waits = 0
+                for kind, entity in everything.wait(timeout):
+                    if entity.callback_group is not None:  # as the executor's own guards have
+                        self._ready.append((kind, entity))
+        except _rclpy.InvalidHandle:
+            self._changed = True  # another thread has just destroyed something
 
     def _gather(self) -> None:
         """Look which entities there are; forget the wait lists if they are others."""
@@ -222,13 +224,9 @@ class PatrolExecutor(SingleThreadedExecutor):  # type: ignore[misc]  # rclpy has
             'service': [each for node in nodes for each in node.services],
             'waitable': [each for node in nodes for each in node.waitables],
         }
-        if entities != self._entities or len(self._wait_lists) > _MOST_LISTS:
+        if entities != self._entities:
             self._close_wait_lists()
             self._entities = entities
-            self._clocks = defaultdict(list)
-            for each in entities['subscription']:
-                if _sets_clock(each):
-                    self._clocks[each.topic_name].append(each)
 
     def _close_wait_lists(self) -> None:
         for both in self._wait_lists.values():
@@ -242,14 +240,6 @@ class PatrolExecutor(SingleThreadedExecutor):  # type: ignore[misc]  # rclpy has
             kind: [each for each in entities if each.callback_group.can_execute(each)]
             for kind, entities in self._entities.items()
         }
-        seen = set()
-        for each in [each for each in free['subscription'] if _sets_clock(each)]:
-            if each.topic_name in seen:
-                free['subscription'].remove(each)
-                # Its events would end each wait, since nobody takes its messages.
-                for event in each.event_handlers:
-                    free['waitable'].remove(event)
-            seen.add(each.topic_name)
         busy = {kind: each if kind in _BUSY_KINDS else [] for kind, each in free.items()}
         return (
             _WaitList(busy, [], self._context),
@@ -274,23 +264,6 @@ class PatrolExecutor(SingleThreadedExecutor):  # type: ignore[misc]  # rclpy has
                 entity.callback_group.ending_execution(entity)
             else:
                 self._waiting[task] = entity
-
-    def _call_subscription(self, subscription: Subscription) -> Any:
-        """Take a message and hand it over; return what the callback left to await, if anything."""
-        try:
-            with subscription.handle:
-                taken = subscription.handle.take_message(subscription.msg_type, subscription.raw)
-        except _rclpy.InvalidHandle:
-            return None
-        if taken is None:
-            return None
-        if _sets_clock(subscription):
-            for each in self._clocks[subscription.topic_name]:
-                each.callback(taken[0])
-            return None
-        if subscription._callback_type is Subscription.CallbackType.MessageOnly:
-            taken = taken[:1]
-        return _coroutine(subscription.callback(*taken))
 
     def _carry_on(self) -> None:
         """Go on with all tasks until those that are left wait for something."""
@@ -317,11 +290,6 @@ class PatrolExecutor(SingleThreadedExecutor):  # type: ignore[misc]  # rclpy has
         return bool(super().shutdown(timeout_sec))
 
 
-def _sets_clock(subscription: Subscription) -> bool:
-    """Return whether a subscription is a node's own, which sets its clock to simulated time."""
-    return getattr(subscription.callback, '__func__', None) is TimeSource.clock_callback
-
-
 def _call_timer(timer: Any) -> Any:
     """Set a timer for the next time and call its callback; return what is left to await."""
     try:
@@ -330,6 +298,20 @@ def _call_timer(timer: Any) -> Any:
     except _rclpy.InvalidHandle:
         return None
     return _coroutine(timer.callback())
+
+
+def _call_subscription(subscription: Subscription) -> Any:
+    """Take a message and hand it over; return what the callback left to await, if anything."""
+    try:
+        with subscription.handle:
+            taken = subscription.handle.take_message(subscription.msg_type, subscription.raw)
+    except _rclpy.InvalidHandle:
+        return None
+    if taken is None:
+        return None
+    if subscription._callback_type is Subscription.CallbackType.MessageOnly:
+        taken = taken[:1]
+    return _coroutine(subscription.callback(*taken))
 
 
 def _coroutine(returned: Any) -> Any:

@@ -120,11 +120,28 @@ def test_a_child_that_dies_again_and_again_calls_somebody(start):
     assert launch.end(signal.SIGINT)[0] == 0
 
 
-def test_a_child_that_slept_for_long_is_started_again(start):
-    sleeper = 'import os; os.write(int(os.environ["LAUNCH_HEARTBEAT"]), b"S"); input()'
-    launch = start(DRIVER, f'watched={sleeper}')
-    launch.until(r'watched slept so long that its peers may have forgotten it: ending it')
-    launch.until(r'watched died \(slept so long .*\): starting it again')
+SLEEPER = (
+    'import os; os.write(int(os.environ["LAUNCH_HEARTBEAT"]), b"S"); print("woke", flush=True)\n'
+    'input()'
+)
+
+
+def test_children_that_slept_for_long_are_started_again_in_turn(start):
+    """A machine that froze has all of them killed at once; they do not all come up at once."""
+    sleepers = [f'{name}={SLEEPER}' for name in ('one', 'two')]
+    launch = start(DRIVER, *sleepers, environ={**USER_ENVIRON, 'AT_ONCE': '1'})
+    for name in ('one', 'two'):
+        launch.until(rf'{name} slept so long that its peers may have forgotten it: ending it')
+        launch.until(rf'{name} died \(slept so long .*\): starting it again')
+    assert launch.end(signal.SIGINT)[0] == 0
+
+
+def test_a_child_that_slept_and_has_no_peers_goes_on(start):
+    launch = start(DRIVER, f'alone={SLEEPER}')
+    launch.until(r'alone +\| woke')
+    launch.write('alone go')
+    launch.until(r'alone died \(exit code 0\)')
+    assert not any('slept' in line for line in launch.lines)
     assert launch.end(signal.SIGINT)[0] == 0
 
 

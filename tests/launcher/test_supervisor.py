@@ -128,6 +128,24 @@ def test_no_more_processes_come_up_at_once_than_allowed(start):
     ]
 
 
+def test_restarts_wait_for_their_turn_as_first_starts_do(start):
+    """All that died at once, as after a machine froze, would slow one another down."""
+    slow = 'import signal; print("coming", flush=True); signal.pause()'
+    launch = start(DRIVER, f'one={slow}', f'two={slow}', environ={**USER_ENVIRON, 'AT_ONCE': '1'})
+    launch.until(r'one +\| coming')
+    launch.until(r'two +\| coming')
+    seen = len(launch.lines)
+    for line in list(launch.lines):
+        if match := re.search(r'started \w+ \(process (\d+)\)', line):
+            os.kill(int(match[1]), signal.SIGKILL)
+    launch.until(r'started one', after=seen)
+    launch.until(r'started two', after=seen)
+    starts = [line.split()[0] for line in launch.lines[seen:] if ' started ' in line]
+    first, second = (float(start.rsplit(':', 1)[1]) for start in starts[:2])
+    assert (second - first) % 60 > 1.0
+    assert launch.end(signal.SIGINT)[0] == 0
+
+
 def test_a_child_that_dies_comes_back_and_the_rest_goes_on(start):
     launch = start(DRIVER, f'one={WAIT}', f'two={WAIT}')
     first = int(launch.until(r'started one \(process (\d+)\)')[1])

@@ -9,15 +9,19 @@ from collections.abc import Iterator
 import pytest
 import rclpy
 from builtin_interfaces.msg import Time
-from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
+from rclpy.clock import JumpThreshold
+from rclpy.duration import Duration
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.task import Future
+from rclpy.timer import Timer
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Int32
 from std_srvs.srv import Trigger
 
+from surveillance_runtime import executor
 from surveillance_runtime.executor import PatrolExecutor
 from surveillance_runtime.testing import claim_domain
 
@@ -175,56 +179,87 @@ def test_the_end_of_the_context_ends_the_spinning(spun: Spun) -> None:
         spun.until(lambda: False)
 
 
-def test_nodes_share_the_clock_that_one_of_them_hears(spun: Spun) -> None:
-    """A time that is told is every node's, also of a node whose callback waits at the moment."""
+def test_each_node_hears_the_clock_also_one_that_joins_while_time_stands(spun: Spun) -> None:
     simulated = Parameter('use_sim_time', value=True)
+    first, second = spun.nodes
     third = Node(
         'third',
         context=spun.context,
         use_global_arguments=False,
         parameter_overrides=[simulated],
     )
-    spun.executor.add_node(third)
-    for node in spun.nodes:
-        node.set_parameters([simulated])
-    nodes = [*spun.nodes, third]
-    teller = spun.nodes[0].create_publisher(Clock, '/clock', 1)
-    spun.until(lambda: teller.get_subscription_count() == len(nodes))
-
-    def tell(seconds: int) -> None:
-        def told() -> bool:
-            teller.publish(Clock(clock=Time(sec=seconds)))
-            return clocks() == [seconds] * len(nodes)
-
-        spun.until(told)
+    first.set_parameters([simulated])
+    second.set_parameters([simulated])
+    teller = first.create_publisher(Clock, '/clock', 1)
 
     def clocks() -> list[int]:
-        return [node.get_clock().now().nanoseconds // 10**9 for node in nodes]
+        return [node.get_clock().now().nanoseconds // 10**9 for node in (first, second, third)]
 
-    def rests() -> bool:
-        begun = time.monotonic()
-        spun.executor.spin_once(timeout_sec=0.1)
-        return time.monotonic() - begun >= 0.05
-
-    tell(5)
-    assert any(rests() for _ in range(20)), 'messages that nobody takes wake the executor'
-    gate, begun = Future(), []
-
-    async def slow(message: Int32) -> None:
-        begun.append(message.data)
-        await gate
-
-    numbers = third.create_publisher(Int32, 'numbers', 1)
-    spun.nodes[0].create_subscription(Int32, 'numbers', slow, 1)
-    spun.until(lambda: numbers.get_subscription_count() == 1)
-    numbers.publish(Int32())
-    spun.until(lambda: begun)
-    tell(6)
-    gate.set_result(None)
-    spun.executor.wake()
-    spun.executor.remove_node(nodes.pop(0))
-    tell(7)
+    spun.until(lambda: teller.get_subscription_count() == 3)
+    teller.publish(Clock(clock=Time(sec=5)))
+    spun.until(lambda: clocks() == [5, 5, 0])
+    spun.executor.add_node(third)
     spun.nodes.append(third)
+    spun.until(lambda: clocks() == [5, 5, 5])
+    first.set_parameters([Parameter('use_sim_time', value=False)])
+    spun.until(lambda: teller.get_subscription_count() == 2)
+    teller.publish(Clock(clock=Time(sec=6)))
+    spun.until(lambda: clocks()[1:] == [6, 6])
+    assert clocks()[0] > 6
+
+
+def test_a_jump_callback_that_fails_costs_no_other_node_its_time(spun: Spun) -> None:
+    for node in spun.nodes:
+        node.set_parameters([Parameter('use_sim_time', value=True)])
+    clocks = [node.get_clock() for node in spun.nodes]
+    handles = [
+        clock.create_jump_callback(
+            JumpThreshold(min_forward=Duration(nanoseconds=1), min_backward=None),
+            post_callback=lambda _jump: 1 / 0,
+        )
+        for clock in clocks
+    ]
+    teller = spun.nodes[0].create_publisher(Clock, '/clock', 1)
+    spun.until(lambda: teller.get_subscription_count() == 2)
+    teller.publish(Clock(clock=Time(sec=5)))
+    for _ in spun.nodes:
+        with pytest.raises(Exception, match='division by zero'):
+            spun.until(lambda: False)
+    assert [clock.now().nanoseconds for clock in clocks] == [5 * 10**9] * 2
+    for handle in handles:
+        handle.unregister()
+
+
+def test_what_another_thread_destroys_in_the_middle_of_a_wait_raises_nothing(spun: Spun) -> None:
+    node = spun.nodes[0]
+    listener = node.create_subscription(Int32, 'numbers', lambda _message: None, 1)
+    spun.executor.spin_once(timeout_sec=0.0)
+    spun.until(lambda: not spun.executor._changed)
+    listener.event_handlers[0].destroy()  # as `destroy_subscription` begins, before it wakes
+    spun.executor.spin_once(timeout_sec=0.0)
+    node.destroy_subscription(listener)
+    task = spun.executor.create_task(lambda: None)
+    spun.until(task.done)
+
+
+def test_coroutines_of_many_groups_leave_few_wait_lists(spun: Spun) -> None:
+    """Each set of groups that are held at once has a list; there may be very many such sets."""
+    node, gates = spun.nodes[0], [Future() for _ in range(40)]
+    timers: list[Timer] = []
+    begun: list[int] = []
+    for number, gate in enumerate(gates):
+
+        async def waits(number: int = number, gate: Future = gate) -> None:
+            timers[number].cancel()
+            begun.append(number)
+            await gate
+
+        timers.append(node.create_timer(0.001, waits, MutuallyExclusiveCallbackGroup()))
+    spun.until(lambda: len(begun) >= len(gates))
+    for gate in gates:
+        gate.set_result(None)
+        spun.executor.spin_once(timeout_sec=0.01)
+    assert len(spun.executor._wait_lists) <= executor._MOST_LISTS
 
 
 def test_a_service_answers_while_messages_keep_the_executor_busy(spun: Spun) -> None:
