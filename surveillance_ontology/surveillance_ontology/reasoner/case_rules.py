@@ -157,7 +157,7 @@ class CaseRules:
         self.above: dict[int, tuple[int, ...]] = {}
         self.props_above: dict[str, tuple[str, ...]] = {}
         self.disjoint: dict[int, set[int]] = {}
-        self.disjoint_props: dict[str, set[str]] = {}
+        self.disjoint_props: dict[str, dict[str, None]] = {}
         self.keys: list[KeyRule] = []
         self.gaps: dict[str, None] = {}
         self.has_inverse = False
@@ -165,8 +165,9 @@ class CaseRules:
         self._recognised: dict[ClassExpression, int] = {}
         self._counts: dict[object, int] = {}
         self._chains = Chains()
-        self._inclusions: dict[AnyRole, set[AnyRole]] = {}
-        self._data_inclusions: dict[str, set[str]] = {}
+        # No sets of names: their order, and with it the search, would differ from run to run.
+        self._inclusions: dict[AnyRole, dict[AnyRole, None]] = {}
+        self._data_inclusions: dict[str, dict[str, None]] = {}
         self._datatypes = {
             a.datatype: a.range for a in tbox if isinstance(a, ax.DatatypeDefinition)
         }
@@ -428,7 +429,7 @@ class CaseRules:
             if data:
                 if sub[0] == TOP_DATA:
                     raise UnsupportedError('owl:topDataProperty is below another property')
-                self._data_inclusions.setdefault(sub[0], set()).add(sup[0])
+                self._data_inclusions.setdefault(sub[0], {})[sup[0]] = None
             else:
                 self._below(sub, sup)
         if isinstance(axiom, ax.TransitiveObjectProperty):
@@ -457,8 +458,8 @@ class CaseRules:
     def _below(self, sub: AnyRole, sup: AnyRole) -> None:
         for role in (sub, sup):
             self.role(role)
-        self._inclusions.setdefault(sub, set()).add(sup)
-        self._inclusions.setdefault(turned(sub), set()).add(turned(sup))
+        self._inclusions.setdefault(sub, {})[sup] = None
+        self._inclusions.setdefault(turned(sub), {})[turned(sup)] = None
         self._chains.imply((sub,), sup)
 
     def _check_chains(self, axiom: Axiom) -> None:
@@ -528,8 +529,8 @@ class CaseRules:
             self.functional_values.append(ValueCount(1, axiom.prop, EVERY))
         elif isinstance(axiom, ax.DisjointDataProperties):
             for name, other in ax.pairs_of(axiom.props):
-                self.disjoint_props.setdefault(name, set()).add(other)
-                self.disjoint_props.setdefault(other, set()).add(name)
+                self.disjoint_props.setdefault(name, {})[other] = None
+                self.disjoint_props.setdefault(other, {})[name] = None
 
     def _exclude(self, first: int, second: int) -> None:
         for one, other in ((first, second), (-first, -second)):

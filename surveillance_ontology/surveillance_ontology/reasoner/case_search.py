@@ -529,7 +529,7 @@ class CaseSearch:
 
     def _core_blocker(self, x: int, blocked: dict[int, int]) -> int | None:
         """Return an earlier individual that is all that x is, and that x may be."""
-        model, put_off = self.model, self._put_off
+        model, put_off, nominals = self.model, self._put_off, self.rules.nominals.keys()
         own, known = model.labels[x].keys(), self.blocked.get(x)
         parent = model.parent[x]
         assert parent is not None
@@ -538,7 +538,8 @@ class CaseSearch:
             if y in blocked or y in put_off or y >= x or model.is_gone(y):
                 continue
             other = model.labels[y].keys()
-            if not own <= other:
+            # Nobody is like a named individual: it would be that individual.
+            if not own <= other or not nominals.isdisjoint(other):
                 continue
             model.step()
             if not unwanted & other <= own:

@@ -79,7 +79,7 @@ class Chains:
 
     def __init__(self) -> None:
         self._chains: dict[AnyRole, list[tuple[AnyRole, ...]]] = {}
-        self._below: dict[AnyRole, set[AnyRole]] = {}
+        self._below: dict[AnyRole, dict[AnyRole, None]] = {}
 
     def __bool__(self) -> bool:
         return bool(self._chains)
@@ -91,8 +91,8 @@ class Chains:
         """Note that a chain, or with one part a property, implies a role."""
         back = tuple(turned(one) for one in reversed(chain))
         if len(chain) == 1:
-            self._below.setdefault(role, set()).add(chain[0])
-            self._below.setdefault(turned(role), set()).add(back[0])
+            self._below.setdefault(role, {})[chain[0]] = None
+            self._below.setdefault(turned(role), {})[back[0]] = None
         else:
             self._chains.setdefault(role, []).append(tuple(chain))
             self._chains.setdefault(turned(role), []).append(back)

@@ -337,3 +337,14 @@ def test_classes_that_everybody_is_in_or_out_of_are_decided_for_few() -> None:
     assert not reasoner.stopped
     both = ex.ObjectIntersectionOf(('x:in4', ex.ObjectSomeValuesFrom(P, 'x:out5')))
     assert not CaseReasoner([*axioms, ClassAssertion(both, i)], 50_000).consistent()
+
+
+def test_nobody_is_put_off_as_being_like_a_named_individual() -> None:
+    """All four would be one of three; each has a choice that those three have made."""
+    colours = ex.ObjectOneOf((j, k, m))
+    only = ex.ObjectAllValuesFrom(P, A)
+    four = ex.ObjectIntersectionOf((ex.ObjectMinCardinality(4, P), C))
+    axioms = [ax.EquivalentClasses((A, colours)), ax.EquivalentClasses((C, only))]
+    assert not CaseReasoner([*axioms, ClassAssertion(four, i)]).consistent()
+    three = ex.ObjectIntersectionOf((ex.ObjectMinCardinality(3, P), C))
+    assert CaseReasoner([*axioms, ClassAssertion(three, i)]).consistent()
