@@ -427,7 +427,7 @@ class KnowledgeBase:
         known = self._classification
         if known is None:
             return set()
-        found = known.classes() if cls == THING else known.subclasses(cls)
+        found = set(known.classes()) if cls == THING else known.subclasses(cls)
         if known.within and cls != THING:
             found.update(name for name in known.within if cls in self.superclasses(name))
         if self._told.schema_changed or cls == THING:

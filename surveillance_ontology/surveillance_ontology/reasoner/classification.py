@@ -182,9 +182,9 @@ class Classification:
         above, impossible = self._own
         return sub in impossible or sup == THING or sup in above.get(sub, ())
 
-    def classes(self) -> set[str]:
-        """Return every named class, and owl:Thing, which may be below others."""
-        return set(self._above)
+    def classes(self) -> tuple[str, ...]:
+        """Return every named class, and owl:Thing, which may be below others, in a fixed order."""
+        return tuple(self._above)
 
     def _hierarchy(self) -> None:
         contexts = self._contexts
