@@ -633,7 +633,10 @@ class Translation:
 
     def _all_disjoint(self, classes: tuple[ClassExpression, ...]) -> None:
         for first, second in ax.pairs_of(map(normal_form, classes)):
-            self._disjoint(self._recognise(first), self._recognise(second))
+            if THING in (first, second):
+                self._attempt(self._sub_class, second if first == THING else first, NOTHING)
+            else:
+                self._disjoint(self._recognise(first), self._recognise(second))
 
     def _key(self, axiom: ax.HasKey) -> None:
         props = [self._direction(prop) for prop in axiom.object_props]

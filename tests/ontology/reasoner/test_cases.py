@@ -160,6 +160,20 @@ def test_a_chain_over_somebody_unnamed_and_back_reaches_nobody_else() -> None:
     assert kb.object_values(Q, j) == {j}
 
 
+@pytest.mark.parametrize(
+    'axiom',
+    [
+        ax.DisjointClasses((A, ex.ObjectUnionOf((B, ex.ObjectComplementOf(NOTHING))))),
+        ax.DisjointUnion(D, (A, THING)),
+    ],
+)
+def test_what_is_disjoint_with_everything_is_empty(axiom: Axiom) -> None:
+    kb = reasoned(axiom, SubClassOf(C, B))
+    assert A in kb.subclasses(NOTHING)
+    kb.add(ClassAssertion(A, i))
+    assert not kb.reason()
+
+
 def test_as_many_values_as_a_range_has_are_all_of_them() -> None:
     some = ex.DataOneOf((whole(1), whole(2), whole(3)))
     all_three = SubClassOf(A, ex.DataMinCardinality(3, P, some))
