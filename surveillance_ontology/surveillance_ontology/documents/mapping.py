@@ -375,11 +375,15 @@ class Mapping:
 
     def _attempt(self, subject: str, read: Callable[..., None], *arguments: object) -> None:
         """Read one statement; what is ill-formed in it costs the statement alone."""
+        left_out = f'a statement about {local_name(subject)} is left out'
         try:
             read(*arguments)
         except IllFormedError as error:
-            text = f'a statement about {local_name(subject)} is left out: {error.message}'
+            text = f'{left_out}: {error.message}'
             self.unsupported.append(f'line {error.line}: {text}' if error.line else text)
+        except RecursionError:
+            self._open.clear()
+            self._report(subject, f'{left_out}: it nests too deeply, or contains itself')
 
     def _triple(self, subject: str, predicate: str, value: Node) -> None:
         handler = _PREDICATES.get(predicate)

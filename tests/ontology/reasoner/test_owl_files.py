@@ -166,6 +166,15 @@ def test_errors_name_line_and_column(text: bytes, line: int, words: str) -> None
             3,
             'data property p of a has the resource',
         ),
+        (
+            document(
+                '<rdf:Description rdf:about="#p"><rdfs:range>\n<rdfs:Datatype rdf:nodeID="r">'
+                '<owl:datatypeComplementOf rdf:nodeID="r"/></rdfs:Datatype></rdfs:range>'
+                '</rdf:Description>'
+            ),
+            3,
+            'p is left out: it nests too deeply, or contains itself',
+        ),
     ],
 )
 def test_an_ill_formed_statement_is_left_out_alone(text: bytes, line: int, words: str) -> None:
