@@ -1,9 +1,9 @@
 """What recorded messages tell: the time line of a recording that has none, lidar and camera.
 
 The messages of a recording, such as one by `ros2 bag record`, go through the same table of topics
-as those of a running mission. What a
-running mission is asked for, a recording cannot answer: places and doors come from `place_markers`,
-visits and URGENT from `fact_changes`, the nodes from `/diagnostics`.
+as those of a running mission. What a running mission is asked for, a recording cannot answer:
+places and doors come from `place_markers`, visits and URGENT from `fact_changes`, the nodes from
+`/diagnostics`.
 """
 
 from __future__ import annotations
