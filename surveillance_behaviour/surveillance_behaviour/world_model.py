@@ -203,12 +203,7 @@ class WorldModel:
             self._ontology.set_urgency_threshold(threshold, interrupt)
             self._told_threshold = threshold
         visits = self.experience.visits
-        try:
-            found = self._ontology.snapshot(now, classes, visits, interrupt)
-        except PeerError:
-            # The ontology that comes back may be another one.
-            self._told_threshold = None
-            raise
+        found = self._ontology.snapshot(now, classes, visits, interrupt)
         graph = self._map_of(found, interrupt)
         visited_at = {}
         for place, seconds in found.visited_at.items():
