@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache, cached_property
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 from surveillance_ontology.owl import expressions as ex
 from surveillance_ontology.owl.expressions import DataRange
@@ -42,40 +42,30 @@ _PLAIN = (
 _BOOLEANS = frozenset([('boolean', True), ('boolean', False)])
 
 
-class _End:
-    """The place of an interval's end: below, at or above a key; a total order with `_LOW`."""
+class _End(NamedTuple):
+    """The place of an interval's end, in their order: below all keys, beside a key, above all."""
 
-    __slots__ = ('key', 'side')
-
-    def __init__(self, key: Any, side: int) -> None:
-        self.key, self.side = key, side
-
-    def _place(self) -> tuple[int, Any, int]:
-        if self.key is None:
-            return self.side, 0, 0
-        return 0, self.key, self.side
-
-    def __lt__(self, other: _End) -> bool:
-        return self._place() < other._place()
-
-    def __le__(self, other: _End) -> bool:
-        return self._place() <= other._place()
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _End) and self._place() == other._place()
-
-    def __hash__(self) -> int:
-        return hash((self.key, self.side))
+    beyond: int
+    key: Any
+    side: int
 
 
-_LOW, _HIGH = _End(None, -1), _End(None, 1)
+def _below(key: Any) -> _End:
+    return _End(0, key, -1)
+
+
+def _above(key: Any) -> _End:
+    return _End(0, key, 1)
+
+
+_LOW, _HIGH = _End(-1, 0, 0), _End(1, 0, 0)
 _Intervals: TypeAlias = 'tuple[tuple[_End, _End], ...]'
 _EVERY: _Intervals = ((_LOW, _HIGH),)
 
 
 def _union(parts: Iterable[tuple[_End, _End]]) -> _Intervals:
     joined: list[tuple[_End, _End]] = []
-    for low, high in sorted((part for part in parts if part[0] < part[1]), key=_by_low):
+    for low, high in sorted(part for part in parts if part[0] < part[1]):
         if joined and low <= joined[-1][1]:
             joined[-1] = (joined[-1][0], max(joined[-1][1], high))
         else:
@@ -83,12 +73,19 @@ def _union(parts: Iterable[tuple[_End, _End]]) -> _Intervals:
     return tuple(joined)
 
 
-def _by_low(part: tuple[_End, _End]) -> tuple[int, Any, int]:
-    return part[0]._place()
-
-
 def _common(first: _Intervals, second: _Intervals) -> _Intervals:
-    return _union((max(a, c), min(b, d)) for a, b in first for c, d in second)
+    found, i, j = [], 0, 0
+    while i < len(first) and j < len(second):
+        (a, b), (c, d) = first[i], second[j]
+        low, high = max(a, c), min(b, d)
+        if low < high:
+            found.append((low, high))
+        # The one that ends first has nothing in common with what follows.
+        if b <= d:
+            i += 1
+        else:
+            j += 1
+    return tuple(found)
 
 
 def _outside(parts: _Intervals) -> _Intervals:
@@ -277,7 +274,7 @@ class ValueSet:
 
 def _count(layer: str, low: _End, high: _End) -> float:
     """Return how many values of a layer lie between two ends."""
-    if low.key is None or high.key is None:
+    if low.beyond or high.beyond:
         return math.inf
     if layer == 'whole':
         first = math.ceil(low.key) + (low.side > 0 and math.ceil(low.key) == low.key)
@@ -350,12 +347,12 @@ def point(value: Value) -> ValueSet:
     """Return the set of one value."""
     _, key = comparable(value)
     if isinstance(value, (int, Fraction)):
-        return ValueSet({_layer_of(value): ((_End(key, -1), _End(key, 1)),)}, {})
+        return ValueSet({_layer_of(value): ((_below(key), _above(key)),)}, {})
     if isinstance(value, str):
         return ValueSet({}, {'string': _listed([value])})
     space = value[0]
     if space in ('float', 'double') and len(value) == 2 and value[1] != 'NaN':
-        return ValueSet({space: ((_End(key, -1), _End(key, 1)),)}, {})
+        return ValueSet({space: ((_below(key), _above(key)),)}, {})
     return ValueSet({}, {space if space in _PLAIN else 'other': _listed([value])})
 
 
@@ -373,7 +370,7 @@ def _datatype(datatype: str) -> ValueSet | None:
     name = datatype.removeprefix(XSD)
     if name in BOUNDS:
         low, high = BOUNDS[name]
-        ends = (_LOW if low is None else _End(low, -1), _HIGH if high is None else _End(high, 1))
+        ends = (_LOW if low is None else _below(low), _HIGH if high is None else _above(high))
         return ValueSet({'whole': (ends,)}, {})
     if name in ('float', 'double'):
         return ValueSet({name: _EVERY}, {'other': _listed([(name, 'NaN'), (name, 0.0, '-')])})
@@ -387,10 +384,10 @@ def _datatype(datatype: str) -> ValueSet | None:
 
 
 _ENDS: dict[str, Callable[[Any], tuple[_End, _End]]] = {
-    'minInclusive': lambda key: (_End(key, -1), _HIGH),
-    'minExclusive': lambda key: (_End(key, 1), _HIGH),
-    'maxInclusive': lambda key: (_LOW, _End(key, 1)),
-    'maxExclusive': lambda key: (_LOW, _End(key, -1)),
+    'minInclusive': lambda key: (_below(key), _HIGH),
+    'minExclusive': lambda key: (_above(key), _HIGH),
+    'maxInclusive': lambda key: (_LOW, _above(key)),
+    'maxExclusive': lambda key: (_LOW, _below(key)),
 }
 
 
