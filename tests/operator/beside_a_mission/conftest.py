@@ -22,13 +22,14 @@ def mission_domain() -> int:
 
 @pytest.fixture(scope='module')
 def mission(mission_domain: int, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Started]:
-    """Provide a patrol that is ten times as fast as real time, with a page that may control it."""
+    """Provide a patrol at four times real time, with a page that may control it."""
     with socket.socket() as free:
         free.bind(('127.0.0.1', 0))
         port = free.getsockname()[1]  # a page that is started again keeps its address
     words = ['--composed', '--web-control', '--web-address', f'127.0.0.1:{port}']
     words += ['--domain', str(mission_domain), '--record', str(tmp_path_factory.mktemp('runs'))]
-    started = Started([*LAUNCH, *words, '--params', str(ROOT / 'config/fast.yaml')])
+    words += ['-p', 'speed:=4.0', '--params', str(ROOT / 'config/fast.yaml')]
+    started = Started([*LAUNCH, *words])
     started.until('decision 1', timeout=90)
     yield started
     started.end(signal.SIGINT)
