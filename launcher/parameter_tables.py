@@ -12,7 +12,6 @@ import math
 import os
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +24,7 @@ from surveillance_runtime.configuration import (
     NodeSchema,
     read_schema,
 )
+from surveillance_runtime.parameters import ParameterError, ParameterSpec
 from surveillance_runtime.place.rooms import GEOMETRY_KEYS, PLACE_KEYS
 
 _HEAD = """\
@@ -49,25 +49,24 @@ def collect() -> dict[str, Any]:
     import rclpy
     from rclpy.parameter import Parameter
 
-    from surveillance_runtime.node import PatrolNode
-
     tables: dict[str, Any] = {}
     context = rclpy.Context()
     rclpy.init(context=context, domain_id=101)
     here = os.getcwd()
     try:
-        with tempfile.TemporaryDirectory() as folder, _recording(PatrolNode) as record:
+        with tempfile.TemporaryDirectory() as folder:
             os.chdir(folder)
             for node in node_table.NODES:
-                declared: dict[str, Any] = {}
+                declared: dict[str, ParameterSpec] = {}
                 prefixes: set[str] = set()
                 for given in _variants(node):
-                    record.begin(declared, prefixes)
                     overrides = [Parameter(name, value=value) for name, value in given.items()]
-                    _make_once(node, context, overrides)
+                    more, below = _declared(node, context, overrides)
+                    declared = more | declared
+                    prefixes |= below
                 tables[node.name] = {
                     'prefixes': sorted(prefixes),
-                    'parameters': {name: declared[name] for name in sorted(declared)},
+                    'parameters': {name: _row(declared[name]) for name in sorted(declared)},
                 }
     finally:
         os.chdir(here)
@@ -88,17 +87,22 @@ def _variants(node: node_table.Node) -> Iterator[dict[str, Any]]:
             yield {**described, 'execution_mode': mode, 'behaviour': behaviour, 'console': False}
 
 
-def _make_once(node: node_table.Node, context: Any, overrides: Sequence[Any]) -> None:
+def _declared(
+    node: node_table.Node, context: Any, overrides: Sequence[Any]
+) -> tuple[dict[str, ParameterSpec], set[str]]:
+    """Make a node and return its parameters and prefixes; of one that cannot start the first."""
     from surveillance_runtime.node import StartError
-    from surveillance_runtime.parameters import ParameterError
 
     kind = getattr(importlib.import_module(node.module), node.class_name)
+    made = kind.__new__(kind)
     try:
-        made = kind(context=context, parameter_overrides=overrides, use_global_arguments=False)
+        made.__init__(context=context, parameter_overrides=overrides, use_global_arguments=False)
     except (StartError, ParameterError):
-        return  # what it declared until then is noted
-    made.stop()
-    made.destroy_node()
+        pass
+    else:
+        made.stop()
+        made.destroy_node()
+    return made.declared, made.prefixes
 
 
 def _portable(value: Any) -> Any:
@@ -112,56 +116,25 @@ def _name_of(check: Any) -> str:
     return f'{check.__module__}:{name}' if name.isidentifier() else ''
 
 
-class _Record:
-    def __init__(self) -> None:
-        self._declared: dict[str, Any] = {}
-        self._prefixes: set[str] = set()
-
-    def begin(self, declared: dict[str, Any], prefixes: set[str]) -> None:
-        self._declared, self._prefixes = declared, prefixes
-
-    def note(self, spec: Any, description: str, changeable: bool) -> None:
-        kind = spec.element or type(spec.default)
-        row: dict[str, Any] = {
-            'type': kind.__name__ + ('[]' if spec.element else ''),
-            'default': _portable(list(spec.default) if spec.element else spec.default),
-            'description': description,
-        }
-        for name in ('minimum', 'maximum'):
-            value = getattr(spec, name)
-            if value is not None:
-                row[name] = value
-        if check := _name_of(spec.check):
-            row['check'] = check
-        if spec.choices:
-            row['choices'] = list(spec.choices)
-        if changeable:
-            row['changeable'] = True
-        self._declared.setdefault(spec.name, row)
-
-    def note_prefix(self, prefix: str) -> None:
-        self._prefixes.add(prefix)
-
-
-@contextmanager
-def _recording(node_class: Any) -> Iterator[_Record]:
-    """Note every declaration of a parameter."""
-    record = _Record()
-    declare, under = node_class._declare_checked, node_class.parameters_under
-
-    def noting(self: Any, spec: Any, descriptor: Any) -> Any:
-        record.note(spec, descriptor.description, not descriptor.read_only)
-        return declare(self, spec, descriptor)
-
-    def noting_prefix(self: Any, prefix: str) -> Any:
-        record.note_prefix(prefix)
-        return under(self, prefix)
-
-    node_class._declare_checked, node_class.parameters_under = noting, noting_prefix
-    try:
-        yield record
-    finally:
-        node_class._declare_checked, node_class.parameters_under = declare, under
+def _row(spec: ParameterSpec) -> dict[str, Any]:
+    """Return a parameter in the form of the schema file."""
+    kind = spec.element or type(spec.default)
+    row: dict[str, Any] = {
+        'type': kind.__name__ + ('[]' if spec.element else ''),
+        'default': _portable(list(spec.default) if spec.element else spec.default),
+        'description': spec.description,
+    }
+    for name in ('minimum', 'maximum'):
+        value = getattr(spec, name)
+        if value is not None:
+            row[name] = value
+    if check := _name_of(spec.check):
+        row['check'] = check
+    if spec.choices:
+        row['choices'] = list(spec.choices)
+    if not spec.read_only:
+        row['changeable'] = True
+    return row
 
 
 def as_json(tables: Mapping[str, Any]) -> str:
@@ -183,8 +156,8 @@ def as_markdown(schema: Mapping[str, NodeSchema]) -> str:
             continue
         parts.append('| parameter | default | allowed | |\n|---|---|---|---|\n')
         for name, spec in table.parameters.items():
-            live = ' *live*' if name in table.changeable else ''
-            text = table.descriptions[name].replace('|', '\\|')
+            live = '' if spec.read_only else ' *live*'
+            text = spec.description.replace('|', '\\|')
             default = _shown(spec.default)
             parts.append(f'| `{name}` | {default} | {spec.expected()} | {text}{live} |\n')
     return ''.join(parts)

@@ -13,11 +13,13 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 from surveillance_behaviour.policy.battery_reserve import Battery, BatteryLimits, reserve
-from surveillance_behaviour.policy.policies import DEFAULT_POLICY, Scores, make_policy
+from surveillance_behaviour.policy.policies import DEFAULT_POLICY, POLICIES, Scores, make_policy
 from surveillance_behaviour.policy.world import Decision, World
+from surveillance_runtime import parameter_checks
+from surveillance_runtime.parameters import converted, parameter, parameters
 from surveillance_runtime.suggestions import nearest
 
 RECHARGE = 'recharge'
@@ -87,22 +89,39 @@ class DecisionSettings:
     """What a decision depends on beside the world and the battery; may be changed in between.
 
     Attributes:
-        rules: Classes of places by priority.
-        policy: Name of the policy.
-        urgency_threshold: Seconds after which a place is URGENT.
-        recharge_rooms: Places with a charging station.
         battery: When to charge.
-        exploration_seconds: Seconds spent in each place.
-        speed: Metres per second, to tell how long a move takes before any was driven.
     """
 
-    rules: Rules = field(default_factory=Rules)
-    policy: str = DEFAULT_POLICY
-    urgency_threshold: float = 7.0
-    recharge_rooms: tuple[str, ...] = ('E',)
-    battery: BatteryLimits = field(default_factory=BatteryLimits)
-    exploration_seconds: float = 2.0
-    speed: float = 0.6
+    rules: Rules = converted(
+        lambda names: Rules(tuple(names)),
+        DEFAULT_RULES,
+        'Classes of places by falling priority; empty: any place within reach.',
+        name='rooms_priority',
+        of=str,
+        check=rules_expected,
+    )
+    policy: str = parameter(
+        DEFAULT_POLICY,
+        'How a place is chosen among those that the rules allow.',
+        choices=tuple(POLICIES),
+    )
+    urgency_threshold: float = parameter(
+        7, 'Seconds without a visit after which a place is URGENT.', 0, 10**9
+    )
+    recharge_rooms: tuple[str, ...] = parameter(
+        ('E',), 'Places with a charging station.', of=str, check=parameter_checks.not_empty
+    )
+    battery: BatteryLimits = parameters(BatteryLimits)
+    exploration_seconds: float = parameter(
+        2.0, 'Seconds the robot takes to explore a place.', 0.0, 86_400.0
+    )
+    speed: float = parameter(
+        0.6,
+        "Metres per second, to tell a move's time before any was driven.",
+        0.001,
+        100.0,
+        name='robot_speed',
+    )
 
 
 def decide(world: World, battery: Battery, settings: DecisionSettings) -> Decision:

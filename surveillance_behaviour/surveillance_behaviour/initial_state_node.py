@@ -32,18 +32,12 @@ from surveillance_fsm.ros import CallError, ServiceCaller
 from surveillance_interfaces.msg import OntologyMap
 from surveillance_interfaces.srv import ReferenceName
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.parameters import Described, declare_fields
 from surveillance_runtime.place.parameters import described_place
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 from surveillance_runtime.waiting import AwaitedEvent
 
 _BUILD_SECONDS = 20.0
-_SCAN = {
-    'poses': Described("The arm's poses for looking around.", 1, 4),
-    'deadline': Described('Seconds after which what was found has to do.', 0.0),
-    'dwell': Described('Rest at each view of a scan, seconds.', 0.0),
-}
 
 
 class InitialState(PatrolNode):
@@ -52,11 +46,8 @@ class InitialState(PatrolNode):
     def __init__(self, **node_options: Any) -> None:
         super().__init__('initial_state', **node_options)
         self._configured = described_place(self, source='markers', required=True)
-        self._scan = declare_fields(
-            self,
-            InitialScan(),
-            _SCAN,
-            on_change=lambda *change: setattr(self._scan, *change),
+        self._scan = self.declare_fields(
+            InitialScan(), on_change=lambda new: vars(self._scan).update(vars(new))
         )
         pictures = self.parameter('pictures', 6, 'Pictures to take at each pose.', minimum=1)
         patience = self.parameter(

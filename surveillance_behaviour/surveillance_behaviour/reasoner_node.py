@@ -39,7 +39,7 @@ class Reasoner(PatrolNode):
     def __init__(self, **node_options: Any) -> None:
         super().__init__('reasoner', **node_options)
         settings = behaviour_parameters.choice_settings(self, explores=False)
-        deadlines = behaviour_parameters.deadlines(self, ('answer', 'build'))
+        deadlines = behaviour_parameters.deadlines(self, without=('plan', 'move', 'charge'))
         battery = BatteryMonitor()
         self._wait = ClockWait(self)
         self._decider = Decider.of_mission(

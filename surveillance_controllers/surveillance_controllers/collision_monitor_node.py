@@ -23,7 +23,7 @@ from surveillance_controllers.motion.path_following import Velocity, room_ahead
 from surveillance_controllers.motion.sensor_age import STANDSTILL
 from surveillance_controllers.motion.transforms import Transforms, lidar_mount
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.parameters import Described, declare_fields
+from surveillance_runtime.parameters import parameter
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import SENSOR_QOS
 from surveillance_runtime.robot_base import ROBOT_DECELERATION, ROBOT_RADIUS
@@ -38,19 +38,26 @@ LATENCY = 0.15
 
 @dataclass(frozen=True)
 class MonitorSettings:
-    """What the monitor allows.
+    """What the monitor allows."""
 
-    Attributes:
-        radius: Of the robot, metres.
-        margin: Kept free beside it, metres.
-        deceleration: With which the base brakes when it must, m/s^2.
-        longest_silence: The robot stands when a scan or a command is overdue by this, seconds.
-    """
-
-    radius: float = ROBOT_RADIUS
-    margin: float = 0.02
-    deceleration: float = ROBOT_DECELERATION
-    longest_silence: float = STANDSTILL
+    radius: float = parameter(
+        ROBOT_RADIUS, 'Radius of the robot, m.', 0.01, 20.0, name='robot_radius'
+    )
+    margin: float = parameter(0.02, 'Kept free beside the robot, m.', 0.0, 20.0)
+    deceleration: float = parameter(
+        ROBOT_DECELERATION,
+        'With which the base brakes when it must, m/s^2.',
+        0.05,
+        20.0,
+        name='robot_deceleration',
+    )
+    longest_silence: float = parameter(
+        STANDSTILL,
+        'The robot stands when scan or cmd_vel is overdue by this, and brakes before, '
+        's of ROS time.',
+        0.05,
+        10.0,
+    )
 
     @property
     def reach(self) -> float:
@@ -60,21 +67,6 @@ class MonitorSettings:
     def way_to_stand(self, speed: float) -> float:
         """Return how far the robot goes until it stands, from a speed in m/s; metres."""
         return abs(speed) * LATENCY + speed**2 / (2.0 * self.deceleration)
-
-
-_SETTINGS = {
-    'radius': Described('Radius of the robot, m.', 0.01, 20.0, name='robot_radius'),
-    'margin': Described('Kept free beside the robot, m.', 0.0, 20.0),
-    'deceleration': Described(
-        'With which the base brakes when it must, m/s^2.', *(0.05, 20.0), name='robot_deceleration'
-    ),
-    'longest_silence': Described(
-        'The robot stands when scan or cmd_vel is overdue by this, and brakes before, '
-        's of ROS time.',
-        0.05,
-        10.0,
-    ),
-}
 
 
 def allowed(wanted: Velocity, seen: Points, settings: MonitorSettings) -> Velocity:
@@ -109,7 +101,7 @@ class CollisionMonitor(PatrolNode):
 
     def __init__(self, **node_options: Any) -> None:
         super().__init__('collision_monitor', **node_options)
-        self._settings = declare_fields(self, MonitorSettings(), _SETTINGS)
+        self._settings = self.declare_fields(MonitorSettings())
         self._mount = lidar_mount(self)
         self._frames = Transforms(self)
         self._wanted = Velocity()

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import astuple, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 
 from surveillance_controllers.battery.model import BatteryParameters
 from surveillance_controllers.geometry import Points, Pose
 from surveillance_runtime import parameter_checks
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.parameters import Described, declare_fields
+from surveillance_runtime.parameters import converted, parameter
 
 EXECUTION_MODES = ('MANUAL', 'RANDOM', 'SIMULATED')
 
@@ -26,87 +26,62 @@ def execution_mode(node: PatrolNode) -> str:
     return mode
 
 
-_RANDOM_SEED = Described(
-    'Makes a RANDOM run repeatable; -1 takes another course each time.', minimum=-1
-)
-_CONSOLE = Described(
-    'In MANUAL mode, read commands from standard input; they always come by ~/command too.'
-)
-_STATION = Described(
-    'Where the charging station is: x, y in metres, yaw in radians, world frame.',
-    check=parameter_checks.pose,
-)
-_STATE_FILE = Described(
-    'File that keeps what the node models over a restart of its process; empty: nothing is kept.'
-)
-_DOCK_REACH = Described(
-    'SIMULATED: the robot is at the station within this distance of it, m.', 0.0, 100.0
-)
-_PEER_TIMEOUT = Described(
-    'How long map and ontology may take to appear and answer, s of real time.', 0.1, 3600.0
-)
+@dataclass(frozen=True)
+class ControllerSettings:
+    """What every controller is told by its parameters."""
 
-_BATTERY_MODEL = {
-    field: Described('SIMULATED: ' + text, 0.0)
-    for field, text in {
-        'capacity': 'Energy of a full battery, Wh.',
-        'rest_power': 'Drawn all the time, W.',
-        'joules_per_metre': 'Drawn by driving, J/m.',
-        'joules_per_radian': 'Drawn by turning, J/rad.',
-        'equipment_power': 'Drawn by arm and camera while the arm moves, W.',
-        'charging_power': 'Given by the station while the battery is below taper_from, W.',
-        'taper_from': 'State of charge from which charging slows down, between 0 and 1.',
-        'taper_floor': 'Least charging power as a part of charging_power.',
-        'empty_voltage': 'Voltage of an empty battery, V.',
-        'full_voltage': 'Voltage of a full battery, V.',
-    }.items()
-}
-_BATTERY = {
-    'initial_value': Described(
-        'Charge at the start, percent.', 0, 100, name='battery_initial_value'
-    ),
-    'random_seed': _RANDOM_SEED,
-    'random_battery_time': Described(
-        'RANDOM: shortest and longest time between two changes of the battery, s.',
-        check=parameter_checks.times,
-    ),
-    'recharge_seconds': Described(
-        'MANUAL and RANDOM: time in which recharge fills an empty battery, s.', 0.0, 86_400.0
-    ),
-    'station': _STATION,
-    'dock_reach': _DOCK_REACH,
-    'update_period': Described(
-        'SIMULATED: time between two steps of the battery model, s.',
-        *(0.01, 60.0),
-        name='battery_update_period',
-    ),
-    'state_file': _STATE_FILE,
-    'console': _CONSOLE,
-}
-_BATTERY_AT_RUN_TIME = {
-    'require_recharge': Described(
-        'Below this charge the battery counts as low, percent.',
-        *(0, 100),
-        name='battery_require_recharge',
-    ),
-}
+    random_seed: int = parameter(
+        -1, 'Makes a RANDOM run repeatable; -1 takes another course each time.', minimum=-1
+    )
+    console: bool = parameter(
+        True,
+        'In MANUAL mode, read commands from standard input; they always come by ~/command too.',
+    )
 
 
 @dataclass(frozen=True)
-class BatterySettings:
+class StationSettings(ControllerSettings):
+    """What a controller is told that models where the robot is or how far it is charged."""
+
+    station: Pose = parameter(
+        (0.0, 0.0, 0.0),
+        'Where the charging station is: x, y in metres, yaw in radians, world frame.',
+        check=parameter_checks.pose,
+    )
+    dock_reach: float = parameter(
+        0.5, 'SIMULATED: the robot is at the station within this distance of it, m.', 0.0, 100.0
+    )
+    state_file: str = parameter(
+        '',
+        'File that keeps what the node models over a restart of its process; empty: nothing is '
+        'kept.',
+    )
+
+
+@dataclass(frozen=True)
+class BatterySettings(StationSettings):
     """What `battery_controller` is told by its parameters; units as declared."""
 
-    initial_value: int = 100
+    initial_value: int = parameter(
+        100, 'Charge at the start, percent.', 0, 100, name='battery_initial_value'
+    )
     require_recharge: int = 20
     model: BatteryParameters = field(default_factory=BatteryParameters)
-    random_seed: int = -1
-    random_battery_time: tuple[float, float] = (10.0, 15.0)
-    recharge_seconds: float = 6.0
-    station: Pose = (0.0, 0.0, 0.0)
-    dock_reach: float = 0.5
-    update_period: float = 1.0
-    state_file: str = ''
-    console: bool = True
+    random_battery_time: tuple[float, float] = parameter(
+        (10.0, 15.0),
+        'RANDOM: shortest and longest time between two changes of the battery, s.',
+        check=parameter_checks.times,
+    )
+    recharge_seconds: float = parameter(
+        6.0, 'MANUAL and RANDOM: time in which recharge fills an empty battery, s.', 0.0, 86_400.0
+    )
+    update_period: float = parameter(
+        1.0,
+        'SIMULATED: time between two steps of the battery model, s.',
+        0.01,
+        60.0,
+        name='battery_update_period',
+    )
 
 
 def battery_settings(
@@ -121,12 +96,18 @@ def battery_settings(
     Raises:
         ParameterError: A value is of the wrong type or out of range.
     """
-    model = declare_fields(node, BatteryParameters(), _BATTERY_MODEL, prefix='battery.')
-    return declare_fields(
-        node,
-        declare_fields(node, BatterySettings(model=model), _BATTERY),
-        _BATTERY_AT_RUN_TIME,
-        on_change=lambda _, value: on_require_recharge(value),
+    settings = node.declare_fields(BatterySettings())
+    return replace(
+        settings,
+        model=node.declare_fields(settings.model, prefix='battery.', mode='SIMULATED'),
+        require_recharge=node.parameter(
+            'battery_require_recharge',
+            settings.require_recharge,
+            'Below this charge the battery counts as low, percent.',
+            minimum=0,
+            maximum=100,
+            on_change=on_require_recharge,
+        ),
     )
 
 
@@ -147,27 +128,29 @@ class Environment:
         return f'[{self.x_min:g}, {self.x_max:g}, {self.y_min:g}, {self.y_max:g}]'
 
 
-_PLANNER = {
-    'via_point_count': Described(
-        'How many via points motion/planner returns, both ends included.', 2, 10_000
-    ),
-    'via_point_delay': Described('Time between two feedbacks of motion/planner, s.', 0.0, 60.0),
-    'random_seed': _RANDOM_SEED,
-    'peer_timeout': _PEER_TIMEOUT,
-    'console': _CONSOLE,
-}
-
-
 @dataclass(frozen=True)
-class PlannerSettings:
+class PlannerSettings(ControllerSettings):
     """What `planner_controller` is told by its parameters; units as declared."""
 
-    environment: Environment = Environment(-1000.0, 1000.0, -1000.0, 1000.0)
-    via_point_count: int = 10
-    via_point_delay: float = 0.1
-    random_seed: int = -1
-    peer_timeout: float = 10.0
-    console: bool = True
+    environment: Environment = converted(
+        lambda limits: Environment(*limits),
+        [-1000.0, 1000.0, -1000.0, 1000.0],
+        'Limits of the place: [x_min, x_max, y_min, y_max], metres, world frame.',
+        name='environment_size',
+        check=parameter_checks.rectangle,
+    )
+    via_point_count: int = parameter(
+        10, 'How many via points motion/planner returns, both ends included.', 2, 10_000
+    )
+    via_point_delay: float = parameter(
+        0.1, 'Time between two feedbacks of motion/planner, s.', 0.0, 60.0
+    )
+    peer_timeout: float = parameter(
+        10.0,
+        'How long map and ontology may take to appear and answer, s of real time.',
+        0.1,
+        3600.0,
+    )
 
     def spacing(self, length: float) -> float:
         """Return the distance of the via points of a path of `length` metres, metres."""
@@ -180,61 +163,42 @@ def planner_settings(node: PatrolNode) -> PlannerSettings:
     Raises:
         ParameterError: A value is of the wrong type or out of range.
     """
-    settings = declare_fields(node, PlannerSettings(), _PLANNER)
-    limits = node.parameter(
-        'environment_size',
-        list(astuple(settings.environment)),
-        'Limits of the place: [x_min, x_max, y_min, y_max], metres, world frame.',
-        check=parameter_checks.rectangle,
-        read_only=True,
-    )
-    return replace(settings, environment=Environment(*limits))
-
-
-_MOTION = {
-    'navigator': Described(
-        'SIMULATED: who drives the base: this node, or Nav2 by its action navigate_through_poses.',
-        choices=('own', 'nav2'),
-    ),
-    'docking': Described(
-        'SIMULATED: a docking server that docks the robot where a way ends at the station.',
-        choices=('none', 'opennav'),
-    ),
-    'dock_type': Described("The dock's type, as the docking server knows it."),
-    'station': _STATION,
-    'dock_reach': _DOCK_REACH,
-    'feedback_period': Described('Time between two feedbacks on the way, s.', 0.01, 60.0),
-    'place_reach': Described(
-        'MANUAL, RANDOM and Nav2: the robot is in the nearest place within this distance, m.',
-        *(0.0, 1000.0),
-    ),
-    'robot_room': Described(
-        'MANUAL, RANDOM and Nav2: the room in which the robot starts; empty: as the map says that '
-        'is built from a message.'
-    ),
-    'state_file': _STATE_FILE,
-    'random_seed': _RANDOM_SEED,
-    'peer_timeout': _PEER_TIMEOUT,
-    'console': _CONSOLE,
-}
+    return node.declare_fields(PlannerSettings())
 
 
 @dataclass(frozen=True)
-class MotionSettings:
+class MotionSettings(StationSettings):
     """What `motion_controller` is told by its parameters; units as declared."""
 
-    navigator: str = 'own'
-    docking: str = 'none'
-    dock_type: str = ''
-    station: Pose = (0.0, 0.0, 0.0)
-    dock_reach: float = 0.5
-    feedback_period: float = 0.2
-    place_reach: float = 2.0
-    robot_room: str = ''
-    state_file: str = ''
-    random_seed: int = -1
-    peer_timeout: float = 10.0
-    console: bool = True
+    navigator: str = parameter(
+        'own',
+        'SIMULATED: who drives the base: this node, or Nav2 by its action navigate_through_poses.',
+        choices=('own', 'nav2'),
+    )
+    docking: str = parameter(
+        'none',
+        'SIMULATED: a docking server that docks the robot where a way ends at the station.',
+        choices=('none', 'opennav'),
+    )
+    dock_type: str = parameter('', "The dock's type, as the docking server knows it.")
+    feedback_period: float = parameter(0.2, 'Time between two feedbacks on the way, s.', 0.01, 60.0)
+    place_reach: float = parameter(
+        2.0,
+        'MANUAL, RANDOM and Nav2: the robot is in the nearest place within this distance, m.',
+        0.0,
+        1000.0,
+    )
+    robot_room: str = parameter(
+        '',
+        'MANUAL, RANDOM and Nav2: the room in which the robot starts; empty: as the map says that '
+        'is built from a message.',
+    )
+    peer_timeout: float = parameter(
+        10.0,
+        'How long map and ontology may take to appear and answer, s of real time.',
+        0.1,
+        3600.0,
+    )
 
 
 def motion_settings(node: PatrolNode) -> MotionSettings:
@@ -243,4 +207,4 @@ def motion_settings(node: PatrolNode) -> MotionSettings:
     Raises:
         ParameterError: A value is of the wrong type or out of range.
     """
-    return declare_fields(node, MotionSettings(), _MOTION)
+    return node.declare_fields(MotionSettings())

@@ -8,35 +8,8 @@ from pathlib import Path
 from surveillance_ontology.armor.access import DATA, Settings, state_folder
 from surveillance_ontology.armor.service import ArmorService
 from surveillance_ontology.armor.store import JournalError, Store
-from surveillance_runtime import parameter_checks
 from surveillance_runtime.node import PatrolNode, StartError
-from surveillance_runtime.parameters import Described, declare_fields
-
-_SERVICE = {
-    'ontologies_folder': Described(
-        'The folder in which SAVE and LOG may write, and LOAD may read; empty: '
-        '~/.local/state/surveillance/ontologies.'
-    ),
-    'directories': Described(
-        'Directories in which LOAD may read as well.',
-        check=parameter_checks.not_empty,
-    ),
-    'history': Described(
-        'Axioms of past changes that are kept for QUERY AT, for each reference.', 0, 10_000_000
-    ),
-    'sparql_timeout': Described('Longest time a SPARQL query may take, seconds.', 0.01, 3600.0),
-    'overwrite_loaded': Described(
-        'Let SAVE without a path write over the file that was loaded, as ARMOR 2.2 does.'
-    ),
-    'enforce_mount': Described(
-        'Refuse changes by others while a client is mounted; ARMOR 2.2 does not.'
-    ),
-    'narrow_doubles': Described('Store values of type DOUBLE as xsd:float, as ARMOR 2.2 does.'),
-    'allow_web': Described('Let LOAD WEB fetch documents from the web.'),
-    'sparql_derived': Described(
-        'Let SPARQL see derived facts; ARMOR 2.2 shows it the asserted ones only.'
-    ),
-}
+from surveillance_runtime.parameters import parameter
 
 
 def described_service(node: PatrolNode, *, keep: bool = False) -> ArmorService:
@@ -50,7 +23,7 @@ def described_service(node: PatrolNode, *, keep: bool = False) -> ArmorService:
         ParameterError: A parameter is of the wrong type or out of range.
         StartError: The store cannot be used.
     """
-    settings = declare_fields(node, Settings(), _SERVICE)
+    settings = node.declare_fields(Settings())
     stored = node.parameter(
         'store',
         'auto' if keep else 'none',
@@ -83,23 +56,17 @@ def _own_folder(node: PatrolNode) -> Path:
 class BuilderSettings:
     """What `ontology_map_builder` is told by its parameters beside the place."""
 
-    ontology_reference: str = 'surveillance'
-    ontology_path: str = str(DATA / 'surveillance.owl')
-    ontology_uri: str = 'http://bnc/exp-rob-lab/2022-23'
-    armor_timeout: float = 5.0
-    urgent_at_start: bool = True
-
-
-_BUILDER = {
-    'ontology_reference': Described('Reference name of the ontology in the server.'),
-    'ontology_path': Described('The ontology to start from.'),
-    'ontology_uri': Described('IRI of the ontology.'),
-    'armor_timeout': Described('Longest wait for an answer of the server, seconds.', 0.1),
-    'urgent_at_start': Described(
+    ontology_reference: str = parameter(
+        'surveillance', 'Reference name of the ontology in the server.'
+    )
+    ontology_path: str = parameter(str(DATA / 'surveillance.owl'), 'The ontology to start from.')
+    ontology_uri: str = parameter('http://bnc/exp-rob-lab/2022-23', 'IRI of the ontology.')
+    armor_timeout: float = parameter(5.0, 'Longest wait for an answer of the server, seconds.', 0.1)
+    urgent_at_start: bool = parameter(
+        True,
         'Places that nobody has visited count as never visited, and so as URGENT; '
-        'else as visited when the map was built.'
-    ),
-}
+        'else as visited when the map was built.',
+    )
 
 
 def builder_settings(node: PatrolNode) -> BuilderSettings:
@@ -108,4 +75,4 @@ def builder_settings(node: PatrolNode) -> BuilderSettings:
     Raises:
         ParameterError: A parameter is of the wrong type or out of range.
     """
-    return declare_fields(node, BuilderSettings(), _BUILDER)
+    return node.declare_fields(BuilderSettings())

@@ -128,9 +128,7 @@ class NodeSchema:
     """What one node declares: parameters by name, and prefixes under which it takes any name."""
 
     parameters: Mapping[str, ParameterSpec] = field(default_factory=dict)
-    descriptions: Mapping[str, str] = field(default_factory=dict)
     prefixes: tuple[str, ...] = ()
-    changeable: frozenset[str] = frozenset()
 
     def spec(self, name: str) -> ParameterSpec | None:
         """Return what is known of a parameter, None where the node has none of this name."""
@@ -159,19 +157,15 @@ def _node_schema(body: Mapping[str, Any]) -> NodeSchema:
         specs[name] = ParameterSpec(
             name,
             row['default'],
-            kind if row['type'].endswith('[]') else None,
+            row['description'],
             row.get('minimum'),
             row.get('maximum'),
             tuple(row.get('choices', ())),
+            kind if row['type'].endswith('[]') else None,
             partial(_checked_by, row['check']) if 'check' in row else None,
+            read_only=not row.get('changeable'),
         )
-    rows = body['parameters']
-    return NodeSchema(
-        specs,
-        {name: rows[name]['description'] for name in rows},
-        tuple(body['prefixes']),
-        frozenset(name for name in rows if rows[name].get('changeable')),
-    )
+    return NodeSchema(specs, tuple(body['prefixes']))
 
 
 def _checked_by(name: str, value: Any) -> str | None:

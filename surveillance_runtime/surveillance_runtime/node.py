@@ -11,8 +11,9 @@ import os
 import threading
 import time
 import traceback
-from collections.abc import Callable, Sequence
-from typing import Any, Protocol
+from collections.abc import Callable, Collection, Container, Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Protocol
 
 from rcl_interfaces.msg import (
     FloatingPointRange,
@@ -42,7 +43,10 @@ from surveillance_fsm.ros.waiting import CLIENT_QOS, SERVICE_QOS
 from surveillance_runtime.configuration import RosArguments, Setting, read_schema
 from surveillance_runtime.health import Health
 from surveillance_runtime.logging import CleanLogger, clean
-from surveillance_runtime.parameters import Check, ParameterError, ParameterSpec, element_type
+from surveillance_runtime.parameters import ParameterError, ParameterSpec, specs_of, with_values
+
+if TYPE_CHECKING:
+    from surveillance_runtime.parameters import Record
 
 _EMPTY = {
     bool: Parameter.Type.BOOL_ARRAY,
@@ -91,6 +95,8 @@ class PatrolNode(Node):  # type: ignore[misc]
         unusable: Whether that is its configuration.
         finished: Whether the node ended on purpose.
         health: What the node says of itself on `/diagnostics`.
+        declared: Its parameters, by name.
+        prefixes: Prefixes below which it takes parameters of any name.
     """
 
     def __init__(self, name: str, **node_options: Any) -> None:
@@ -100,8 +106,10 @@ class PatrolNode(Node):  # type: ignore[misc]
         self.unusable = False
         self.finished = False
         self.health = Health()
-        self._specs: dict[str, ParameterSpec] = {}
+        self.declared: dict[str, ParameterSpec] = {}
+        self.prefixes: set[str] = set()
         self._on_change: dict[str, Callable[[Any], None]] = {}
+        self._live: list[_LiveRecord] = []
         self._threads: list[threading.Thread] = []
         self._spawning = threading.Lock()
         self._owned: list[Destroyable] = []
@@ -131,72 +139,102 @@ class PatrolNode(Node):  # type: ignore[misc]
         default: Any,
         description: str,
         *,
-        minimum: float | None = None,
-        maximum: float | None = None,
-        choices: Sequence[Any] = (),
-        of: type | None = None,
-        read_only: bool = False,
         on_change: Callable[[Any], None] | None = None,
-        check: Check | None = None,
+        **more: Any,
     ) -> Any:
-        """Declare a parameter and return its value.
+        """Declare one parameter and return its value.
 
         Args:
             name: The parameter's name.
             default: Its default, whose type is the parameter's type.
             description: One sentence with the unit.
-            minimum: Least value of a number (or of a list's numbers).
-            maximum: Greatest value, likewise.
-            choices: The only values allowed.
-            of: Element type of a list whose default is empty.
-            read_only: Refuse changes at run time.
             on_change: Called with the new value after each change at run time.
-            check: Looks at the value last; returns what was expected, or None when it is good.
+            **more: Other attributes of `ParameterSpec`.
 
         Raises:
             ParameterError: The value given at the start is not allowed.
         """
-        element = element_type(name, default, of)
-        spec = ParameterSpec(name, default, element, minimum, maximum, tuple(choices), check)
+        value = self._declare(ParameterSpec(name, default, description, **more))
+        if on_change is not None:
+            self._on_change[name] = on_change
+        return value
+
+    def declare_fields(
+        self,
+        record: Record,
+        *,
+        prefix: str = '',
+        mode: str = '',
+        without: Container[str] = (),
+        on_change: Callable[[Record], None] | None = None,
+    ) -> Record:
+        """Declare the fields of a record that are parameters, see `parameters.parameter`.
+
+        Args:
+            record: The defaults.
+            prefix: Stands before the fields' names, with its dot.
+            mode: The mode of the node in which alone the parameters count, if it is one.
+            without: Fields that are not declared; they stay as they are.
+            on_change: Called with the new record after each change at run time; without it the
+                parameters are read-only.
+
+        Returns:
+            The record with the parameters' values.
+
+        Raises:
+            ParameterError: A value given at the start is not allowed, alone or beside the others:
+                then the record raised a ValueError that begins with a field's name.
+        """
+        note = f'{mode}: ' if mode else ''
+        values = {}
+        for spec in specs_of(record, prefix, without):
+            text, read_only = note + spec.description, spec.read_only or on_change is None
+            spec = replace(spec, description=text, read_only=read_only)
+            values[spec.name] = self._declare(spec)
+        try:
+            record = with_values(record, values, prefix)
+        except ParameterError as error:
+            raise self._located(error) from None
+        if on_change is not None:
+            self._live.append(_LiveRecord(record, prefix, values.keys(), on_change))
+        return record
+
+    def _declare(self, spec: ParameterSpec) -> Any:
+        name, default, element = spec.name, spec.default, spec.element
         descriptor = ParameterDescriptor(
-            description=description,
+            description=spec.description,
             additional_constraints=f'Expected: {spec.expected()}.',
-            read_only=read_only,
+            read_only=spec.read_only,
             # Typing is checked here, in the same words at the start and at run time.
             dynamic_typing=True,
         )
-        if element is None and minimum is not None and maximum is not None:
+        if element is None and spec.minimum is not None and spec.maximum is not None:
             if isinstance(default, float):
                 descriptor.floating_point_range = [
-                    FloatingPointRange(from_value=float(minimum), to_value=float(maximum))
+                    FloatingPointRange(from_value=float(spec.minimum), to_value=float(spec.maximum))
                 ]
             else:
                 descriptor.integer_range = [
-                    IntegerRange(from_value=int(minimum), to_value=int(maximum))
+                    IntegerRange(from_value=int(spec.minimum), to_value=int(spec.maximum))
                 ]
-        self._specs[name] = spec
+        self.declared[name] = spec
         try:
-            accepted = self._declare_checked(spec, descriptor)
+            try:
+                value = self.declare_parameter(name, default, descriptor).value
+            except (InvalidParameterValueException, InvalidParameterTypeException) as error:
+                override = self._parameter_overrides.get(name)
+                given = override.value if override is not None else getattr(error, 'value', None)
+                spec.accept(given)
+                raise spec.error(given) from error
+            return spec.accept(default if element is not None and value is None else value)
         except ParameterError as error:
-            if name in self._overrides_given:
-                raise ParameterError(f'{self._overrides_given[name].origin}: {error}') from error
-            raise
-        if on_change is not None:
-            self._on_change[name] = on_change
-        return accepted
+            raise self._located(error) from error
 
-    def _declare_checked(self, spec: ParameterSpec, descriptor: ParameterDescriptor) -> Any:
-        name, default = spec.name, spec.default
-        try:
-            value = self.declare_parameter(name, default, descriptor).value
-        except (InvalidParameterValueException, InvalidParameterTypeException) as error:
-            override = self._parameter_overrides.get(name)
-            given = override.value if override is not None else getattr(error, 'value', None)
-            spec.accept(given)
-            raise spec.error(given) from error
-        if isinstance(default, list | tuple) and value is None:
-            value = default
-        return spec.accept(value)
+    def _located(self, error: ParameterError) -> ParameterError:
+        """Return an error of a parameter with the file and line that its value came from."""
+        name = str(error).split()[1].rstrip(':')
+        setting = self._overrides_given.get(name)
+        return ParameterError(f'{setting.origin}: {error}') if setting else error
 
     def parameters_under(self, prefix: str) -> dict[str, Any]:
         """Declare and return all parameters that were given below a prefix.
@@ -208,6 +246,7 @@ class PatrolNode(Node):  # type: ignore[misc]
             The values by the rest of the name, in the order given.
         """
         start = prefix + '.'
+        self.prefixes.add(prefix)
         values = {}
         # rclpy offers no public way to list overrides before they are declared.
         for name, override in self._parameter_overrides.items():
@@ -370,21 +409,39 @@ class PatrolNode(Node):  # type: ignore[misc]
             self.get_logger().warn(f'{late} did not end in {JOIN_SECONDS} s')
 
     def _check_parameters(self, parameters: list[Parameter]) -> SetParametersResult:
-        for parameter in parameters:
-            spec = self._specs.get(parameter.name)
-            if spec is None:
-                continue
-            try:
-                spec.accept(_plain(parameter.value))
-            except ParameterError as error:
-                return SetParametersResult(successful=False, reason=str(error))
+        try:
+            values = self._accepted(parameters)
+            for live in self._live:
+                live.changed(values)
+        except ParameterError as error:
+            return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
 
     def _tell_parameters(self, parameters: list[Parameter]) -> None:
-        for parameter in parameters:
-            told = self._on_change.get(parameter.name)
-            if told is not None:
-                told(self._specs[parameter.name].accept(_plain(parameter.value)))
+        values = self._accepted(parameters)
+        for name in values.keys() & self._on_change.keys():
+            self._on_change[name](values[name])
+        for live in self._live:
+            if values.keys() & live.names:
+                live.record = live.changed(values)
+                live.on_change(live.record)
+
+    def _accepted(self, parameters: list[Parameter]) -> dict[str, Any]:
+        known = (each for each in parameters if each.name in self.declared)
+        return {each.name: self.declared[each.name].accept(_plain(each.value)) for each in known}
+
+
+@dataclass
+class _LiveRecord:
+    """A record whose fields are parameters that may change at run time."""
+
+    record: Any
+    prefix: str
+    names: Collection[str]
+    on_change: Callable[[Any], None]
+
+    def changed(self, values: Mapping[str, Any]) -> Any:
+        return with_values(self.record, values, self.prefix)
 
 
 def report_exception(error: BaseException, node: Node, what: str) -> None:

@@ -1,30 +1,32 @@
-"""Checks of parameter values, with errors that say what was wrong, where, and what was expected.
+"""Declared parameters: what values each takes, with errors that say what was expected instead.
 
 A parameter's type is that of its default. An integer is accepted where a float is declared, since
 people write `speed:=1` and mean 1.0.
 
-The fields of a record are declared together, from a table beside its defaults:
+A record of settings declares its fields where it defines them, and a node declares them all:
 
-FIELDS = {
-    'speed': Described('Top speed, m/s.', 0.01, 20.0),
-    'turn': Described('Top turning speed, rad/s.', 0.01, 20.0),
-}
-drive = declare_fields(node, DriveParameters(), FIELDS, prefix='drive.')
+    @dataclass(frozen=True)
+    class DriveSettings:
+        speed: float = parameter(0.6, 'Top speed, m/s.', 0.01, 20.0)
+        turn: float = parameter(1.5, 'Top turning speed, rad/s.', 0.01, 20.0)
+        latency: float = 0.3  # no parameter
+
+    drive = node.declare_fields(DriveSettings(), prefix='drive.')
 """
 
 from __future__ import annotations
 
 import math
 from array import array
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from typing import TYPE_CHECKING, Any, TypeVar
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
     Record = TypeVar('Record', bound=DataclassInstance)
+T = TypeVar('T')
 
 Check = Callable[[Any], str | None]
 """Looks at a valid value further; returns what was expected instead, or None when it is good."""
@@ -39,25 +41,43 @@ class ParameterError(ValueError):
 
 @dataclass(frozen=True)
 class ParameterSpec:
-    """What values a parameter takes.
+    """One declared parameter.
 
     Attributes:
         name: The parameter's name.
         default: Its default; fixes the type.
-        element: Type of a list's elements; None for a single value.
+        description: One sentence with the unit.
         minimum: Least value, for numbers and for the numbers in a list.
         maximum: Greatest value, likewise.
         choices: The only values allowed; empty for any.
-        check: Looks at the value after everything else.
+        of: Element type of a list; needed where the default is empty.
+        check: Looks at the value last; returns what was expected, or None when it is good.
+        read_only: Whether changes at run time are refused.
+
+    Raises:
+        TypeError: The default is an empty list and `of` is not given.
     """
 
     name: str
     default: Any
-    element: type | None = None
+    description: str = ''
     minimum: float | None = None
     maximum: float | None = None
-    choices: tuple[Any, ...] = ()
+    choices: Sequence[Any] = ()
+    of: type | None = None
     check: Check | None = None
+    read_only: bool = False
+
+    def __post_init__(self) -> None:
+        if isinstance(self.default, list | tuple) and not self.default and self.of is None:
+            raise TypeError(f'parameter {self.name}: an empty default needs of=<element type>')
+
+    @property
+    def element(self) -> type | None:
+        """Type of a list's elements; None for a single value."""
+        if isinstance(self.default, list | tuple):
+            return self.of or type(self.default[0])
+        return None
 
     def accept(self, value: Any) -> Any:
         """Return the value as the node works with it: numbers as declared, arrays as lists.
@@ -65,11 +85,12 @@ class ParameterSpec:
         Raises:
             ParameterError: The value has the wrong type or is out of range.
         """
-        if self.element is None:
+        element = self.element
+        if element is None:
             return self._checked(self._element(value, type(self.default), value), value)
         if isinstance(value, str | bytes) or not isinstance(value, Sequence | array):
             raise self.error(value)
-        return self._checked([self._element(v, self.element, value) for v in value], value)
+        return self._checked([self._element(v, element, value) for v in value], value)
 
     def error(self, value: Any, expected: str | None = None) -> ParameterError:
         """Build the error for a value that does not fit."""
@@ -136,21 +157,6 @@ class ParameterSpec:
         return accepted
 
 
-def element_type(name: str, default: Any, of: type | None) -> type | None:
-    """Find the type of a list parameter's elements; None when the default is a single value.
-
-    Raises:
-        TypeError: The default is an empty list and `of` is not given.
-    """
-    if not isinstance(default, list | tuple):
-        return None
-    if of is not None:
-        return of
-    if not default:
-        raise TypeError(f'parameter {name}: an empty default needs of=<element type>')
-    return type(default[0])
-
-
 def _shown(value: Any) -> str:
     if isinstance(value, str):
         return repr(value)
@@ -161,86 +167,89 @@ def _shown(value: Any) -> str:
     return str(value)
 
 
-@dataclass(frozen=True)
-class Described:
-    """How a field is declared; its default and type are those of the record.
-
-    Attributes:
-        text: One sentence with the unit.
-        minimum: Least value of a number (or of a list's numbers).
-        maximum: Greatest value, likewise.
-        choices: The only values allowed.
-        of: Element type of a list whose default is empty.
-        check: Looks at the value last; returns what was expected, or None when it is good.
-        name: The parameter's name where it is not the field's behind the prefix.
-    """
-
-    text: str
-    minimum: float | None = None
-    maximum: float | None = None
-    choices: tuple[Any, ...] = ()
-    of: type | None = None
-    check: Check | None = None
-    name: str = ''
-
-
-class Declaring(Protocol):
-    """A node that declares parameters; see `PatrolNode.parameter`."""
-
-    @property
-    def parameter(self) -> Callable[..., Any]:
-        """Declare a parameter and return its value."""
-
-
-def declare_fields(
-    node: Declaring,
-    record: Record,
-    described: Mapping[str, Described],
-    *,
-    prefix: str = '',
-    on_change: Callable[[str, Any], None] | None = None,
-) -> Record:
-    """Declare fields of a record as parameters.
+def parameter(
+    default: T,
+    description: str,
+    minimum: float | None = None,
+    maximum: float | None = None,
+    **more: Any,
+) -> T:
+    """Return the field of a record that is a parameter, too; a tuple is declared as a list.
 
     Args:
-        node: The node.
-        record: The defaults; a tuple among them is declared as a list.
-        described: The fields that are parameters; the others stay as they are.
-        prefix: Stands before the fields' names, with its dot.
-        on_change: Called with a field's name and its new value after each change at run time;
-            without it the parameters are read-only.
+        default: The default.
+        description: One sentence with the unit.
+        minimum: Least value.
+        maximum: Greatest value.
+        **more: Other attributes of `ParameterSpec`; `name` where the parameter's is not the
+            field's behind the prefix.
+    """
+    spec = _field_spec(default, description, minimum, maximum, **more)
+    declared: T = field(default=default, metadata={'parameter': spec})
+    return declared
 
-    Returns:
-        The record with the parameters' values.
+
+def converted(make: Callable[[Any], T], default: Any, description: str, **more: Any) -> T:
+    """Return as `parameter` a field whose value is made from the parameter's."""
+    metadata = {'parameter': _field_spec(default, description, **more), 'make': make}
+    declared: T = field(default_factory=lambda: make(default), metadata=metadata)
+    return declared
+
+
+def _field_spec(*declared: Any, name: str = '', **more: Any) -> ParameterSpec:
+    return ParameterSpec(name, *declared, **more)
+
+
+def parameters(record: Callable[[], T]) -> T:
+    """Return the field of a record that is a record itself, with fields that are parameters."""
+    declared: T = field(default_factory=record, metadata={'parameters': True})
+    return declared
+
+
+def specs_of(
+    record: DataclassInstance, prefix: str = '', without: Container[str] = ()
+) -> Iterator[ParameterSpec]:
+    """Yield the parameters of a record; the defaults are the record's values.
+
+    Args:
+        record: The record.
+        prefix: Stands before the fields' names, with its dot.
+        without: Names of fields that are not declared.
+    """
+    for each in fields(record):
+        value = getattr(record, each.name)
+        if each.name in without:
+            continue
+        if 'parameters' in each.metadata:
+            yield from specs_of(value, prefix, without)
+        elif spec := each.metadata.get('parameter'):
+            default = spec.default if 'make' in each.metadata else value
+            default = list(default) if isinstance(default, tuple) else default
+            yield replace(spec, name=spec.name or prefix + each.name, default=default)
+
+
+def with_values(record: Record, values: Mapping[str, Any], prefix: str = '') -> Record:
+    """Return a record with new values of its parameters.
+
+    Args:
+        record: The record.
+        values: By the parameters' names; others may be among them.
+        prefix: Stands before the fields' names, with its dot.
 
     Raises:
-        ParameterError: A value given at the start is not allowed, alone or beside the others: then
-            the record raised a ValueError that begins with the field's name.
+        ParameterError: The values do not go together: the record raised a ValueError, which begins
+            with a field's name.
     """
-    values: dict[str, Any] = {}
-    for field, how in described.items():
-        default = getattr(record, field)
-        kind = tuple if isinstance(default, tuple) else None
-        value = node.parameter(
-            how.name or prefix + field,
-            list(default) if kind else default,
-            how.text,
-            minimum=how.minimum,
-            maximum=how.maximum,
-            choices=how.choices,
-            of=how.of,
-            check=how.check,
-            read_only=on_change is None,
-            on_change=None if on_change is None else partial(_tell, on_change, field, kind),
-        )
-        values[field] = kind(value) if kind else value
+    changed = {}
+    for each in fields(record):
+        spec = each.metadata.get('parameter')
+        if 'parameters' in each.metadata:
+            changed[each.name] = with_values(getattr(record, each.name), values, prefix)
+        elif spec and (name := spec.name or prefix + each.name) in values:
+            value = values[name]
+            make = each.metadata.get('make') or (tuple if spec.element else None)
+            changed[each.name] = make(value) if make else value
     try:
-        return replace(record, **values)
+        return replace(record, **changed)
     except ValueError as error:
         raise ParameterError(f'parameter {prefix}{error}') from None
-
-
-def _tell(
-    told: Callable[[str, Any], None], field: str, kind: Callable[[Any], Any] | None, value: Any
-) -> None:
-    told(field, kind(value) if kind else value)

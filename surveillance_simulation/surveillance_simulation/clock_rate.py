@@ -19,6 +19,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from surveillance_runtime.parameters import parameter
+
 PLANNING = ('compute_path', 'motion/planner')
 """Actions that take no simulated time: it stands still while one of their goals is executed."""
 DRIVING = ('follow_path', 'motion/controller')
@@ -34,19 +36,25 @@ class ClockRateModel:
     """How time goes.
 
     Attributes:
-        speed: Simulated seconds per real second; 0 as fast as possible.
-        ceiling: Greatest simulated seconds per real second when `speed` is 0.
-        step: Simulated seconds between two ticks of the clock.
-        idle_step: The same while nothing moves and `speed` is 0.
         window: Simulated seconds that may pass after a command before the next one must come.
         estimate_window: Likewise after the measurement that an estimate of the pose answers.
         patience: Real seconds that time waits for either.
     """
 
-    speed: float = 1.0
-    ceiling: float = 100.0
-    step: float = 0.1
-    idle_step: float = 0.5
+    speed: float = parameter(
+        1.0, 'Simulated seconds per real second; 0: as fast as the nodes keep up.', 0.0, 1000.0
+    )
+    ceiling: float = parameter(
+        100.0,
+        'Simulated seconds per real second at most when speed is 0.',
+        1.0,
+        10000.0,
+        name='top_speed',
+    )
+    step: float = parameter(
+        0.1, 'Simulated seconds between two messages on clock, odom and scan.', 0.005, 0.5
+    )
+    idle_step: float = parameter(0.5, 'The same while nothing moves and speed is 0.', 0.005, 5.0)
     window: float = 0.05
     estimate_window: float = 0.45
     patience: float = 3.0

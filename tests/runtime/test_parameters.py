@@ -7,14 +7,23 @@ from dataclasses import dataclass
 import pytest
 from rclpy.parameter import Parameter
 
-from surveillance_runtime.parameters import Described, ParameterError, declare_fields
+from surveillance_runtime.parameters import ParameterError, converted, parameter, parameters
+
+
+@dataclass(frozen=True)
+class Lamp:
+    colour: str = parameter('white', 'Colour.', choices=('white', 'red'))
 
 
 @dataclass(frozen=True)
 class Drive:
-    speed: float = 0.5
-    gears: int = 3
-    names: tuple[str, ...] = ('slow', 'fast')
+    speed: float = parameter(0.5, 'Top speed, m/s.', 0.01, 20.0)
+    gears: int = parameter(3, 'Gears.', 1, name='gear_count')
+    names: tuple[str, ...] = parameter(
+        ('slow', 'fast'), 'Names.', check=lambda names: None if names else 'at least one name'
+    )
+    marks: frozenset[int] = converted(frozenset, [], 'Marks.', of=int)
+    lamp: Lamp = parameters(Lamp)
     wheel: float = 0.1
 
     def __post_init__(self) -> None:
@@ -22,24 +31,23 @@ class Drive:
             raise ValueError(f'speed is {self.speed}: expected at most twice the gears')
 
 
-FIELDS = {
-    'speed': Described('Top speed, m/s.', 0.01, 20.0),
-    'gears': Described('Gears.', 1, name='gear_count'),
-    'names': Described('Names.', check=lambda names: None if names else 'at least one name'),
-}
-
-
 def declared(graph, parameters=None, **options):
     node = graph.add(type(graph.node), parameters=parameters, name='driver')
-    return node, declare_fields(node, Drive(), FIELDS, prefix='drive.', **options)
+    return node, node.declare_fields(Drive(), prefix='drive.', **options)
 
 
 def test_defaults_are_the_records_and_given_values_take_their_place(graph):
     _, default = declared(graph)
     assert default == Drive()
-    given = {'drive.speed': 2, 'gear_count': 5, 'drive.names': ['one']}
+    given = {
+        'drive.speed': 2,
+        'gear_count': 5,
+        'drive.names': ['one'],
+        'drive.marks': [4, 4],
+        'drive.colour': 'red',
+    }
     _, drive = declared(graph, given)
-    assert drive == Drive(2.0, 5, ('one',))
+    assert drive == Drive(2.0, 5, ('one',), frozenset({4}), Lamp('red'))
     assert isinstance(drive.speed, float)
 
 
@@ -63,8 +71,22 @@ def test_they_are_read_only_unless_somebody_follows(graph):
     (refused,) = fixed.set_parameters([Parameter('drive.speed', value=1.0)])
     assert not refused.successful
     heard = []
-    open_, _ = declared(graph, on_change=lambda *change: heard.append(change))
-    for name, value in (('drive.speed', 1), ('drive.names', ['a', 'b'])):
+    open_, _ = declared(graph, on_change=heard.append)
+    for name, value in (('drive.speed', 1), ('drive.names', ['a', 'b']), ('drive.marks', [1])):
         (result,) = open_.set_parameters([Parameter(name, value=value)])
         assert result.successful
-    assert heard == [('speed', 1.0), ('names', ('a', 'b'))]
+    assert heard == [
+        Drive(1.0),
+        Drive(1.0, names=('a', 'b')),
+        Drive(1.0, names=('a', 'b'), marks=frozenset({1})),
+    ]
+
+
+def test_a_change_that_does_not_go_with_the_other_fields_is_refused(graph):
+    heard = []
+    node, _ = declared(graph, on_change=heard.append)
+    (refused,) = node.set_parameters([Parameter('drive.speed', value=7.0)])
+    assert refused.reason == 'parameter drive.speed is 7.0: expected at most twice the gears'
+    both = [Parameter('drive.speed', value=7.0), Parameter('gear_count', value=4)]
+    assert node.set_parameters_atomically(both).successful
+    assert heard == [Drive(7.0, 4)]

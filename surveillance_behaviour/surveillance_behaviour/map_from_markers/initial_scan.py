@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from surveillance_behaviour.map_from_markers.assembly import SurveyReport
+from surveillance_runtime.parameters import parameter
 
 _OVERLAP = 0.12
 _REACH = 0.3
@@ -51,14 +52,12 @@ class InitialScan:
     """How to scan.
 
     Attributes:
-        poses: Numbers of the poses, in order.
         deadline: Seconds after which what was found has to do; may change while it runs.
-        dwell: Rest at each view of the first scan, seconds.
     """
 
-    poses: Sequence[int] = (1, 2, 3, 4)
-    deadline: float = 45.0
-    dwell: float = 0.5
+    poses: Sequence[int] = parameter((1, 2, 3, 4), "The arm's poses for looking around.", 1, 4)
+    deadline: float = parameter(45.0, 'Seconds after which what was found has to do.', 0.0)
+    dwell: float = parameter(0.5, 'Rest at each view of a scan, seconds.', 0.0)
 
     def run(
         self,

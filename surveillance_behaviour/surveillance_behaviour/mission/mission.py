@@ -18,6 +18,7 @@ from surveillance_behaviour.peers.ports import PeerError, Point, Ports
 from surveillance_behaviour.policy.battery_reserve import Battery
 from surveillance_behaviour.policy.world import Decision
 from surveillance_fsm import Clock, Interrupt
+from surveillance_runtime.parameters import parameter
 
 
 @dataclass
@@ -27,19 +28,28 @@ class MissionSettings:
     Attributes:
         choice: Those that are.
         recovery: How patient it is.
-        arrival_tolerance: How far from its path's end a robot may stop and still have arrived, m.
-        goal_tolerance: How far from the goal a planner's path may end, m.
-        charge_stall_seconds: How long a level may stay the same while charging before the robot
-            drives to the station again; 0: for ever.
         settle_seconds: How long the battery's topics may lag behind the robot and behind the
             `recharge` service, seconds of real time.
     """
 
     choice: DecisionSettings = field(default_factory=DecisionSettings)
     recovery: RecoveryLimits = field(default_factory=RecoveryLimits)
-    arrival_tolerance: float = 1.0
-    goal_tolerance: float = 1.0
-    charge_stall_seconds: float = 300.0
+    arrival_tolerance: float = parameter(
+        1.0,
+        "How far from its path's end the robot may stop and still have arrived, m.",
+        0.0,
+        1000.0,
+    )
+    goal_tolerance: float = parameter(
+        1.0, "How far from the goal a planner's path may end, m.", 0.0, 1000.0
+    )
+    charge_stall_seconds: float = parameter(
+        300.0,
+        'How long the level may stay the same at the station before the robot docks anew, s; '
+        '0: for ever.',
+        0.0,
+        86_400.0,
+    )
     settle_seconds: float = 2.0
 
 

@@ -14,6 +14,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+from surveillance_runtime.parameters import parameter
+
 DOUBLINGS = 30
 """More doublings of a time than this are not worth counting."""
 
@@ -32,21 +34,24 @@ class RecoveryLimits:
     """How patient the recovery is.
 
     Attributes:
-        path_tries: Times a place is tried before another one is.
-        place_tries: Places given up in a row before the robot goes back.
         avoid_seconds: How long a place that was given up is left alone at first; doubled each
             time it is given up again.
-        longest_avoid: The longest time a place is left alone, seconds.
-        help_seconds: The first pause while waiting for help; doubled each time.
-        longest_help: The longest such pause, seconds.
     """
 
-    path_tries: int = 3
-    place_tries: int = 3
-    avoid_seconds: float = 60.0
-    longest_avoid: float = 600.0
-    help_seconds: float = 2.0
-    longest_help: float = 60.0
+    path_tries: int = parameter(3, 'Times a place is tried before another one is chosen.', 1, 1000)
+    place_tries: int = parameter(3, 'Places given up in a row before the robot goes back.', 1, 1000)
+    avoid_seconds: float = parameter(
+        60.0, 'How long a place that was given up is left alone at first, s.', 0.0, 86_400.0
+    )
+    longest_avoid: float = parameter(
+        600.0, 'The longest time a place is left alone, s.', 0.0, 86_400.0
+    )
+    help_seconds: float = parameter(
+        2.0, 'The first pause while waiting for help, s.', 0.0, 86_400.0
+    )
+    longest_help: float = parameter(
+        60.0, 'The longest pause while waiting for help, s.', 0.0, 86_400.0
+    )
 
 
 @dataclass(frozen=True)

@@ -45,6 +45,7 @@ from surveillance_interfaces.srv import Reason, ReferenceName, RoomPosition
 from surveillance_ontology.armor_client import RosTransport
 from surveillance_runtime.conversions import nanoseconds_of
 from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.parameters import parameter
 from surveillance_runtime.qos import STATE_QOS
 
 ASK_AGAIN = 10.0
@@ -57,21 +58,36 @@ LONGEST_CHARGE = 24 * 3600.0
 
 @dataclass(frozen=True)
 class Deadlines:
-    """Seconds of steady time; 0 where a peer may take as long as it lives.
+    """Seconds of steady time; 0 where a peer may take as long as it lives."""
 
-    Attributes:
-        answer: For a service's answer, and for a goal to be accepted.
-        build: For the ontology's map, and for looking around at the start.
-        plan: For a path.
-        move: For following one.
-        charge: For the battery to get on while it is charged.
-    """
-
-    answer: float = 5.0
-    build: float = 120.0
-    plan: float = 600.0
-    move: float = 600.0
-    charge: float = 60.0
+    answer: float = parameter(
+        5.0,
+        "Seconds of real time for a service's answer, and for a goal to be accepted.",
+        0.1,
+        86_400.0,
+    )
+    build: float = parameter(
+        120.0,
+        'Seconds of real time for the ontology to be built, and for looking around at the start.',
+        0.1,
+        86_400.0,
+    )
+    plan: float = parameter(
+        600.0, 'Seconds of real time for a path; 0: as long as the planner lives.', 0.0, 86_400.0
+    )
+    move: float = parameter(
+        600.0,
+        'Seconds of real time for following a path; 0: as long as the controller lives.',
+        0.0,
+        86_400.0,
+    )
+    charge: float = parameter(
+        60.0,
+        'Seconds of real time for the battery to get on while it is charged by `recharge`; '
+        '0: for ever.',
+        0.0,
+        86_400.0,
+    )
 
 
 def ros_ontology(node: PatrolNode, deadlines: Deadlines) -> ArmorKnowledge:

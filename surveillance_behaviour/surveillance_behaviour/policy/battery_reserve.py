@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from statistics import fmean
 
 from surveillance_behaviour.policy.graph import PatrolGraph
+from surveillance_runtime.parameters import parameter
 
 FALLS_REMEMBERED = 50
 LEARNED_FALL = 2.0
@@ -56,24 +57,26 @@ class Draw:
 class BatteryLimits:
     """The battery's parameters, in percent.
 
-    Attributes:
-        require_recharge: Below this the robot goes charging in any case.
-        stop_recharge: From this on it may leave the station.
-        margin: What is left at the station after the worst leg and the way home.
-
     Raises:
         ValueError: The levels are not in order.
     """
 
-    require_recharge: float = 20.0
-    stop_recharge: float = 90.0
-    margin: float = 5.0
+    require_recharge: float = parameter(
+        20, 'Charge below which it must charge, %.', 0, 100, name='battery_require_recharge'
+    )
+    stop_recharge: float = parameter(
+        90, 'Charge from which it may stop charging, %.', 0, 100, name='battery_stop_recharge'
+    )
+    margin: float = parameter(
+        5, 'Charge left after the worst leg and the way home, %.', 0, 100, name='battery_margin'
+    )
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.require_recharge < self.stop_recharge <= 100.0:
             raise ValueError(
-                'expected 0 <= battery_require_recharge < battery_stop_recharge <= 100, got '
-                f'{self.require_recharge:g} and {self.stop_recharge:g}'
+                'battery_require_recharge: expected 0 <= battery_require_recharge < '
+                f'battery_stop_recharge <= 100, got {self.require_recharge:g} and '
+                f'{self.stop_recharge:g}'
             )
 
 

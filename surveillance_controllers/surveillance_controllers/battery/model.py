@@ -15,6 +15,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from surveillance_runtime.parameters import parameter
+
 SECONDS_PER_HOUR = 3600.0
 
 
@@ -22,32 +24,24 @@ SECONDS_PER_HOUR = 3600.0
 class BatteryParameters:
     """Sizes of the battery and of its consumers.
 
-    Attributes:
-        capacity: Energy of a full battery, Wh.
-        rest_power: Drawn all the time (computer, lidar), W.
-        joules_per_metre: Drawn by driving, J/m.
-        joules_per_radian: Drawn by turning, J/rad.
-        equipment_power: Drawn by arm and camera while they are in use, W.
-        charging_power: At the station, below `taper_from`, W.
-        taper_from: State of charge where charging slows down, 0 to 1 (excluded).
-        taper_floor: The least charging power, as a part of `charging_power`, above 0.
-        empty_voltage: Open-circuit voltage of an empty battery, V.
-        full_voltage: Open-circuit voltage of a full one, V.
-
     Raises:
         ValueError: A value is out of range; the text names it.
     """
 
-    capacity: float = 40.0
-    rest_power: float = 15.0
-    joules_per_metre: float = 60.0
-    joules_per_radian: float = 6.0
-    equipment_power: float = 10.0
-    charging_power: float = 600.0
-    taper_from: float = 0.8
-    taper_floor: float = 0.1
-    empty_voltage: float = 18.0
-    full_voltage: float = 25.2
+    capacity: float = parameter(40.0, 'Energy of a full battery, Wh.', 0.0)
+    rest_power: float = parameter(15.0, 'Drawn all the time, W.', 0.0)
+    joules_per_metre: float = parameter(60.0, 'Drawn by driving, J/m.', 0.0)
+    joules_per_radian: float = parameter(6.0, 'Drawn by turning, J/rad.', 0.0)
+    equipment_power: float = parameter(10.0, 'Drawn by arm and camera while the arm moves, W.', 0.0)
+    charging_power: float = parameter(
+        600.0, 'Given by the station while the battery is below taper_from, W.', 0.0
+    )
+    taper_from: float = parameter(
+        0.8, 'State of charge from which charging slows down, between 0 and 1.', 0.0
+    )
+    taper_floor: float = parameter(0.1, 'Least charging power as a part of charging_power.', 0.0)
+    empty_voltage: float = parameter(18.0, 'Voltage of an empty battery, V.', 0.0)
+    full_voltage: float = parameter(25.2, 'Voltage of a full battery, V.', 0.0)
 
     def __post_init__(self) -> None:
         for name in ('capacity', 'charging_power', 'empty_voltage'):

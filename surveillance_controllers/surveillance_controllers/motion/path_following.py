@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 
 from surveillance_controllers import geometry
 from surveillance_controllers.geometry import Points, Pose, angle_between
+from surveillance_runtime.parameters import parameter
 from surveillance_runtime.robot_base import ROBOT_DECELERATION
 
 
@@ -27,13 +28,8 @@ class DriveParameters:
     """The robot's limits and tracking settings.
 
     Attributes:
-        radius: Radius of the robot, metres.
         margin: Gap kept between the robot and what the lidar sees, metres.
-        speed: Top speed, m/s.
-        turn: Top turning speed, rad/s.
         acceleration: Of the speed, m/s^2; also with which a drive brakes.
-        deceleration: With which the base brakes when it must, m/s^2.
-        turn_acceleration: Of the turning speed, rad/s^2.
         jerk: Greatest change of the acceleration, m/s^3; only to avoid a contact it brakes at once.
         shortest_look: Least distance of the point steered to, metres.
         longest_look: Greatest distance of the point steered to, metres.
@@ -44,18 +40,23 @@ class DriveParameters:
             metres.
         creep: What regulation does not reduce the speed below, m/s.
         turn_first: Where the point lies further to the side than this, turn on the spot, rad.
-        tolerance: The end is reached within this distance, metres.
         settle: Towards the end the robot goes the remaining way in this time constant, seconds.
         latency: Time between seeing and braking, seconds; two periods of the lidar and a half.
     """
 
-    radius: float = 0.22
-    margin: float = 0.04
-    speed: float = 0.6
-    turn: float = 1.5
-    acceleration: float = 0.8
-    deceleration: float = ROBOT_DECELERATION
-    turn_acceleration: float = 3.0
+    radius: float = parameter(0.22, 'Radius of the robot, m.', 0.01, 20.0, name='robot_radius')
+    margin: float = parameter(0.04, 'Kept from what the lidar sees, m.', 0.01, 20.0)
+    speed: float = parameter(0.6, 'Top speed, m/s.', 0.01, 20.0)
+    turn: float = parameter(1.5, 'Top turning speed, rad/s.', 0.01, 20.0)
+    acceleration: float = parameter(0.8, 'Acceleration, m/s^2.', 0.01, 20.0)
+    deceleration: float = parameter(
+        ROBOT_DECELERATION,
+        'With which the base brakes when it must, m/s^2.',
+        0.05,
+        20.0,
+        name='robot_deceleration',
+    )
+    turn_acceleration: float = parameter(3.0, 'Turning acceleration, rad/s^2.', 0.01, 20.0)
     jerk: float = 4.0
     shortest_look: float = 0.25
     longest_look: float = 0.8
@@ -65,7 +66,7 @@ class DriveParameters:
     caution: float = 0.25
     creep: float = 0.1
     turn_first: float = 0.9
-    tolerance: float = 0.08
+    tolerance: float = parameter(0.08, 'The end is reached within this distance, m.', 0.01, 20.0)
     settle: float = 1.0
     latency: float = 0.3
 

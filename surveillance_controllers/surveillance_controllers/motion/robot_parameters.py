@@ -14,29 +14,7 @@ from surveillance_controllers.motion.place_regions import Segment, door_segment
 from surveillance_controllers.motion.transforms import lidar_mount
 from surveillance_controllers.planning.grid_planning import PlanningParameters
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.parameters import Described, ParameterError, declare_fields
-
-_RADIUS = 'SIMULATED: Radius of the robot, m.'
-_PLANNING = {
-    'radius': Described(_RADIUS, 0.0, 20.0, name='robot_radius'),
-    'margin': Described('SIMULATED: Kept beyond the radius, m.', 0.0, 20.0),
-    'comfort': Described('SIMULATED: Room that a path prefers, m.', 0.0, 20.0),
-    'aversion': Described('SIMULATED: How much more a path near obstacles costs.', 0.0, 20.0),
-}
-_DRIVE = {
-    'radius': Described(_RADIUS, 0.01, 20.0, name='robot_radius'),
-    'margin': Described('SIMULATED: Kept from what the lidar sees, m.', 0.01, 20.0),
-    'speed': Described('SIMULATED: Top speed, m/s.', 0.01, 20.0),
-    'turn': Described('SIMULATED: Top turning speed, rad/s.', 0.01, 20.0),
-    'acceleration': Described('SIMULATED: Acceleration, m/s^2.', 0.01, 20.0),
-    'deceleration': Described(
-        'SIMULATED: With which the base brakes when it must, m/s^2.',
-        *(0.05, 20.0),
-        name='robot_deceleration',
-    ),
-    'turn_acceleration': Described('SIMULATED: Turning acceleration, rad/s^2.', 0.01, 20.0),
-    'tolerance': Described('SIMULATED: The end is reached within this distance, m.', 0.01, 20.0),
-}
+from surveillance_runtime.parameters import ParameterError, parameter
 
 
 def door_segments(node: PatrolNode) -> dict[str, Segment]:
@@ -79,7 +57,7 @@ def _are_numbers(values: object, count: int) -> bool:
 
 def planning_parameters(node: PatrolNode) -> PlanningParameters:
     """Declare how `planner_controller` plans in SIMULATED mode."""
-    return declare_fields(node, PlanningParameters(), _PLANNING, prefix='planning.')
+    return node.declare_fields(PlanningParameters(), prefix='planning.', mode='SIMULATED')
 
 
 @dataclass(frozen=True)
@@ -90,10 +68,16 @@ class RobotSettings:
     drive: DriveParameters
     doors: dict[str, Segment]
     positions: dict[str, Points]
-    sensor_timeout: float
-    track_place: bool
-    spin: bool
     lidar_mount: Pose | None
+    sensor_timeout: float = parameter(
+        5.0, 'how long map, odom and scan may be silent, s of real time.', 0.1, 3600.0
+    )
+    track_place: bool = parameter(
+        True, 'robot_place follows the robot on its way, not at its end alone.'
+    )
+    spin: bool = parameter(
+        True, 'motion/controller ends with one turn on the spot.', name='spin_on_arrival'
+    )
 
 
 def robot_settings(node: PatrolNode, motion: MotionSettings) -> RobotSettings:
@@ -102,30 +86,7 @@ def robot_settings(node: PatrolNode, motion: MotionSettings) -> RobotSettings:
     Raises:
         ParameterError: A value is of the wrong type or out of range.
     """
-    return RobotSettings(
-        motion=motion,
-        drive=declare_fields(node, DriveParameters(), _DRIVE, prefix='drive.'),
-        doors=door_segments(node),
-        positions=place_positions(node),
-        sensor_timeout=node.parameter(
-            'sensor_timeout',
-            5.0,
-            'SIMULATED: how long map, odom and scan may be silent, s of real time.',
-            minimum=0.1,
-            maximum=3600.0,
-            read_only=True,
-        ),
-        track_place=node.parameter(
-            'track_place',
-            True,
-            'SIMULATED: robot_place follows the robot on its way, not at its end alone.',
-            read_only=True,
-        ),
-        spin=node.parameter(
-            'spin_on_arrival',
-            True,
-            'SIMULATED: motion/controller ends with one turn on the spot.',
-            read_only=True,
-        ),
-        lidar_mount=lidar_mount(node),
-    )
+    drive = node.declare_fields(DriveParameters(), prefix='drive.', mode='SIMULATED')
+    doors, positions = door_segments(node), place_positions(node)
+    settings = RobotSettings(motion, drive, doors, positions, lidar_mount(node))
+    return node.declare_fields(settings, mode='SIMULATED')

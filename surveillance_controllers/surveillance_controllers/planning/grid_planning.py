@@ -23,6 +23,7 @@ from surveillance_controllers import geometry
 from surveillance_controllers.geometry import Points
 from surveillance_controllers.planning.grid_map import GridMap, distance_to, points_on
 from surveillance_controllers.planning.grid_search import GridSearch
+from surveillance_runtime.parameters import parameter
 
 Lines = Mapping[str, tuple[float, float, float, float]]
 """Named segments x1, y1, x2, y2, metres."""
@@ -40,7 +41,6 @@ class PlanningParameters:
     """How close to obstacles a path may run, and how much it avoids them.
 
     Attributes:
-        radius: Radius of the robot, metres.
         margin: What a path keeps beyond the radius, metres; at least 0.71 cells, so that a
             diagonal step between two free cells grazes nothing.
         comfort: Beyond radius and margin, room up to this distance makes a cell cheaper, metres.
@@ -50,10 +50,10 @@ class PlanningParameters:
         corner: Longest part of a straight line that rounding a corner may take, metres.
     """
 
-    radius: float = 0.22
-    margin: float = 0.05
-    comfort: float = 0.5
-    aversion: float = 3.0
+    radius: float = parameter(0.22, 'Radius of the robot, m.', 0.0, 20.0, name='robot_radius')
+    margin: float = parameter(0.05, 'Kept beyond the radius, m.', 0.0, 20.0)
+    comfort: float = parameter(0.5, 'Room that a path prefers, m.', 0.0, 20.0)
+    aversion: float = parameter(3.0, 'How much more a path near obstacles costs.', 0.0, 20.0)
     escape: float = 0.6
     goal_shift: float = 1.0
     corner: float = 0.5

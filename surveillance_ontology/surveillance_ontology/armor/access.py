@@ -12,6 +12,8 @@ from pathlib import Path
 
 from surveillance_ontology.armor.protocol import DirectiveError
 from surveillance_ontology.armor.rendering import shown
+from surveillance_runtime import parameter_checks
+from surveillance_runtime.parameters import parameter
 
 CODE = Path(__file__).resolve().parent.parent
 DATA = CODE / 'data'
@@ -38,16 +40,9 @@ class Settings:
         ontologies_folder: The only place where SAVE and LOG write, made when it is needed; LOAD
             reads there too. A relative path of a directive stands for a file in it. Empty:
             ``ontologies`` in `state_folder`.
-        directories: Where LOAD may read as well.
         read_only_directories: Likewise; by default the ontologies of this package.
-        overwrite_loaded: SAVE without a path writes over the file that was loaded, as ARMOR does.
-        enforce_mount: Refuse changes by other clients while one is mounted; ARMOR does not.
-        narrow_doubles: Store DOUBLE as xsd:float, as ARMOR does.
-        allow_web: Let LOAD WEB fetch documents.
-        sparql_derived: SPARQL sees derived facts too; ARMOR shows it the asserted ones only.
         sparql_timeout: Longest time a SPARQL query may take, seconds, whatever it asks for.
         sparql_rows: Most rows of a SPARQL answer.
-        history: Axioms of past changes that are kept for QUERY AT, for each reference.
         max_file_bytes: Largest document that is loaded, and largest log of LOG FILE.
         max_arguments: Most arguments of one directive.
         max_characters: Most characters of all arguments of one directive together.
@@ -57,17 +52,38 @@ class Settings:
         ValueError: ``ontologies_folder`` holds the program's code or lies in it.
     """
 
-    ontologies_folder: str | Path = ''
-    directories: tuple[str | Path, ...] = ('.',)
+    ontologies_folder: str | Path = parameter(
+        '',
+        'The folder in which SAVE and LOG may write, and LOAD may read; empty: '
+        '~/.local/state/surveillance/ontologies.',
+    )
+    directories: tuple[str | Path, ...] = parameter(
+        ('.',), 'Directories in which LOAD may read as well.', check=parameter_checks.not_empty
+    )
     read_only_directories: tuple[str | Path, ...] = (DATA,)
-    overwrite_loaded: bool = False
-    enforce_mount: bool = True
-    narrow_doubles: bool = False
-    allow_web: bool = False
-    sparql_derived: bool = True
-    sparql_timeout: float = 30.0
+    overwrite_loaded: bool = parameter(
+        False, 'Let SAVE without a path write over the file that was loaded, as ARMOR 2.2 does.'
+    )
+    enforce_mount: bool = parameter(
+        True, 'Refuse changes by others while a client is mounted; ARMOR 2.2 does not.'
+    )
+    narrow_doubles: bool = parameter(
+        False, 'Store values of type DOUBLE as xsd:float, as ARMOR 2.2 does.'
+    )
+    allow_web: bool = parameter(False, 'Let LOAD WEB fetch documents from the web.')
+    sparql_derived: bool = parameter(
+        True, 'Let SPARQL see derived facts; ARMOR 2.2 shows it the asserted ones only.'
+    )
+    sparql_timeout: float = parameter(
+        30.0, 'Longest time a SPARQL query may take, seconds.', 0.01, 3600.0
+    )
     sparql_rows: int = 100_000
-    history: int = 20_000
+    history: int = parameter(
+        20_000,
+        'Axioms of past changes that are kept for QUERY AT, for each reference.',
+        0,
+        10_000_000,
+    )
     max_file_bytes: int = 64 * 1024 * 1024
     max_arguments: int = 100_000
     max_characters: int = 16 * 1024 * 1024

@@ -9,16 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.parameters import Described, declare_fields
+from surveillance_runtime.parameters import converted, parameter
 from surveillance_runtime.robot_arm import Arm, Array
 
-_SCAN = {
-    'dwell': Described('Rest at each view of a scan, seconds.', 0.0),
-    'pictures': Described(
-        'Pictures that the marker detector must have looked at before a view is left.', 0
-    ),
-    'patience': Described('Seconds after which a view is left without them.', 0.0),
-}
 _PAN = {'left': math.pi / 2, 'home': 0.0, 'right': -math.pi / 2, 'back': math.pi}
 
 
@@ -29,18 +22,32 @@ class ArmSettings:
     Attributes:
         poses: Joint positions (n,) of the named poses, rad.
         dwell: Rest at each view of a scan, seconds; may change at any time.
-        pictures: Pictures that the marker detector must have looked at before a view is left.
-        patience: Seconds after which a view is left without them.
-        horizontal: The camera's horizontal field of view, rad.
-        vertical: The vertical one, rad.
     """
 
     poses: Mapping[str, Array]
-    dwell: float = 0.5
-    pictures: int = 4
-    patience: float = 1.5
-    horizontal: float = math.radians(60.0)
-    vertical: float = math.radians(46.8)
+    dwell: float = parameter(0.5, 'Rest at each view of a scan, seconds.', 0.0)
+    pictures: int = parameter(
+        4, 'Pictures that the marker detector must have looked at before a view is left.', 0
+    )
+    patience: float = parameter(1.5, 'Seconds after which a view is left without them.', 0.0)
+    horizontal: float = converted(
+        math.radians,
+        60.0,
+        "The camera's horizontal field of view, degrees.",
+        minimum=5.0,
+        maximum=150.0,
+        name='horizontal_field_of_view',
+        read_only=True,
+    )
+    vertical: float = converted(
+        math.radians,
+        46.8,
+        "The camera's vertical field of view, degrees.",
+        minimum=5.0,
+        maximum=150.0,
+        name='vertical_field_of_view',
+        read_only=True,
+    )
 
 
 def arm_settings(node: PatrolNode, arm: Arm) -> ArmSettings:
@@ -49,22 +56,10 @@ def arm_settings(node: PatrolNode, arm: Arm) -> ArmSettings:
     Raises:
         ParameterError: A value is of the wrong type or out of range.
     """
-    settings = declare_fields(
-        node,
-        ArmSettings({name: _pose(node, arm, name, pan) for name, pan in _PAN.items()}),
-        _SCAN,
-        on_change=lambda *change: setattr(settings, *change),
+    poses = {name: _pose(node, arm, name, pan) for name, pan in _PAN.items()}
+    settings = node.declare_fields(
+        ArmSettings(poses), on_change=lambda new: vars(settings).update(vars(new))
     )
-    for name in ('horizontal', 'vertical'):
-        degrees = node.parameter(
-            f'{name}_field_of_view',
-            round(math.degrees(getattr(settings, name)), 3),
-            f"The camera's {name} field of view, degrees.",
-            minimum=5.0,
-            maximum=150.0,
-            read_only=True,
-        )
-        setattr(settings, name, math.radians(degrees))
     return settings
 
 

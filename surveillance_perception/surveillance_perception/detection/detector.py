@@ -42,6 +42,8 @@ from surveillance_perception.detection.image_sampling import (
 )
 from surveillance_perception.detection.preprocessing import PreparedImage, prepare
 from surveillance_perception.detection.template_fit import Indices
+from surveillance_runtime import parameter_checks
+from surveillance_runtime.parameters import parameter
 
 _SAME_QUAD = 2.0
 _LARGE_CELL = 8.0
@@ -64,33 +66,41 @@ class DetectorSettings:
         known_ids: Ids that are expected; None when none is more likely than another.
         windows: Sides in pixels of the neighbourhoods a border is compared with, odd.
         bridges: Gaps in pixels that are closed for markers seen at a flat angle.
-        contrast: Grey levels by which a border must be darker than its neighbourhood.
-        min_length: Longer side in pixels of the smallest marker.
         max_outlines: Dark outlines after which only those near quadrilaterals are looked at, and
             no further neighbourhood or bridge is tried.
         max_candidates: Bound of an image's work: quadrilaterals that are read, the likeliest first.
-        blur: Standard deviation in pixels of the lens's blur.
         least_correlation: Correlation with the image that a reading needs, 0 to 1: of its cells'
             differences, or of the whole marker.
-        least_inner_correlation: The same over the code's own cells.
         known_lead: How many times less than the second best code the best one must leave
             unexplained, when its id is known.
-        unknown_lead: The same for any other id.
     """
 
     dictionary: str = 'DICT_5X5_100'
     known_ids: frozenset[int] | None = None
-    windows: tuple[int, ...] = (15, 31)
-    bridges: tuple[int, ...] = (5,)
-    contrast: float = 7.0
-    min_length: float = 8.0
-    max_outlines: int = 250
-    max_candidates: int = 1000
-    blur: float = 0.8
-    least_correlation: float = 0.85
-    least_inner_correlation: float = 0.8
-    known_lead: float = 2.2
-    unknown_lead: float = 3.0
+    windows: tuple[int, ...] = parameter(
+        (15, 31), 'Neighbourhoods of a border, odd, pixels.', check=parameter_checks.odd_numbers
+    )
+    bridges: tuple[int, ...] = parameter((5,), 'Gaps to close in a border, pixels.', 2, 99, of=int)
+    contrast: float = parameter(
+        7.0, 'Grey levels by which a border is darker than around it.', 1.0, 100.0
+    )
+    min_length: float = parameter(8.0, 'Longer side of the smallest marker, pixels.', 4.0, 1000.0)
+    max_outlines: int = parameter(
+        250,
+        'Outlines after which only near quadrilaterals are looked at, in no further mask.',
+        1,
+        100000,
+    )
+    max_candidates: int = parameter(
+        1000, "Bound of an image's work: outlines that are read.", 1, 100000
+    )
+    blur: float = parameter(0.8, "Deviation of the lens's blur in a sharp image, pixels.", 0.0, 5.0)
+    least_correlation: float = parameter(0.85, 'Correlation that a reading needs.', 0.0, 1.0)
+    least_inner_correlation: float = parameter(
+        0.8, "Correlation over the code's own cells that a reading needs.", 0.0, 1.0
+    )
+    known_lead: float = parameter(2.2, 'Lead over the second best code, known ids.', 1.0, 100.0)
+    unknown_lead: float = parameter(3.0, 'Lead over the second best code, other ids.', 1.0, 100.0)
 
     def __post_init__(self) -> None:
         if not self.windows or any(each < 3 or each % 2 == 0 for each in self.windows):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections import defaultdict, deque
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from surveillance_perception.detection.camera_model import Array, CameraModel
 from surveillance_perception.detection.detector import Detection, DetectorSettings, MarkerDetector
 from surveillance_perception.detection.pose import MarkerPose, pose_of
 from surveillance_perception.stream.image_files import ImageArray
+from surveillance_runtime.parameters import converted, parameter, parameters
 
 # images that count, as a multiple of those that must show an id: half of them may miss it
 _WINDOW = 2
@@ -36,23 +37,42 @@ def sizes_from(entries: Sequence[str]) -> dict[int, float]:
     return sizes
 
 
+def sizes_expected(entries: Sequence[str]) -> str | None:
+    """Ask for sizes of markers."""
+    try:
+        sizes_from(entries)
+    except ValueError as error:
+        return str(error)
+    return None
+
+
 @dataclass(frozen=True)
 class StreamSettings:
     """How detections of a stream are judged.
 
     Attributes:
         detector: What to look for.
-        size: Side of a marker's black square, metres.
-        sizes: The same for ids that differ.
         known_frames: Images that must show an id of the known list before it is confirmed.
-        unknown_frames: The same for any other id.
     """
 
-    detector: DetectorSettings = field(default_factory=DetectorSettings)
-    size: float = 0.2
-    sizes: Mapping[int, float] = field(default_factory=dict)
-    known_frames: int = 2
-    unknown_frames: int = 4
+    detector: DetectorSettings = parameters(DetectorSettings)
+    size: float = parameter(
+        0.2, 'Side of the black square, metres.', 0.001, 100.0, name='marker_size'
+    )
+    sizes: Mapping[int, float] = converted(
+        sizes_from,
+        [],
+        "Sizes of ids that differ, like '14:0.3'.",
+        name='marker_sizes',
+        of=str,
+        check=sizes_expected,
+    )
+    known_frames: int = parameter(
+        2, 'Images that confirm a known id.', 1, 100, name='confirmation_frames'
+    )
+    unknown_frames: int = parameter(
+        4, 'Images that confirm any other id.', 1, 100, name='unknown_confirmation_frames'
+    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from surveillance_simulation.camera.lighting import lit
+from surveillance_runtime.parameters import parameter
+from surveillance_simulation.camera.lighting import LIGHTINGS, lit
 
 Array = npt.NDArray[np.float64]
 Picture = npt.NDArray[np.uint8]
@@ -90,20 +91,23 @@ class Conditions:
     """What stands between the scene and its picture.
 
     Attributes:
-        light: Factor on the brightness: 1 a lit room, 0.1 a dark one, 2 overexposed.
-        noise: Standard deviation of the sensor's noise, grey levels.
-        blur: Standard deviation of the lens's blur, pixels.
-        motion: Length of the streak that motion draws, pixels.
         motion_angle: Direction of the streak in the picture, rad, from x towards y.
-        lighting: One of `LIGHTINGS`: how evenly the light falls.
     """
 
-    light: float = 1.0
-    noise: float = 2.0
-    blur: float = 0.4
-    motion: float = 0.0
-    motion_angle: float = 0.0
-    lighting: str = 'even'
+    light: float = parameter(
+        1.0, "Brightness of the camera's pictures: 1 a lit room, 0.1 a dark one.", 0.0, 100.0
+    )
+    noise: float = parameter(
+        2.0, "Standard deviation of the camera's noise, grey levels.", 0.0, 100.0
+    )
+    blur: float = parameter(0.4, "Standard deviation of the lens's blur, pixels.", 0.0, 100.0)
+    motion: float = parameter(
+        0.0, 'Length of the streak that motion draws in a picture, pixels.', 0.0, 100.0
+    )
+    motion_angle: float = parameter(0.0, 'Direction of that streak, rad.', -math.pi, math.pi)
+    lighting: str = parameter(
+        'even', 'How evenly the light falls on what the camera sees.', choices=LIGHTINGS
+    )
 
 
 def expose(

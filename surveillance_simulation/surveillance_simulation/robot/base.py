@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from surveillance_runtime.parameters import parameter
 from surveillance_runtime.place.floor_plan import Pose
 from surveillance_runtime.robot_base import ROBOT_DECELERATION, ROBOT_RADIUS
 from surveillance_simulation.world.world import World
@@ -29,26 +30,32 @@ class BaseModel:
     """The base's body, limits and errors.
 
     Attributes:
-        radius: Radius of the robot, metres.
         speed: Greatest forward and backward speed, m/s.
-        turn_speed: Greatest turning speed, rad/s.
-        acceleration: Greatest increase of speed, m/s^2.
-        deceleration: Greatest decrease of speed, m/s^2.
-        turn_acceleration: Greatest change of turning speed, rad/s^2.
-        command_timeout: After this many seconds without a command the base stops.
-        distance_error: Standard deviation of the odometry's distance per sqrt(m), metres.
-        turn_error: Standard deviation of the odometry's heading per sqrt(rad), rad.
     """
 
-    radius: float = ROBOT_RADIUS
-    speed: float = 0.6
-    turn_speed: float = 1.5
-    acceleration: float = 1.0
-    deceleration: float = ROBOT_DECELERATION
-    turn_acceleration: float = 4.0
-    command_timeout: float = 0.5
-    distance_error: float = 0.004
-    turn_error: float = 0.003
+    radius: float = parameter(
+        ROBOT_RADIUS, 'Radius of the robot, metres.', 0.01, 20.0, name='robot_radius'
+    )
+    speed: float = parameter(0.6, 'Greatest speed, m/s.', 0.01, 20.0)
+    turn_speed: float = parameter(1.5, 'Greatest turn speed, rad/s.', 0.01, 20.0)
+    acceleration: float = parameter(1.0, 'Greatest acceleration, m/s^2.', 0.01, 20.0)
+    deceleration: float = parameter(
+        ROBOT_DECELERATION,
+        'With which the base brakes when it must, m/s^2.',
+        0.05,
+        20.0,
+        name='robot_deceleration',
+    )
+    turn_acceleration: float = parameter(4.0, 'Greatest turning acceleration, rad/s^2.', 0.01, 20.0)
+    command_timeout: float = parameter(
+        0.5, 'Seconds without a command after which the base stops.', 0.01, 20.0
+    )
+    distance_error: float = parameter(
+        0.004, "Standard deviation of the odometry's distance after one metre, metres.", 0.0, 1.0
+    )
+    turn_error: float = parameter(
+        0.003, "Standard deviation of the odometry's heading after one radian, rad.", 0.0, 1.0
+    )
 
 
 class Base:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from surveillance_runtime.parameters import parameter
 from surveillance_runtime.place import boxes
 from surveillance_runtime.place.floor_plan import Pose
 from surveillance_simulation.world.world import World
@@ -28,13 +29,12 @@ class LidarModel:
         rays: Rays of a full turn; the first looks backwards (-pi), the others follow anticlockwise.
         range_min: Least distance reported, metres.
         range_max: Greatest distance reported, metres; beyond it a ray returns infinity.
-        noise: Standard deviation of a distance, metres.
     """
 
-    rays: int = 360
+    rays: int = parameter(360, 'Rays of a full turn.', 4, 7200)
     range_min: float = 0.1
-    range_max: float = 8.0
-    noise: float = 0.01
+    range_max: float = parameter(8.0, 'Greatest distance measured, metres.', 0.5, 200.0)
+    noise: float = parameter(0.01, 'Standard deviation of a distance, metres.', 0.0, 1.0)
 
     @property
     def angles(self) -> boxes.Array:

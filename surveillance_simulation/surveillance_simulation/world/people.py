@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from surveillance_runtime.parameters import parameter
 from surveillance_runtime.place import boxes, occupancy_grid
 from surveillance_runtime.place.floor_plan import WALL_THICKNESS, FloorPlan, Point
 
@@ -32,23 +33,18 @@ _WALL_GAP = 0.05
 
 @dataclass(frozen=True)
 class PeopleModel:
-    """Who walks about.
+    """Who walks about."""
 
-    Attributes:
-        count: How many people.
-        speed: How fast they walk, m/s.
-        manner: 'polite' or 'pushy', see the module.
-        radius: Of a person, metres.
-        shortest_rest: Least time that a person stays in a room, seconds.
-        longest_rest: Greatest time that a person stays in a room, seconds.
-    """
-
-    count: int = 0
-    speed: float = 1.2
-    manner: str = 'polite'
-    radius: float = 0.25
-    shortest_rest: float = 2.0
-    longest_rest: float = 20.0
+    count: int = parameter(0, 'People who walk about.', 0, 100)
+    speed: float = parameter(1.2, 'How fast they walk, m/s.', 0.1, 3.0)
+    manner: str = parameter(
+        'polite', 'polite: they keep 0.6 m from the robot; pushy: 5 cm.', choices=MANNERS
+    )
+    radius: float = parameter(0.25, 'Radius of a person, metres.', 0.05, 1.0)
+    shortest_rest: float = parameter(2.0, 'Least time a person stays in a room, s.', 0.0, 86400.0)
+    longest_rest: float = parameter(
+        20.0, 'Greatest time a person stays in a room, s.', 0.0, 86400.0
+    )
 
 
 class People:
