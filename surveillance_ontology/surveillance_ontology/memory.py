@@ -20,7 +20,11 @@ PAUSE = 0.0002
 
 @contextmanager
 def uncollected() -> Iterator[None]:
-    """Switch the garbage collector off for a while, where it is on."""
+    """Switch the garbage collector off for a while, where it is on.
+
+    What was made meanwhile counts as old afterwards: else the collector would look through it all
+    at the next allocation.
+    """
     if not gc.isenabled():
         yield
         return
@@ -28,6 +32,9 @@ def uncollected() -> Iterator[None]:
     try:
         yield
     finally:
+        if gc.get_count()[0] > LARGE and not gc.get_freeze_count():
+            gc.freeze()
+            gc.unfreeze()
         gc.enable()
 
 

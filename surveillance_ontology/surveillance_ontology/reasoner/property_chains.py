@@ -109,6 +109,11 @@ class Chains:
         """Whether a chain implies the role."""
         return any(one in self._chains for one in self.roles_below(role))
 
+    def ends_in(self, role: AnyRole) -> bool:
+        """Tell whether the last step of every chain that implies the role does so by itself."""
+        below = self.roles_below(role)
+        return all(chain[-1] in below for one in below for chain in self._chains.get(one, ()))
+
     def steps(self, role: AnyRole) -> list[Step]:
         """Return the automaton of a role: its steps from state 0 to state 1.
 
@@ -247,6 +252,8 @@ class _Spelling:
         if isinstance(to, Constant):
             return
         source = [atom for atom in rest if one in atom.terms]
+        if not source and isinstance(one, int) and self.chains.ends_in(role):
+            return  # Whatever begins the chain: the clause itself holds of its last step.
         target = [atom for atom in rest if one not in atom.terms]
         self._automaton(source, one, role, target, to, clause.head, clause)
 
