@@ -275,18 +275,28 @@ class Engine:
 
     # --- single facts ---
 
-    def _assert(self, fact: Fact, fresh: list[Fact]) -> None:
+    def _assert(self, fact: Fact) -> None:
         asserted = self.asserted
-        count = asserted.get(fact)
-        if count is not None:
-            asserted[fact] = count + 1
-            return
-        asserted[fact] = 1
-        if self.changed is not None:
-            self.changed.setdefault(fact, fact[0].holds(fact))
-        if not fact[0].holds(fact):
-            fact[0].insert(fact)
-            fresh.append(fact)
+        count = asserted.get(fact, 0)
+        asserted[fact] = count + 1
+        if not count:
+            if self.changed is not None:
+                self.changed.setdefault(fact, fact[0].holds(fact))
+            self._queue.append(fact)
+
+    def _enter(self) -> list[Fact]:
+        """Have the queued facts hold, so that what they support stays when others go.
+
+        Returns:
+            Those that did not hold; nothing was derived from them yet.
+        """
+        fresh = []
+        for fact in self._queue:
+            if not fact[0].holds(fact):
+                fact[0].insert(fact)
+                fresh.append(fact)
+        self._queue.clear()
+        return fresh
 
     def _unassert(self, fact: Fact) -> None:
         count = self.asserted.get(fact, 0)
@@ -446,10 +456,11 @@ class Engine:
                 self._state_same(axiom)
             stated = self.fact_of(axiom)
             if stated is not None and not members.isdisjoint(_individuals_in(stated)):
-                self._assert(stated, fresh)
+                self._assert(stated)
             if self.program.uses_thing:
                 for individual in individuals_of(axiom) & members:
-                    self._assert((self.program.thing, individual), fresh)
+                    self._assert((self.program.thing, individual))
+        fresh += self._enter()
         for other in others:
             self._split(other, fresh)
 
@@ -462,7 +473,6 @@ class Engine:
     def update(self, added: Iterable[Axiom], removed: Iterable[Axiom]) -> None:
         """Apply changed assertions and bring what follows up to date."""
         equality, uses_thing = self.equality, self.program.uses_thing
-        fresh: list[Fact] = []
         splitting: set[str] = set()
         self.proofs.reset()
         added, removed = list(added), list(removed)
@@ -487,24 +497,30 @@ class Engine:
                 self._state_same(axiom)
             fact = self.fact_of(axiom)
             if fact is not None:
-                self._assert(fact, fresh)
+                self._assert(fact)
             if uses_thing:
                 for individual in individuals_of(axiom):
-                    self._assert((self.program.thing, equality.find(individual)), fresh)
+                    self._assert((self.program.thing, equality.find(individual)))
+        if self._overdeleted or splitting:
+            self._replace(splitting)
+        self._queue.reverse()
+        self._propagate()
+        if len(self._values) > self._most_values:
+            self._forget_values()
+
+    def _replace(self, splitting: Iterable[str]) -> None:
+        """Take away what went, and classes of equal individuals, beside the assertions that came."""
+        fresh = self._enter()
         for representative in splitting:
             self._split(representative, fresh)
         for fact in fresh:
             for early in fact[0].early:
                 early(*fact[1:])
-        if self._overdeleted or self._removed:
-            self._overdelete(fresh)
+        self._overdelete(fresh)
         for fact in fresh:
             if fact[0].holds(fact):
                 for fire in fact[0].on_insert:
                     fire(*fact[1:])
-        self._propagate()
-        if len(self._values) > self._most_values:
-            self._forget_values()
 
     def adopt(self, change: ProgramChange) -> None:
         """Run another program on the facts that are there; nobody may be the same as another."""
@@ -676,7 +692,8 @@ class Engine:
         changed = self.changed
         values_left = _MOST_VALUES + 4 * len(self.asserted)
         while True:
-            for fact in queue:
+            while queue:
+                fact = queue.pop()
                 predicate = fact[0]
                 if len(fact) == 2:
                     x = fact[1]
@@ -691,10 +708,15 @@ class Engine:
                 _, x, y = fact
                 succ = predicate.succ
                 values = succ.get(x)
+                if values is not None and y in values:
+                    continue
+                if predicate.kind == 'data':
+                    values_left -= 1
+                    if values_left < 0 and fact not in self.asserted:
+                        self._stop_generating(predicate)
+                        continue
                 if values is None:
                     succ[x] = {y}
-                elif y in values:
-                    continue
                 else:
                     values.add(y)
                 pred = predicate.pred
@@ -707,12 +729,6 @@ class Engine:
                     changed.setdefault(fact, False)
                 for fire in predicate.on_insert:
                     fire(x, y)
-                if predicate.kind == 'data':
-                    values_left -= 1
-                    if values_left < 0:
-                        self._stop_generating(predicate)
-                        break
-            queue.clear()
             if self._requests:
                 self._run_requests()
             elif touched:
