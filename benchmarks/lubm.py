@@ -178,9 +178,9 @@ def main() -> None:
     print(f'{len(axioms)} axioms')
     print(f'{"":12} {"read":>8} {"reason":>8} {"Student":>8} {"Person":>8} {"Chair":>6}  named')
     with tempfile.TemporaryDirectory() as folder:
-        for ending in ('nt', 'owl'):
+        for ending, form in (('nt', 'ntriples'), ('owl', 'rdfxml')):
             path = Path(folder) / f'university.{ending}'
-            write_ontology(axioms, UB, path)
+            write_ontology(axioms, UB, path, form)
             read, reason, kb = measure(path)
             counts = [len(kb.instances(UB + name)) for name in ('Student', 'Person', 'Chair')]
             line = f'{"here, ." + ending:12} {read:7.2f}s {reason:7.2f}s '

@@ -288,19 +288,25 @@ class KnowledgeBase:
 
     def axioms_about(self, entity: str) -> Iterator[Axiom]:
         """Return the asserted axioms that mention an entity in any role."""
-        return iter(tuple(self._told.about.get(entity, ())))
+        return iter(tuple(self._told.mentioning(entity)))
 
     def asserted_values(self, prop: str, individual: str) -> Iterable[Literal]:
         """Return the values asserted now for a data property of an individual, as they are
         written.
         """
-        return tuple(self._told.literals.get((prop, individual), ()))
+        return tuple(
+            axiom.literal
+            for axiom in self._told.mentioning(individual)
+            if type(axiom) is DataPropertyAssertion
+            and axiom.prop == prop
+            and axiom.subject == individual
+        )
 
     def asserted_objects(self, prop: str, individual: str) -> Iterable[str]:
         """Return what an individual is asserted to be related to by an object property."""
         return tuple(
             axiom.object
-            for axiom in self._told.about.get(individual, ())
+            for axiom in self._told.mentioning(individual)
             if type(axiom) is ObjectPropertyAssertion
             and axiom.prop == prop
             and axiom.subject == individual
@@ -308,7 +314,7 @@ class KnowledgeBase:
 
     def is_known(self, kind: str, iri: str) -> bool:
         """Tell whether an asserted axiom declares or uses the entity as this kind."""
-        return any((kind, iri) in entities_of(axiom) for axiom in self._told.about.get(iri, ()))
+        return any((kind, iri) in entities_of(axiom) for axiom in self._told.mentioning(iri))
 
     def schema_names(self, kind: str) -> list[str]:
         """Return the classes or properties of an ontology that has few; none of a large one."""
@@ -363,7 +369,7 @@ class KnowledgeBase:
         if engine is None:
             return frozenset(
                 axiom.individual
-                for axiom in self._told.about.get(cls, ())
+                for axiom in self._told.mentioning(cls)
                 if isinstance(axiom, ClassAssertion) and axiom.cls == cls
             )
         if cls == THING:
@@ -404,7 +410,7 @@ class KnowledgeBase:
 
     def types(self, individual: str) -> set[str]:
         """Named classes of an individual, direct and indirect, without owl:Thing."""
-        about = [a for a in self._told.about.get(individual, ()) if isinstance(a, ClassAssertion)]
+        about = [a for a in self._told.mentioning(individual) if isinstance(a, ClassAssertion)]
         found = {a.cls for a in about if isinstance(a.cls, str) and a.individual == individual}
         engine = self._usable
         if engine is not None:
@@ -496,10 +502,10 @@ class KnowledgeBase:
         """
         engine = self._usable
         if engine is None:
-            return set(self._told.literals.get((prop, individual), ()))
+            return set(self.asserted_values(prop, individual))
         found: set[Literal] = set()
         for name in engine.equality.same(individual):
-            found.update(self._told.literals.get((prop, name), ()))
+            found.update(self.asserted_values(prop, name))
         known = engine.program.datas.get(prop)
         if known is None:
             return found
@@ -526,13 +532,13 @@ class KnowledgeBase:
         return {name for name in names if self.data_values(name, individual)}
 
     def _props(self, individual: str, kind: type[Any]) -> set[str]:
-        return {a.prop for a in self._told.about.get(individual, ()) if isinstance(a, kind)}
+        return {a.prop for a in self._told.mentioning(individual) if isinstance(a, kind)}
 
     def equivalents(self, cls: str) -> list[ClassExpression]:
         """Return the other sides of the asserted equivalences that have the class as one side."""
         return [
             other
-            for axiom in self._told.about.get(cls, ())
+            for axiom in self._told.mentioning(cls)
             if isinstance(axiom, EquivalentClasses) and cls in axiom.classes
             for other in axiom.classes
             if other != cls
@@ -808,7 +814,7 @@ class KnowledgeBase:
     def _rebuild(self, old: Engine | None) -> None:
         before = self._feed.shown_by(old) if self._feed else set()
         assert self._classification is not None
-        engine = self._engine = Engine(self._classification.program, self._told.mentioning)
+        engine = self._engine = Engine(self._classification.program, self._told)
         if old is not None:
             engine.take_spelling(old)
         self._told.settle()

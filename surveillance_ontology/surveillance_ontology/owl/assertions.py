@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from itertools import count
 
 from surveillance_ontology.owl.axioms import (
     Annotation,
@@ -20,7 +21,6 @@ from surveillance_ontology.owl.axioms import (
     SubClassOf,
 )
 from surveillance_ontology.owl.entities import entities_of
-from surveillance_ontology.owl.expressions import Literal
 from surveillance_ontology.owl.vocabulary import THING
 
 
@@ -28,25 +28,24 @@ class Assertions:
     """A set of axioms.
 
     Attributes:
-        axioms: All of them, oldest first.
-        about: The axioms that mention an entity.
+        axioms: All of them, oldest first, each with its number.
+        about: The axioms that mention an entity, by their numbers.
         schema: Those that are not about individuals, oldest first.
         complex: Those about individuals that a program must be made for: memberships of complex
             classes, and negative ones.
-        literals: The values asserted for a data property (first) of an individual (second).
         added, removed: What changed about individuals since `settle`.
         schema_changed: Whether anything else that matters to a reasoner changed since `settle`.
     """
 
     def __init__(self) -> None:
-        self.axioms: dict[Axiom, None] = {}
-        self.about: dict[str, dict[Axiom, None]] = {}
+        self.axioms: dict[Axiom, int] = {}
+        self.about: dict[str, dict[int, Axiom]] = {}
         self.schema: dict[Axiom, None] = {}
         self.complex: dict[Axiom, None] = {}
-        self.literals: dict[tuple[str, str], dict[Literal, None]] = {}
         self.added: dict[Axiom, None] = {}
         self.removed: dict[Axiom, None] = {}
         self.schema_changed = True
+        self._numbers = count(1)
         self._notes: dict[Axiom, dict[AxiomAnnotation, None]] = {}
 
     def settle(self) -> tuple[tuple[Axiom, ...], tuple[Axiom, ...]]:
@@ -58,24 +57,24 @@ class Assertions:
         return changes
 
     def mentioning(self, entity: str) -> Iterable[Axiom]:
-        """Return the axioms that mention an entity."""
-        return self.about.get(entity, ())
+        """Return the axioms that mention an entity, oldest first."""
+        mentions = self.about.get(entity)
+        return () if mentions is None else mentions.values()
 
     def insert(self, axiom: Axiom) -> bool:
         """Assert an axiom; return False when it was asserted already."""
-        if axiom in self.axioms:
+        number = next(self._numbers)
+        if self.axioms.setdefault(axiom, number) != number:
             return False
-        self.axioms[axiom] = None
+        about = self.about
         for entity in _mentioned(axiom):
-            mentions = self.about.get(entity)
+            mentions = about.get(entity)
             if mentions is None:
-                self.about[entity] = {axiom: None}
+                about[entity] = {number: axiom}
             else:
-                mentions[axiom] = None
-        if type(axiom) is DataPropertyAssertion:
-            self.literals.setdefault((axiom.prop, axiom.subject), {})[axiom.literal] = None
+                mentions[number] = axiom
         if is_assertion(axiom):
-            if axiom in self.removed:
+            if self.removed and axiom in self.removed:
                 del self.removed[axiom]
             else:
                 self.added[axiom] = None
@@ -91,23 +90,18 @@ class Assertions:
 
     def discard(self, axiom: Axiom) -> bool:
         """Retract an axiom and what annotates it; return False when it was not asserted."""
-        if axiom not in self.axioms:
+        number = self.axioms.pop(axiom, None)
+        if number is None:
             return False
         if self._notes:
             for note in tuple(self._notes.get(axiom, ())):
                 self.discard(note)
-        del self.axioms[axiom]
         for entity in _mentioned(axiom):
             mentions = self.about.get(entity)
             if mentions is not None:
-                mentions.pop(axiom, None)
+                mentions.pop(number, None)
                 if not mentions:
                     del self.about[entity]
-        if type(axiom) is DataPropertyAssertion:
-            written = self.literals[axiom.prop, axiom.subject]
-            del written[axiom.literal]
-            if not written:
-                del self.literals[axiom.prop, axiom.subject]
         if is_assertion(axiom):
             if axiom in self.added:
                 del self.added[axiom]

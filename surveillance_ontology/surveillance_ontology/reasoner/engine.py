@@ -12,12 +12,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 
+from surveillance_ontology.owl.assertions import Assertions, is_assertion
 from surveillance_ontology.owl.axioms import (
-    Assertion,
     Axiom,
     ClassAssertion,
     DataPropertyAssertion,
-    Declaration,
     DifferentIndividuals,
     NegativeDataPropertyAssertion,
     NegativeObjectPropertyAssertion,
@@ -55,7 +54,7 @@ class Engine:
 
     Args:
         program: What to run; its predicates hold the facts and belong to this engine.
-        about: Gives the assertions that mention an individual (as of the current `update`).
+        told: The axioms that are asserted (as of the current `update`).
 
     Attributes:
         equality: Who stands for whom.
@@ -70,9 +69,9 @@ class Engine:
             reset.
     """
 
-    def __init__(self, program: Program, about: Callable[[str], Iterable[Axiom]]) -> None:
+    def __init__(self, program: Program, told: Assertions) -> None:
         self.program = program
-        self.about = about
+        self.told = told
         self.equality = Equality()
         self.spelling: dict[Value, Literal] = {}
         self._values: dict[Literal, Value] = {}
@@ -172,12 +171,6 @@ class Engine:
             return fact[0], names.get(fact[1], fact[1])
         predicate, x, y = fact
         return predicate, names.get(x, x), y if predicate.kind == 'data' else names.get(y, y)
-
-    def states(self, axiom: Axiom) -> bool:
-        """Tell whether an assertion is among those that were made."""
-        individuals = axiom.individuals if isinstance(axiom, SameIndividual) else None
-        name = next(iter(individuals)) if individuals else next(iter(individuals_of(axiom)))
-        return axiom in self.about(name)
 
     @staticmethod
     def needs_of(
@@ -383,7 +376,7 @@ class Engine:
         equality = self.equality
         for merge in pending:
             origin = merge.origin
-            if isinstance(origin, SameIndividual) and origin not in self.about(merge.first):
+            if isinstance(origin, SameIndividual) and origin not in self.told.axioms:
                 continue
             x, y = equality.find(merge.first), equality.find(merge.second)
             if x == y or not all(self._holds(self.current(fact)) for fact in merge.premises):
@@ -448,8 +441,8 @@ class Engine:
         axioms: dict[Axiom, None] = {}
         for member in sorted(members):
             self._touched[member] = None
-            for axiom in self.about(member):
-                if is_about_individuals(axiom):
+            for axiom in self.told.mentioning(member):
+                if is_assertion(axiom):
                     axioms[axiom] = None
         for axiom in axioms:
             if isinstance(axiom, SameIndividual):
@@ -509,7 +502,7 @@ class Engine:
             self._forget_values()
 
     def _replace(self, splitting: Iterable[str]) -> None:
-        """Take away what went, and classes of equal individuals, beside the assertions that came."""
+        """Take away what went, and split classes of equal individuals, once new assertions hold."""
         fresh = self._enter()
         for representative in splitting:
             self._split(representative, fresh)
@@ -761,13 +754,6 @@ def individuals_of(axiom: Axiom) -> set[str]:
     return {name for kind, name in entities_of(axiom) if kind == 'individual'}
 
 
-def is_about_individuals(axiom: Axiom) -> bool:
-    """Tell whether an axiom is an assertion; the declaration of an individual is one."""
-    return isinstance(axiom, Assertion) or (
-        isinstance(axiom, Declaration) and axiom.kind == 'individual'
-    )
-
-
 def _individuals_in(fact: Fact) -> tuple[str, ...]:
     return fact[1:2] if fact[0].kind == 'data' else fact[1:]
 
@@ -815,7 +801,7 @@ class FactView:
     def derived(self) -> Iterator[Axiom]:
         """Yield every fact that holds and is not asserted, equality of individuals included."""
         engine = self._engine
-        classes = engine.equality.members
+        classes, stated = engine.equality.members, engine.told.axioms
         if not classes:
             asserted = engine.asserted
             for fact in self.stored():
@@ -827,11 +813,11 @@ class FactView:
                 yield from self._derived_values(fact)
                 continue
             for axiom in self.public(fact, classes):
-                if not engine.states(axiom):
+                if axiom not in stated:
                     yield axiom
         for members in classes.values():
             same = SameIndividual(frozenset(members))
-            if not engine.states(same):
+            if same not in stated:
                 yield same
 
     def _derived_values(self, fact: Fact) -> Iterator[Axiom]:
@@ -839,7 +825,7 @@ class FactView:
         engine = self._engine
         predicate, representative, value = fact
         for subject in engine.equality.same(representative):
-            for axiom in engine.about(subject):
+            for axiom in engine.told.mentioning(subject):
                 if (
                     isinstance(axiom, DataPropertyAssertion)
                     and axiom.prop == predicate.expression

@@ -224,7 +224,7 @@ class Reasons:
         names = [name for name in fact[1:] if isinstance(name, str)]
         for name in names:
             for other in sorted(engine.equality.same(name)):
-                for axiom in engine.about(other):
+                for axiom in engine.told.mentioning(other):
                     if isinstance(axiom, ax.Assertion) and engine.fact_of(axiom) == fact:
                         written = Explanation(axiom_text(axiom), 'asserted', axioms=(axiom,))
                         same = self._renamings(axiom, fact)
