@@ -167,7 +167,6 @@ class WorldModel:
         self._all: frozenset[str] = frozenset()
         self._graph_key: object = None
         self._since: float | None = None
-        self._told_threshold: float | None = None
 
     @property
     def places(self) -> frozenset[str]:
@@ -199,11 +198,8 @@ class WorldModel:
         self.experience.tell_time(now)
         self._since = now if self._since is None else min(self._since, now)
         threshold, classes = self.settings.urgency_threshold, self.settings.rules.classes
-        if threshold != self._told_threshold:
-            self._ontology.set_urgency_threshold(threshold, interrupt)
-            self._told_threshold = threshold
         visits = self.experience.visits
-        found = self._ontology.snapshot(now, classes, visits, interrupt)
+        found = self._ontology.snapshot(now, classes, visits, interrupt, threshold)
         graph = self._map_of(found, interrupt)
         visited_at = {}
         for place, seconds in found.visited_at.items():

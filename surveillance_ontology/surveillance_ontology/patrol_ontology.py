@@ -118,7 +118,6 @@ class PatrolOntology:
         self._robot = robot
         self._places: tuple[str, ...] = ()
         self._last: Snapshot | None = None
-        self._threshold: int | None = None
 
     @property
     def reference(self) -> str:
@@ -300,8 +299,7 @@ class PatrolOntology:
             ArmorServiceCallError: The server does not answer.
             ArmorServiceInternalError: It refuses.
         """
-        self._threshold = int(seconds)
-        told = self._set_value('urgencyThreshold', self._robot, self._threshold)
+        told = self._set_value('urgencyThreshold', self._robot, int(seconds))
         self._carry_out([told, self._request('REASON')])
 
     def snapshot(
@@ -311,6 +309,7 @@ class PatrolOntology:
         *,
         not_before: int = 0,
         visits: Mapping[str, float] | None = None,
+        threshold: float | None = None,
         patience: float = 0.0,
         interrupt: Waiting | None = None,
     ) -> Snapshot:
@@ -329,6 +328,8 @@ class PatrolOntology:
             visits: When the robot visited places, seconds; the ontology is told what it does not
                 know of that. Somebody else's later visit stays, unless it lies ahead: then the
                 clock was set back. A place that was taken away does not come back.
+            threshold: Seconds without a visit after which a place is URGENT, told with each
+                snapshot, since an ontology that was built anew does not know it; None: as it was.
             patience: How long to wait for an ontology that is there, is consistent and knows where
                 the robot is, seconds of steady time. One that is built anew is gone meanwhile.
             interrupt: Ends the wait early.
@@ -345,7 +346,7 @@ class PatrolOntology:
         while True:
             is_over = time.monotonic() >= deadline
             try:
-                found = self._ask(now, classes, visits or {})
+                found = self._ask(now, classes, visits or {}, threshold)
                 if found.is_in.is_consistent:
                     snapshot = self._snapshot_of(found, classes)
                 else:
@@ -388,14 +389,21 @@ class PatrolOntology:
             visited_at={**last.visited_at, **told},
         )
 
-    def _ask(self, now: float, classes: Sequence[str], visits: Mapping[str, float]) -> _Answers:
+    def _ask(
+        self,
+        now: float,
+        classes: Sequence[str],
+        visits: Mapping[str, float],
+        threshold: float | None,
+    ) -> _Answers:
         """Tell and ask until the answers are about all places, of one moment."""
+        own = {'now': now} if threshold is None else {'urgencyThreshold': threshold, 'now': now}
         asked = self._places
         # A visit of this moment is the latest there can be, and nobody takes away the place that
         # the robot stands in: it can be told unasked. For any other the ontology is asked first.
         owed = [place for place, at in visits.items() if place in asked and int(at) >= int(now)]
         while True:
-            found = self._exchange(now, {place: visits[place] for place in owed}, classes, asked)
+            found = self._exchange(own, {place: visits[place] for place in owed}, classes, asked)
             self._places = _names(found.locations)
             owed = [
                 place
@@ -412,14 +420,17 @@ class PatrolOntology:
             asked = self._places
 
     def _exchange(
-        self, now: float, visits: Mapping[str, float], classes: Sequence[str], asked: Sequence[str]
+        self,
+        own: Mapping[str, float],
+        visits: Mapping[str, float],
+        classes: Sequence[str],
+        asked: Sequence[str],
     ) -> _Answers:
-        """Tell visits and the time, and ask about the robot and some places, in one batch."""
+        """Tell visits and values of the robot, ask about it and some places, all in one batch."""
         request, robot = self._request, self._robot
         told = [self._set_value('visitedAt', place, int(at)) for place, at in visits.items()]
-        if self._threshold is not None:  # an ontology that was built anew does not know it
-            told.append(self._set_value('urgencyThreshold', robot, self._threshold))
-        told += [self._set_value('now', robot, int(now)), request('REASON')]
+        told += [self._set_value(name, robot, int(value)) for name, value in own.items()]
+        told.append(request('REASON'))
         questions = [
             request('QUERY OBJECTPROP IND', 'isIn', robot),
             request('QUERY DATAPROP IND', 'seenAt', robot),

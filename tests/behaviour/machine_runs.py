@@ -21,7 +21,6 @@ from .scripted_world import World
 CALLS = {
     'surveillance': [
         'wait_until_built',
-        'set_urgency_threshold',
         'snapshot',
         'position',
         'plan',
@@ -30,7 +29,6 @@ CALLS = {
     'patrol': [
         'start',
         'wait_until_built',
-        'set_urgency_threshold',
         'snapshot',
         'position',
         'reason',

@@ -165,18 +165,16 @@ class World:
     def place_classes(self, interrupt: Interrupt) -> tuple[str, ...]:
         return ('LOCATION', 'ROOM', 'CORRIDOR', 'URGENT')
 
-    def set_urgency_threshold(self, seconds: float, interrupt: Interrupt) -> None:
-        self._call('set_urgency_threshold', interrupt)
-        self.threshold = seconds
-
     def snapshot(
         self,
         now: float,
         classes: Sequence[str],
         visits: Mapping[str, float],
         interrupt: Interrupt,
+        threshold: float | None = None,
     ) -> Snapshot:
         self._call('snapshot', interrupt)
+        self.threshold = self.threshold if threshold is None else threshold
         for place, at in visits.items():
             if place in self.rooms and int(at) > int(self.visited_at[place]):
                 self.visited_at[place] = at

@@ -44,11 +44,10 @@ def knowledge(transport: InProcessTransport) -> ArmorKnowledge:
 
 
 def ask(knowledge: ArmorKnowledge, now: float, **visits: float) -> Snapshot:
-    return knowledge.snapshot(now, RULES, visits, NOBODY)
+    return knowledge.snapshot(now, RULES, visits, NOBODY, threshold=30.0)
 
 
 def test_a_snapshot_is_what_the_ontology_infers(knowledge: ArmorKnowledge) -> None:
-    knowledge.set_urgency_threshold(30.0, NOBODY)
     found = ask(knowledge, 110.7)
     assert found.place == 'E'
     assert found.reachable == ('C1', 'C2')
@@ -62,7 +61,6 @@ def test_a_snapshot_is_what_the_ontology_infers(knowledge: ArmorKnowledge) -> No
 def test_places_become_urgent_beyond_the_threshold(
     knowledge: ArmorKnowledge, now: float, urgent: bool
 ) -> None:
-    knowledge.set_urgency_threshold(30.0, NOBODY)
     assert ('URGENT' in ask(knowledge, now).classes['R1']) is urgent
 
 

@@ -35,7 +35,7 @@ def test_a_peer_that_stays_away_is_cried_about_and_waited_for(name: str, call: s
 
     world.clock.after(100.0, begin)
     Run(name, world).until(2000.0)
-    if call in ('start', 'wait_until_built', 'set_urgency_threshold'):
+    if call in ('start', 'wait_until_built'):
         assert not world.cries, 'asked at the start only'
         return
     assert any('scripted fault' in cry for cry in world.cries)

@@ -319,7 +319,12 @@ def test_a_snapshot_waits_for_an_ontology_that_is_built_anew(
     before = ontology.snapshot(120.0, RULES, visits={'E': 100.0})
     builder.forget()
     found = ontology.snapshot(
-        121.0, RULES, visits={'E': 100.0, 'C1': 120.0}, patience=60.0, interrupt=Pause()
+        121.0,
+        RULES,
+        visits={'E': 100.0, 'C1': 120.0},
+        threshold=30.0,
+        patience=60.0,
+        interrupt=Pause(),
     )
     assert next(steps, None) is None, 'no step of the building was taken for the whole'
     assert (found.place, found.visited_at) == ('C1', {'E': 100.0, 'C1': 120.0})

@@ -121,11 +121,6 @@ class ArmorKnowledge:
         """Ask for the name of the ontology, which is answered once the map is built."""
         self._armor.reference_name = self._ask_reference(interrupt)
 
-    def set_urgency_threshold(self, seconds: float, interrupt: fsm.Interrupt) -> None:
-        """Replace the robot's urgencyThreshold."""
-        with self._talking(interrupt):
-            self._ontology.set_urgency_threshold(seconds)
-
     def place_classes(self, interrupt: fsm.Interrupt) -> tuple[str, ...]:
         """Return the classes that a place can be in."""
         with self._talking(interrupt):
@@ -144,6 +139,7 @@ class ArmorKnowledge:
         classes: Sequence[str],
         visits: Mapping[str, float],
         interrupt: fsm.Interrupt,
+        threshold: float | None = None,
     ) -> Snapshot:
         """Tell the time and what the ontology does not know of ``visits``; ask what follows.
 
@@ -155,6 +151,7 @@ class ArmorKnowledge:
                 classes,
                 not_before=self._whereabouts.stamp,
                 visits=visits,
+                threshold=threshold,
                 patience=self._patience,
                 interrupt=interrupt,
             )

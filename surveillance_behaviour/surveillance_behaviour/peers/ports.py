@@ -61,9 +61,6 @@ class Ontology(Protocol):
     def wait_until_built(self, interrupt: Interrupt) -> None:
         """Return once the map is in the ontology."""
 
-    def set_urgency_threshold(self, seconds: float, interrupt: Interrupt) -> None:
-        """Set the time after which a place becomes URGENT."""
-
     def place_classes(self, interrupt: Interrupt) -> tuple[str, ...]:
         """Return the classes that a place can be in."""
 
@@ -73,6 +70,7 @@ class Ontology(Protocol):
         classes: Sequence[str],
         visits: Mapping[str, float],
         interrupt: Interrupt,
+        threshold: float | None = None,
     ) -> Snapshot:
         """Tell the time and the visits that the ontology does not know, and ask what follows.
 
@@ -83,6 +81,7 @@ class Ontology(Protocol):
             classes: The classes of places that matter.
             visits: When the robot was in each place last, seconds.
             interrupt: Ends it.
+            threshold: Seconds without a visit after which a place is URGENT; None: as it was.
         """
 
     def await_place(self, place: str, seconds: float, interrupt: Interrupt) -> str:
