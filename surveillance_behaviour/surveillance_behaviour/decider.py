@@ -9,7 +9,7 @@ from __future__ import annotations
 import random
 import threading
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from surveillance_behaviour.charging import BatteryMonitor
 from surveillance_behaviour.decision import (
@@ -31,7 +31,22 @@ from surveillance_behaviour.policy.plan import LEG_CHANGE
 from surveillance_behaviour.policy.world import Decision, World
 from surveillance_behaviour.world_model import Experience, WorldModel
 from surveillance_fsm import Interrupt
+from surveillance_runtime.parameters import parameter
 from surveillance_runtime.suggestions import nearest
+
+
+@dataclass(frozen=True)
+class MemorySettings:
+    """What a node that decides is told of what it keeps, and of chance."""
+
+    record: str = parameter(
+        '',
+        'File that the mission is recorded in, and beside which `FILE.experience.json` keeps what '
+        'was learned (visits, leg times, battery); empty: none.',
+    )
+    random_seed: int = parameter(
+        -1, 'Makes the policies that draw repeatable; -1 takes another course each time.', -1
+    )
 
 
 class Decider:
@@ -82,9 +97,7 @@ class Decider:
         battery: BatteryMonitor,
         now: Callable[[], float],
         warn: Callable[[str], None],
-        *,
-        record: str,
-        seed: int,
+        memory: MemorySettings,
     ) -> Decider:
         """Return a decider that knows what was learned before and learns the battery's draw.
 
@@ -95,13 +108,12 @@ class Decider:
             battery: The battery.
             now: Seconds on the mission's clock.
             warn: See `Decider`; also told when what was learned cannot be read.
-            record: File of the mission record, see `Experience.of_record`.
-            seed: Makes the policies that draw repeatable; -1: another course each time.
+            memory: Where what was learned is, see `Experience.of_record`.
         """
-        experience = Experience.of_record(record)
+        experience = Experience.of_record(memory.record)
         if experience.problem:
             warn(experience.problem)
-        generator = random.Random(seed if seed >= 0 else None)
+        generator = random.Random(memory.random_seed if memory.random_seed >= 0 else None)
         decider = cls(settings, ontology, places, battery, experience, generator, warn)
         battery.watch(lambda: decider.learn_draw(now()))
         return decider

@@ -46,9 +46,7 @@ class InitialState(PatrolNode):
     def __init__(self, **node_options: Any) -> None:
         super().__init__('initial_state', **node_options)
         self._configured = described_place(self, source='markers', required=True)
-        self._scan = self.declare_fields(
-            InitialScan(), on_change=lambda new: vars(self._scan).update(vars(new))
-        )
+        self._scan = self.declare_live(InitialScan())
         pictures = self.parameter('pictures', 6, 'Pictures to take at each pose.', minimum=1)
         patience = self.parameter(
             'patience', 2.0, 'Seconds after which a pose is left without them.', minimum=0.0

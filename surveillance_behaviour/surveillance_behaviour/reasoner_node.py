@@ -14,14 +14,13 @@ from typing import Any
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.task import Future
 
-from surveillance_behaviour import behaviour_parameters
 from surveillance_behaviour.charging import BatteryMonitor
-from surveillance_behaviour.decider import Decider
-from surveillance_behaviour.decision import NowhereToGoError
+from surveillance_behaviour.decider import Decider, MemorySettings
+from surveillance_behaviour.decision import DecisionSettings, NowhereToGoError
 from surveillance_behaviour.peers.announcing import DecisionTopic
 from surveillance_behaviour.peers.decision_services import DecisionServices
 from surveillance_behaviour.peers.ports import InterruptedWaitError, PeerError
-from surveillance_behaviour.peers.ros_ports import RosPlaces, hear_battery, ros_ontology
+from surveillance_behaviour.peers.ros_ports import Deadlines, RosPlaces, hear_battery, ros_ontology
 from surveillance_fsm import Interrupt
 from surveillance_fsm.ros import ClockWait
 from surveillance_interfaces.msg import MissionStatus
@@ -38,8 +37,12 @@ class Reasoner(PatrolNode):
 
     def __init__(self, **node_options: Any) -> None:
         super().__init__('reasoner', **node_options)
-        settings = behaviour_parameters.choice_settings(self, explores=False)
-        deadlines = behaviour_parameters.deadlines(self, without=('plan', 'move', 'charge'))
+        settings = self.declare_live(
+            DecisionSettings(exploration_seconds=0.0), without=('exploration_seconds',)
+        )
+        deadlines = self.declare_fields(
+            Deadlines(), prefix='deadline.', without=('plan', 'move', 'charge')
+        )
         battery = BatteryMonitor()
         self._wait = ClockWait(self)
         self._decider = Decider.of_mission(
@@ -49,8 +52,7 @@ class Reasoner(PatrolNode):
             battery,
             self._wait.now,
             lambda warning: self.get_logger().warn(warning),
-            record=behaviour_parameters.record_path(self),
-            seed=behaviour_parameters.random_seed(self),
+            self.declare_fields(MemorySettings()),
         )
         self._decisions = DecisionTopic(self)
         self._avoided: frozenset[str] = frozenset()

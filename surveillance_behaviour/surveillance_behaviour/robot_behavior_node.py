@@ -16,9 +16,10 @@ from typing import Any, cast
 from sensor_msgs.msg import BatteryState
 
 import surveillance_fsm as fsm
-from surveillance_behaviour import behaviour_parameters, conversions
+from surveillance_behaviour import conversions
 from surveillance_behaviour.charging import BatteryMonitor
-from surveillance_behaviour.decider import Decider
+from surveillance_behaviour.decider import Decider, MemorySettings
+from surveillance_behaviour.decision import DecisionSettings
 from surveillance_behaviour.machines import MACHINES
 from surveillance_behaviour.mission.mission import Mission, MissionSettings
 from surveillance_behaviour.mission.mission_log import (
@@ -60,16 +61,16 @@ class RobotBehavior(PatrolNode):
             choices=tuple(MACHINES),
             read_only=True,
         )
-        settings = behaviour_parameters.mission_settings(self)
-        deadlines = behaviour_parameters.deadlines(self)
-        seed = behaviour_parameters.random_seed(self)
-        path = behaviour_parameters.record_path(self)
-        left_at = self._where_it_was_cut_off(path)
-        self._record = _open_record(path)
+        choice = self.declare_live(DecisionSettings())
+        settings = self.declare_fields(MissionSettings(choice))
+        deadlines = self.declare_fields(Deadlines(), prefix='deadline.')
+        memory = self.declare_fields(MemorySettings())
+        left_at = self._where_it_was_cut_off(memory.record)
+        self._record = _open_record(memory.record)
         self._mission_clock = MissionClock(self)
         self._work: AwaitedWork | None = None
         battery = BatteryMonitor()
-        ports = self._ports(settings, deadlines, battery, path, seed)
+        ports = self._ports(choice, deadlines, battery, memory)
         clock = cast(fsm.Clock, self._mission_clock)
         self.mission = Mission(
             self._behaviour, settings, ports, battery, clock, self._record, left_at
@@ -89,11 +90,10 @@ class RobotBehavior(PatrolNode):
 
     def _ports(
         self,
-        settings: MissionSettings,
+        settings: DecisionSettings,
         deadlines: Deadlines,
         battery: BatteryMonitor,
-        record: str,
-        seed: int,
+        memory: MemorySettings,
     ) -> Ports:
         """Return the peers of the machine that runs; in `surveillance` this process decides."""
         clock = self._mission_clock
@@ -105,14 +105,13 @@ class RobotBehavior(PatrolNode):
             return Ports(ontology, places, self._announcer, reasoner, routine=routine)
         self._announcer = RosAnnouncer(self, DecisionTopic(self))
         decider = Decider.of_mission(
-            settings.choice,
+            settings,
             ontology,
             places,
             battery,
             clock.now,
             lambda warning: self.get_logger().warn(warning),
-            record=record,
-            seed=seed,
+            memory,
         )
         self._work = AwaitedWork(self, 1)
         DecisionServices(

@@ -10,6 +10,7 @@ import sys
 import time
 from collections import deque
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from rclpy.callback_groups import ReentrantCallbackGroup
@@ -18,12 +19,14 @@ from rclpy.event_handler import PublisherEventCallbacks
 
 from surveillance_interfaces.msg import ArmorDirectiveRes, FactChanges
 from surveillance_interfaces.srv import ArmorDirective, ArmorDirectiveList
+from surveillance_ontology.armor.access import Settings, state_folder
 from surveillance_ontology.armor.protocol import DirectiveRequest
+from surveillance_ontology.armor.service import ArmorService
 from surveillance_ontology.armor.session import ChangeFeed, NumberedChange
+from surveillance_ontology.armor.store import JournalError, Store
 from surveillance_ontology.armor_client import CHANGES_TOPIC
 from surveillance_ontology.conversions import changes_to_ros, fill_response, request_from_ros
-from surveillance_ontology.ontology_parameters import described_service
-from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.node import PatrolNode, StartError
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.waiting import AwaitedWork
@@ -79,7 +82,7 @@ class ArmorServer(PatrolNode):
 
     def __init__(self, *, keep: bool = False, **node_options: Any) -> None:
         super().__init__('armor_server', **node_options)
-        self._service = described_service(self, keep=keep)
+        self._service = _service(self, keep)
         self._feed = ChangeFeed(self._service.session, self._soon)
         self._subscribers = 0
         self._untold: list[NumberedChange] = []
@@ -219,6 +222,46 @@ class ArmorServer(PatrolNode):
             msg = changes_to_ros(change)
             msg.stamp = self.get_clock().now().to_msg()
             self._publisher.publish(msg)
+
+
+def _service(node: PatrolNode, keep: bool) -> ArmorService:
+    """Make the service that a node's parameters describe; it logs through the node.
+
+    Args:
+        node: The node.
+        keep: Whether the store is on by default.
+
+    Raises:
+        ParameterError: A parameter is of the wrong type or out of range.
+        StartError: The store cannot be used.
+    """
+    settings = node.declare_fields(Settings())
+    stored = node.parameter(
+        'store',
+        'auto' if keep else 'none',
+        'Directory in which references and their changes are kept over a restart; auto: one for '
+        "this domain and name in the user's state folder; none: nothing is kept.",
+        read_only=True,
+    )
+    log = node.get_logger()
+    folder = _own_folder(node) if stored == 'auto' else Path(stored).expanduser()
+    try:
+        store = None if stored in ('', 'none') else Store(folder)
+        clock = node.get_clock()
+        service = ArmorService(
+            settings, log.info, log.warn, store, lambda: clock.now().nanoseconds * 1e-9
+        )
+        if store:
+            kept = ', '.join(service.references.names()) or 'nothing'
+            log.info(f'store {folder}, which holds {kept}; "-p store:=none" keeps nothing')
+        return service
+    except JournalError as error:
+        raise StartError(f'{node.get_name()}: parameter store: {error}') from None
+
+
+def _own_folder(node: PatrolNode) -> Path:
+    name = node.get_fully_qualified_name().strip('/').replace('/', '.')
+    return state_folder() / 'armor' / f'{node.context.get_domain_id()}.{name}'
 
 
 def main(args: list[str] | None = None) -> int:

@@ -8,9 +8,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from surveillance_ontology.armor.access import DATA
 from surveillance_ontology.armor.client import ArmorServiceCallError, ArmorServiceInternalError
 from surveillance_ontology.map_building import RoomNote, extended
 from surveillance_ontology.patrol_ontology import NEVER, PatrolOntology, is_gone
+from surveillance_runtime.parameters import parameter
 from surveillance_runtime.place import Place, PlaceError
 
 MOST_REPLACED = 10
@@ -36,18 +38,19 @@ class Reports:
 
 @dataclass(frozen=True)
 class Source:
-    """The ontology that a map is entered into.
+    """The ontology that a map is entered into."""
 
-    Attributes:
-        path: Its file.
-        uri: Its IRI.
-        urgent_at_start: Places that nobody has visited count as never visited; else as visited
-            when the map was built first.
-    """
-
-    path: str
-    uri: str
-    urgent_at_start: bool = True
+    path: str = parameter(
+        str(DATA / 'surveillance.owl'), 'The ontology to start from.', name='ontology_path'
+    )
+    uri: str = parameter(
+        'http://bnc/exp-rob-lab/2022-23', 'IRI of the ontology.', name='ontology_uri'
+    )
+    urgent_at_start: bool = parameter(
+        True,
+        'Places that nobody has visited count as never visited, and so as URGENT; '
+        'else as visited when the map was built.',
+    )
 
 
 class MapKeeper:

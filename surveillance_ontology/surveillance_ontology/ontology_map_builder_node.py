@@ -20,7 +20,6 @@ from surveillance_interfaces.srv import AddRoom, ReferenceName, RemoveRoom, Room
 from surveillance_ontology.armor_client import CHANGES_QOS, CHANGES_TOPIC, ArmorClient
 from surveillance_ontology.conversions import point_to_ros, position_from_ros, room_note_from_ros
 from surveillance_ontology.map_keeper import MapKeeper, Reports, Source
-from surveillance_ontology.ontology_parameters import builder_settings
 from surveillance_ontology.patrol_ontology import PatrolOntology
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.place import Place
@@ -41,11 +40,23 @@ class OntologyMapBuilder(PatrolNode):
 
     def __init__(self, **node_options: Any) -> None:
         super().__init__('ontology_map_builder', **node_options)
-        settings = builder_settings(self)
-        self._reference = settings.ontology_reference
+        self._reference = self.parameter(
+            'ontology_reference',
+            'surveillance',
+            'Reference name of the ontology in the server.',
+            read_only=True,
+        )
+        timeout = self.parameter(
+            'armor_timeout',
+            5.0,
+            'Longest wait for an answer of the server, seconds.',
+            minimum=0.1,
+            read_only=True,
+        )
+        source = self.declare_fields(Source())
         place = described_place(self)
         # The first reasoning over thousands of places takes its time.
-        timeout = max(settings.armor_timeout, SECONDS_PER_ROOM * len(place.rooms if place else ()))
+        timeout = max(timeout, SECONDS_PER_ROOM * len(place.rooms if place else ()))
         armor = ArmorClient(
             self, self.get_name(), self._reference, timeout=timeout, interrupt=self.stopping
         )
@@ -53,7 +64,7 @@ class OntologyMapBuilder(PatrolNode):
         log = self.get_logger()
         self._keeper = MapKeeper(
             PatrolOntology(armor),
-            Source(settings.ontology_path, settings.ontology_uri, settings.urgent_at_start),
+            source,
             place,
             lambda: int(self.get_clock().now().nanoseconds // 1_000_000_000),
             self.stopping.is_set,

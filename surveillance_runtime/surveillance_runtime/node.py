@@ -199,6 +199,13 @@ class PatrolNode(Node):  # type: ignore[misc]
             self._live.append(_LiveRecord(record, prefix, values.keys(), on_change))
         return record
 
+    def declare_live(self, record: Record, without: Container[str] = ()) -> Record:
+        """Declare fields as `declare_fields`; the record that is returned follows each change."""
+        live = self.declare_fields(
+            record, without=without, on_change=lambda new: vars(live).update(vars(new))
+        )
+        return live
+
     def _declare(self, spec: ParameterSpec) -> Any:
         name, default, element = spec.name, spec.default, spec.element
         descriptor = ParameterDescriptor(

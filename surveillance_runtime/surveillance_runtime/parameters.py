@@ -200,9 +200,9 @@ def _field_spec(*declared: Any, name: str = '', **more: Any) -> ParameterSpec:
     return ParameterSpec(name, *declared, **more)
 
 
-def parameters(record: Callable[[], T]) -> T:
+def parameters(record: Callable[[], T], prefix: str = '') -> T:
     """Return the field of a record that is a record itself, with fields that are parameters."""
-    declared: T = field(default_factory=record, metadata={'parameters': True})
+    declared: T = field(default_factory=record, metadata={'parameters': prefix})
     return declared
 
 
@@ -220,8 +220,8 @@ def specs_of(
         value = getattr(record, each.name)
         if each.name in without:
             continue
-        if 'parameters' in each.metadata:
-            yield from specs_of(value, prefix, without)
+        if (inner := each.metadata.get('parameters')) is not None:
+            yield from specs_of(value, prefix + inner, without)
         elif spec := each.metadata.get('parameter'):
             default = spec.default if 'make' in each.metadata else value
             default = list(default) if isinstance(default, tuple) else default
@@ -243,8 +243,8 @@ def with_values(record: Record, values: Mapping[str, Any], prefix: str = '') -> 
     changed = {}
     for each in fields(record):
         spec = each.metadata.get('parameter')
-        if 'parameters' in each.metadata:
-            changed[each.name] = with_values(getattr(record, each.name), values, prefix)
+        if (inner := each.metadata.get('parameters')) is not None:
+            changed[each.name] = with_values(getattr(record, each.name), values, prefix + inner)
         elif spec and (name := spec.name or prefix + each.name) in values:
             value = values[name]
             make = each.metadata.get('make') or (tuple if spec.element else None)

@@ -18,7 +18,7 @@ from surveillance_behaviour.peers.ports import PeerError, Point, Ports
 from surveillance_behaviour.policy.battery_reserve import Battery
 from surveillance_behaviour.policy.world import Decision
 from surveillance_fsm import Clock, Interrupt
-from surveillance_runtime.parameters import parameter
+from surveillance_runtime.parameters import parameter, parameters
 
 
 @dataclass
@@ -33,7 +33,7 @@ class MissionSettings:
     """
 
     choice: DecisionSettings = field(default_factory=DecisionSettings)
-    recovery: RecoveryLimits = field(default_factory=RecoveryLimits)
+    recovery: RecoveryLimits = parameters(RecoveryLimits, 'recovery.')
     arrival_tolerance: float = parameter(
         1.0,
         "How far from its path's end the robot may stop and still have arrived, m.",

@@ -57,10 +57,7 @@ def arm_settings(node: PatrolNode, arm: Arm) -> ArmSettings:
         ParameterError: A value is of the wrong type or out of range.
     """
     poses = {name: _pose(node, arm, name, pan) for name, pan in _PAN.items()}
-    settings = node.declare_fields(
-        ArmSettings(poses), on_change=lambda new: vars(settings).update(vars(new))
-    )
-    return settings
+    return node.declare_live(ArmSettings(poses))
 
 
 def _pose(node: PatrolNode, arm: Arm, name: str, pan: float) -> Array:
