@@ -9,7 +9,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from surveillance_ontology.armor.access import DATA
-from surveillance_ontology.armor.client import ArmorServiceCallError, ArmorServiceInternalError
+from surveillance_ontology.armor.client import (
+    ArmorError,
+    ArmorServiceCallError,
+    ArmorServiceInternalError,
+)
 from surveillance_ontology.map_building import RoomNote, extended
 from surveillance_ontology.patrol_ontology import NEVER, PatrolOntology, is_gone
 from surveillance_runtime.parameters import parameter
@@ -173,7 +177,7 @@ class MapKeeper:
         if before is not None and self.is_built:
             try:
                 self._ontology.change(before, place, self._first_visit())
-            except (ArmorServiceCallError, ArmorServiceInternalError) as error:
+            except ArmorError as error:
                 self._reports.warn(f'the map is built anew: {error}')
             else:
                 return
@@ -196,7 +200,7 @@ class MapKeeper:
         except PlaceError as error:
             self.place = before
             return str(error)
-        except (ArmorServiceCallError, ArmorServiceInternalError) as error:
+        except ArmorError as error:
             self.place = before
             return f'the ontology was not changed: {error}'
         return ''

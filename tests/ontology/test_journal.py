@@ -120,10 +120,8 @@ def test_a_snapshot_stands_for_what_was_before_it(tmp_path: Path) -> None:
     journal.append([2])
     number = journal.begin_snapshot()
     journal.append([3])
-    assert list(journal.records()) == [1, 2, 3]
     journal.finish_snapshot(number, ['state'])
     journal.append([4])
-    assert list(journal.records()) == ['state', 3, 4]
     journal.close()
     assert reopened(tmp_path) == ['state', 3, 4]
     assert sorted(p.name for p in tmp_path.iterdir()) == ['journal-1.log', 'lock', 'snapshot-1.log']
@@ -160,8 +158,8 @@ def test_a_write_that_fails_leaves_nothing(tmp_path: Path, monkeypatch: pytest.M
         with pytest.raises(JournalError, match='No space left'):
             journal.append([2])
     journal.append([3])
-    assert list(journal.records()) == [1, 3]
     journal.close()
+    assert reopened(tmp_path) == [1, 3]
 
 
 def test_a_directory_that_cannot_be_used(tmp_path: Path) -> None:

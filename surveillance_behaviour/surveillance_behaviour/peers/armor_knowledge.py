@@ -16,6 +16,7 @@ from surveillance_behaviour.peers.ports import (
 )
 from surveillance_ontology.armor.client import (
     ArmorClient,
+    ArmorError,
     ArmorServiceCallError,
     ArmorServiceInternalError,
     Transport,
@@ -169,7 +170,7 @@ class ArmorKnowledge:
         forget = interrupt.subscribe(self._wake.set)
         try:
             yield
-        except (ArmorServiceCallError, ArmorServiceInternalError, OntologyNotReadyError) as error:
+        except (ArmorError, OntologyNotReadyError) as error:
             if isinstance(error, ArmorServiceInternalError):
                 # A server that was started anew does not know the ontology yet.
                 self._armor.reference_name = ''

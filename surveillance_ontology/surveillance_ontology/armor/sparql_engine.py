@@ -19,6 +19,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+from surveillance_ontology.armor.protocol import DirectiveError
 from surveillance_ontology.memory import uncollected
 
 if TYPE_CHECKING:
@@ -55,10 +56,6 @@ class Binding:
     language: str
 
 
-class SparqlError(Exception):
-    """A query that cannot be answered: one line."""
-
-
 class SparqlEngine:
     """Runs queries in processes of its own; threads may share it."""
 
@@ -89,7 +86,7 @@ class SparqlEngine:
 
         Raises:
             TimeoutError: Stopped at the time limit.
-            SparqlError: Not a valid SELECT query, too many rows, too much memory.
+            DirectiveError: Not a valid SELECT query, too many rows, too much memory.
         """
         deadline = time.monotonic() + limit
         worker = self._take(version)
@@ -101,7 +98,7 @@ class SparqlEngine:
                 self._busy.discard(worker)
             worker.kill()
             if self._closed:
-                raise SparqlError('the server stops') from None
+                raise DirectiveError('QUERY SPARQL: the server stops') from None
             raise
         with self._lock:
             self._busy.discard(worker)
@@ -112,7 +109,7 @@ class SparqlEngine:
         for other in surplus:
             other.kill()
         if 'error' in answer:
-            raise SparqlError(' '.join(str(answer['error']).split()))
+            raise DirectiveError(f'QUERY SPARQL: {" ".join(str(answer["error"]).split())}')
         return [[Binding(*bound) for bound in row] for row in answer['rows']]
 
     def is_busy(self) -> bool:
@@ -140,7 +137,7 @@ class SparqlEngine:
     def _take(self, version: Version) -> _Worker:
         with self._lock:
             if self._closed:
-                raise SparqlError('the server stops')
+                raise DirectiveError('QUERY SPARQL: the server stops')
             # The one that has most of it.
             self._idle.sort(key=lambda worker: _distance(worker.version, version))
             worker = self._idle[0] if self._idle else None
@@ -218,7 +215,7 @@ class _Worker:
             try:
                 view = view[os.write(self._in, view) :]
             except BrokenPipeError:
-                raise SparqlError(self._why_ended()) from None
+                raise DirectiveError(f'QUERY SPARQL: {self._why_ended()}') from None
 
     def _receive(self, deadline: float) -> bytes:
         parts: list[bytes] = []
@@ -226,7 +223,7 @@ class _Worker:
             self._await(deadline, writing=False)
             part = os.read(self._out, 1 << 20)
             if not part:
-                raise SparqlError(self._why_ended())
+                raise DirectiveError(f'QUERY SPARQL: {self._why_ended()}')
             parts.append(part)
         return b''.join(parts)
 

@@ -83,7 +83,6 @@ class Journal:
     def __init__(self, directory: Path) -> None:
         self._directory = directory
         self.notes: list[str] = []
-        self._parts_lock = threading.Lock()
         try:
             directory.mkdir(parents=True, exist_ok=True)
             self._lock = (directory / 'lock').open('w')
@@ -109,32 +108,23 @@ class Journal:
         segments = sorted(n for n in numbers['journal'] if n >= start) or [start]
         missing = [n for n in range(start, segments[-1]) if n not in segments]
         self.notes += [f'{self._path("journal", n)}: is missing' for n in missing]
-        self._parts = [self._path('snapshot', start)] if start else []
-        self._parts += [self._path('journal', number) for number in segments]
-        self._found: list[Any] | None = []
-        for path in self._parts:
-            self._found += self._mended(path, last=path == self._parts[-1])
+        parts = [self._path('snapshot', start)] if start else []
+        parts += [self._path('journal', number) for number in segments]
+        self._found: list[Any] = []
+        for path in parts:
+            self._found += self._mended(path, last=path == parts[-1])
         self.snapshot_size = self._path('snapshot', start).stat().st_size if start else 0
-        sizes = [path.stat().st_size for path in self._parts if path.exists()]
+        sizes = [path.stat().st_size for path in parts if path.exists()]
         self.size = sum(sizes) - self.snapshot_size
         self._number = segments[-1]
         self._file = self._segment(self._number)
         self._end = self._file.tell()
         self._remove_before(start)
 
-    def records(self) -> Iterator[Any]:
-        """Give the records, oldest first.
-
-        Raises:
-            JournalError: Not readable.
-        """
-        with self._parts_lock:
-            found, self._found = self._found, None
-            if found is not None:
-                yield from found
-                return
-            for path in self._parts:
-                yield from _Contents(self._bytes(path), last=path == self._parts[-1]).records
+    def records(self) -> list[Any]:
+        """Hand out what was found when the journal was opened, oldest first; once."""
+        found, self._found = self._found, []
+        return found
 
     def append(self, records: Iterable[Any]) -> None:
         """Write records as one: after a crash all of them are there or none.
@@ -143,7 +133,6 @@ class Journal:
             JournalError: They could not be written; none of them is there.
         """
         self.check_open()
-        self._found = None
         *first, last = records
         lines = b''.join([*(_line(record, more=True) for record in first), _line(last)])
         try:
@@ -174,7 +163,6 @@ class Journal:
             raise JournalError(f'{self._directory}: {error.strerror}') from None
         self._file.close()
         self._file, self._number, self.size, self._end = file, number, 0, 0
-        self._parts.append(self._path('journal', number))
         return number
 
     def finish_snapshot(self, number: int, records: Iterable[Any]) -> None:
@@ -187,12 +175,9 @@ class Journal:
         try:
             temporary = _written(path, records)
             self.snapshot_size = temporary.stat().st_size
-            with self._parts_lock:
-                temporary.rename(path)
-                self._sync_directory()
-                current = self._parts.index(self._path('journal', number))
-                self._parts = [path, *self._parts[current:]]
-                self._remove_before(number)
+            temporary.rename(path)
+            self._sync_directory()
+            self._remove_before(number)
         except OSError as error:
             # It may hold the last space that there was.
             path.with_suffix('.tmp').unlink(missing_ok=True)
@@ -237,17 +222,14 @@ class Journal:
             if path.suffix == '.tmp' or (match and int(match[2]) < number):
                 path.unlink(missing_ok=True)
 
-    def _bytes(self, path: Path) -> bytes:
-        try:
-            return path.read_bytes()
-        except FileNotFoundError:
-            return b''
-        except OSError as error:
-            raise JournalError(f'{path}: {error.strerror}') from None
-
     def _mended(self, path: Path, *, last: bool) -> list[Any]:
         """Read a part; afterwards it holds whole records only."""
-        contents = _Contents(self._bytes(path), last=last)
+        try:
+            contents = _Contents(path.read_bytes(), last=last)
+        except FileNotFoundError:
+            return []
+        except OSError as error:
+            raise JournalError(f'{path}: {error.strerror}') from None
         if contents.damage:
             first, count = contents.damage[0], len(contents.damage)
             place = f'{path}: {count} damaged entr{"y" if count == 1 else "ies"}, from byte {first}'
@@ -441,14 +423,12 @@ class Store:
             JournalError: A record that this version does not know.
         """
         recovery = _Recovery(history)
-        with self._lock:
-            for record in self._journal.records():
-                try:
-                    recovery.take(record)
-                except (IndexError, TypeError, ValueError) as error:
-                    raise JournalError(f'record {record!r:.80} cannot be read: {error}') from None
-            self._names = set(recovery.references)
-        self.notes = list(self._journal.notes)
+        for record in self._journal.records():
+            try:
+                recovery.take(record)
+            except (IndexError, TypeError, ValueError) as error:
+                raise JournalError(f'record {record!r:.80} cannot be read: {error}') from None
+        self._names = set(recovery.references)
         if recovery.orphans:
             self.notes.append(
                 f'{self.directory}: {recovery.orphans} changes of references that are not there '

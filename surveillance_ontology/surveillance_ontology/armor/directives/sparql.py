@@ -11,7 +11,6 @@ from surveillance_ontology.armor.rendering import shown
 from surveillance_ontology.armor.session import Session
 from surveillance_ontology.armor.sparql_engine import (
     Binding,
-    SparqlError,
 )
 from surveillance_ontology.armor.sparql_graph import GraphUpdate, Version
 from surveillance_ontology.owl.vocabulary import XSD
@@ -109,8 +108,6 @@ def _select(session: Session, ref: Reference, parts: tuple[str, ...]) -> list[li
         raise DirectiveError(
             f'QUERY SPARQL: stopped after {seconds * 1000:g} ms', timeout=True
         ) from None
-    except SparqlError as error:
-        raise DirectiveError(f'QUERY SPARQL: {error}') from None
 
 
 def _milliseconds(text: str) -> int:
