@@ -68,9 +68,10 @@ _RESTRICTIONS = (
 BUILT_IN = (OWL, RDF, RDFS, XSD, SWRL)
 
 
+_TRUE = Literal('true', XSD + 'boolean')
 _MARKS = {
     *(OWL + name for name in ('Ontology', 'Restriction')),
-    *(RDF + name for name in ('List', 'Property')),
+    RDF + 'List',
     *(SWRL + name for name in ('Variable', 'AtomList', 'Builtin')),
 }
 _STRUCTURE = {RDF + 'first', RDF + 'rest'} | {
@@ -91,7 +92,7 @@ class Mapping:
     def __init__(self, graph: Graph) -> None:
         self.axioms: dict[Axiom, None] = {}
         self.unsupported: list[str] = []
-        self.iri = ''
+        self._header = ''
         self._places = graph.places
         self._subject_read = ''
         self._nodes: dict[str, dict[str, list[Node]]] = {}
@@ -105,8 +106,8 @@ class Mapping:
                 kind = DECLARATIONS.get(value)
                 if kind is not None:
                     self._kinds.setdefault(subject, set()).add(kind)
-                elif value == OWL + 'Ontology' and not self.iri:
-                    self.iri = subject
+                elif value == OWL + 'Ontology' and not self._header:
+                    self._header = subject
                 elif value in CHARACTERISTICS:
                     self._kinds.setdefault(subject, set()).add('object_property')
                 elif value == SWRL + 'Variable':
@@ -118,20 +119,32 @@ class Mapping:
             self._subject(subject, properties)
 
     def _guess_kinds(self) -> None:
-        """Undeclared properties with a datatype as range, or a literal as value, are data
-        properties.
+        """Give undeclared properties the kinds that their values and ranges have.
+
+        rdf:Property tells no kind: without values and ranges it is an object property.
         """
-        guessed: set[str] = set()
+        guessed: dict[str, set[str]] = {}
+
+        def guess(name: str, are_data: Iterable[bool]) -> None:
+            if name not in self._kinds and not name.startswith(BUILT_IN):
+                kinds = ('data_property' if is_data else 'object_property' for is_data in are_data)
+                guessed.setdefault(name, set()).update(kinds)
+
         for subject, properties in self._nodes.items():
+            if RDF + 'Property' in properties.get(_TYPE, ()):
+                guess(subject, ())
             for predicate, values in properties.items():
                 if predicate == RDFS + 'range':
-                    if any(isinstance(v, str) and self._is_data_range(v) for v in values):
-                        guessed.add(subject)
-                elif any(isinstance(value, Literal) for value in values):
-                    guessed.add(predicate)
-        for name in guessed - ANNOTATIONS:
-            if not name.startswith(BUILT_IN):
-                self._kinds.setdefault(name, {'data_property'})
+                    guess(subject, (isinstance(v, str) and self._is_data_range(v) for v in values))
+                else:
+                    guess(predicate, (isinstance(value, Literal) for value in values))
+        for name, kinds in guessed.items():
+            self._kinds[name] = kinds or {'object_property'}
+
+    @property
+    def iri(self) -> str:
+        """The IRI in the header; '' without one."""
+        return '' if self._header.startswith('_:') else self._header
 
     # --- reporting ---
 
@@ -196,10 +209,8 @@ class Mapping:
 
     def _is_data(self, prop: str, range_node: Node | None = None) -> bool:
         kinds = self._kinds.get(prop, ())
-        if 'object_property' in kinds:
-            return False
-        if 'data_property' in kinds:
-            return True
+        if ('object_property' in kinds) != ('data_property' in kinds):
+            return 'data_property' in kinds
         return isinstance(range_node, str) and self._is_data_range(range_node)
 
     def _is_data_range(self, node: str) -> bool:
@@ -360,8 +371,8 @@ class Mapping:
         if special is not None:
             self._attempt(subject, special, self, subject, properties)
             return
-        for name in types:
-            self._attempt(subject, self._type, subject, name)
+        for value in properties.get(_TYPE, ()):
+            self._attempt(subject, self._type, subject, value)
         if OWL + 'onProperty' in properties and not subject.startswith('_:'):
             self._attempt(subject, self._named_restriction, subject, properties)
         for predicate, values in properties.items():
@@ -402,7 +413,9 @@ class Mapping:
                 f' {value.lexical!r}, expected a resource',
             )
 
-    def _type(self, subject: str, name: str) -> None:
+    def _type(self, subject: str, name: Node) -> None:
+        if isinstance(name, Literal):
+            raise self._ill_formed(subject, f'its type is the literal {name.lexical!r}')
         kind = DECLARATIONS.get(name)
         if kind is not None:
             if not subject.startswith('_:'):
@@ -416,6 +429,11 @@ class Mapping:
                 self._add(ax.FunctionalDataProperty(subject))
             else:
                 self._add(ax.FunctionalObjectProperty(self._property(subject)))
+        elif name == RDF + 'Property':
+            for kind in sorted(self._kinds.get(subject, ())):
+                self._add(ax.Declaration(kind, subject))
+        elif name in (OWL + 'DeprecatedClass', OWL + 'DeprecatedProperty'):
+            self._add(ax.AnnotationAssertion(OWL + 'deprecated', subject, _TRUE))
         elif name in _MARKS or (name.startswith(SWRL) and name.endswith('Atom')):
             pass  # Read where the node is used.
         elif name.startswith(BUILT_IN[:3]) and name not in (THING, NOTHING):
@@ -425,8 +443,10 @@ class Mapping:
 
     def _statement(self, subject: str, predicate: str, value: Node) -> None:
         kinds = self._kinds.get(predicate, set())
-        if 'annotation_property' in kinds or predicate in ANNOTATIONS or subject == self.iri:
-            if not subject.startswith('_:'):
+        if 'annotation_property' in kinds or predicate in ANNOTATIONS or subject == self._header:
+            if subject.startswith('_:') and self._is_construct(subject):
+                self._report(subject, f'{local_name(predicate)} of what has no name is not kept')
+            else:
                 self._add(ax.AnnotationAssertion(predicate, subject, value))
         elif predicate.startswith(SWRL):
             pass
@@ -450,6 +470,14 @@ class Mapping:
             )
         else:
             self._add(ax.ObjectPropertyAssertion(predicate, subject, value))
+
+    def _is_construct(self, node: str) -> bool:
+        """Tell whether a blank node is part of OWL's own syntax, and no individual."""
+        properties = self._nodes[node]
+        types = {value for value in properties.get(_TYPE, ()) if isinstance(value, str)}
+        if any(name.startswith((OWL, SWRL)) for name in types - {THING, OWL + 'NamedIndividual'}):
+            return True
+        return not {*_STRUCTURE, *_CONSTRUCTED, OWL + 'inverseOf'}.isdisjoint(properties)
 
     def _equivalent_class(self, subject: str, value: str) -> Axiom:
         if self._is_data_range(subject):

@@ -7,6 +7,7 @@ this package, so that errors name their place also where the syntax is good and 
 from __future__ import annotations
 
 import codecs
+import contextlib
 import re
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -34,6 +35,7 @@ _BOMS = {
 _DECLARED = re.compile(rb'<\?xml[^>]*?\sencoding\s*=\s*["\']([\w.:-]+)')
 _COMMENTS = re.compile(rb'(?:\s+|#[^\n]*)*')
 _XML = re.compile(rb'<(?:[?!]|[A-Za-z_][\w.-]*(?::[A-Za-z_][\w.-]*)?(?:[\s/>]|\Z))')
+_SPACE = re.compile(r'\s')
 _JSON = re.compile(rb'\{\s*["}]|\[\s*\{')
 _TRIPLE = re.compile(
     rb'(?:<[^\s<>]*>|_:[^\s<]+)\s*<[^\s<>]*>[^\n]*\.[ \t\r]*(?:#.*)?$', re.MULTILINE
@@ -167,7 +169,14 @@ def _parsed(data: bytes, iri: str) -> OntologyDocument:
     if is_functional(data):
         return _stated(parse_functional(_text(data)), 'functional')
     if _TRIPLE.match(data, place):
-        return _mapped(_rdf_text(data, iri, 'ntriples'), 'ntriples')
+        try:
+            return _mapped(_rdf_text(data, iri, 'ntriples', lenient=True), 'ntriples')
+        except OntologyFileError as error:
+            # Turtle can begin so as well.
+            try:
+                return _mapped(_rdf_text(data, iri, 'turtle'), 'turtle')
+            except OntologyFileError as other:
+                raise max(error, other, key=lambda e: e.line) from None
     if _XML.match(data, place):
         if is_owl_xml(data):
             return _stated(parse_owl_xml(data, iri), 'owlxml')
@@ -201,13 +210,14 @@ def _mapped(graph: Graph, form: str) -> OntologyDocument:
     )
 
 
-def _rdf_text(data: bytes, iri: str, form: str) -> Graph:
+def _rdf_text(data: bytes, iri: str, form: str, lenient: bool = False) -> Graph:
     """Parse a document; the graph knows no places.
 
     Args:
         data: The document.
         iri: Base for relative IRIs where the document gives none.
         form: 'turtle', 'ntriples' or 'jsonld'.
+        lenient: Take names that are no IRIs, such as those with two '#', as they are.
 
     Raises:
         OntologyFileError: Not of that format, or with statements that are no plain triples.
@@ -222,9 +232,7 @@ def _rdf_text(data: bytes, iri: str, form: str) -> Graph:
     }[form]
     graph = Graph()
     try:
-        # N-Triples hold what SAVE writes: names that are no IRIs, too.
-        lenient = form == 'ntriples'
-        base = None if lenient else iri
+        base = None if form == 'ntriples' else iri
         for quad in pyoxigraph.parse(data, format=source, base_iri=base, lenient=lenient):
             if quad.graph_name != pyoxigraph.DefaultGraph():
                 raise OntologyFileError('named graphs are not read')
@@ -242,6 +250,12 @@ def _rdf_text(data: bytes, iri: str, form: str) -> Graph:
     except SyntaxError as error:
         message = _PARSER_PLACE.sub('', str(error.msg), count=1)
         place = error.lineno or 0, error.offset or 0
+        if message.startswith('Invalid IRI') and not lenient:
+            with contextlib.suppress(OntologyFileError):
+                graph = _rdf_text(data, iri, form, lenient=True)
+                names = (n for triple in graph.triples for n in triple if isinstance(n, str))
+                if not any(map(_SPACE.search, names)):
+                    return graph
         raise OntologyFileError(f'not {_NAMES[form]}: {message}', *place) from None
     if not graph.triples:
         raise OntologyFileError(f'not {_NAMES[form]}: it states nothing')

@@ -250,11 +250,15 @@ class _Mapping:
         return node
 
 
+_VALUED = ('object_property', 'data_property')
+
+
 def triples_of(axioms: Iterable[Axiom], iri: str) -> Iterator[Triple]:
     """Return the triples of an ontology, its header first.
 
     Classes, properties and datatypes that are used but not declared are declared: without, a reader
-    could not tell an object property from a data property.
+    could not tell an object property from a data property. One that the header is annotated with
+    is not declared for that where it has values, too: they would be read as annotations.
     """
     mapping = _Mapping(iri)
     mapping.add(iri, _TYPE, OWL + 'Ontology')
@@ -278,7 +282,10 @@ def triples_of(axioms: Iterable[Axiom], iri: str) -> Iterator[Triple]:
             for kind, name in entities_of(axiom):
                 if kind not in ('individual', 'annotated'):
                     used[kind, name] = None
+    valued = {name for kind, name in used | dict.fromkeys(declared) if kind in _VALUED}
     for kind, name in used:
+        if kind == 'annotation_property' and name in valued:
+            continue
         if (kind, name) not in declared and not name.startswith((OWL, RDF, RDFS, XSD)):
             mapping.add(name, _TYPE, _KIND_TYPES[kind])
     return iter(mapping.triples)

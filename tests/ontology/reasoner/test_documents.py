@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 
 from surveillance_ontology import KnowledgeBase, OntologyFileError, read_ontology
+from surveillance_ontology.documents.reading import OntologyDocument
+from surveillance_ontology.documents.writing import ontology_bytes
 from surveillance_ontology.owl import axioms as ax
 from surveillance_ontology.owl import expressions as ex
 from surveillance_ontology.owl.expressions import Literal, Variable
@@ -152,3 +154,91 @@ def test_an_axiom_with_a_name_for_a_construct_costs_itself_alone(axiom: str) -> 
     document = read_ontology(text.encode(), IRI)
     assert document.axioms == [ax.SubClassOf('http://x/#A', 'http://x/#B')]
     assert ['line 3: ' in sentence for sentence in document.unsupported] == [True]
+
+
+TURTLE = """@prefix : <http://x/#> . @prefix owl: <http://www.w3.org/2002/07/owl#> .
+@prefix rdf: <http://www.w3.org/1999/02/22-rdf-syntax-ns#> .
+@prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> .
+@prefix xsd: <http://www.w3.org/2001/XMLSchema#> . <http://x/> a owl:Ontology .
+"""
+
+
+def read_turtle(text: str) -> OntologyDocument:
+    return read_ontology((TURTLE + text).encode(), IRI)
+
+
+def test_an_undeclared_property_is_what_its_values_and_ranges_say() -> None:
+    document = read_turtle(
+        ':place a rdf:Property ; rdfs:range :Room , xsd:string . :near a rdf:Property .\n'
+        ':width a rdf:Property ; rdfs:range xsd:integer .\n'
+        ':i :place :hall , "the hall" ; :said "yes" , :j .'
+    )
+    x = 'http://x/#'
+    assert document.unsupported == []
+    kinds = {(a.iri, a.kind) for a in document.axioms if isinstance(a, ax.Declaration)}
+    assert kinds == {
+        (x + 'place', 'data_property'),
+        (x + 'place', 'object_property'),
+        (x + 'near', 'object_property'),
+        (x + 'width', 'data_property'),
+    }
+    for axiom in (
+        ax.ObjectPropertyRange(x + 'place', x + 'Room'),
+        ax.DataPropertyRange(x + 'place', XSD + 'string'),
+        ax.ObjectPropertyAssertion(x + 'place', x + 'i', x + 'hall'),
+        ax.DataPropertyAssertion(x + 'said', x + 'i', Literal('yes')),
+        ax.ObjectPropertyAssertion(x + 'said', x + 'i', x + 'j'),
+    ):
+        assert axiom in document.axioms
+
+
+def test_what_has_no_name_keeps_its_annotations_or_says_so() -> None:
+    document = read_turtle(
+        '[] a :Robot ; rdfs:label "someone" .\n'
+        ':A rdfs:subClassOf [ owl:unionOf ( :B :C ) ; rdfs:comment "either" ] .\n'
+        ':old a owl:DeprecatedClass . :i a "5"^^xsd:int .'
+    )
+    notes = {a.prop: a.value for a in document.axioms if isinstance(a, ax.AnnotationAssertion)}
+    assert notes == {
+        RDFS + 'label': Literal('someone'),
+        'http://www.w3.org/2002/07/owl#deprecated': Literal('true', XSD + 'boolean'),
+    }
+    assert document.unsupported == [
+        'comment of what has no name is not kept',
+        "a statement about i is left out: its type is the literal '5'",
+    ]
+
+
+def test_a_header_without_a_name_is_no_name() -> None:
+    text = '@prefix owl: <http://www.w3.org/2002/07/owl#> . [] a owl:Ontology ; owl:versionInfo 2 .'
+    document = read_ontology(text.encode(), IRI)
+    assert (document.iri, document.axioms) == ('', [])
+    assert document.unsupported == ['versionInfo of what has no name is not kept']
+
+
+@pytest.mark.parametrize(
+    'text',
+    [
+        '<http://x/##i> <http://x/##p> <http://x/##j> .\n<http://x/##i> <http://x/##q> 1 ;\n'
+        ' <http://x/##q> 2 .',
+        '@prefix : <http://x/##> . :i :p :j ; :q 1 , 2 .',
+    ],
+)
+def test_turtle_that_begins_as_n_triples_do_and_names_that_are_no_iris(text: str) -> None:
+    document = read_ontology(text.encode(), IRI)
+    x, integer = 'http://x/##', XSD + 'integer'
+    assert document.format == 'turtle'
+    assert document.axioms == [
+        ax.ObjectPropertyAssertion(x + 'p', x + 'i', x + 'j'),
+        ax.DataPropertyAssertion(x + 'q', x + 'i', Literal('1', integer)),
+        ax.DataPropertyAssertion(x + 'q', x + 'i', Literal('2', integer)),
+    ]
+
+
+@pytest.mark.parametrize('form', ['rdfxml', 'ntriples'])
+def test_a_value_stays_one_where_the_header_has_its_property_too(form: str) -> None:
+    text = '<http://x/> :title "Rooms" . :i :title "Hall" .'
+    axioms = read_turtle(text).axioms
+    again = read_ontology(ontology_bytes(axioms, IRI, form), IRI).axioms
+    assert set(axioms) <= set(again)
+    assert ax.DataPropertyAssertion('http://x/#title', 'http://x/#i', Literal('Hall')) in again
