@@ -17,7 +17,7 @@ from surveillance_behaviour.decision import RECHARGE
 from surveillance_behaviour.machines.shared_states import (
     FAILED,
     PREEMPTED,
-    PeerState,
+    MissionState,
     Recover,
     WaitForHelp,
     add,
@@ -33,13 +33,11 @@ from surveillance_behaviour.peers.ports import Point, Routine
 BATTERY_LOW = 'battery_low'
 
 
-class Initial(PeerState):
+class Initial(MissionState):
     """Has the robot look around and build its ontology."""
 
     task = 'starting'
-
-    def __init__(self, mission: Mission) -> None:
-        super().__init__(mission, ['start'])
+    ends = ('start', FAILED)
 
     def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
         routine_of(self.mission).start(interrupt)
@@ -48,13 +46,12 @@ class Initial(PeerState):
         return 'start'
 
 
-class Reasoning(PeerState):
+class Reasoning(MissionState):
     """Asks for the next place, unless the battery has to be charged first."""
 
     task = 'reasoning'
-
-    def __init__(self, mission: Mission) -> None:
-        super().__init__(mission, ['reasoned', BATTERY_LOW], output_keys=['target'])
+    ends = ('reasoned', BATTERY_LOW, FAILED)
+    writes = ('target',)
 
     def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
         mission = self.mission
@@ -68,7 +65,7 @@ class Reasoning(PeerState):
         return BATTERY_LOW
 
 
-class MoveStep(PeerState):
+class MoveStep(MissionState):
     """One of the two steps of a move; whether a low battery ends it depends on where it goes.
 
     Args:
@@ -89,8 +86,9 @@ class MoveStep(PeerState):
         input_keys: tuple[str, ...],
         output_keys: tuple[str, ...] = (),
     ) -> None:
-        outcomes = [outcome, BATTERY_LOW] if heeds_battery else [outcome]
-        super().__init__(mission, outcomes, input_keys, output_keys)
+        self.ends = [outcome, *([BATTERY_LOW] if heeds_battery else []), FAILED]
+        self.reads, self.writes = input_keys, output_keys
+        super().__init__(mission)
         self.task = task
         self._step = step
         self._outcome = outcome
@@ -125,13 +123,11 @@ def follow_path(mission: Mission, ud: Any, interrupt: fsm.Interrupt) -> None:
     mission.arrived(ud.target, distance, ud.via_points)
 
 
-class GoBack(PeerState):
+class GoBack(MissionState):
     """Goes back to the last place the robot is known to have been in."""
 
     task = 'going back'
-
-    def __init__(self, mission: Mission) -> None:
-        super().__init__(mission, ['returned'])
+    ends = ('returned', FAILED)
 
     def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
         place = self.mission.place
@@ -163,13 +159,12 @@ def drive(
     return path_length(via_points)
 
 
-class Recharge(PeerState):
+class Recharge(MissionState):
     """Charges the battery if the robot is at the dock, else chooses the dock to go to."""
 
     task = 'recharging'
-
-    def __init__(self, mission: Mission) -> None:
-        super().__init__(mission, ['battery_full', 'not_at_dock'], output_keys=['target'])
+    ends = ('battery_full', 'not_at_dock', FAILED)
+    writes = ('target',)
 
     def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
         mission = self.mission

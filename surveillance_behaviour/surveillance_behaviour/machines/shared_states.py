@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import surveillance_fsm as fsm
@@ -21,26 +21,40 @@ FAILED = 'failed'
 class MissionState(fsm.State):
     """A state that knows the mission; a preempt that comes before its work ends it.
 
+    One that talks to peers has the outcome `FAILED`, and ends with it when one of them fails.
+
     Args:
         mission: The mission's memory and ports.
-        outcomes: Outcomes beside ``preempted``.
-        input_keys: Userdata read.
-        output_keys: Userdata written.
     """
 
-    def __init__(
-        self,
-        mission: Mission,
-        outcomes: Iterable[str],
-        input_keys: Iterable[str] = (),
-        output_keys: Iterable[str] = (),
-    ) -> None:
-        super().__init__([*outcomes, PREEMPTED], input_keys, output_keys)
+    ends: Sequence[str] = ()
+    """Outcomes beside ``preempted``."""
+    reads: Sequence[str] = ()
+    """Userdata read."""
+    writes: Sequence[str] = ()
+    """Userdata written."""
+    task = ''
+    """What the state does, for the message when that fails."""
+    charging = False
+    """Whether a failure means that the battery is not charged."""
+
+    def __init__(self, mission: Mission) -> None:
+        super().__init__([*self.ends, PREEMPTED], self.reads, self.writes)
         self.mission = mission
 
     def execute(self, ud: Any) -> str | None:
-        """Work, unless a preempt came first."""
-        return self.preempted() if self.preempt_requested() else self.work(ud, self.interrupt)
+        """Work until done, failed or preempted, unless a preempt came first."""
+        if self.preempt_requested():
+            return self.preempted()
+        try:
+            return self.work(ud, self.interrupt)
+        except InterruptedWaitError:
+            return self.preempted() if self.preempt_requested() else self.interrupted(ud)
+        except AwayError as error:
+            self.mission.failed(self.task, str(error), is_over=error.is_back)
+        except (PeerError, NowhereToGoError) as error:
+            self.mission.failed(self.task, str(error), self.goal(ud), charging=self.charging)
+        return FAILED
 
     def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
         """Do the state's own work and return the outcome."""
@@ -50,44 +64,6 @@ class MissionState(fsm.State):
         """Serve the preempt and return the outcome for that."""
         self.service_preempt()
         return PREEMPTED
-
-
-class PeerState(MissionState):
-    """A state that talks to peers: it ends with ``failed`` when one of them fails.
-
-    Args:
-        mission: The mission's memory and ports.
-        outcomes: Outcomes beside ``failed`` and ``preempted``.
-        input_keys: Userdata read.
-        output_keys: Userdata written.
-    """
-
-    task = ''
-    """What the state does, for the message when that fails."""
-    charging = False
-    """Whether a failure means that the battery is not charged."""
-
-    def __init__(
-        self,
-        mission: Mission,
-        outcomes: Iterable[str],
-        input_keys: Iterable[str] = (),
-        output_keys: Iterable[str] = (),
-    ) -> None:
-        super().__init__(mission, [*outcomes, FAILED], input_keys, output_keys)
-
-    def execute(self, ud: Any) -> str | None:
-        """Work until done, failed or preempted."""
-        try:
-            return super().execute(ud)
-        except InterruptedWaitError:
-            return self.preempted() if self.preempt_requested() else self.interrupted(ud)
-        except AwayError as error:
-            self.mission.failed(self.task, str(error), is_over=error.is_back)
-            return FAILED
-        except (PeerError, NowhereToGoError) as error:
-            self.mission.failed(self.task, str(error), self.goal(ud), charging=self.charging)
-            return FAILED
 
     def interrupted(self, ud: Any) -> str:
         """Return the outcome when something else than a preempt ended the work."""
@@ -104,17 +80,17 @@ class Recover(MissionState):
     """Looks at the last failure and chooses the next step."""
 
     def __init__(self, mission: Mission, *, steps: Iterable[Step] = tuple(Step)) -> None:
-        self._steps = tuple(steps)
-        super().__init__(mission, self._steps)
+        self.ends = tuple(steps)
+        super().__init__(mission)
 
     def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
         """Return the step that the recovery takes; one that the machine lacks becomes waiting."""
         mission = self.mission
         assert mission.failure is not None
         step = mission.recovery.next_step(
-            mission.failure, mission.now(), may_go_back=Step.GO_BACK in self._steps
+            mission.failure, mission.now(), may_go_back=Step.GO_BACK in self.ends
         )
-        if step not in self._steps:
+        if step not in self.ends:
             step = Step.WAIT_FOR_HELP
         mission.say(f'recovery: {WORDS[step]}')
         return step.value
@@ -138,8 +114,7 @@ class WaitForHelp(MissionState):
     The return of a peer that was away ends the pause.
     """
 
-    def __init__(self, mission: Mission) -> None:
-        super().__init__(mission, ['try_again'])
+    ends = ('try_again',)
 
     def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
         """Wait for one pause, or until the peer that was away is back."""

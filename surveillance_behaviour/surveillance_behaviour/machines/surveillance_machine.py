@@ -14,7 +14,6 @@ from surveillance_behaviour.machines.shared_states import (
     FAILED,
     PREEMPTED,
     MissionState,
-    PeerState,
     Recover,
     WaitForHelp,
     add,
@@ -32,13 +31,11 @@ NOTE_SECONDS = 1.0
 """The shortest time between two notes of how far a place is explored, seconds."""
 
 
-class Initialization(PeerState):
+class Initialization(MissionState):
     """Waits until the ontology holds the map, and sets the robot's parameters."""
 
     task = 'initialization'
-
-    def __init__(self, mission: Mission) -> None:
-        super().__init__(mission, ['initialized'])
+    ends = ('initialized', FAILED)
 
     def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
         self.mission.ports.ontology.wait_until_built(interrupt)
@@ -49,8 +46,7 @@ class Initialization(PeerState):
 class ChooseRoomTask(MissionState):
     """Charge if the battery asks for it and the robot is at a station, else explore."""
 
-    def __init__(self, mission: Mission) -> None:
-        super().__init__(mission, ['recharge', 'explore'])
+    ends = ('recharge', 'explore')
 
     def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
         must_charge = self.mission.at_station() and self.mission.ports.decisions.why_charge()
@@ -60,8 +56,7 @@ class ChooseRoomTask(MissionState):
 class ExploreTask(MissionState):
     """Looks around for a while; a battery that gets low ends it."""
 
-    def __init__(self, mission: Mission) -> None:
-        super().__init__(mission, ['explored'])
+    ends = ('explored',)
 
     def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
         mission = self.mission
@@ -90,14 +85,12 @@ class ExploreTask(MissionState):
         return True
 
 
-class RechargeTask(PeerState):
+class RechargeTask(MissionState):
     """Waits at the station until the battery is charged enough."""
 
     task = 'recharging'
     charging = True
-
-    def __init__(self, mission: Mission) -> None:
-        super().__init__(mission, ['recharged'])
+    ends = ('recharged', FAILED)
 
     def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
         mission = self.mission
@@ -110,26 +103,24 @@ class RechargeTask(PeerState):
         return self.mission.place
 
 
-class ChooseNextRoom(PeerState):
+class ChooseNextRoom(MissionState):
     """Charging place if the battery asks for it, else rules and policy."""
 
     task = 'choosing the next room'
-
-    def __init__(self, mission: Mission) -> None:
-        super().__init__(mission, ['chosen'], output_keys=['next_room'])
+    ends = ('chosen', FAILED)
+    writes = ('next_room',)
 
     def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
         ud.next_room = self.mission.decide(interrupt).place
         return 'chosen'
 
 
-class MoveToNextRoom(PeerState):
+class MoveToNextRoom(MissionState):
     """Moves to the next room."""
 
     task = 'moving'
-
-    def __init__(self, mission: Mission) -> None:
-        super().__init__(mission, ['moved'], ['next_room'])
+    ends = ('moved', FAILED)
+    reads = ('next_room',)
 
     def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
         path = drive(self.mission, ud.next_room, interrupt)
@@ -140,13 +131,11 @@ class MoveToNextRoom(PeerState):
         return str(ud.next_room)
 
 
-class ReturnToLastPlace(PeerState):
+class ReturnToLastPlace(MissionState):
     """Goes back to the last place the robot is known to have been in."""
 
     task = 'going back'
-
-    def __init__(self, mission: Mission) -> None:
-        super().__init__(mission, ['returned'])
+    ends = ('returned', FAILED)
 
     def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
         mission = self.mission
@@ -248,8 +237,8 @@ def surveillance_machine(mission: Mission) -> fsm.StateMachine:
 class ReDock(MissionState):
     """Drives to the station again when the battery does not rise there."""
 
-    def __init__(self, mission: Mission) -> None:
-        super().__init__(mission, ['again', 'give_up'], output_keys=['next_room'])
+    ends = ('again', 'give_up')
+    writes = ('next_room',)
 
     def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
         mission = self.mission

@@ -7,9 +7,9 @@ same names. A new command is one decorated function.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from enum import Enum
+from enum import Enum, StrEnum
 from functools import cached_property, lru_cache
 from typing import Any, Protocol, TypeVar
 
@@ -51,7 +51,7 @@ class Kind(Enum):
         return self in (Kind.MANIPULATION, Kind.CONTROL)
 
 
-class Read(Enum):
+class Read(StrEnum):
     """How an argument is read."""
 
     INDIVIDUAL = 'individual'
@@ -181,30 +181,32 @@ class Directive:
             raise DirectiveError(f'{self.words}: {count} arguments, at most {self.most}')
         values: list[Any] = []
         type_word = ''
-        index = 0
         try:
-            for index, (read, default) in enumerate(self._plan):
-                text = args[index] if index < count else default
-                if read == _ENTITY:
-                    values.append(self._entity(self.arguments[index].read, text, base))
-                elif read == Read.TYPE.value:
+            for argument, text in self._paired(args):
+                read = argument.read
+                if read in ENTITY_KINDS:
+                    values.append(self._entity(read, text, base))
+                elif read is Read.TYPE:
                     type_word = self._type(text, args)
-                elif read in _LITERALS:
-                    stored = read == Read.STORED.value
+                elif read in (Read.VALUE, Read.STORED):
+                    stored = read is Read.STORED
                     values.append(
                         parse_literal(type_word, text, narrow_doubles=narrow_doubles, stored=stored)
                     )
                 else:
                     values.append(_OTHERS[read](text))
-            if self.rest:
-                for text in args[len(self._plan) :]:
-                    entity = read == _ENTITY
-                    kind = self.arguments[index].read
-                    values.append(self._entity(kind, text, base) if entity else text)
         except ValueError as error:
-            name = self.arguments[index].name
-            raise DirectiveError(f'{self.words}: argument {name} {error}') from None
+            raise DirectiveError(f'{self.words}: argument {argument.name} {error}') from None
         return values
+
+    def _paired(self, args: Sequence[str]) -> Iterator[tuple[Argument, str]]:
+        """Yield each argument with its text: defaults filled in, the last one as often as given."""
+        yield from zip(self.arguments, args, strict=False)
+        for argument in self.arguments[len(args) :]:
+            yield argument, argument.default or ''
+        if self.rest:
+            for text in args[len(self.arguments) :]:
+                yield self.arguments[-1], text
 
     def _entity(self, read: Read, text: str, base: str) -> str:
         iri = parse_entity(text, base)
@@ -214,17 +216,6 @@ class Directive:
         if self.kind is Kind.MANIPULATION and self.command != 'REMOVE':
             raise ValueError(f'{shown(text)} is a word of OWL itself, expected another name')
         return iri
-
-    @cached_property
-    def _plan(self) -> tuple[tuple[str, str], ...]:
-        """Way of reading and default of each argument; strings, since reading is hot."""
-        return tuple(
-            (
-                _ENTITY if argument.read in ENTITY_KINDS else argument.read.value,
-                argument.default or '',
-            )
-            for argument in self.arguments
-        )
 
     def _type(self, text: str, args: Sequence[str]) -> str:
         word = text.upper()
@@ -245,12 +236,10 @@ def _flag(text: str) -> bool:
     return text.lower() == 'true'
 
 
-_ENTITY = 'entity'
-_LITERALS = (Read.VALUE.value, Read.STORED.value)
-_OTHERS: dict[str, Callable[[str], Any]] = {
-    Read.NUMBER.value: _number,
-    Read.FLAG.value: _flag,
-    Read.TEXT.value: str,
+_OTHERS: dict[Read, Callable[[str], Any]] = {
+    Read.NUMBER: _number,
+    Read.FLAG: _flag,
+    Read.TEXT: str,
 }
 TABLE: dict[tuple[str, str, str], Directive] = {}
 """Every directive under its capital words; filled by the modules `manipulations`, `queries`, ..."""
