@@ -187,7 +187,7 @@ def by_the_command_line(line: Line) -> tuple[str, Any]:
             return 'refused', said.getvalue()
         try:
             return read_back(line, words)
-        except (ValueError, runtime_node.StartError) as error:  # what ends a node with one line
+        except ValueError as error:  # what ends a node with one line
             return 'refused', f'{error}\n'
 
 

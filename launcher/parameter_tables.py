@@ -91,13 +91,12 @@ def _declared(
     node: node_table.Node, context: Any, overrides: Sequence[Any]
 ) -> tuple[dict[str, ParameterSpec], set[str]]:
     """Make a node and return its parameters and prefixes; of one that cannot start the first."""
-    from surveillance_runtime.node import StartError
 
     kind = getattr(importlib.import_module(node.module), node.class_name)
     made = kind.__new__(kind)
     try:
         made.__init__(context=context, parameter_overrides=overrides, use_global_arguments=False)
-    except (StartError, ParameterError):
+    except ParameterError:
         pass
     else:
         made.stop()

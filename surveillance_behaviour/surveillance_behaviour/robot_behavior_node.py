@@ -42,7 +42,8 @@ from surveillance_behaviour.peers.ros_ports import (
     ros_ontology,
 )
 from surveillance_fsm.ros import IntrospectionServer
-from surveillance_runtime.node import JOIN_SECONDS, PatrolNode, StartError
+from surveillance_runtime.node import JOIN_SECONDS, PatrolNode
+from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import SENSOR_QOS
 from surveillance_runtime.waiting import AwaitedWork
@@ -166,7 +167,7 @@ def _open_record(path: str) -> MissionRecord | None:
     try:
         return MissionRecord(path)
     except MissionLogError as error:
-        raise StartError(f'parameter record: {error}') from None
+        raise ParameterError(f'parameter record: {error}') from None
 
 
 def main(args: Sequence[str] | None = None) -> int:

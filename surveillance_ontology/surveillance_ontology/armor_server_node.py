@@ -26,7 +26,8 @@ from surveillance_ontology.armor.session import ChangeFeed, NumberedChange
 from surveillance_ontology.armor.store import JournalError, Store
 from surveillance_ontology.armor_client import CHANGES_TOPIC
 from surveillance_ontology.conversions import changes_to_ros, fill_response, request_from_ros
-from surveillance_runtime.node import PatrolNode, StartError
+from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.waiting import AwaitedWork
@@ -233,7 +234,7 @@ def _service(node: PatrolNode, keep: bool) -> ArmorService:
 
     Raises:
         ParameterError: A parameter is of the wrong type or out of range.
-        StartError: The store cannot be used.
+        ParameterError: The store cannot be used.
     """
     settings = node.declare_fields(Settings())
     stored = node.parameter(
@@ -256,7 +257,7 @@ def _service(node: PatrolNode, keep: bool) -> ArmorService:
             log.info(f'store {folder}, which holds {kept}; "-p store:=none" keeps nothing')
         return service
     except JournalError as error:
-        raise StartError(f'{node.get_name()}: parameter store: {error}') from None
+        raise ParameterError(f'{node.get_name()}: parameter store: {error}') from None
 
 
 def _own_folder(node: PatrolNode) -> Path:

@@ -36,7 +36,8 @@ from surveillance_operator.recording.bag import (
 )
 from surveillance_operator.recording.schemas import definition, message_class
 from surveillance_operator.recording.timeline import TimelineWriter
-from surveillance_runtime.node import PatrolNode, StartError
+from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.process import run_node
 
 DRAIN_PERIOD, SEAL_PERIOD, FEED_PERIOD = 0.15, 0.6, 0.4
@@ -89,7 +90,7 @@ class MissionRecorder(PatrolNode):
         except DiskFullError:
             pass  # it is tried again
         except RecordingError as error:
-            raise StartError(str(error)) from error
+            raise ParameterError(str(error)) from error
         self._images = ImageRecorder(self, self._bag, image_period)
         self._subscriptions_by_topic: dict[str, PolledSubscription] = {}
         self._unknown: set[str] = set()

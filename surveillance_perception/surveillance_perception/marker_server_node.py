@@ -13,7 +13,8 @@ from surveillance_interfaces.msg import MarkerDetectionArray
 from surveillance_interfaces.srv import RoomInformation
 from surveillance_perception.conversions import fused_from_ros, marked_place_to_ros
 from surveillance_perception.marker_registry import MarkedPlace, read_registry
-from surveillance_runtime.node import PatrolNode, StartError
+from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.process import run_node
 from surveillance_runtime.yaml_file import YamlFileError
 
@@ -45,7 +46,7 @@ class MarkerServer(PatrolNode):
         try:
             self._read(path)
         except YamlFileError as error:
-            raise StartError(f'{self.get_name()}: {error}') from None
+            raise ParameterError(f'{self.get_name()}: {error}') from None
         self.create_service(RoomInformation, 'room_info', self._on_room_info)
         self.create_subscription(MarkerDetectionArray, 'arm/markers', self._on_seen, 10)
 

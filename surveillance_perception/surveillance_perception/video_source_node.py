@@ -15,7 +15,8 @@ from surveillance_perception.detection.camera_model import CameraModel
 from surveillance_perception.stream.image_files import ImageArray, ImageError
 from surveillance_perception.stream.image_subscription import IMAGES_QOS
 from surveillance_perception.stream.video import FrameSource, open_source
-from surveillance_runtime.node import PatrolNode, StartError
+from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.process import run_node
 
 
@@ -61,7 +62,7 @@ class VideoSource(PatrolNode):
         try:
             opened = open_source(self._source)
         except ImageError as error:
-            raise StartError(f'{self.get_name()}: {error}') from None
+            raise ParameterError(f'{self.get_name()}: {error}') from None
         self.spawn(lambda: self._work(opened), 'video')
 
     def _work(self, source: FrameSource) -> None:

@@ -2,11 +2,12 @@
 
 What others may use, by module:
 
-- `node`: `PatrolNode`, the base class with checked parameters and threads that end with it;
-  `StartError`. `process`: `run_node`, `run_nodes`, `ExecutorThread`.
+- `node`: `PatrolNode`, the base class with checked parameters and threads that end with it.
+  `process`: `run_node`, `run_nodes`, `ExecutorThread`.
 - `health`: `Health`, what a node says of itself on `/diagnostics`.
-- `parameters`: `Described` and `declare_fields`, a table of parameters beside its record;
-  `ParameterError`. `configuration`: files, place and arguments merged and checked, without ROS.
+- `parameters`: `parameter`, `parameters` and `converted`, the fields of a record that a node
+  declares; `ParameterError`. `configuration`: files, place and arguments merged and checked,
+  without ROS.
 - `waiting`: `AwaitedWork` and `AwaitedEvent` for callbacks. `state_file`: `StateFile`, what
   outlives a killed process.
 - `place`: `Place`, `FloorPlan`, `read_place_file`, without ROS.

@@ -74,10 +74,6 @@ def give_arguments(arguments: RosArguments | None) -> None:
     _given = arguments
 
 
-class StartError(Exception):
-    """The node cannot start; the message is one line that says why."""
-
-
 class Destroyable(Protocol):
     """A part of a node that must be taken down by hand."""
 

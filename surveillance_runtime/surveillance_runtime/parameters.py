@@ -36,7 +36,7 @@ _LIST_NAMES = {bool: 'booleans', int: 'integers', float: 'numbers', str: 'texts'
 
 
 class ParameterError(ValueError):
-    """A parameter has a value that the node cannot work with; the message is one line."""
+    """A node cannot work with what a parameter says; the message is one line."""
 
 
 @dataclass(frozen=True)

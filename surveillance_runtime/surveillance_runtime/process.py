@@ -30,7 +30,6 @@ from surveillance_runtime.executor import PatrolExecutor
 from surveillance_runtime.node import (
     JOIN_SECONDS,
     PatrolNode,
-    StartError,
     give_arguments,
     report_exception,
 )
@@ -105,7 +104,7 @@ def _run_nodes(factories: Sequence[Callable[[], PatrolNode]], args: Sequence[str
         ending.wait()
         if any(node.finished for node in nodes):
             heartbeat.say_finished()
-    except (ParameterError, StartError) as error:
+    except ParameterError as error:
         who = getattr(factory, '__name__', '') + ' ' if len(factories) > 1 else ''
         print(f'{who}cannot start: {_one_line(error)}', file=sys.stderr)
         code = EXIT_CANNOT_START

@@ -20,7 +20,8 @@ from trajectory_msgs.msg import JointTrajectory
 
 from surveillance_interfaces.msg import RobotPlace
 from surveillance_runtime.conversions import seconds_of
-from surveillance_runtime.node import PatrolNode, StartError
+from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.place import PlaceError
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
@@ -62,7 +63,7 @@ class Simulator(PatrolNode):
         try:
             world = World.from_parameters(simulator_parameters.place(self))
         except PlaceError as error:
-            raise StartError(f'simulator: {error}') from None
+            raise ParameterError(f'simulator: {error}') from None
         model = simulator_parameters.people(self)
         self.robot = Robot(
             world,
@@ -87,7 +88,7 @@ class Simulator(PatrolNode):
         try:
             self._camera = CameraFeed(self, self.robot, seed, self._changing, self._stamp)
         except (PlaceError, ImportError) as error:
-            raise StartError(f'simulator: {error}') from None
+            raise ParameterError(f'simulator: {error}') from None
         FaultServices(self, self.robot, self._changing, self._changed)
         self._is_monitored = False
         self.create_subscription(Twist, 'cmd_vel', self._on_command, 1)

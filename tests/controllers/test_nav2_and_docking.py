@@ -20,7 +20,7 @@ from surveillance_controllers.motion import nav2 as nav2_motion
 from surveillance_controllers.motion.arrival import MotionFailedError
 from surveillance_fsm import Interrupt
 from surveillance_fsm.ros import CallInterruptedError, GoalEnd, UnavailableError
-from surveillance_runtime.node import StartError
+from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.qos import STATE_QOS
 
 PATH = np.array([[0.0, 0, 0], [3, 0, 0], [3, 4, 0]])
@@ -185,7 +185,7 @@ def test_without_their_messages_both_say_what_to_install(
     for package in ('nav2_msgs', 'opennav_docking_msgs'):
         monkeypatch.setitem(sys.modules, package, None)
         monkeypatch.setitem(sys.modules, f'{package}.action', None)
-    with pytest.raises(StartError, match='install ros-jazzy-nav2-msgs'):
+    with pytest.raises(ParameterError, match='install ros-jazzy-nav2-msgs'):
         nav2_motion.navigate_through_poses()
-    with pytest.raises(StartError, match='install ros-jazzy-opennav-docking-msgs'):
+    with pytest.raises(ParameterError, match='install ros-jazzy-opennav-docking-msgs'):
         docking.docking_actions()

@@ -24,7 +24,7 @@ from surveillance_ontology.armor_server_node import ArmorServer
 from surveillance_ontology.conversions import point_to_ros
 from surveillance_ontology.ontology_map_builder_node import OntologyMapBuilder
 from surveillance_ontology.patrol_ontology import PatrolOntology
-from surveillance_runtime.node import StartError
+from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.qos import STATE_QOS
 
 from .seven_rooms import SEVEN_ROOMS, reach
@@ -248,7 +248,7 @@ def test_a_map_comes_over_the_topic_in_parts(graph: Any, armor: ArmorClient, cal
 def test_a_wrong_map_ends_the_builder_with_one_line(
     graph: Any, change: dict[str, Any], words: str
 ) -> None:
-    with pytest.raises(StartError) as refusal:
+    with pytest.raises(ParameterError) as refusal:
         graph.add(OntologyMapBuilder, {**PLACE, **change})
     assert words in str(refusal.value)
     assert '\n' not in str(refusal.value)

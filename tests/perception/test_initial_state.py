@@ -16,7 +16,8 @@ from surveillance_interfaces.action import ScanSurroundings
 from surveillance_interfaces.msg import OntologyMap
 from surveillance_interfaces.srv import MarkerRoutine, ReferenceName
 from surveillance_perception.marker_server_node import MarkerServer
-from surveillance_runtime.node import PatrolNode, StartError
+from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.qos import STATE_QOS
 
 CONFIGURED = {
@@ -156,9 +157,9 @@ def test_map_can_come_from_the_configuration(graph: Any) -> None:
 
 
 def test_configuration_that_is_no_place_is_refused(graph: Any) -> None:
-    with pytest.raises(StartError, match='robot_room'):
+    with pytest.raises(ParameterError, match='robot_room'):
         graph.add(InitialState, parameters=CONFIGURED | {'robot_room': 'Z'})
-    with pytest.raises(StartError, match='initial_state: parameter map: expected rooms'):
+    with pytest.raises(ParameterError, match='initial_state: parameter map: expected rooms'):
         graph.add(InitialState, parameters={'map_source': 'configuration'})
 
 

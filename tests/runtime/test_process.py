@@ -14,12 +14,12 @@ from surveillance_runtime.discovery import prefer_quick_discovery
 PROGRAM = """
 import numpy, scipy.linalg
 from threadpoolctl import threadpool_info
-from surveillance_runtime.node import StartError
+from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.process import run_nodes
 
 def node():
     print({each['user_api']: each['num_threads'] for each in threadpool_info()})
-    raise StartError('enough')
+    raise ParameterError('enough')
 
 run_nodes([node], [])
 """

@@ -28,7 +28,6 @@ from surveillance_interfaces.srv import (
     SetMarker,
     SlipOdometry,
 )
-from surveillance_runtime.node import StartError
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 from surveillance_simulation.simulator_node import Simulator
@@ -288,7 +287,7 @@ def test_light_can_be_changed_while_it_runs(graph: Any) -> None:
 def test_it_does_not_start_in_a_wrong_place(
     graph: Any, parameters: dict[str, Any], message: str
 ) -> None:
-    with pytest.raises(StartError) as caught:
+    with pytest.raises(ParameterError) as caught:
         graph.add(Simulator, parameters=flat(parameters))
     assert str(caught.value).startswith(message)
 

@@ -16,7 +16,8 @@ from surveillance_controllers.controller_parameters import MotionSettings
 from surveillance_controllers.geometry import Points
 from surveillance_controllers.motion.arrival import MotionFailedError
 from surveillance_fsm.ros import CallError, GoalCaller, GoalRun
-from surveillance_runtime.node import PatrolNode, StartError
+from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.parameters import ParameterError
 
 
 class Motion(Protocol):
@@ -38,12 +39,12 @@ def docking_actions() -> tuple[Any, Any]:
     """Return the docking server's action types, to dock and to undock.
 
     Raises:
-        StartError: opennav_docking_msgs is not installed.
+        ParameterError: opennav_docking_msgs is not installed.
     """
     try:
         from opennav_docking_msgs.action import DockRobot, UndockRobot
     except ImportError:
-        raise StartError(
+        raise ParameterError(
             'parameter docking: got opennav, but the Python package opennav_docking_msgs is not '
             'installed: install ros-jazzy-opennav-docking-msgs and source its workspace, or use '
             'docking:=none'
@@ -61,7 +62,7 @@ class DockingMotion:
             server may take to appear and accept a goal.
 
     Raises:
-        StartError: opennav_docking_msgs is not installed.
+        ParameterError: opennav_docking_msgs is not installed.
     """
 
     def __init__(self, node: PatrolNode, inner: Motion, settings: MotionSettings) -> None:

@@ -22,7 +22,8 @@ from surveillance_controllers.map_knowledge import MapKnowledge
 from surveillance_controllers.motion.arrival import MotionFailedError, place_reached
 from surveillance_controllers.motion.place_recording import PlaceRecorder
 from surveillance_fsm.ros import CallError, CallInterruptedError, GoalCaller, GoalRun
-from surveillance_runtime.node import PatrolNode, StartError
+from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.qos import STATE_QOS
 
 SPACING = 1.5
@@ -35,12 +36,12 @@ def navigate_through_poses() -> Any:
     """Nav2's action type.
 
     Raises:
-        StartError: nav2_msgs is not installed.
+        ParameterError: nav2_msgs is not installed.
     """
     try:
         from nav2_msgs.action import NavigateThroughPoses
     except ImportError:
-        raise StartError(
+        raise ParameterError(
             'parameter navigator: got nav2, but the Python package nav2_msgs is not installed: '
             'install ros-jazzy-nav2-msgs and source its workspace, or use navigator:=own'
         ) from None
@@ -57,7 +58,7 @@ class Nav2Motion:
         settings: How long Nav2 may take to appear and accept a goal, and how near a place is.
 
     Raises:
-        StartError: nav2_msgs is not installed.
+        ParameterError: nav2_msgs is not installed.
     """
 
     def __init__(

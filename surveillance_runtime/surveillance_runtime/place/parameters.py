@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from surveillance_runtime.node import PatrolNode, StartError
+from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.place import Place, PlaceError, make_place
 
 
@@ -21,7 +22,7 @@ def described_place(
 
     Raises:
         ParameterError: A parameter is of the wrong type.
-        StartError: What is described is not a place.
+        ParameterError: What is described is not a place.
     """
     chosen = node.parameter(
         'map_source',
@@ -51,4 +52,4 @@ def described_place(
     try:
         return make_place(rooms, positions, robot_room, stations)
     except PlaceError as error:
-        raise StartError(f'{node.get_name()}: parameter {error}') from None
+        raise ParameterError(f'{node.get_name()}: parameter {error}') from None
