@@ -17,6 +17,7 @@ from surveillance_behaviour.decision import NowhereToGoError
 from surveillance_behaviour.mission.mission import Mission, MissionSettings
 from surveillance_behaviour.mission.mission_log import CutOff, MissionRecord
 from surveillance_behaviour.peers.ports import (
+    AwayError,
     InterruptedWaitError,
     PeerError,
     Point,
@@ -353,11 +354,16 @@ class ScriptedRoutine:
         self.world.recharge(interrupt)
 
 
+def started_again(peer: str, reason: str) -> AwayError:
+    """Return the error of a peer that was lost and is there again."""
+    return AwayError(peer, reason, lambda: True)
+
+
 def fails(
     method: str,
     times: float = math.inf,
     reason: str = 'scripted fault',
-    kind: type[PeerError] = PeerError,
+    kind: Callable[[str, str], PeerError] = PeerError,
 ) -> Callable[[str], None]:
     """Return a fault: the first ``times`` calls of a port method fail."""
     left = [times]

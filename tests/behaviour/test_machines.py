@@ -9,9 +9,10 @@ import pytest
 
 import surveillance_fsm as fsm
 from surveillance_behaviour.machines import MACHINES
+from surveillance_behaviour.peers.ports import PeerError
 
 from .machine_runs import CALLS, Run
-from .scripted_world import World, fails
+from .scripted_world import World, fails, started_again
 
 WAYS = {
     'surveillance': [
@@ -96,16 +97,22 @@ def test_the_same_world_gives_the_same_mission(name: str) -> None:
     assert runs[0].world.arrivals == runs[1].world.arrivals
 
 
-def troubled(call: str, times: float, level: float, charge: float = 2.0) -> World:
+def troubled(
+    call: str,
+    times: float,
+    level: float,
+    charge: float = 2.0,
+    kind: Callable[[str, str], PeerError] = PeerError,
+) -> World:
     """Return a world in which calls fail at the start and again later, with a battery that
     falls.
     """
     world = World(charge=charge)
-    world.faults = fails(call, 2.0)
+    world.faults = fails(call, 2.0, kind=kind)
 
     def trouble() -> None:
         world.set_level(level)
-        world.faults = fails(call, times)
+        world.faults = fails(call, times, kind=kind)
 
     world.clock.after(45.0, trouble)
     return world
@@ -131,6 +138,7 @@ def troubled_worlds(name: str) -> Iterator[World]:
         yield troubled(call, 12.0, 100.0)
         yield troubled(call, 9.0, 100.0)
         yield troubled(call, 3.0, 10.0)
+        yield troubled(call, 1.0, 10.0, kind=started_again)
         yield low_during(call)
 
 

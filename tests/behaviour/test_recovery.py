@@ -10,7 +10,7 @@ import surveillance_fsm as fsm
 from surveillance_behaviour.peers.ports import AwayError, PeerError, Point
 
 from .machine_runs import CALLS, Run, visited
-from .scripted_world import POSITIONS, SEVEN_ROOMS, World, fails
+from .scripted_world import POSITIONS, SEVEN_ROOMS, World, fails, started_again
 
 
 @pytest.mark.parametrize('times', [2, 20])
@@ -71,12 +71,21 @@ def test_the_return_of_a_peer_ends_the_pause(machine: str) -> None:
     assert 180.0 <= min(at for at in tries if at >= 180.0) < 180.5
 
 
+def test_a_peer_that_was_started_again_is_asked_at_once_without_a_cry(machine: str) -> None:
+    undisturbed, world = World(), World()
+    Run(machine, undisturbed).until(60.0)
+    world.faults = fails('plan', 2, 'another server', started_again)
+    Run(machine, world).until(60.0)
+    assert not any(world.cries)
+    assert world.arrivals[0] == undisturbed.arrivals[0]
+
+
 def test_a_peer_that_is_there_and_fails_has_the_whole_pause(machine: str) -> None:
     world = World()
-    world.faults = fails('plan', 4, 'no answer', lambda *said: AwayError(*said, lambda: True))
+    world.faults = fails('plan', 9, 'no answer', started_again)
     Run(machine, world).until(200.0)
-    assert len([cry for cry in world.cries if 'no answer' in cry]) == 4
-    assert min(time for time, _ in world.arrivals) > 2.0 + 4.0 + 8.0 + 16.0
+    assert len([cry for cry in world.cries if 'no answer' in cry]) == 3  # each third time
+    assert min(time for time, _ in world.arrivals) > 2.0 + 4.0 + 8.0
 
 
 WRONG_PATHS: list[tuple[list[Point], str]] = [

@@ -204,7 +204,7 @@ def moving(mission: Mission, *, heeds_battery: bool) -> fsm.StateMachine:
 def recharge_routine(mission: Mission) -> fsm.StateMachine:
     """Recharge, with a move to the dock before it when the robot is not there."""
     machine = fsm.StateMachine(['battery_full', PREEMPTED])
-    steps = (Step.ANOTHER_PATH, Step.ANOTHER_PLACE, Step.WAIT_FOR_HELP)
+    steps = tuple(step for step in Step if step != Step.GO_BACK)
     with machine:
         add(
             'Recharge',
@@ -220,6 +220,7 @@ def recharge_routine(mission: Mission) -> fsm.StateMachine:
             'Recover',
             Recover(mission, steps=steps),
             {
+                'choose_anew': 'Recharge',
                 'another_path': 'Moving',
                 'another_place': 'Recharge',
                 'wait_for_help': 'WaitForHelp',
@@ -252,6 +253,7 @@ def patrol_machine(mission: Mission) -> fsm.StateMachine:
             'Recover',
             Recover(mission),
             {
+                'choose_anew': 'Reasoning',
                 'another_path': 'Moving',
                 'another_place': 'Reasoning',
                 'go_back': 'GoBack',

@@ -97,6 +97,7 @@ class Recover(MissionState):
 
 
 WORDS = {
+    Step.CHOOSE_ANEW: 'choosing anew',
     Step.ANOTHER_PATH: 'trying another path',
     Step.ANOTHER_PLACE: 'trying another place',
     Step.GO_BACK: 'going back to the last known place',

@@ -219,6 +219,7 @@ def surveillance_machine(mission: Mission) -> fsm.StateMachine:
             'RECOVER',
             Recover(mission),
             {
+                'choose_anew': 'CHOOSE_NEXT_ROOM',
                 'another_path': 'MOVE_TO_NEXT_ROOM',
                 'another_place': 'CHOOSE_NEXT_ROOM',
                 'go_back': 'RETURN_TO_LAST_PLACE',

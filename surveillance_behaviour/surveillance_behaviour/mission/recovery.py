@@ -1,10 +1,11 @@
 """What to do after a failure: another path, another place, back, or wait for help.
 
-The steps escalate. Whatever fails is tried again on another path; then its place is left alone
-for a while and another one is chosen; when that fails several times in a row, something is
-wrong with where the robot is, so it goes back to the last place it knows it was in; and when
-not even that helps, it waits for help. It never gives up: the pauses grow up to a limit, and
-after each the steps begin anew.
+The steps escalate. A peer that was lost and is there again, as after a restart, costs a new choice.
+Whatever else fails is tried again on another path; then its place is left alone for a while and
+another one is chosen; when that fails several times in a row, something is wrong with where the
+robot is, so it goes back to the last place it knows it was in; and when not even that helps, it
+waits for help. It never gives up: the pauses grow up to a limit, and after each the steps begin
+anew.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ DOUBLINGS = 30
 class Step(StrEnum):
     """What to do next; the values are the outcomes of the machines' recovery state."""
 
+    CHOOSE_ANEW = 'choose_anew'
     ANOTHER_PATH = 'another_path'
     ANOTHER_PLACE = 'another_place'
     GO_BACK = 'go_back'
@@ -86,6 +88,7 @@ class Recovery:
     _in_a_row: int = 0
     _went_back: bool = False
     _pauses: int = 0
+    _chosen_anew: int = 0
 
     def tries(self, goal: str) -> int:
         """Return how often ``goal`` failed since it last worked or was given up."""
@@ -101,7 +104,11 @@ class Recovery:
         """
         goal = failure.goal
         if goal is None:
-            return Step.WAIT_FOR_HELP
+            is_over = failure.is_over is not None and failure.is_over()
+            if not is_over or self._chosen_anew + 1 >= self.limits.path_tries:
+                return Step.WAIT_FOR_HELP
+            self._chosen_anew += 1
+            return Step.CHOOSE_ANEW
         tries = self._charge_tries if failure.charging else self._tries
         tries[goal] += 1
         if tries[goal] % self.limits.path_tries:
@@ -132,7 +139,7 @@ class Recovery:
 
     def arrived(self, place: str) -> None:
         """Note that a place was reached."""
-        self._in_a_row = 0
+        self._in_a_row = self._chosen_anew = 0
         self._went_back = False
         if not self._charge_tries:
             self._pauses = 0
@@ -155,7 +162,7 @@ class Recovery:
             self.limits.help_seconds * 2.0 ** min(self._pauses, DOUBLINGS), self.limits.longest_help
         )
         self._pauses += 1
-        self._in_a_row = 0
+        self._in_a_row = self._chosen_anew = 0
         self._went_back = False
         self._tries.clear()
         return seconds
