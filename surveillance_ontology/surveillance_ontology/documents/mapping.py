@@ -7,7 +7,7 @@ silence.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from typing import TypeAlias
 
@@ -87,11 +87,18 @@ _STRUCTURE = {RDF + 'first', RDF + 'rest'} | {
 
 
 class Mapping:
-    """Turns one graph into `axioms` (document order) and `unsupported` (sentences)."""
+    """Turns one graph into axioms.
+
+    Attributes:
+        axioms: In document order; there after `read`.
+        unsupported: One sentence for each statement that was not understood.
+        prefixes: The prefixes that the document declares.
+    """
 
     def __init__(self, graph: Graph) -> None:
         self.axioms: dict[Axiom, None] = {}
         self.unsupported: list[str] = []
+        self.prefixes = graph.prefixes
         self._header = ''
         self._places = graph.places
         self._subject_read = ''
@@ -112,9 +119,34 @@ class Mapping:
                     self._kinds.setdefault(subject, set()).add('object_property')
                 elif value == SWRL + 'Variable':
                     self._variables.add(subject)
-        self._guess_kinds()
         self._added: list[Axiom] = []
         self._used: set[str] = set()
+
+    @property
+    def iri(self) -> str:
+        """The IRI in the header; '' without one."""
+        return '' if self._header.startswith('_:') else self._header
+
+    @property
+    def declared(self) -> Iterator[tuple[str, str]]:
+        """Pairs (kind, IRI) of what the graph declares."""
+        return ((kind, name) for name, kinds in self._kinds.items() for kind in kinds)
+
+    @property
+    def imports(self) -> Iterator[str]:
+        """The IRIs of the ontologies that the graph imports."""
+        found = (nodes.get(OWL + 'imports', ()) for nodes in self._nodes.values())
+        return (value for values in found for value in values if isinstance(value, str))
+
+    def read(self, declared: Iterable[tuple[str, str]] = ()) -> None:
+        """Read the axioms.
+
+        Args:
+            declared: Pairs (kind, IRI) of what is declared in documents that are read with this.
+        """
+        for kind, name in declared:
+            self._kinds.setdefault(name, set()).add(kind)
+        self._guess_kinds()
         for subject, properties in self._nodes.items():
             self._subject(subject, properties)
 
@@ -140,11 +172,6 @@ class Mapping:
                     guess(predicate, (isinstance(value, Literal) for value in values))
         for name, kinds in guessed.items():
             self._kinds[name] = kinds or {'object_property'}
-
-    @property
-    def iri(self) -> str:
-        """The IRI in the header; '' without one."""
-        return '' if self._header.startswith('_:') else self._header
 
     # --- reporting ---
 

@@ -9,7 +9,8 @@ from __future__ import annotations
 import codecs
 import contextlib
 import re
-from dataclasses import dataclass, replace
+from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
@@ -21,6 +22,7 @@ from surveillance_ontology.documents.structural import Axioms
 from surveillance_ontology.documents.xml_reading import OntologyFileError
 from surveillance_ontology.memory import uncollected
 from surveillance_ontology.owl.axioms import Axiom, Import
+from surveillance_ontology.owl.entities import entities_of, renamed
 from surveillance_ontology.owl.expressions import Literal
 from surveillance_ontology.owl.vocabulary import RDF, local_name
 
@@ -87,25 +89,45 @@ def read_ontology(
     """
     folder = None if isinstance(source, bytes) else Path(source).parent
     seen = set() if isinstance(source, bytes) else {Path(source).resolve()}
-    document = _read(source, iri, size_limit)
-    axioms: dict[Axiom, None] = {}
-    unsupported = list(document.unsupported)
-    pending = [(document, folder)]
-    for read, place in pending:
-        for axiom in read.axioms:
-            if not isinstance(axiom, Import):
-                axioms[axiom] = None
-                continue
-            path = _imported(axiom.iri, place)
+    form, main = _read(source, iri, size_limit)
+    documents: list[tuple[str, Mapping | Axioms, Path | None]] = [('', main, folder)]
+    missing: dict[str, None] = {}
+    for _, document, place in documents:
+        for name in document.imports:
+            path = _imported(name, place)
             if path is None:
-                axioms[axiom] = None
-                unsupported.append(f'owl:imports <{axiom.iri}> is not followed: no file beside it')
+                missing[name] = None
             elif path.resolve() not in seen:
                 seen.add(path.resolve())
-                other = _read(path, axiom.iri, size_limit)
-                unsupported += (f'{path.name}: {text}' for text in other.unsupported)
-                pending.append((other, path.parent))
-    return replace(document, axioms=list(axioms), unsupported=unsupported)
+                _, other = _read(path, name, size_limit)
+                documents.append((f'{path.name}: ', other, path.parent))
+    declared = [pair for _, document, _ in documents for pair in document.declared]
+    axioms: dict[Axiom, None] = {}
+    blanks: set[str] = set()
+    unsupported: list[str] = []
+    for number, (prefix, document, _) in enumerate(documents):
+        with uncollected():
+            document.read(declared if documents[1:] else ())
+        read: Iterable[Axiom] = document.axioms
+        if documents[1:]:
+            read = _apart(read, blanks, f'_:d{number}.')
+        for axiom in read:
+            if not isinstance(axiom, Import) or axiom.iri in missing:
+                axioms[axiom] = None
+        unsupported += (prefix + text for text in document.unsupported)
+    unsupported += (f'owl:imports <{name}> is not followed: no file beside it' for name in missing)
+    return OntologyDocument(list(axioms), unsupported, form, main.iri, main.prefixes)
+
+
+def _apart(axioms: Iterable[Axiom], taken: set[str], prefix: str) -> list[Axiom]:
+    """Give individuals without a name other labels than those of documents read before."""
+    found = list(axioms)
+    own = {name for a in found for _, name in entities_of(a) if name.startswith('_:')}
+    for name in own & taken:
+        new = prefix + name[2:]
+        found = [renamed(axiom, 'individual', name, new) for axiom in found]
+    taken |= own
+    return found
 
 
 def _imported(iri: str, folder: Path | None) -> Path | None:
@@ -122,8 +144,8 @@ def _imported(iri: str, folder: Path | None) -> Path | None:
     return None
 
 
-def _read(source: str | Path | bytes, iri: str, size_limit: int) -> OntologyDocument:
-    """Read one document."""
+def _read(source: str | Path | bytes, iri: str, size_limit: int) -> tuple[str, Mapping | Axioms]:
+    """Parse one document; return its format and what it states."""
     if isinstance(source, bytes):
         name, data = '<document>', source
     else:
@@ -160,31 +182,31 @@ def _utf8(data: bytes) -> bytes:
         raise OntologyFileError(f'its encoding cannot be read: {error}', 1, 1) from None
 
 
-def _parsed(data: bytes, iri: str) -> OntologyDocument:
-    """Read a document in UTF-8 by the format that it begins with."""
+def _parsed(data: bytes, iri: str) -> tuple[str, Mapping | Axioms]:
+    """Parse a document in UTF-8 by the format that it begins with."""
     begin = _COMMENTS.match(data)
     place = begin.end() if begin else 0
     if place == len(data):
         raise OntologyFileError('the document is empty', 1, 1)
     if is_functional(data):
-        return _stated(parse_functional(_text(data)), 'functional')
+        return 'functional', parse_functional(_text(data))
     if _TRIPLE.match(data, place):
         try:
-            return _mapped(_rdf_text(data, iri, 'ntriples', lenient=True), 'ntriples')
+            return 'ntriples', Mapping(_rdf_text(data, iri, 'ntriples', lenient=True))
         except OntologyFileError as error:
             # Turtle can begin so as well.
             try:
-                return _mapped(_rdf_text(data, iri, 'turtle'), 'turtle')
+                return 'turtle', Mapping(_rdf_text(data, iri, 'turtle'))
             except OntologyFileError as other:
                 raise max(error, other, key=lambda e: e.line) from None
     if _XML.match(data, place):
         if is_owl_xml(data):
-            return _stated(parse_owl_xml(data, iri), 'owlxml')
-        return _mapped(parse_rdf_xml(data, iri), 'rdfxml')
+            return 'owlxml', parse_owl_xml(data, iri)
+        return 'rdfxml', Mapping(parse_rdf_xml(data, iri))
     if _JSON.match(data, place):
-        return _mapped(_rdf_text(data, iri, 'jsonld'), 'jsonld')
+        return 'jsonld', Mapping(_rdf_text(data, iri, 'jsonld'))
     if _TURTLE.match(data, place):
-        return _mapped(_rdf_text(data, iri, 'turtle'), 'turtle')
+        return 'turtle', Mapping(_rdf_text(data, iri, 'turtle'))
     shown = data[place : place + 40].decode('latin-1')
     raise OntologyFileError(
         f'expected {FORMATS}, got {shown!r}', data.count(b'\n', 0, place) + 1, 1
@@ -197,17 +219,6 @@ def _text(data: bytes) -> str:
     except UnicodeDecodeError as error:
         line = data.count(b'\n', 0, error.start) + 1
         raise OntologyFileError(f'not UTF-8: {error.reason}', line, 1) from None
-
-
-def _stated(read: Axioms, form: str) -> OntologyDocument:
-    return OntologyDocument(list(read.axioms), read.unsupported, form, read.iri, read.prefixes)
-
-
-def _mapped(graph: Graph, form: str) -> OntologyDocument:
-    mapping = Mapping(graph)
-    return OntologyDocument(
-        list(mapping.axioms), mapping.unsupported, form, mapping.iri, graph.prefixes
-    )
 
 
 def _rdf_text(data: bytes, iri: str, form: str, lenient: bool = False) -> Graph:

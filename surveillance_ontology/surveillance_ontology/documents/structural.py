@@ -7,14 +7,14 @@ itself alone and is reported with its line (https://www.w3.org/TR/owl2-syntax/, 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import MISSING, dataclass, fields
 from typing import Any, TypeAlias, get_args
 
 from surveillance_ontology.documents.xml_reading import IllFormedError
 from surveillance_ontology.owl import axioms as ax
 from surveillance_ontology.owl import expressions as ex
-from surveillance_ontology.owl.axioms import Axiom
+from surveillance_ontology.owl.axioms import Axiom, Declaration, Import
 from surveillance_ontology.owl.expressions import Literal
 from surveillance_ontology.owl.vocabulary import OWL, RDF, RDFS, SWRL, SWRLB, XSD
 
@@ -58,6 +58,19 @@ class Axioms:
         self.unsupported: list[str] = []
         self.iri = ''
         self.prefixes: dict[str, str] = {}
+
+    @property
+    def declared(self) -> Iterator[tuple[str, str]]:
+        """Pairs (kind, IRI) of what the document declares."""
+        return ((axiom.kind, axiom.iri) for axiom in self.axioms if isinstance(axiom, Declaration))
+
+    @property
+    def imports(self) -> Iterator[str]:
+        """The IRIs of the ontologies that the document imports."""
+        return (axiom.iri for axiom in self.axioms if isinstance(axiom, Import))
+
+    def read(self, declared: Iterable[tuple[str, str]] = ()) -> None:
+        """Nothing is left to read: each axiom says of what kind its names are."""
 
     def named(self, name: str) -> str | None:
         """Return the IRI of a prefixed name; None where its prefix is not declared."""

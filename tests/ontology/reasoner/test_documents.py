@@ -242,3 +242,38 @@ def test_a_value_stays_one_where_the_header_has_its_property_too(form: str) -> N
     again = read_ontology(ontology_bytes(axioms, IRI, form), IRI).axioms
     assert set(axioms) <= set(again)
     assert ax.DataPropertyAssertion('http://x/#title', 'http://x/#i', Literal('Hall')) in again
+
+
+def test_what_an_import_declares_holds_in_the_document_that_imports_it(tmp_path: Path) -> None:
+    main, upper = tmp_path / 'main.ttl', tmp_path / 'upper.ttl'
+    upper.write_text(
+        TURTLE.replace('<http://x/>', '<http://x/upper>')
+        + ':size a owl:DatatypeProperty . :note a owl:AnnotationProperty .\n'
+        '_:b a :Wheel .'
+    )
+    main.write_text(
+        TURTLE + '<http://x/> owl:imports <http://x/upper> . :height rdfs:subPropertyOf :size .\n'
+        ':A rdfs:subClassOf [ owl:onProperty :size ; owl:maxCardinality 1 ] .\n'
+        ':i :note "new" . _:b a :Door .'
+    )
+    document = read_ontology(main, IRI)
+    x = 'http://x/#'
+    for axiom in (
+        ax.SubDataPropertyOf(x + 'height', x + 'size'),
+        ax.SubClassOf(x + 'A', ex.DataMaxCardinality(1, x + 'size', RDFS + 'Literal')),
+        ax.AnnotationAssertion(x + 'note', x + 'i', Literal('new')),
+    ):
+        assert axiom in document.axioms
+    assert document.unsupported == []
+
+
+def test_individuals_without_a_name_of_two_documents_are_two(tmp_path: Path) -> None:
+    def written(name: str, body: str) -> Path:
+        path = tmp_path / name
+        path.write_text(f'Prefix(:=<http://x/#>)\nOntology(<http://x/{name}>\n{body})')
+        return path
+
+    written('upper.ofn', 'ClassAssertion(:Wheel _:b)')
+    main = written('main.ofn', 'Import(<http://x/upper>) ClassAssertion(:Door _:b)')
+    kinds = [a for a in read_ontology(main, IRI).axioms if isinstance(a, ax.ClassAssertion)]
+    assert len({axiom.individual for axiom in kinds}) == len(kinds) == 2
