@@ -46,7 +46,8 @@ def point_of(pose: Pose) -> Points:
 def in_map(pose: Pose, points: Points) -> Points:
     """Return points of the robot's frame, shape (n, 2), in the frame of its pose."""
     cos, sin = math.cos(pose[2]), math.sin(pose[2])
-    return np.asarray(points @ np.array([[cos, sin], [-sin, cos]]) + pose[:2])
+    x, y = points.T
+    return np.array([pose[0] + cos * x - sin * y, pose[1] + sin * x + cos * y]).T
 
 
 def distances_along(path: ArrayLike) -> Points:
@@ -142,11 +143,10 @@ class Scan:
     @cached_property
     def points(self) -> Points:
         """The points met, in the robot's frame, shape (m, 2), m at most n."""
-        met = np.isfinite(self.ranges) & (self.ranges < self.range_max)
-        ranges, angles = self.ranges[met], self.angles[met]
+        met = self.ranges < self.range_max
         x, y, yaw = self.mount
-        turned = angles + yaw
-        return np.stack([x + ranges * np.cos(turned), y + ranges * np.sin(turned)], axis=1)
+        ranges, turned = self.ranges[met], self.angles[met] + yaw
+        return np.array([x + ranges * np.cos(turned), y + ranges * np.sin(turned)]).T
 
     def thinned(self, count: int) -> Scan:
         """About `count` of the rays, evenly taken."""

@@ -361,7 +361,7 @@ class Localiser:
         row = ((y - self.grid.origin[1]) * (1 / self.grid.resolution)).astype(np.int32)
         np.clip(column, 0, columns - 1, out=column)
         np.clip(row, 0, rows - 1, out=row)
-        hit = self._occupied[row, column]
+        hit = self._occupied.ravel().take(row * columns + column)
         first = hit.argmax(axis=1)
         met = hit[np.arange(len(angles)), first]
         return np.where(met, np.minimum(way[first], range_max), range_max)
@@ -381,15 +381,14 @@ class Localiser:
             error, slope_x, slope_y = self._edge_at(x, y)
             weight = 1.0 / (1.0 + (error / self.parameters.spread) ** 2) ** 2
             slope_turn = slope_y * (x - estimate[0]) - slope_x * (y - estimate[1])
-            jacobian = np.stack([slope_x, slope_y, slope_turn], axis=1)
-            weighted = jacobian * weight[:, None]
+            jacobian = np.array([slope_x, slope_y, slope_turn])
+            weighted = jacobian * weight
             back = estimate - pose
             back[2] = math.remainder(back[2], math.tau)
             change = np.linalg.solve(
-                weighted.T @ jacobian + np.diag(pull + 1e-9),
-                -(weighted.T @ error + pull * back),
+                weighted @ jacobian.T + np.diag(pull + 1e-9), -(weighted @ error + pull * back)
             )
-            estimate += np.clip(change, -0.15, 0.15)
+            estimate += np.minimum(np.maximum(change, -0.15), 0.15)
             if np.abs(change).max() < 1e-4:
                 break
         return float(estimate[0]), float(estimate[1]), math.remainder(estimate[2], math.tau)
@@ -399,8 +398,8 @@ class Localiser:
         column = (x - self.grid.origin[0]) / self.grid.resolution - 0.5
         row = (y - self.grid.origin[1]) / self.grid.resolution - 0.5
         rows, columns = self._edges.shape
-        column = np.clip(column, 0, columns - 1.001)
-        row = np.clip(row, 0, rows - 1.001)
+        column = np.minimum(np.maximum(column, 0), columns - 1.001)
+        row = np.minimum(np.maximum(row, 0), rows - 1.001)
         c, r = column.astype(np.intp), row.astype(np.intp)
         u, v = column - c, row - r
         flat = self._edges.ravel()

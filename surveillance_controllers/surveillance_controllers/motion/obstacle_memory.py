@@ -46,6 +46,8 @@ class ObstacleMemory:
         """Replace the map; obstacles that it has are the map's from now on."""
         self._grid = grid
         self._known = distance_to(grid.occupied, grid.resolution)
+        # A frame of what is off the map.
+        self._framed = np.pad(self._known, 1, constant_values=-np.inf)
         for cell in list(self._seen):
             at = (np.array(cell, dtype=float) + 0.5) * self._cell
             if grid.interpolated(self._known, at)[0] <= self._apart:
@@ -60,11 +62,12 @@ class ObstacleMemory:
     def is_unknown(self, points: Points, apart: float) -> NDArray[np.bool_]:
         """Tell which points, shape (n, 2), lie on the map and further than `apart` metres from
         what it has."""
-        cells = self._grid.cells_of(points)
-        unknown = self._grid.contains(cells)
         # Most points are the map's: within a cell the distance changes by its diagonal at most.
-        row, column = cells[unknown].T
-        unknown[unknown] = self._known[row, column] > apart - 2.0 * self._grid.resolution
+        row, column = self._grid.cells_of(points).T
+        rows, columns = self._framed.shape
+        row, column = np.minimum(row + 1, rows - 1), np.minimum(column + 1, columns - 1)
+        near = self._framed.ravel().take(row * columns + column)
+        unknown: NDArray[np.bool_] = near > apart - 2.0 * self._grid.resolution
         if unknown.any():
             unknown[unknown] = self._grid.interpolated(self._known, points[unknown]) > apart
         return unknown
@@ -95,8 +98,8 @@ class ObstacleMemory:
         new = points[self.is_unknown(points, self._apart)]
         if may_move is not None:
             new = new[~may_move(new)]
-        for column, row in np.unique(np.floor(new / self._cell).astype(int), axis=0):
-            self._seen[int(column), int(row)] = now
+        for column, row in np.floor(new / self._cell).astype(int).tolist():
+            self._seen[column, row] = now
         return set(self._seen) != before
 
     def _forget(self, pose: Pose, scan: Scan, now: float) -> None:

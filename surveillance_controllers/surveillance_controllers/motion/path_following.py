@@ -112,6 +112,8 @@ class PathFollower:
         keep = np.concatenate(([True], np.hypot(*np.diff(given, axis=0).T) > 1e-6))
         self.path: Points = given[keep]
         self._along = geometry.distances_along(self.path)
+        self._steps = np.diff(self.path, axis=0)
+        self._lengths = np.diff(self._along)
         self.progress = 0.0
         self._velocity = Velocity()
         self._acceleration = 0.0
@@ -140,7 +142,7 @@ class PathFollower:
         side = angle_between(pose[2], bearing)
         if abs(side) > p.turn_first:
             return self._guide(*self._turn(side, seen, dt), False, off_path, dt)
-        distance = max(float(np.hypot(*(target - position))), 1e-6)
+        distance = max(math.dist(target, position), 1e-6)
         curvature = 2 * math.sin(side) / distance
         wanted = min(
             p.speed,
@@ -199,15 +201,12 @@ class PathFollower:
 
     def _at(self, along: Points) -> Points:
         """Return the points at some ways along the path, shape (n, 2), metres."""
-        x, y = self.path.T
-        return np.stack(
-            [np.interp(along, self._along, x), np.interp(along, self._along, y)], axis=1
-        )
+        return np.array([np.interp(along, self._along, axis) for axis in self.path.T]).T
 
     def _remaining(self, position: Points) -> float:
         """Return how far the end is, metres; 0 when it is reached."""
         p = self.parameters
-        to_end = float(np.hypot(*(self.path[-1] - position)))
+        to_end = math.dist(self.path[-1], position)
         if to_end <= p.tolerance and self.length - self.progress <= 2 * p.tolerance:
             return 0.0
         return max(self.length - self.progress, to_end)
@@ -336,13 +335,13 @@ class PathFollower:
         last = max(last, first + 1) if first + 1 < len(self.path) else first
         if last == first:
             first -= 1
-        begin, step = self.path[first:last], np.diff(self.path[first : last + 1], axis=0)
-        lengths = np.diff(self._along[first : last + 1])
-        share = ((position - begin) * step).sum(axis=1) / lengths**2
-        share = np.clip(share, 0.0, 1.0)
-        along = np.clip(self._along[first:last] + share * lengths, self.progress, window)
-        share = (along - self._along[first:last]) / lengths
-        gaps = np.hypot(*(begin + np.clip(share, 0, 1)[:, None] * step - position).T)
+        (x, y), (dx, dy) = self.path[first:last].T, self._steps[first:last].T
+        begin, lengths = self._along[first:last], self._lengths[first:last]
+        along = begin + ((position[0] - x) * dx + (position[1] - y) * dy) / lengths
+        along = np.maximum(along, np.maximum(begin, self.progress))
+        along = np.minimum(along, np.minimum(begin + lengths, window))
+        share = (along - begin) / lengths
+        gaps = np.hypot(x + share * dx - position[0], y + share * dy - position[1])
         nearest = int(np.argmin(gaps))
         self.progress = float(max(self.progress, min(along[nearest], self.length)))
         return float(gaps[nearest])
@@ -350,19 +349,19 @@ class PathFollower:
     def _target(self, position: Points) -> Points:
         p = self.parameters
         look = min(max(self._velocity.speed * p.look_time, p.shortest_look), p.longest_look)
-        ahead = self._at(self.progress + np.linspace(0.0, look, 9))
+        ahead = self._at(self.progress + look * np.arange(9) / 8)
         first = max(1, math.ceil(8 * p.shortest_look / look))
         for index in range(8, first, -1):
             line = ahead[index] - position
             between = ahead[1:index] - position
             across = np.abs(line[0] * between[:, 1] - line[1] * between[:, 0])
-            if (across <= p.deviation * max(float(np.hypot(*line)), 1e-9)).all():
+            if (across <= p.deviation * max(math.hypot(*line), 1e-9)).all():
                 return np.asarray(ahead[index])
         return np.asarray(ahead[first])
 
 
 def _nearest(seen: Points) -> float:
-    return float(np.sqrt((seen**2).sum(axis=1).min())) if len(seen) else math.inf
+    return float(np.hypot(*seen.T).min()) if len(seen) else math.inf
 
 
 def room_ahead(seen: Points, curvature: float, reach: float, horizon: float) -> float:
@@ -382,7 +381,8 @@ def room_ahead(seen: Points, curvature: float, reach: float, horizon: float) -> 
     """
     if not len(seen):
         return horizon
-    near = seen[(np.abs(seen) <= horizon + reach).all(axis=1)]
+    x, y = np.abs(seen.T)
+    near = seen[(x <= horizon + reach) & (y <= horizon + reach)]
     if not len(near):
         return horizon
     way = np.linspace(0.0, horizon, max(2, math.ceil(horizon / 0.04)) + 1)

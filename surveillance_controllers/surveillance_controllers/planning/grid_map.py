@@ -59,11 +59,12 @@ class GridMap:
         """Return the row and column of each point, shape (n, 2); they may lie outside of the
         map.
         """
-        xy = np.asarray(points, dtype=float).reshape(-1, 2)
-        columns_rows = np.floor((xy - self.origin) / self.resolution)
+        # Coordinate by coordinate: numpy is slow on many short rows.
+        xy = np.asarray(points, dtype=float).reshape(-1, 2).T
+        columns_rows = np.floor((xy - np.reshape(self.origin, (2, 1))) / self.resolution)
         # Far outside, and what is no number, is outside: no larger number survives the conversion.
         cells: NDArray[np.intp] = np.fmin(np.fmax(columns_rows, -1), 2**40).astype(np.intp)
-        return cells[:, ::-1]
+        return cells[::-1].T
 
     def centres_of(self, cells: ArrayLike) -> Points:
         """Return the centre of each cell (row, column), shape (n, 2), metres."""
@@ -72,8 +73,9 @@ class GridMap:
 
     def contains(self, cells: ArrayLike) -> NDArray[np.bool_]:
         """Return which cells (row, column) lie on the map, shape (n,)."""
-        rows_columns = np.asarray(cells).reshape(-1, 2)
-        return np.asarray(((rows_columns >= 0) & (rows_columns < self.cells.shape)).all(axis=1))
+        row, column = np.asarray(cells).reshape(-1, 2).T
+        rows, columns = self.cells.shape
+        return np.asarray((row >= 0) & (row < rows) & (column >= 0) & (column < columns))
 
     def interpolated(self, field: NDArray[np.float32], points: ArrayLike) -> Points:
         """Return the values of a field of the map's shape at points, bilinear between cell centres.

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -36,7 +37,7 @@ class LidarModel:
     range_max: float = parameter(8.0, 'Greatest distance measured, metres.', 0.5, 200.0)
     noise: float = parameter(0.01, 'Standard deviation of a distance, metres.', 0.0, 1.0)
 
-    @property
+    @cached_property
     def angles(self) -> boxes.Array:
         """Direction of each ray in the robot's frame (rays,), rad."""
         steps: boxes.Array = np.arange(self.rays, dtype=np.float64) * (2.0 * math.pi / self.rays)
