@@ -34,7 +34,7 @@ from rclpy.waitable import NumberOfEntities
 
 _MOST_LISTS = 30
 """Wait lists that are kept: one for each set of callback groups that coroutines held at once."""
-_MOST_BUSY_WAITS = 3
+_MOST_BUSY_WAITS = 15
 """Waits in a row that may look at messages and timers alone, when there always are some."""
 _BUSY_KINDS = ('timer', 'subscription')
 _KINDS = ('timer', 'subscription', 'guard_condition', 'client', 'service')

@@ -103,7 +103,7 @@ class ClockRate:
     """Decides how much simulated time passes at each tick.
 
     Attributes:
-        is_waiting: Whether time stands still until a program answers.
+        is_waiting: Whether time stood still, when last asked, until a program answers.
     """
 
     def __init__(self, model: ClockRateModel, steady: float) -> None:
@@ -186,6 +186,17 @@ class ClockRate:
         """Note an estimate of the pose from what was measured at this simulated time, seconds."""
         self._estimates.note(measured)
 
+    def waits(self, simulated: float, steady: float) -> bool:
+        """Return whether time stands still until a program answers; times as for `due`."""
+        late = (
+            self._commands.are_late(simulated, steady),
+            self._estimates.are_late(simulated, steady),
+            self._mission_is_late(simulated, steady),
+            self._place_is_late(steady),
+        )
+        self.is_waiting = self._model.speed == 0.0 and any(late)
+        return self.is_waiting
+
     def due(self, simulated: float, steady: float, *, moving: bool) -> float:
         """Return how many simulated seconds pass now; 0 to wait.
 
@@ -197,13 +208,7 @@ class ClockRate:
         model = self._model
         elapsed, self._last = steady - self._last, steady
         step = model.step
-        late = [
-            answers.are_late(simulated, steady) for answers in (self._commands, self._estimates)
-        ]
-        late.append(self._mission_is_late(simulated, steady))
-        late.append(self._place_is_late(steady))
-        self.is_waiting = model.speed == 0.0 and any(late)
-        if self.is_waiting:
+        if self.waits(simulated, steady):
             # Ready to go on at once when the answer comes.
             self._owed = min(self._owed + elapsed * model.ceiling, step)
             return 0.0

@@ -123,7 +123,7 @@ class Simulator(PatrolNode):
     def _tick(self) -> None:
         with self._changing:
             measure = self._advance()
-            if self._rate.is_waiting:
+            if self._rate.waits(self.robot.time, time.monotonic()):
                 # The answer wakes it: useless ticks would take the time that the answer needs.
                 self._timer.cancel()
         if measure:
@@ -152,7 +152,7 @@ class Simulator(PatrolNode):
         self._sensors.tell_doors()
 
     def _go_on(self) -> None:
-        if self._rate.is_waiting:
+        if self._rate.is_waiting and not self._rate.waits(self.robot.time, time.monotonic()):
             self._timer.reset()
             self._tick()
 
