@@ -4,7 +4,8 @@ rclpy's `SingleThreadedExecutor` gathers every entity of every node anew before 
 a task and two coroutines for each callback: half of the processor time of a process with all the
 patrol's nodes (230 entities, 30 waits for each simulated second). Here the entities are gathered
 when one came or went, and a callback is simply called. While messages and timers alone keep the
-process busy, the rest (most of the entities) is looked at in every fourth wait.
+process busy, the rest (most of the entities) is looked at in every fifth wait, and the events of
+publishers and subscriptions when nothing else is to be done.
 
 rclpy's own `EventsExecutor` waits for no set at all, but in Jazzy it leaves asynchronous service
 callbacks unanswered (rclpy 1613), asks a waiting coroutine again without pause, and may end the
@@ -20,6 +21,7 @@ from contextlib import ExitStack
 from typing import Any
 
 from rclpy.callback_groups import CallbackGroup
+from rclpy.event_handler import EventHandler
 from rclpy.executors import (
     ExternalShutdownException,
     SingleThreadedExecutor,
@@ -34,7 +36,7 @@ from rclpy.waitable import NumberOfEntities
 
 _MOST_LISTS = 30
 """Wait lists that are kept: one for each set of callback groups that coroutines held at once."""
-_MOST_BUSY_WAITS = 15
+_MOST_BUSY_WAITS = 4
 """Waits in a row that may look at messages and timers alone, when there always are some."""
 _BUSY_KINDS = ('timer', 'subscription')
 _KINDS = ('timer', 'subscription', 'guard_condition', 'client', 'service')
@@ -137,8 +139,10 @@ class PatrolExecutor(SingleThreadedExecutor):  # type: ignore[misc]  # rclpy has
         # Tasks that wait, and the entity whose callback group they hold, if any.
         self._waiting: dict[Task, Any] = {}
         self._entities: dict[str, list[Any]] = {}
-        # By the groups that coroutines hold: what keeps a process busy, and everything.
-        self._wait_lists: dict[frozenset[CallbackGroup], tuple[_WaitList, _WaitList]] = {}
+        # By the groups that coroutines hold: what keeps a process busy, all work, and everything.
+        self._wait_lists: dict[
+            frozenset[CallbackGroup], tuple[_WaitList, _WaitList, _WaitList]
+        ] = {}
         self._busy_waits = 0
         self._changed = True
         self._take: dict[str, Callable[[Any], Any]] = {
@@ -199,12 +203,11 @@ class PatrolExecutor(SingleThreadedExecutor):  # type: ignore[misc]  # rclpy has
         if held not in self._wait_lists:
             if len(self._wait_lists) >= _MOST_LISTS:
                 self._close_wait_lists()
-            self._wait_lists[held] = self._both_wait_lists()
-        busy, everything = self._wait_lists[held]
+            self._wait_lists[held] = self._new_wait_lists()
+        busy, work, everything = self._wait_lists[held]
         self._busy_waits = (self._busy_waits + 1) % (_MOST_BUSY_WAITS + 1)
         try:
-            if self._busy_waits:
-                self._ready.extend(busy.wait(0))
+            self._ready.extend((busy if self._busy_waits else work).wait(0))
             if not self._ready:
                 self._busy_waits = 0
                 for kind, entity in everything.wait(timeout):
@@ -229,20 +232,25 @@ class PatrolExecutor(SingleThreadedExecutor):  # type: ignore[misc]  # rclpy has
             self._entities = entities
 
     def _close_wait_lists(self) -> None:
-        for both in self._wait_lists.values():
-            for each in both:
+        for lists in self._wait_lists.values():
+            for each in lists:
                 each.close()
         self._wait_lists.clear()
 
-    def _both_wait_lists(self) -> tuple[_WaitList, _WaitList]:
+    def _new_wait_lists(self) -> tuple[_WaitList, _WaitList, _WaitList]:
         """Return what may be waited for now: entities whose groups are not held."""
         free = {
             kind: [each for each in entities if each.callback_group.can_execute(each)]
             for kind, entities in self._entities.items()
         }
         busy = {kind: each if kind in _BUSY_KINDS else [] for kind, each in free.items()}
+        work = {
+            kind: [each for each in entities if not isinstance(each, EventHandler)]
+            for kind, entities in free.items()
+        }
         return (
             _WaitList(busy, [], self._context),
+            _WaitList(work, [], self._context),
             _WaitList(free, [self._guard, self._sigint_gc], self._context),
         )
 
