@@ -48,22 +48,29 @@ def nanoseconds_of(stamp: Time) -> int:
     return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
 
 
-def cloud_from_points(points: NDArray[np.float64]) -> PointCloud2:
-    """Return points of shape (n, 2), metres, as a cloud in the map's frame; the caller stamps
-    it.
+def cloud_from_points(
+    points: NDArray[np.float64], **values: NDArray[np.float64] | NDArray[np.bool_]
+) -> PointCloud2:
+    """Return points as a cloud in the map's frame; the caller stamps it.
+
+    Args:
+        points: Shape (n, 2), metres.
+        values: Further fields by name, each of shape (n,).
     """
     message = PointCloud2()
     message.header.frame_id = 'map'
     message.height, message.width = 1, len(points)
+    names = ('x', 'y', 'z', *values)
     message.fields = [
         PointField(name=name, offset=4 * index, datatype=PointField.FLOAT32, count=1)
-        for index, name in enumerate('xyz')
+        for index, name in enumerate(names)
     ]
-    message.point_step, message.row_step = 12, 12 * len(points)
+    message.point_step, message.row_step = 4 * len(names), 4 * len(names) * len(points)
     message.is_dense = True
-    xyz = np.zeros((len(points), 3), dtype='<f4')
-    xyz[:, :2] = points
-    message.data.frombytes(xyz.tobytes())
+    heights = np.zeros(len(points))
+    message.data.frombytes(
+        np.column_stack([points, heights, *values.values()]).astype('<f4').tobytes()
+    )
     return message
 
 
@@ -73,20 +80,29 @@ def points_from_cloud(message: PointCloud2) -> NDArray[np.float64]:
     Raises:
         ValueError: The cloud has no x and y of 32 bits.
     """
-    offsets = {
-        field.name: field.offset for field in message.fields if field.datatype == PointField.FLOAT32
-    }
-    if not {'x', 'y'} <= offsets.keys():
+    x, y = (values_from_cloud(message, name) for name in 'xy')
+    if x is None or y is None:
         raise ValueError('a cloud without x and y: expected fields of type FLOAT32')
-    count = message.width * message.height
-    order = '>f4' if message.is_bigendian else '<f4'
-    kind = np.dtype(
-        {
-            'names': ['x', 'y'],
-            'formats': [order, order],
-            'offsets': [offsets['x'], offsets['y']],
-            'itemsize': message.point_step,
-        }
-    )
-    points = np.frombuffer(bytes(message.data), dtype=kind, count=count)
-    return np.stack([points['x'], points['y']], axis=1).astype(float)
+    return np.stack([x, y], axis=1)
+
+
+def values_from_cloud(message: PointCloud2, name: str) -> NDArray[np.float64] | None:
+    """Return one field of a cloud's points, shape (n,); None: it has no such field of 32 bits.
+
+    Raises:
+        ValueError: The cloud is not as long as it says.
+    """
+    for field in message.fields:
+        if field.name == name and field.datatype == PointField.FLOAT32:
+            kind = np.dtype(
+                {
+                    'names': [name],
+                    'formats': ['>f4' if message.is_bigendian else '<f4'],
+                    'offsets': [field.offset],
+                    'itemsize': message.point_step,
+                }
+            )
+            count = message.width * message.height
+            points = np.frombuffer(bytes(message.data), dtype=kind, count=count)
+            return np.asarray(points[name], dtype=np.float64)
+    return None

@@ -17,7 +17,7 @@ from std_msgs.msg import Header
 from surveillance_controllers import conversions
 from surveillance_controllers.battery.model import Battery, BatteryParameters
 from surveillance_controllers.motion.path_following import Velocity
-from surveillance_runtime.conversions import cloud_from_points, points_from_cloud
+from surveillance_runtime.conversions import cloud_from_points, points_from_cloud, values_from_cloud
 
 NUMBER = st.floats(-1e4, 1e4)
 YAW = st.floats(-3.1, 3.1)
@@ -50,9 +50,12 @@ def test_poses_come_back(x: float, y: float, yaw: float) -> None:
 @settings(max_examples=40)
 def test_clouds_come_back(points: list[tuple[float, float]]) -> None:
     array = np.array(points).reshape(-1, 2)
-    cloud = cloud_from_points(array)
+    stays = array[:, 0] > 0
+    cloud = cloud_from_points(array, stays=stays)
     assert cloud.width == len(points)
     assert points_from_cloud(cloud) == pytest.approx(array, abs=1e-4)
+    assert np.array_equal(values_from_cloud(cloud, 'stays'), stays)
+    assert values_from_cloud(cloud, 'intensity') is None
 
 
 def test_a_cloud_without_coordinates_is_refused() -> None:

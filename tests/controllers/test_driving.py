@@ -103,6 +103,25 @@ def test_an_obstacle_seen_far_ahead_on_the_path_asks_for_another_one_at_once() -
     assert velocity == Velocity()
 
 
+def test_a_path_in_spite_of_an_obstacle_is_followed_until_something_stands_there() -> None:
+    drive = Drive([[0, 0], [4, 0]])
+    robot = Robot(drive)
+    robot.run(1.0)
+    drive.heed(np.array([[2.5, 0.1]]))
+    assert drive.state is State.ASKING
+    drive.new_path([robot.pose[:2], (4, 0)])
+    drive.heed(np.array([[2.5, 0.1], [2.5, 0.15]]))
+    assert drive.state is State.DRIVING
+    robot.wall = 2.5
+    robot.run(60, until=State.WAITING)
+    assert 1.5 < robot.pose[0] < 2.5 - DriveParameters().radius
+    robot.wall = None
+    robot.run(60, until=State.ASKING)
+    drive.new_path([robot.pose[:2], (4, 0)])
+    robot.run(60)
+    assert drive.state is State.ARRIVED
+
+
 def test_a_robot_that_was_carried_off_asks_for_another_path() -> None:
     drive = Drive([[0, 0], [4, 0]])
     robot = Robot(drive)

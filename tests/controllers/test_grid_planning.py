@@ -109,6 +109,30 @@ def test_a_goal_that_an_obstacle_covers_is_approached() -> None:
         planner.plan((0.5, 2), (7, 2))
 
 
+def test_who_may_leave_a_door_is_planned_through_unless_there_is_a_way_round() -> None:
+    planner = GridPlanner(two_rooms(), ROBOT)
+    planner.set_obstacles([(4.02, 2.0), (2.0, 2.0)], np.array([False, True]))
+    path = geometry.equally_spaced(planner.plan((1, 2), (7, 2)), 0.02)
+    assert np.hypot(*(path - (4.02, 2)).T).min() < ROBOT.radius
+    assert np.hypot(*(path - (2, 2)).T).min() >= ROBOT.radius
+    planner.set_obstacles([(4.02, 2.0)])
+    with pytest.raises(NoPathError, match=r'an obstacle at \(4\.02, 2\.00\) is in the way'):
+        planner.plan((1, 2), (7, 2))
+    planner.set_obstacles([(2.0, 2.0)], np.array([False]))
+    planner.set_closed({'D1': (4.02, 1.5, 4.02, 2.5)})
+    with pytest.raises(NoPathError, match='the closed door D1 is in the way'):
+        planner.plan((1, 2), (7, 2))
+
+
+def test_a_goal_beside_a_door_is_not_moved_through_it() -> None:
+    planner = GridPlanner(two_rooms(), ROBOT, {'D1': (4.02, 1.5, 4.02, 2.5)})
+    planner.set_obstacles([(4.2, y) for y in np.arange(1.5, 2.6, 0.05)])
+    # On this side of the door the place nearest to the goal is reached, through the door none is.
+    assert planner.plan((6, 2), (4.2, 2.0))[-1][0] > 4.4
+    with pytest.raises(NoPathError, match=r'the goal \(4\.20, 2\.00\) is .* from an obstacle'):
+        planner.plan((1, 2), (4.2, 2.0))
+
+
 def test_a_robot_pushed_against_a_wall_finds_its_way_out() -> None:
     planner = GridPlanner(two_rooms(), ROBOT)
     path = planner.plan((0.2, 1), (3, 1))

@@ -138,6 +138,21 @@ def test_obstacles_are_forgotten_when_rays_go_through_them(flat: Any) -> None:
     assert len(memory.points) == 0
 
 
+def test_what_stands_for_long_stays_and_whoever_comes_later_may_leave(flat: Any) -> None:
+    memory = ObstacleMemory(flat.grid, settle=30.0, gap=5.0)
+    pose = (1.0, 1.5, 0.0)
+    scan = flat.scan(pose, [(2.5, 1.2, 0.15)])
+    memory.update(pose, scan, 0.0)
+    # Nobody knows who stood there in between.
+    for moment in (40.0, 44.0, 48.0, 52.0, 56.0, 60.0, 64.0, 68.0):
+        memory.update(pose, scan, moment)
+        assert not memory.stay.any()
+    assert memory.update(pose, scan, 71.0)
+    assert memory.stay.all()
+    memory.update(pose, scan, 120.0)
+    assert memory.stay.all()
+
+
 def test_obstacles_that_stay_unseen_are_forgotten_in_the_end(flat: Any) -> None:
     memory = ObstacleMemory(flat.grid, keep=10.0)
     pose = (1.0, 1.5, 0.0)

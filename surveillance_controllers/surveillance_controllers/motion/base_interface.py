@@ -273,7 +273,7 @@ class RobotBase:
             self._node.get_logger().info(f'found itself at ({x:.2f}, {y:.2f})')
         if navigator.obstacles_changed:
             navigator.obstacles_changed = False
-            cloud = cloud_from_points(navigator.obstacles)
+            cloud = cloud_from_points(navigator.obstacles, stays=navigator.obstacles_stay)
             cloud.header.stamp = stamp
             self._obstacles.publish(cloud)
         if navigator.odometry is not None:

@@ -140,6 +140,8 @@ class Drive:
         self._backed = 0.0
         self._last: Pose | None = None
         self._lost_since: float | None = None
+        self._obstacles: Points = np.zeros((0, 2))
+        self._through = False
         self._moved_at = -math.inf
         self._trouble_since = -math.inf
 
@@ -200,16 +202,25 @@ class Drive:
         return self._follower.halt(seen, dt)
 
     def heed(self, obstacles: Points) -> None:
-        """Take the obstacles known now (map frame); ask for another path if one is on the path."""
-        r = self._recovery
+        """Take the obstacles known now (map frame); ask for another path if one is on the path.
+
+        A path that was found in spite of an obstacle is followed up to there: it may go away.
+        """
+        self._obstacles = obstacles
         if self.state is State.DRIVING and self._now is not None:
-            reach = self._robot.radius + self._robot.margin / 2
-            if not self._follower.is_clear(obstacles, reach, r.look_ahead):
+            before, self._through = self._through, self._is_through()
+            if self._through and not before:
                 self._ask(self._now, 'something is on the path ahead')
+
+    def _is_through(self) -> bool:
+        """Tell whether an obstacle is on the path ahead."""
+        reach = self._robot.radius + self._robot.margin / 2
+        return not self._follower.is_clear(self._obstacles, reach, self._recovery.look_ahead)
 
     def new_path(self, path: ArrayLike) -> None:
         """Go on along another path."""
         self._follower = PathFollower(path, self._robot)
+        self._through = self._is_through()
         self.state = State.DRIVING
         self._blocked_since = self._mark = None
         self._best = 0.0

@@ -11,7 +11,7 @@ import math
 from collections.abc import Iterable, Mapping
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from surveillance_controllers.geometry import Points, Pose, Scan, in_map, relative
 from surveillance_controllers.motion.driving import Drive, Spin
@@ -107,6 +107,11 @@ class Navigator:
     def obstacles(self) -> Points:
         """Obstacles that the map does not have, shape (n, 2), metres, map frame."""
         return np.zeros((0, 2)) if self._memory is None else self._memory.points
+
+    @property
+    def obstacles_stay(self) -> NDArray[np.bool_]:
+        """Which of the obstacles stay, shape (n,); the others may be people."""
+        return np.zeros(0, np.bool_) if self._memory is None else self._memory.stay
 
     def set_map(self, grid: GridMap) -> None:
         """Take the map, or another one."""

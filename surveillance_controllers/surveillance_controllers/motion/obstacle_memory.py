@@ -1,19 +1,29 @@
 """What the lidar sees and the map does not have, remembered until it is seen to be gone.
 
 A point counts when it lies well away from everything the map has occupied. It is forgotten when a
-ray goes through where it was, or when it has not been seen for a long time.
+ray goes through where it was, or when it has not been seen for a long time. It stays once it was
+seen to stand for longer than people rest; until then it may go away.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from surveillance_controllers.geometry import Points, Pose, Scan, composed, in_map
 from surveillance_controllers.planning.grid_map import GridMap, distance_to
+
+
+@dataclass
+class _Sight:
+    """When a point was seen first and last, seconds."""
+
+    since: float
+    last: float
 
 
 class ObstacleMemory:
@@ -25,6 +35,8 @@ class ObstacleMemory:
         apart: Nearer than this to what the map has, a point is the map's, metres.
         reach: Points further from the robot than this are not taken, metres.
         keep: How long an obstacle that is not seen again is remembered, seconds.
+        settle: What was seen to stand for this long stays, seconds.
+        gap: What was not seen for this long may be another one that stands there, seconds.
     """
 
     def __init__(
@@ -34,12 +46,16 @@ class ObstacleMemory:
         apart: float = 0.25,
         reach: float = 4.0,
         keep: float = 120.0,
+        settle: float = 30.0,
+        gap: float = 5.0,
     ) -> None:
         self._cell = cell
         self._apart = apart
         self._reach = reach
         self._keep = keep
-        self._seen: dict[tuple[int, int], float] = {}
+        self._settle = settle
+        self._gap = gap
+        self._seen: dict[tuple[int, int], _Sight] = {}
         self.set_map(grid)
 
     def set_map(self, grid: GridMap) -> None:
@@ -58,6 +74,14 @@ class ObstacleMemory:
         """The obstacles, points of shape (n, 2), metres, map frame."""
         cells = np.array(sorted(self._seen), dtype=float).reshape(-1, 2)
         return (cells + 0.5) * self._cell
+
+    @property
+    def stay(self) -> NDArray[np.bool_]:
+        """Which of the obstacles stay, shape (n,); the others may be people."""
+        return np.array([self._stays(self._seen[cell]) for cell in sorted(self._seen)], np.bool_)
+
+    def _stays(self, sight: _Sight) -> bool:
+        return sight.last - sight.since >= self._settle
 
     def is_unknown(self, points: Points, apart: float) -> NDArray[np.bool_]:
         """Tell which points, shape (n, 2), lie on the map and further than `apart` metres from
@@ -88,9 +112,9 @@ class ObstacleMemory:
             may_move: Tells which points are not remembered, for what they belong to may move.
 
         Returns:
-            Whether the obstacles changed.
+            Whether the obstacles changed, or one of them stays from now on.
         """
-        before = set(self._seen)
+        before = self._standing()
         self._forget(pose, scan, now)
         local = scan.points
         local = local[(local**2).sum(axis=1) <= self._reach**2]
@@ -99,8 +123,14 @@ class ObstacleMemory:
         if may_move is not None:
             new = new[~may_move(new)]
         for column, row in np.floor(new / self._cell).astype(int).tolist():
-            self._seen[column, row] = now
-        return set(self._seen) != before
+            sight = self._seen.setdefault((column, row), _Sight(now, now))
+            if now - sight.last > self._gap and not self._stays(sight):
+                sight.since = now
+            sight.last = now
+        return self._standing() != before
+
+    def _standing(self) -> dict[tuple[int, int], bool]:
+        return {cell: self._stays(sight) for cell, sight in self._seen.items()}
 
     def _forget(self, pose: Pose, scan: Scan, now: float) -> None:
         if not self._seen:
@@ -119,5 +149,5 @@ class ObstacleMemory:
         around = [beyond[np.clip(ray + offset, 0, count - 1)] for offset in (-1, 0, 1)]
         gone = (ray < count) & (np.minimum.reduce(around) > distance + 2 * self._cell)
         for cell, is_gone in zip(cells, gone, strict=True):
-            if is_gone or now - self._seen[cell] > self._keep:
+            if is_gone or now - self._seen[cell].last > self._keep:
                 del self._seen[cell]

@@ -21,7 +21,7 @@ from skimage.graph import MCP_Geometric
 
 from surveillance_controllers import geometry
 from surveillance_controllers.geometry import Points
-from surveillance_controllers.planning.grid_map import GridMap, distance_to, points_on
+from surveillance_controllers.planning.grid_map import GridMap, distance_to, points_on, with_walls
 from surveillance_controllers.planning.grid_search import GridSearch
 from surveillance_runtime.parameters import parameter
 
@@ -66,12 +66,15 @@ class GridPlanner:
     Args:
         grid: The map.
         parameters: The robot's size, margins and costs.
+        doors: All doors, open or closed: a goal is not moved through one.
     """
 
     grid: GridMap
     parameters: PlanningParameters = field(default_factory=PlanningParameters)
+    doors: Lines = field(default_factory=dict)
     _closed: Lines = field(default_factory=dict, init=False)
     _obstacles: Points = field(default_factory=lambda: np.zeros((0, 2)), init=False)
+    _lasting: Points = field(default_factory=lambda: np.zeros((0, 2)), init=False)
     _extra: set[tuple[int, int]] = field(default_factory=set, init=False)
 
     def __post_init__(self) -> None:
@@ -83,6 +86,8 @@ class GridPlanner:
         self._price_cells(np.s_[:, :])
         self._search = GridSearch(self._cost)
         self._divide()
+        rooms = with_walls(self.grid, list(self.doors.values())).free
+        self._rooms = cv2.connectedComponents(rooms.astype(np.uint8), connectivity=4)[1]
 
     def set_closed(self, doors: Lines) -> None:
         """Close doors: nothing leads across their segments. Replaces what was closed before."""
@@ -90,11 +95,21 @@ class GridPlanner:
             self._closed = dict(doors)
             self._update()
 
-    def set_obstacles(self, points: ArrayLike) -> None:
-        """Take obstacles that the map does not have, points of shape (n, 2) on their surface."""
+    def set_obstacles(self, points: ArrayLike, stay: NDArray[np.bool_] | None = None) -> None:
+        """Take obstacles that the map does not have.
+
+        Args:
+            points: Shape (n, 2), on their surface.
+            stay: Which of them stay, shape (n,); the others may be gone when the robot comes
+                there. None: all of them.
+        """
         array = np.asarray(points, dtype=float).reshape(-1, 2)
-        if not np.array_equal(array, self._obstacles):
-            self._obstacles = array
+        self._lasting = array if stay is None else array[stay]
+        self._take(array)
+
+    def _take(self, obstacles: Points) -> None:
+        if not np.array_equal(obstacles, self._obstacles):
+            self._obstacles = obstacles
             self._update()
 
     @property
@@ -118,6 +133,8 @@ class GridPlanner:
     def plan(self, start: ArrayLike, goal: ArrayLike) -> Points:
         """Find the way from one point to another.
 
+        Where none leads around all obstacles, it leads through those that may be gone by then.
+
         Args:
             start: x, y in metres; when it is not free, the path leaves it by the shortest way.
             goal: x, y in metres; when an obstacle that the map does not have stands there, the
@@ -131,6 +148,20 @@ class GridPlanner:
         """
         begin: Points = np.asarray(start, dtype=float)[:2]
         end: Points = np.asarray(goal, dtype=float)[:2]
+        try:
+            return self._way(begin, end)
+        except NoPathError:
+            if len(self._lasting) == len(self._obstacles):
+                raise
+        everything = self._obstacles
+        self._take(self._lasting)
+        try:
+            return self._way(begin, end)
+        finally:
+            self._take(everything)
+
+    def _way(self, begin: Points, end: Points) -> Points:
+        """Find the way around everything that is known; see `plan`."""
         goal_cell = self._cell('the goal', end)
         start_cell = self._free_cell_near(begin)
         if self._regions[goal_cell] == 0:
@@ -228,12 +259,13 @@ class GridPlanner:
     def _cell_beside(
         self, goal: Points, cell: tuple[int, int], start: tuple[int, int]
     ) -> tuple[int, int]:
-        """Return the cell nearest to a goal that an obstacle covers, among those that can be
-        reached.
+        """Return the cell nearest to a goal that an obstacle covers, among those of the same room
+        that can be reached.
         """
         needed = self.parameters.radius + self.parameters.margin
         if self._static[cell] >= needed:
             region = self._regions == self._regions[start]
+            region &= self._rooms == self._rooms[cell]
             for nearest in self._cells_around(cell, self.parameters.goal_shift, region):
                 return nearest
         raise NoPathError(f'the goal {_shown(goal)} {self._why_not_free(goal)}')

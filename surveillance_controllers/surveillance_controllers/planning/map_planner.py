@@ -11,7 +11,7 @@ from itertools import combinations, pairwise
 import numpy as np
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from sensor_msgs.msg import PointCloud2
 
 from surveillance_controllers import conversions
@@ -22,7 +22,7 @@ from surveillance_controllers.planning.door_watch import DoorWatch
 from surveillance_controllers.planning.grid_planning import GridPlanner, NoPathError
 from surveillance_fsm import Interrupt
 from surveillance_fsm.ros import GoalAbortedError, GoalRun
-from surveillance_runtime.conversions import points_from_cloud
+from surveillance_runtime.conversions import points_from_cloud, values_from_cloud
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import STATE_QOS
 
@@ -41,11 +41,12 @@ class NavigationPlanning:
         self._knowledge = knowledge
         self._timeout = peer_timeout
         self._parameters = planning_parameters(node)
-        self._doors = DoorWatch(node, door_segments(node), knowledge, peer_timeout)
+        self._segments = door_segments(node)
+        self._doors = DoorWatch(node, self._segments, knowledge, peer_timeout)
         self._lock = threading.Lock()
         self._has_map = Interrupt()
         self._planner: GridPlanner | None = None
-        self._obstacles: Points = np.zeros((0, 2))
+        self._obstacles: tuple[Points, NDArray[np.bool_] | None] = np.zeros((0, 2)), None
         self._pose: Pose | None = None
         node.create_subscription(OccupancyGrid, 'map', self._on_map, STATE_QOS)
         node.create_subscription(PointCloud2, 'obstacles', self._on_obstacles, STATE_QOS)
@@ -91,7 +92,7 @@ class NavigationPlanning:
         closed = self._doors.closed_segments(run.interrupt)
         with self._lock:
             self._planner.set_closed(closed)
-            self._planner.set_obstacles(self._obstacles)
+            self._planner.set_obstacles(*self._obstacles)
             try:
                 path = self._planner.plan(start, goal)
             except NoPathError as error:
@@ -100,14 +101,16 @@ class NavigationPlanning:
 
     def _on_map(self, message: OccupancyGrid) -> None:
         with conversions.refusing(self._node, 'map'):
-            planner = GridPlanner(conversions.grid_from(message), self._parameters)
+            grid = conversions.grid_from(message)
+            planner = GridPlanner(grid, self._parameters, self._segments)
             with self._lock:
                 self._planner = planner
             self._has_map.set()
 
     def _on_obstacles(self, message: PointCloud2) -> None:
         with conversions.refusing(self._node, 'obstacles'):
-            self._obstacles = points_from_cloud(message)
+            stays = values_from_cloud(message, 'stays')
+            self._obstacles = points_from_cloud(message), None if stays is None else stays > 0
 
     def _on_pose(self, message: PoseWithCovarianceStamped) -> None:
         with conversions.refusing(self._node, 'amcl_pose'):
