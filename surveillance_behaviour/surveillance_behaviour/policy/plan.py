@@ -3,7 +3,8 @@
 A plan follows a `Course`: targets on the way in, and a round that is walked again and again. The
 search has three steps.
 
-1. `rounds` looks for a short round that the rules allow (simulated annealing).
+1. `rounds` looks for a short round that the rules allow (simulated annealing); where the robot
+   would have to wait on it, also for one that is filled with further visits.
 2. Ways into that round are compared by simulating each from where the robot is until the patrol
    repeats itself (`rollout`), which gives the longest wait for ever. So are the walks of the
    simple policies `oldest` and `lookahead`: the plan is never worse than those.
@@ -250,7 +251,8 @@ class Plan:
         if length > rules.least_period:  # Else they wait by walking more.
             starts += filter(None, ([*rules.laps(walk.walk)] for walk in walks))
         self._search = RoundSearch(rules, starts)
-        self._search_on(work / 2.0)
+        filled = self._filled(starts, work / 4.0) if length < rules.least_period else ()
+        self._search_on(self._search, work / 4.0 if filled else work / 2.0)
         self._course = course or self._entered(self._phases()[0])
         self._outcome = self._followed(self._course, math.inf)
         phases = [*self._phases(), *range(len(self._search.best.targets))]
@@ -261,6 +263,7 @@ class Plan:
             for skip in SKIPS
             for patience in (0.0, courses[0].patience, math.inf)
         ]
+        courses[2:2] = [self._entered(phase, filled) for phase in range(len(filled))]
         self._climb(iter(courses), work / 2.0)
         for walk in walks:
             if (back := walk.repeated_from(rules.count)) is not None:
@@ -270,7 +273,7 @@ class Plan:
         """Go on with the search from where the robot is."""
         if self._state.place == self._sent and self._finished():
             return
-        self._search_on(MORE_WORK / 2.0)
+        self._search_on(self._search, MORE_WORK / 2.0)
         # The present course and two others are simulated, as soon as there was the work for that.
         self._spared = min(self._spared + MORE_WORK / 2.0, MOST_WORK)
         if 3.0 * MOVE_WORK * len(self._outcome.walk) > self._spared:
@@ -284,9 +287,15 @@ class Plan:
         """Return whether no better course is looked for."""
         return self._search.finished and self._outcome.first <= GOOD_ENOUGH * self._bound
 
-    def _search_on(self, work: float) -> None:
+    def _filled(self, starts: list[list[tuple[int, ...]]], work: float) -> tuple[int, ...]:
+        """Return a lawful round in which the robot need not wait; empty: none was found."""
+        search = RoundSearch(self._rules, starts, fills=True)
+        self._search_on(search, work)
+        return () if search.best.breaches else search.best.targets
+
+    def _search_on(self, search: RoundSearch, work: float) -> None:
         """Go on looking for a better round."""
-        search, end = self._search, self._search.work + work
+        end = search.work + work
         while search.work < end and not search.finished and not self._late():
             search.improve(SLICE_WORK)
 
@@ -329,9 +338,10 @@ class Plan:
         lasting = max(0, round(100.0 * (outcome.settled - self._accepted) / bound))
         return lasting, round(100.0 * outcome.first / bound), outcome.settled
 
-    def _entered(self, phase: int) -> Course:
-        """Return the course that begins the best round with one of its targets."""
-        targets = self._search.best.targets
+    def _entered(self, phase: int, targets: tuple[int, ...] = ()) -> Course:
+        """Return the course that begins a round, the best one if none is given, with one of its
+        targets."""
+        targets = targets or self._search.best.targets
         rules = self._rules
         wait = max(0.0, rules.least_period - rules.length(targets))
         patience = wait + 2.0 * rules.mean_leg

@@ -6,6 +6,10 @@ whether the rules allow the step. The search makes the round short and lawful: t
 is its length plus a penalty for each step that the rules forbid, and simulated annealing changes
 the round where that costs little. It begins with a short tour, which usually needs a few changes:
 a place beside the way that the rules would force the robot into is taken along.
+
+Where places may be entered only when they are URGENT, a round can be shorter than they allow. Then
+the robot waits by going to and fro, or the round is filled: another search adds the visits that
+make it just long enough.
 """
 
 from __future__ import annotations
@@ -21,8 +25,10 @@ from surveillance_behaviour.policy.rollout import RuleMap
 
 PENALTY = 4.0
 """What a forbidden step costs, in mean legs."""
-HEAT = 0.04
-"""The first temperature of an annealing, in penalties."""
+HEAT, FILLING_HEAT = 0.04, 0.3
+"""The first temperature of an annealing, in penalties; of one that fills rounds."""
+FILLING = 0.1
+"""Part of the changes that add a visit where rounds are filled."""
 FIRST_CYCLE = 200_000.0
 """Work of the first annealing; each later one takes twice as much as the one before."""
 ALL_WORK = 10e6
@@ -65,14 +71,21 @@ class RoundSearch:
     Args:
         rules: The map.
         starts: Groups of rounds; the first annealings begin with the best of each group.
+        fills: Whether a round must be as long as the rules demand by what it visits; else the robot
+            is taken to wait before the first target.
 
     Attributes:
         best: The best round so far.
         work: Work done so far.
     """
 
-    def __init__(self, rules: RuleMap, starts: Iterable[Iterable[tuple[int, ...]]]) -> None:
+    def __init__(
+        self, rules: RuleMap, starts: Iterable[Iterable[tuple[int, ...]]], *, fills: bool = False
+    ) -> None:
         self._rules = rules
+        self._least = 0.0 if fills else rules.least_period
+        self._heat = FILLING_HEAT if fills else HEAT
+        self._filling = FILLING if fills else 0.0
         self._draw = random.Random(0)
         self._penalty = PENALTY * rules.mean_leg
         self.work = 0.0
@@ -88,15 +101,12 @@ class RoundSearch:
     def judged(self, targets: tuple[int, ...], limit: float = math.inf) -> Round:
         """Return a round with its length and the steps that the rules forbid.
 
-        Where the round is shorter than the places allow that may be entered only when URGENT, the
-        robot is taken to wait before the first target.
-
         Args:
             targets: Of the round.
             limit: Of the cost; a round that costs more may be judged in part only.
         """
         walk, ends, times = self._walked(targets)
-        length = max(times[-1] if times else 0.0, self._rules.least_period)
+        length = max(times[-1] if times else 0.0, self._least)
         most = (limit - length) / max(self._penalty, 1e-9)
         breaches = self._breaches(walk, ends, times, length, most)
         return Round(targets, length, tuple(breaches))
@@ -167,9 +177,11 @@ class RoundSearch:
                 self._cycle_end = self.work + self._cycle
                 self._take(self._starts.pop(0) if self._starts else self.best)
             cooling = (self._cycle_end - self.work) / self._cycle
-            heat = HEAT * self._penalty * max(0.0, cooling)
+            heat = self._heat * self._penalty * max(0.0, cooling)
             limit = self._cost + 6.0 * heat
-            targets = self._changes.one(limit)
+            changes = self._changes
+            fill = self._filling and self._draw.random() < self._filling
+            targets = changes.doubled(limit) if fill else changes.one(limit)
             if targets is None:
                 continue
             found = self.judged(targets, limit)
