@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from surveillance_ontology.documents.structural import DEEPEST, MOST_DIGITS, Axioms, Call
-from surveillance_ontology.documents.xml_reading import XML, XmlReader
+from surveillance_ontology.documents.xml_reading import XML, XmlReader, is_absolute
 from surveillance_ontology.owl.expressions import Literal
 from surveillance_ontology.owl.vocabulary import OWL, RDF
 
@@ -62,8 +62,18 @@ class _Reader(XmlReader):
         line = self.parser.CurrentLineNumber
         element = _Element(name.removeprefix(OWL), attributes, line, base, language)
         if self.depth == 1 and 'ontologyIRI' in attributes:
-            self.stated.iri = self.resolve(base, attributes['ontologyIRI'])
+            self.stated.iri = self.named(base, attributes['ontologyIRI'])
         self._stack.append(element)
+
+    def named(self, base: str, reference: str) -> str:
+        """Return the IRI that a reference stands for.
+
+        The OWL API leaves the base away where an IRI begins with it, and puts it before what is no
+        whole IRI. For 'A' with a base ending in '#', and for '/A', that is not RFC 3986.
+        """
+        if reference[:1] in ('', '#', '.') or reference.startswith('//') or is_absolute(reference):
+            return self.resolve(base, reference)
+        return self.resolve(base, base + reference)
 
     def characters(self, text: str) -> None:
         element = self._stack[-1]
@@ -93,7 +103,7 @@ class _Reader(XmlReader):
             return self._literal(element)
         text = ''.join(element.text).strip()
         if name == 'IRI':
-            return self.resolve(element.base, text)
+            return self.named(element.base, text)
         if name == 'AbbreviatedIRI':
             return self._named(text)
         if name == 'AnonymousIndividual':
@@ -106,7 +116,7 @@ class _Reader(XmlReader):
         """Return an element's parts as the functional syntax has them."""
         name, parts = element.name, element.parts
         if name == 'Import':
-            return (self.resolve(element.base, ''.join(element.text).strip()),)
+            return (self.named(element.base, ''.join(element.text).strip()),)
         if 'cardinality' in element.attributes:
             number = element.attributes['cardinality']
             if not (number.isascii() and number.isdigit() and len(number) <= MOST_DIGITS):
@@ -115,7 +125,7 @@ class _Reader(XmlReader):
         if name == 'BuiltInAtom':
             return (self._iri(element), *parts)
         if name == 'FacetRestriction':
-            return (self.resolve(element.base, self._attribute(element, 'facet')), *parts)
+            return (self.named(element.base, self._attribute(element, 'facet')), *parts)
         if name == 'DatatypeRestriction':
             facets = (part.parts if isinstance(part, Call) else (part,) for part in parts)
             return tuple(part for found in facets for part in found)
@@ -126,7 +136,7 @@ class _Reader(XmlReader):
     def _literal(self, element: _Element) -> Literal:
         text = ''.join(element.text)
         if 'datatypeIRI' in element.attributes:
-            datatype = self.resolve(element.base, element.attributes['datatypeIRI'])
+            datatype = self.named(element.base, element.attributes['datatypeIRI'])
             if datatype not in (_PLAIN, RDF + 'langString'):
                 return Literal(text, datatype)
         if element.language:
@@ -136,7 +146,7 @@ class _Reader(XmlReader):
     def _iri(self, element: _Element) -> str:
         if 'abbreviatedIRI' in element.attributes:
             return self._named(element.attributes['abbreviatedIRI'])
-        return self.resolve(element.base, self._attribute(element, 'IRI'))
+        return self.named(element.base, self._attribute(element, 'IRI'))
 
     def _named(self, name: str) -> str:
         iri = self.stated.named(name)

@@ -43,6 +43,11 @@ class IllFormedError(OntologyFileError):
     """A statement that says nothing: it is left out, and reported."""
 
 
+def is_absolute(reference: str) -> bool:
+    """Tell whether an IRI reference names its scheme."""
+    return _ABSOLUTE.match(reference) is not None
+
+
 def resolve(base: str, reference: str) -> str:
     """Return an IRI reference against a base IRI (RFC 3986).
 
@@ -52,7 +57,7 @@ def resolve(base: str, reference: str) -> str:
     found = _FORBIDDEN.search(reference)
     if found:
         raise OntologyFileError(f'IRI {reference!r} contains {found.group()!r}')
-    if _ABSOLUTE.match(reference):
+    if is_absolute(reference):
         return reference
     stem = base.partition('#')[0]
     if not reference:

@@ -277,3 +277,25 @@ def test_individuals_without_a_name_of_two_documents_are_two(tmp_path: Path) -> 
     main = written('main.ofn', 'Import(<http://x/upper>) ClassAssertion(:Door _:b)')
     kinds = [a for a in read_ontology(main, IRI).axioms if isinstance(a, ax.ClassAssertion)]
     assert len({axiom.individual for axiom in kinds}) == len(kinds) == 2
+
+
+@pytest.mark.parametrize(
+    ('base', 'reference', 'iri'),
+    [
+        ('http://x/onto', '#A', 'http://x/onto#A'),
+        ('http://x/onto#', 'A', 'http://x/onto#A'),
+        ('http://x/onto#', '#A', 'http://x/onto#A'),
+        ('http://x/onto', '/A', 'http://x/onto/A'),
+        ('http://x/onto/', 'A', 'http://x/onto/A'),
+        ('http://x/onto/', '../A', 'http://x/A'),
+        ('http://x/onto#', 'urn:a:A', 'urn:a:A'),
+    ],
+)
+def test_names_in_owl_xml_are_those_that_the_owl_api_shortened(
+    base: str, reference: str, iri: str
+) -> None:
+    text = (
+        f'<Ontology xmlns="http://www.w3.org/2002/07/owl#" xml:base="{base}" ontologyIRI="{base}">'
+        f'<SubClassOf><Class IRI="{reference}"/><Class IRI="http://x/B"/></SubClassOf></Ontology>'
+    )
+    assert read_ontology(text.encode(), IRI).axioms == [ax.SubClassOf(iri, 'http://x/B')]
