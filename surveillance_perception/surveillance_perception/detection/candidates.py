@@ -7,12 +7,13 @@ few tenths of a pixel wrong, which `template_fit` repairs, but they are there. `
 sides of those that are wrong by up to a cell.
 
 Of the hundreds of dark outlines in a textured image only a few pass `BorderCheck`, and every marker
-that can be read does. A candidate costs 73 samples there and some thousands in `template_fit`.
+that can be read does. A candidate costs 97 samples there and some thousands in `template_fit`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -62,8 +63,8 @@ def dark_masks(
     Args:
         image: (height, width) grey levels.
         windows: Sides in pixels of the neighbourhoods that a border is compared with, odd; one
-            mask for each. Wide ones, which only large markers need, are taken from the halved
-            image.
+            mask for each, in their order. Wide ones, which only large markers need, are taken
+            from the halved image.
         contrast: How many grey levels darker.
         bridges: Lengths in pixels of gaps to close in the first mask, along columns and along
             rows, each in a mask of its own: a marker seen at a flat angle has a border thinner
@@ -124,10 +125,10 @@ def quads_around(
     for mask, scale in masks:
         if len(seen) > limit:
             break
-        contours = _outlines_in(mask, min_length / scale, _LEAST_WIDTH)
-        if not contours:
+        blobs = _blobs_in(mask, min_length / scale, _LEAST_WIDTH)
+        if blobs is None:
             continue
-        boxes, scatter = _measured(contours)
+        outlines, boxes, scatter = blobs
         kept = np.flatnonzero(scatter < _MOST_SCATTER)
         kept = kept[np.argsort(scatter[kept])]
         quads = []
@@ -139,7 +140,7 @@ def quads_around(
             if (blob := tuple(box)) in seen:
                 continue
             seen.add(blob)
-            quad = _quad_around(contours[index], _MIN_AREA / scale**2)
+            quad = _quad_around(outlines[index], _MIN_AREA / scale**2)
             if quad is not None:
                 quads.append(quad)
         if quads:
@@ -149,55 +150,74 @@ def quads_around(
     return np.concatenate(found) if found else np.zeros((0, 4, 2))
 
 
-def _outlines_in(mask: Grey, length: float, width: float) -> list[Outline]:
-    """Return the outlines (k, 1, 2) of a mask's blobs of at least a length and a width in pixels.
+class _Blobs(NamedTuple):
+    """Outer outlines of a mask's blobs.
 
-    One with more corners than its box has pixels around it is no quadrilateral's.
+    Attributes:
+        outlines: (n, 1, 2) points of each.
+        boxes: (k, 4) left, top, right, bottom of each.
+        scatter: (k,) 1 for a parallelogram, 1.33 for a triangle, the more, the further a blob's
+            parts lie from its middle. It is the first affine moment invariant (Flusser and Suk,
+            "Pattern recognition by affine moment invariants", Pattern Recognition 26(1), 1993),
+            relative to a parallelogram's.
     """
-    contours, _ = cv2.findContours(mask, cv2.RETR_LIST, cv2.CHAIN_APPROX_SIMPLE)
-    contours = [contour for contour in contours if len(contour) >= 4]
-    if not contours:
-        return []
-    counts, starts, points = _joined(contours)
-    size = np.maximum.reduceat(points, starts) - np.minimum.reduceat(points, starts) + 1
-    kept = (size.max(axis=1) >= length) & (size.min(axis=1) >= width)
-    kept &= counts <= 2 * size.sum(axis=1)
-    return [contours[index] for index in np.flatnonzero(kept).tolist()]
+
+    outlines: list[Outline]
+    boxes: Indices
+    scatter: Array
 
 
-def _joined(contours: Sequence[Outline]) -> tuple[Indices, Indices, npt.NDArray[np.int32]]:
-    """Return the lengths and starts of outlines within all their points (n, 2), and these."""
-    counts = np.fromiter(map(len, contours), np.int64, len(contours))
-    return counts, counts.cumsum() - counts, np.concatenate(contours)[:, 0]
+def _blobs_in(mask: Grey, length: float, width: float) -> _Blobs | None:
+    """Return a mask's blobs of at least a length and a width in pixels, measured all at once.
 
-
-def _measured(contours: Sequence[Outline]) -> tuple[Indices, Array]:
-    """Measure outlines (k, 1, 2), all at once.
-
-    Returns:
-        (k, 4) left, top, right, bottom of each; and (k,) its scatter: 1 for a parallelogram, 1.33
-        for a triangle, the more, the further its parts lie from its middle; infinite for holes.
-        It is the first affine moment invariant (Flusser and Suk, "Pattern recognition by affine
-        moment invariants", Pattern Recognition 26(1), 1993), relative to a parallelogram's.
+    One with more corners than its box has pixels around it is no quadrilateral.
     """
-    counts, starts, points = _joined(contours)
-    low, high = np.minimum.reduceat(points, starts), np.maximum.reduceat(points, starts)
-    following = np.arange(1, len(points) + 1)
-    following[starts + counts - 1] = starts
-    x, y = (points - low.repeat(counts, axis=0)).astype(float).T
-    u, v = x[following], y[following]
-    # moments of polygons by Green's theorem; outlines of holes run the other way round
+    outlines, hierarchy = cv2.findContours(mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE)
+    if not outlines:
+        return None
+    counts = np.fromiter(map(len, outlines), np.int64, len(outlines))
+    # outlines of holes have a parent
+    kept = np.flatnonzero((counts >= 4) & (hierarchy[0, :, 3] < 0))
+    if not len(kept):
+        return None
+    outlines, counts = [outlines[index] for index in kept.tolist()], counts[kept]
+    x, y = np.concatenate(outlines)[:, 0].T.copy()
+    starts = counts.cumsum() - counts
+    left, right = np.minimum.reduceat(x, starts), np.maximum.reduceat(x, starts)
+    top, bottom = np.minimum.reduceat(y, starts), np.maximum.reduceat(y, starts)
+    wide, high = right - left + 1, bottom - top + 1
+    large = (np.maximum(wide, high) >= length) & (np.minimum(wide, high) >= width)
+    large &= counts <= 2 * (wide + high)
+    if not large.any():
+        return None
+    within = large.repeat(counts)
+    boxes = np.stack([left, top, right + 1, bottom + 1], axis=1)[large].astype(np.int64)
+    return _Blobs(
+        [outlines[index] for index in np.flatnonzero(large).tolist()],
+        boxes,
+        _scatter(
+            x[within] - left.repeat(counts)[within],
+            y[within] - top.repeat(counts)[within],
+            counts[large],
+        ),
+    )
+
+
+def _scatter(x: Indices, y: Indices, counts: Indices) -> Array:
+    """Return the scatter (k,) of polygons with so many corners (k,) each, (n,) in all."""
+    starts = counts.cumsum() - counts
+    x, y = x.astype(float), y.astype(float)
+    u, v = np.roll(x, -1), np.roll(y, -1)
+    u[starts + counts - 1], v[starts + counts - 1] = x[starts], y[starts]
+    # moments of polygons by Green's theorem
     cross = u * y - x * v
-    terms = (x + u, y + v, x * x + x * u + u * u, y * y + y * v + v * v)
-    area = np.add.reduceat(cross, starts) / 2.0
-    hole = area <= 0.0
-    area[hole] = 1.0
+    area = np.maximum(np.add.reduceat(cross, starts) / 2.0, 1e-9)
+    terms = (x + u, y + v, x * x + (x + u) * u, y * y + (y + v) * v)
     mean_x, mean_y, xx, yy = (np.add.reduceat(cross * term, starts) / area for term in terms)
     xy = np.add.reduceat(cross * (2.0 * (x * y + u * v) + x * v + u * y), starts) / area
     spread_x, spread_y = xx / 12.0 - (mean_x / 6.0) ** 2, yy / 12.0 - (mean_y / 6.0) ** 2
     spread_xy = xy / 24.0 - mean_x * mean_y / 36.0
-    scatter = 144.0 * (spread_x * spread_y - spread_xy**2) / area**2
-    return np.hstack([low, high + 1]), np.where(hole, np.inf, scatter)
+    return np.asarray(144.0 * (spread_x * spread_y - spread_xy**2) / area**2)
 
 
 def distinct(quads: Quads, distance: float) -> npt.NDArray[np.int64]:

@@ -19,6 +19,8 @@ from surveillance_perception.detection.template_fit import (
     TemplateFit,
 )
 
+# along a side of a cell, until the likeliest codes are aligned
+_ROUGH_SAMPLES = 2
 _ROUGH_ITERATIONS = 5
 _FINE_ITERATIONS = 3
 _HYPOTHESES = 2
@@ -26,7 +28,7 @@ _RIVALS = 6
 _SHOWN = 0.5
 _LEAST_IF_SHOWN, _LEAST_IF_BLURRED = 0.65, 0.75
 _HYPOTHESIS_RATIO = 1.7
-_LEAST_ROUGH_CORRELATION = 0.7
+_LEAST_ROUGH_CORRELATION = 0.76
 _GOOD_CORRELATION = 0.98
 _STRONGER_BLURS = np.array([[1.6, 1.6], [2.4, 2.4], [0.8, 2.4], [2.4, 0.8]])
 
@@ -71,6 +73,7 @@ class MarkerReader:
     def __init__(self, codes: MarkerCodes, blur: float) -> None:
         self.codes = codes
         self._blur = blur
+        self._rough = TemplateFit(codes, _ROUGH_SAMPLES)
         self._fit = TemplateFit(codes)
         self._differences = CellDifferences(codes)
 
@@ -102,7 +105,9 @@ class MarkerReader:
             Those that look like a marker, at most m; None when there is none.
         """
         blur = np.full((len(homographies), 2), self._blur)
-        entries, correlation, patches, _ = self._score(pyramid, homographies, blur, None)
+        entries, correlation, patches, _ = self._score(
+            self._rough, pyramid, homographies, blur, None
+        )
         # blurred cells show little of their differences, but then the match is not far off
         shown = cells.correlation > _SHOWN
         likely = correlation[:, 0] > np.where(shown, _LEAST_IF_SHOWN, _LEAST_IF_BLURRED)
@@ -113,10 +118,12 @@ class MarkerReader:
         unexplained = 1.0 - np.square(np.maximum(correlation[:, :_HYPOTHESES], 0.0))
         close = unexplained < _HYPOTHESIS_RATIO * unexplained[:, :1] + 1e-6
         owner, column = np.nonzero(close)
-        aligned = self._fit.refine(
+        aligned = self._rough.refine(
             pyramid, homographies[owner], entries[owner, column], blur[owner], _ROUGH_ITERATIONS
         )
-        entries, correlation, patches, _ = self._score(pyramid, aligned, blur[owner], None)
+        entries, correlation, patches, _ = self._score(
+            self._rough, pyramid, aligned, blur[owner], None
+        )
         rank = np.lexsort((-correlation[:, 0], owner))
         best = rank[np.flatnonzero(np.diff(owner[rank], prepend=-1))]
         best = best[correlation[best, 0] > _LEAST_ROUGH_CORRELATION]
@@ -132,7 +139,9 @@ class MarkerReader:
         self, pyramid: ImagePyramid, homographies: Array, blur: Array, listed: Indices
     ) -> Readings:
         """Return readings of aligned candidates (m, 3, 3), with codes out of (m, j)."""
-        entries, correlation, patches, footprint = self._score(pyramid, homographies, blur, listed)
+        entries, correlation, patches, footprint = self._score(
+            self._fit, pyramid, homographies, blur, listed
+        )
         inner = self._fit.inner_correlations(patches, entries[:, :_RIVALS], footprint)
         cells = self._fit.cells(patches)
         shown = self._differences.read(cells)
@@ -149,13 +158,18 @@ class MarkerReader:
             np.where(shown.entries == entries[:, 0], shown.error, np.inf),
         )
 
+    @staticmethod
     def _score(
-        self, pyramid: ImagePyramid, homographies: Array, blur: Array, listed: Indices | None
+        fit: TemplateFit,
+        pyramid: ImagePyramid,
+        homographies: Array,
+        blur: Array,
+        listed: Indices | None,
     ) -> tuple[Indices, Patches, Patches, Footprint]:
-        levels = self._fit.levels(homographies)
-        patches = self._fit.sample(pyramid, homographies, levels)
-        footprint = self._fit.footprint(homographies, levels, blur)
-        return *self._fit.score(patches, footprint, listed), patches, footprint
+        levels = fit.levels(homographies)
+        patches = fit.sample(pyramid, homographies, levels)
+        footprint = fit.footprint(homographies, levels, blur)
+        return *fit.score(patches, footprint, listed), patches, footprint
 
     def _softened(
         self,
@@ -170,11 +184,11 @@ class MarkerReader:
         poor = np.flatnonzero(correlation < _GOOD_CORRELATION)
         if not len(poor):
             return entries, blur
-        levels = self._fit.levels(homographies[poor])
+        levels = self._rough.levels(homographies[poor])
         for stronger in _STRONGER_BLURS:
             tried = np.maximum(stronger, self._blur)
-            footprint = self._fit.footprint(homographies[poor], levels, tried)
-            found, agreement = self._fit.score(patches[poor], footprint, listed[poor])
+            footprint = self._rough.footprint(homographies[poor], levels, tried)
+            found, agreement = self._rough.score(patches[poor], footprint, listed[poor])
             better = agreement[:, 0] > correlation[poor]
             changed = poor[better]
             entries[changed] = found[better, 0]

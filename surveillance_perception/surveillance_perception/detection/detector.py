@@ -47,7 +47,7 @@ from surveillance_runtime.parameters import parameter
 
 _SAME_QUAD = 2.0
 _LARGE_CELL = 8.0
-_BATCH = 64
+_BATCH = 128
 _COVER = 0.7
 # share of the cells that may rather have the other colour: cells a pixel wide show little
 _CONTRADICTED = 0.4
@@ -64,7 +64,9 @@ class DetectorSettings:
     Attributes:
         dictionary: Name of one of OpenCV's dictionaries.
         known_ids: Ids that are expected; None when none is more likely than another.
-        windows: Sides in pixels of the neighbourhoods a border is compared with, odd.
+        windows: Sides in pixels of the neighbourhoods a border is compared with, odd, in the order
+            in which they are tried. The first is small: a wider one takes a thin border and what
+            lies beyond its margin for one blob.
         bridges: Gaps in pixels that are closed for markers seen at a flat angle.
         max_outlines: Dark outlines after which only those near quadrilaterals are looked at, and
             no further neighbourhood or bridge is tried.
@@ -78,7 +80,7 @@ class DetectorSettings:
     dictionary: str = 'DICT_5X5_100'
     known_ids: frozenset[int] | None = None
     windows: tuple[int, ...] = parameter(
-        (15, 31), 'Neighbourhoods of a border, odd, pixels.', check=parameter_checks.odd_numbers
+        (5, 31, 15), 'Neighbourhoods of a border, odd, pixels.', check=parameter_checks.odd_numbers
     )
     bridges: tuple[int, ...] = parameter((5,), 'Gaps to close in a border, pixels.', 2, 99, of=int)
     contrast: float = parameter(
@@ -99,7 +101,7 @@ class DetectorSettings:
     least_inner_correlation: float = parameter(
         0.8, "Correlation over the code's own cells that a reading needs.", 0.0, 1.0
     )
-    known_lead: float = parameter(2.2, 'Lead over the second best code, known ids.', 1.0, 100.0)
+    known_lead: float = parameter(2.6, 'Lead over the second best code, known ids.', 1.0, 100.0)
     unknown_lead: float = parameter(3.0, 'Lead over the second best code, other ids.', 1.0, 100.0)
 
     def __post_init__(self) -> None:

@@ -30,7 +30,6 @@ from surveillance_perception.detection.image_sampling import (
 
 Indices = npt.NDArray[np.int64]
 
-_SAMPLES_PER_CELL = 3
 _MARGIN_SAMPLES = 1
 _LEVEL_CELL_PIXELS = 4.0
 _DAMPING = 1e-3
@@ -52,18 +51,20 @@ class TemplateFit:
 
     Args:
         codes: The dictionary.
+        samples: Samples along a side of a cell.
 
     Attributes:
         codes: The dictionary.
         count: Samples along a side of a patch.
     """
 
-    def __init__(self, codes: MarkerCodes) -> None:
+    def __init__(self, codes: MarkerCodes, samples: int = 3) -> None:
         self.codes = codes
+        self._samples = samples
         cells = codes.side + 2
         self._flat = codes.cells.reshape(len(codes.ids), cells * cells)
-        step = 2.0 / codes.side / _SAMPLES_PER_CELL
-        self.count = codes.side * _SAMPLES_PER_CELL + 2 * _MARGIN_SAMPLES
+        step = 2.0 / codes.side / samples
+        self.count = codes.side * samples + 2 * _MARGIN_SAMPLES
         positions: Array = (np.arange(self.count, dtype=float) - (self.count - 1) / 2.0) * step
         x, y = (each.ravel() for each in np.meshgrid(positions, positions))
         self._grid = np.stack([x, y, np.ones_like(x)])
@@ -87,7 +88,7 @@ class TemplateFit:
 
     def cells(self, patches: Patches) -> Patches:
         """Return values (m, side, side) of the marker's cells, their middles counting most."""
-        side, step = self.codes.side, _SAMPLES_PER_CELL
+        side, step = self.codes.side, self._samples
         square = patches.reshape(-1, self.count, self.count)
         inside = square[:, _MARGIN_SAMPLES:-_MARGIN_SAMPLES, _MARGIN_SAMPLES:-_MARGIN_SAMPLES]
         parts = inside.reshape(-1, side, step, side, step)
