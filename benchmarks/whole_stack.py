@@ -22,7 +22,7 @@ import rclpy  # noqa: E402
 
 from surveillance_runtime import node_table  # noqa: E402
 from surveillance_runtime.node import PatrolNode  # noqa: E402
-from surveillance_runtime.process import ExecutorThread  # noqa: E402
+from surveillance_runtime.process import ExecutorThread, share_clock  # noqa: E402
 from surveillance_runtime.testing import claim_domain  # noqa: E402
 from surveillance_simulation.robot.robot import Robot  # noqa: E402
 from surveillance_simulation.simulator_node import Simulator  # noqa: E402
@@ -79,6 +79,7 @@ class Stack:
 
     def start(self) -> None:
         """Let the nodes run."""
+        share_clock([*self.nodes.values()])
         self._spinner.start()
 
     def close(self) -> None:

@@ -5,11 +5,21 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
+import rclpy
+from builtin_interfaces.msg import Time
+from rclpy.clock import JumpThreshold
+from rclpy.duration import Duration
+from rclpy.parameter import Parameter
+from rosgraph_msgs.msg import Clock as ClockMessage
 
 from surveillance_runtime.discovery import prefer_quick_discovery
+from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.process import ExecutorThread, share_clock
+from surveillance_runtime.testing import claim_domain
 
 PROGRAM = """
 import numpy, scipy.linalg
@@ -44,6 +54,50 @@ def test_a_process_finds_its_peers_quickly_unless_told_how(
     monkeypatch.setenv('FASTRTPS_DEFAULT_PROFILES_FILE', 'mine.xml')
     prefer_quick_discovery()
     assert os.environ['FASTRTPS_DEFAULT_PROFILES_FILE'] == 'mine.xml'
+
+
+def test_nodes_of_one_process_hear_the_clock_once_and_each_keeps_its_own() -> None:
+    context = rclpy.Context()
+    rclpy.init(context=context, domain_id=claim_domain())
+    simulated = Parameter('use_sim_time', value=True)
+    nodes = [
+        PatrolNode(name, context=context, parameter_overrides=[simulated])
+        for name in ('first', 'second', 'third')
+    ]
+    clocks = [node.get_clock() for node in nodes]
+    jump = clocks[1].create_jump_callback(
+        JumpThreshold(min_forward=Duration(nanoseconds=1), min_backward=None),
+        post_callback=lambda _jump: 1 / 0,
+    )
+    share_clock(nodes)
+    spinner = ExecutorThread(context)
+    for node in nodes:
+        spinner.executor.add_node(node)
+    spinner.start()
+    teller = nodes[0].create_publisher(ClockMessage, '/clock', 1)
+
+    def tell(seconds: int) -> list[int]:
+        """Return the clocks in seconds once the last of them is told the time."""
+        end = time.monotonic() + 60.0
+        while clocks[2].now().nanoseconds != seconds * 10**9 and time.monotonic() < end:
+            teller.publish(ClockMessage(clock=Time(sec=seconds)))
+            time.sleep(0.01)
+        return [clock.now().nanoseconds // 10**9 for clock in clocks]
+
+    assert tell(5) == [5, 5, 5]
+    assert teller.get_subscription_count() == 1
+    assert [node.health.lost > 0 for node in nodes] == [False, True, False]
+    nodes[0].set_parameters([Parameter('use_sim_time', value=False)])
+    first, *others = tell(6)
+    assert first > 10**9
+    assert others == [6, 6]
+    nodes[0].set_parameters([simulated])
+    assert tell(7) == [7, 7, 7]
+    jump.unregister()
+    spinner.stop()
+    for node in nodes:
+        node.destroy_node()
+    rclpy.try_shutdown(context=context)
 
 
 SECURED = """
