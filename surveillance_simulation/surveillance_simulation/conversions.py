@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from functools import cache
 
 import numpy as np
 import numpy.typing as npt
@@ -176,6 +177,7 @@ def marker_from_ros(request: SetMarker.Request, size: float) -> Marker:
     return Marker(request.name, int(request.id), request.x, request.y, request.z, request.yaw, size)
 
 
+@cache
 def _covariance(deviation: float, turn_deviation: float) -> npt.NDArray[np.float64]:
     covariance = np.zeros(36)
     covariance[[0, 7]] = deviation**2
