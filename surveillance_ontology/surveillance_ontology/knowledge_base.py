@@ -609,15 +609,9 @@ class KnowledgeBase:
         """
         if fact in self._told.axioms:
             return Explanation(axiom_text(fact), 'asserted', axioms=(fact,))
-        engine = self._usable
-        if engine is None or not self.holds(fact):
+        if self._usable is None or not self.holds(fact):
             return None
-        found = None
-        if not isinstance(fact, SubClassOf):
-            found = Reasons(engine, self._schema_axioms).of_fact(fact)
-        if found is None:
-            return self._listed(axiom_text(fact), *self._justified(fact))
-        return self._complete(found, fact)
+        return self._explained(fact)
 
     def explain_inconsistency(self) -> Explanation | None:
         """Return why the ontology contradicts itself; None where the last `reason` found it does
@@ -625,10 +619,7 @@ class KnowledgeBase:
         """
         if self._engine is None or self._consistent:
             return None
-        found = Reasons(self._engine, self._schema_axioms).of_inconsistency()
-        if found is None:
-            return self._listed('the ontology is inconsistent', *self._justified(None))
-        return self._complete(found, None)
+        return self._explained(None)
 
     def explain_absence(self, fact: Axiom) -> Absence | None:
         """Return what a class or property assertion that does not hold lacks; None where it holds,
@@ -639,21 +630,29 @@ class KnowledgeBase:
             return None
         return Absences(engine).of_fact(fact)
 
-    def _complete(self, found: Explanation, goal: Axiom | None) -> Explanation:
-        """Return the explanation resting on no more axioms than it needs, and on all of them."""
-        until = time.monotonic() + self.patience
-        needed = justify(self._told.axioms, goal, found.sources(), self._told.schema, until=until)
-        again: Explanation | None = found
-        if not set(found.sources()) <= set(needed):
+    def _explained(self, goal: Axiom | None) -> Explanation:
+        """Return an explanation that rests on no more axioms than it needs, and on all of them."""
+        text = 'the ontology is inconsistent' if goal is None else axiom_text(goal)
+        proof = self._proof(goal, self._schema_axioms)
+        needed, fewest = self._justified(goal, proof)
+        if proof is not None and not set(proof.sources()) <= set(needed):
             alone = KnowledgeBase(self.iri, needed)
             alone.reason()
-            assert alone._engine is not None
-            reasons = Reasons(alone._engine, alone._schema_axioms)
-            again = reasons.of_inconsistency() if goal is None else reasons.of_fact(goal)
-        if again is None or again.because == BY_CASES:
-            return self._listed(found.fact_text, needed, time.monotonic() <= until)
-        sources = again.sources()
-        return replace(again, background=tuple(a for a in needed if a not in sources))
+            proof = alone._proof(goal, alone._schema_axioms)
+        if proof is None or proof.because == BY_CASES:
+            return self._listed(text, needed, fewest)
+        sources = proof.sources()
+        return replace(proof, background=tuple(a for a in needed if a not in sources))
+
+    def _proof(
+        self, goal: Axiom | None, schema_axioms: Callable[..., tuple[Axiom, ...]]
+    ) -> Explanation | None:
+        """Return the steps by which the engine derived a fact; with None a contradiction."""
+        assert self._engine is not None
+        if isinstance(goal, SubClassOf):
+            return None
+        reasons = Reasons(self._engine, schema_axioms)
+        return reasons.of_inconsistency() if goal is None else reasons.of_fact(goal)
 
     def justification(self, fact: Axiom | None) -> tuple[Axiom, ...]:
         """Return the fewest asserted axioms to which a fact is owed: without any of them it would
@@ -666,25 +665,21 @@ class KnowledgeBase:
             The axioms; none where the fact does not hold. Once `patience` has passed, there may be
             more than it needs.
         """
-        return self._justified(fact)[0]
-
-    def _justified(self, fact: Axiom | None) -> tuple[tuple[Axiom, ...], bool]:
-        """Return the axioms to which a fact is owed, and whether they are the fewest."""
         if fact in self._told.axioms:
-            return (fact,), True
+            return (fact,)
         holds = not self.consistent if fact is None else self.holds(fact)
         if not holds or self._engine is None:
-            return (), True
+            return ()
+        return self._justified(fact, self._proof(fact, lambda *_: ()))[0]
+
+    def _justified(
+        self, goal: Axiom | None, proof: Explanation | None
+    ) -> tuple[tuple[Axiom, ...], bool]:
+        """Return the axioms to which a fact is owed, and whether they are the fewest."""
         until = time.monotonic() + self.patience
-        reasons = Reasons(self._engine, lambda *_: ())
-        proof = None
-        if fact is None:
-            proof = reasons.of_inconsistency()
-        elif not isinstance(fact, SubClassOf):
-            proof = reasons.of_fact(fact)
         likely = proof.sources() if proof else ()
-        found = justify(self._told.axioms, fact, likely, self._told.schema, until=until)
-        return found, time.monotonic() <= until
+        needed = justify(self._told.axioms, goal, likely, self._told.schema, until=until)
+        return needed, time.monotonic() <= until
 
     def _schema_axioms(self, assumed: tuple[Axiom, ...], goal: Axiom | None) -> tuple[Axiom, ...]:
         """Return the axioms about classes and properties by which assumptions imply something."""
