@@ -157,15 +157,6 @@ class PlannerSettings(ControllerSettings):
         return max(length, 1e-6) / (self.via_point_count - 1)
 
 
-def planner_settings(node: PatrolNode) -> PlannerSettings:
-    """Declare the parameters of `planner_controller`.
-
-    Raises:
-        ParameterError: A value is of the wrong type or out of range.
-    """
-    return node.declare_fields(PlannerSettings())
-
-
 @dataclass(frozen=True)
 class MotionSettings(StationSettings):
     """What `motion_controller` is told by its parameters; units as declared."""
@@ -199,12 +190,3 @@ class MotionSettings(StationSettings):
         0.1,
         3600.0,
     )
-
-
-def motion_settings(node: PatrolNode) -> MotionSettings:
-    """Declare the parameters of `motion_controller`.
-
-    Raises:
-        ParameterError: A value is of the wrong type or out of range.
-    """
-    return node.declare_fields(MotionSettings())

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 import numpy as np
 
 from surveillance_controllers import conversions, geometry, stimuli
-from surveillance_controllers.controller_parameters import execution_mode, motion_settings
+from surveillance_controllers.controller_parameters import MotionSettings, execution_mode
 from surveillance_controllers.geometry import Points
 from surveillance_controllers.manual import commands
 from surveillance_controllers.manual.commands import MOTION, ParsedCommand
@@ -43,7 +43,7 @@ class MotionController(PatrolNode):
     def __init__(self, console_source: TextIO | None = None, **node_options: Any) -> None:
         super().__init__('motion_controller', **node_options)
         self._mode = execution_mode(self)
-        self._settings = motion_settings(self)
+        self._settings = self.declare_fields(MotionSettings())
         self._draw = stimuli.generator(self._settings.random_seed)
         self._knowledge = MapKnowledge(self, self._settings.peer_timeout)
         self._requests: RequestQueue[tuple[float, float]] = RequestQueue(

@@ -19,6 +19,7 @@ from rclpy.clock import ClockType
 from trajectory_msgs.msg import JointTrajectory
 
 from surveillance_interfaces.msg import RobotPlace
+from surveillance_runtime.configuration import PLACE_TABLES
 from surveillance_runtime.conversions import seconds_of
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError
@@ -26,13 +27,15 @@ from surveillance_runtime.place import PlaceError
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.state_file import StateFile
-from surveillance_simulation import conversions, simulator_parameters
-from surveillance_simulation.clock_rate import DRIVING, PLANNING, ClockRate
+from surveillance_simulation import conversions
+from surveillance_simulation.clock_rate import DRIVING, PLANNING, ClockRate, ClockRateModel
 from surveillance_simulation.feeds.camera_feed import CameraFeed
 from surveillance_simulation.feeds.fault_services import FaultServices
 from surveillance_simulation.feeds.sensor_feed import SensorFeed
+from surveillance_simulation.robot.base import BaseModel
+from surveillance_simulation.robot.lidar import LidarModel
 from surveillance_simulation.robot.robot import Robot
-from surveillance_simulation.world.people import People
+from surveillance_simulation.world.people import People, PeopleModel
 from surveillance_simulation.world.world import World
 
 _UNDER_WAY = (
@@ -59,20 +62,27 @@ class Simulator(PatrolNode):
     def __init__(self, **node_options: Any) -> None:
         super().__init__('simulator', **node_options)
         seed = self.parameter('random_seed', 0, 'Seed of all noise: the same seed, the same run.')
-        rate = simulator_parameters.clock_rate(self)
+        rate = self.declare_fields(ClockRateModel())
         try:
-            world = World.from_parameters(simulator_parameters.place(self))
+            world = World.from_parameters(_place_parameters(self))
         except PlaceError as error:
             raise ParameterError(f'simulator: {error}') from None
-        model = simulator_parameters.people(self)
+        model = self.declare_fields(PeopleModel(), prefix='people.')
         self.robot = Robot(
             world,
-            simulator_parameters.base(self),
-            simulator_parameters.lidar(self),
+            self.declare_fields(BaseModel(), prefix='base.'),
+            self.declare_fields(LidarModel(), prefix='lidar.'),
             rng=np.random.default_rng(seed),
             people=People(world.plan, model, np.random.default_rng(seed)) if model.count else None,
         )
-        self._kept = StateFile(self, simulator_parameters.state_file(self))
+        kept = self.parameter(
+            'state_file',
+            '',
+            "File that keeps the robot's pose, the time and the doors over a restart of the "
+            'process; empty: nothing is kept.',
+            read_only=True,
+        )
+        self._kept = StateFile(self, kept)
         if self._kept.found and not self.robot.restore(self._kept.found):
             self.get_logger().warn('parameter state_file: its state is none of this place')
         self._kept_pose = self.robot.base.pose
@@ -212,6 +222,29 @@ class Simulator(PatrolNode):
                 self.robot.arm.follow(names, points, self.robot.time)
         except ValueError as error:
             self.get_logger().error(f'arm/joint_trajectory: {error}')
+
+
+def _place_parameters(node: PatrolNode) -> dict[str, Any]:
+    """Declare the description of the place and return it as its file holds it."""
+    described: dict[str, Any] = {}
+    for table in PLACE_TABLES:
+        entries = node.parameters_under(table)
+        if entries:
+            described[table] = entries
+    described['robot_room'] = node.parameter('robot_room', '', 'Place where the robot starts.')
+    described['recharge_rooms'] = node.parameter(
+        'recharge_rooms', [], 'Places with a charging station.', of=str
+    )
+    described['station'] = node.parameter(
+        'station', [], 'Pose of the charging station: x, y in metres, yaw in rad.', of=float
+    )
+    described['marker_size'] = node.parameter(
+        'marker_size', 0.2, "Side of a marker's black square, metres."
+    )
+    described['marker_dictionary'] = node.parameter(
+        'marker_dictionary', 'DICT_5X5_100', "OpenCV's name of the markers' dictionary."
+    )
+    return described
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -12,7 +12,6 @@ from surveillance_controllers.geometry import Points, Pose
 from surveillance_controllers.motion.path_following import DriveParameters
 from surveillance_controllers.motion.place_regions import Segment, door_segment
 from surveillance_controllers.motion.transforms import lidar_mount
-from surveillance_controllers.planning.grid_planning import PlanningParameters
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError, parameter
 
@@ -53,11 +52,6 @@ def _are_numbers(values: object, count: int) -> bool:
         and len(values) == count
         and all(isinstance(v, int | float) and math.isfinite(v) for v in values)
     )
-
-
-def planning_parameters(node: PatrolNode) -> PlanningParameters:
-    """Declare how `planner_controller` plans in SIMULATED mode."""
-    return node.declare_fields(PlanningParameters(), prefix='planning.', mode='SIMULATED')
 
 
 @dataclass(frozen=True)

@@ -17,9 +17,13 @@ from sensor_msgs.msg import PointCloud2
 from surveillance_controllers import conversions
 from surveillance_controllers.geometry import Points, Pose, point_of
 from surveillance_controllers.map_knowledge import MapKnowledge
-from surveillance_controllers.motion.robot_parameters import door_segments, planning_parameters
+from surveillance_controllers.motion.robot_parameters import door_segments
 from surveillance_controllers.planning.door_watch import DoorWatch
-from surveillance_controllers.planning.grid_planning import GridPlanner, NoPathError
+from surveillance_controllers.planning.grid_planning import (
+    GridPlanner,
+    NoPathError,
+    PlanningParameters,
+)
 from surveillance_fsm import Interrupt
 from surveillance_fsm.ros import GoalAbortedError, GoalRun
 from surveillance_runtime.conversions import points_from_cloud, values_from_cloud
@@ -40,7 +44,9 @@ class NavigationPlanning:
         self._node = node
         self._knowledge = knowledge
         self._timeout = peer_timeout
-        self._parameters = planning_parameters(node)
+        self._parameters = node.declare_fields(
+            PlanningParameters(), prefix='planning.', mode='SIMULATED'
+        )
         self._segments = door_segments(node)
         self._doors = DoorWatch(node, self._segments, knowledge, peer_timeout)
         self._lock = threading.Lock()

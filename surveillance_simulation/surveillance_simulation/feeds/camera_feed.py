@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,8 @@ from builtin_interfaces.msg import Time
 from sensor_msgs.msg import CameraInfo, Image
 
 from surveillance_runtime.node import PatrolNode
-from surveillance_simulation import conversions, simulator_parameters
+from surveillance_runtime.parameters import parameter
+from surveillance_simulation import conversions
 from surveillance_simulation.camera.model import Camera, Conditions, expose
 from surveillance_simulation.camera.mujoco_rendering import MujocoRenderer
 from surveillance_simulation.camera.rendering import Renderer
@@ -20,6 +22,24 @@ from surveillance_simulation.feeds.sensor_feed import SENSOR_DEPTH
 from surveillance_simulation.robot.robot import Robot
 
 _FRAME = 'camera_optical_frame'
+
+
+@dataclass(frozen=True)
+class CameraOptions:
+    """The camera that does not change; units as declared."""
+
+    width: int = parameter(640, 'Columns of a picture.', 16, 4096)
+    height: int = parameter(480, 'Rows of a picture.', 16, 4096)
+    field_of_view: float = parameter(60.0, 'Horizontal field of view, degrees.', 5.0, 150.0)
+    renderer: str = parameter(
+        'opencv',
+        'What draws the pictures; mujoco adds shadows and needs the package mujoco.',
+        choices=('opencv', 'mujoco'),
+    )
+    rate: float = parameter(10.0, 'Pictures per second at most.', 0.1, 100.0)
+    wall_brightness: float = parameter(
+        1.0, 'Brightness of the walls: 1 white plaster, 0.2 dark paint.', 0.0, 1.0
+    )
 
 
 class CameraFeed:
@@ -50,9 +70,11 @@ class CameraFeed:
             PlaceError: A marker's dictionary or id does not exist.
             ImportError: MuJoCo is to render and is not installed.
         """
-        self.conditions = simulator_parameters.conditions(node, self._take_conditions)
+        self.conditions = node.declare_fields(
+            Conditions(), prefix='camera.', on_change=self._take_conditions
+        )
         self._robot = robot
-        options = simulator_parameters.camera(node)
+        options = node.declare_fields(CameraOptions(), prefix='camera.')
         self._camera = Camera.from_field_of_view(
             options.width, options.height, math.radians(options.field_of_view)
         )

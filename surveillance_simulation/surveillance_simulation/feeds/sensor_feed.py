@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid, Odometry
@@ -12,9 +14,10 @@ from std_msgs.msg import UInt32
 
 from surveillance_interfaces.msg import DoorStates
 from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.parameters import parameter
 from surveillance_runtime.place import occupancy_grid
 from surveillance_runtime.qos import STATE_QOS
-from surveillance_simulation import conversions, simulator_parameters
+from surveillance_simulation import conversions
 from surveillance_simulation.robot.robot import Robot
 
 try:
@@ -24,6 +27,16 @@ except ImportError:  # the wheels on PyPI hold no tf2_msgs; an installed ROS 2 d
 
 SENSOR_DEPTH = 5
 """Sensors offer reliable delivery, so that subscribers of either kind are served (REP-2003)."""
+
+
+@dataclass(frozen=True)
+class PublishedOptions:
+    """How the place is published; units as declared."""
+
+    map_resolution: float = parameter(0.05, 'Side of a cell of the map, metres.', 0.01, 0.5)
+    announce_pose: bool = parameter(
+        False, 'Tell each new subscriber of initialpose, such as AMCL, where the robot is.'
+    )
 
 
 class SensorFeed:
@@ -43,7 +56,7 @@ class SensorFeed:
         self._map = node.create_publisher(OccupancyGrid, 'map', STATE_QOS)
         self._tf = None if TFMessage is None else node.create_publisher(TFMessage, 'tf', 10)
         self._told_collisions = -1
-        options = simulator_parameters.published(node)
+        options = node.declare_fields(PublishedOptions())
         grid = occupancy_grid.draw(robot.world.plan, options.map_resolution)
         self._map.publish(conversions.grid_to_ros(grid, 'map', Time()))
         self.tell_doors()
