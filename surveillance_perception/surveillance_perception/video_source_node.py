@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from sensor_msgs.msg import CameraInfo, Image
@@ -16,8 +17,24 @@ from surveillance_perception.stream.image_files import ImageArray, ImageError
 from surveillance_perception.stream.image_subscription import IMAGES_QOS
 from surveillance_perception.stream.video import FrameSource, open_source
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.parameters import ParameterError
+from surveillance_runtime.parameters import ParameterError, parameter
 from surveillance_runtime.process import run_node
+
+
+@dataclass
+class VideoSettings:
+    """What is published, and how; units as declared."""
+
+    source: str = parameter(
+        '', 'A video file or a folder of images; empty: a webcam.', read_only=True
+    )
+    camera: int = parameter(0, 'Number of the webcam.', 0, read_only=True)
+    rate: float = parameter(0.0, "Images a second; 0: the video's own, 5 for images.", 0.0, 1000.0)
+    loop: bool = parameter(False, 'Begin again after the last image.')
+    frame_id: str = parameter(
+        'camera_rgb_optical_frame', "The camera's optical frame.", read_only=True
+    )
+    field_of_view: float = parameter(60.0, 'Horizontal field of view, degrees.', 5.0, 170.0)
 
 
 class VideoSource(PatrolNode):
@@ -25,37 +42,9 @@ class VideoSource(PatrolNode):
 
     def __init__(self, **node_options: Any) -> None:
         super().__init__('video_source', **node_options)
-        path = self.parameter(
-            'source', '', 'A video file or a folder of images; empty: a webcam.', read_only=True
-        )
-        camera = self.parameter('camera', 0, 'Number of the webcam.', minimum=0, read_only=True)
-        self._source = path or str(camera)
-        self._is_camera = not path
-        self._rate = self.parameter(
-            'rate',
-            0.0,
-            "Images a second; 0: the video's own, 5 for images.",
-            minimum=0.0,
-            maximum=1000.0,
-            on_change=lambda value: setattr(self, '_rate', value),
-        )
-        self._loop = self.parameter(
-            'loop',
-            False,
-            'Begin again after the last image.',
-            on_change=lambda value: setattr(self, '_loop', value),
-        )
-        self._frame = self.parameter(
-            'frame_id', 'camera_rgb_optical_frame', "The camera's optical frame.", read_only=True
-        )
-        self._field_of_view = self.parameter(
-            'field_of_view',
-            60.0,
-            'Horizontal field of view, degrees.',
-            minimum=5.0,
-            maximum=170.0,
-            on_change=lambda value: setattr(self, '_field_of_view', value),
-        )
+        settings = self._settings = self.declare_live(VideoSettings())
+        self._source = settings.source or str(settings.camera)
+        self._is_camera = not settings.source
         self._images = self.create_publisher(Image, 'camera/rgb/image_raw', IMAGES_QOS)
         self._infos = self.create_publisher(CameraInfo, 'camera/rgb/camera_info', IMAGES_QOS)
         self._wait = ClockWait(self)
@@ -74,7 +63,7 @@ class VideoSource(PatrolNode):
             if self._is_camera:
                 self.fail(f'camera {self._source} gives no more images')
                 return
-            if not self._loop or not good:
+            if not self._settings.loop or not good:
                 self.get_logger().info('the last image was sent')
                 return
             source = open_source(self._source)
@@ -88,15 +77,15 @@ class VideoSource(PatrolNode):
                 continue
             self._send(frame)
             good = True
-            rate = self._rate or source.rate or (0.0 if self._is_camera else 5.0)
+            rate = self._settings.rate or source.rate or (0.0 if self._is_camera else 5.0)
             if not self._wait.sleep(1.0 / rate if rate else 0.0, self.stopping):
                 break
         return good
 
     def _send(self, frame: ImageArray) -> None:
-        header = Header(stamp=self.get_clock().now().to_msg(), frame_id=self._frame)
+        header = Header(stamp=self.get_clock().now().to_msg(), frame_id=self._settings.frame_id)
         height, width = frame.shape[:2]
-        field_of_view = math.radians(self._field_of_view)
+        field_of_view = math.radians(self._settings.field_of_view)
         camera = CameraModel.from_field_of_view(width, height, field_of_view)
         self._infos.publish(camera_to_ros(camera, header))
         self._images.publish(image_to_ros(frame, header))

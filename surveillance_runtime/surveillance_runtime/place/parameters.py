@@ -2,9 +2,28 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.parameters import ParameterError
+from surveillance_runtime.parameters import ParameterError, parameter
 from surveillance_runtime.place import Place, PlaceError, make_place
+
+
+@dataclass(frozen=True)
+class PlaceSettings:
+    """What a node is told of the place beside its rooms."""
+
+    map_source: str = parameter(
+        'configuration',
+        'Where the map comes from: the parameters, or the markers that the robot finds.',
+        choices=('configuration', 'markers'),
+    )
+    robot_room: str = parameter(
+        '', 'Room in which the robot starts; empty with markers: the one nearest to it.'
+    )
+    recharge_rooms: tuple[str, ...] = parameter(
+        (), 'Rooms with a charging station; they are never removed.', of=str
+    )
 
 
 def described_place(
@@ -24,32 +43,13 @@ def described_place(
         ParameterError: A parameter is of the wrong type.
         ParameterError: What is described is not a place.
     """
-    chosen = node.parameter(
-        'map_source',
-        source,
-        'Where the map comes from: the parameters, or the markers that the robot finds.',
-        choices=('configuration', 'markers'),
-        read_only=True,
-    )
-    robot_room = node.parameter(
-        'robot_room',
-        '',
-        'Room in which the robot starts; empty with markers: the one nearest to it.',
-        read_only=True,
-    )
-    stations = node.parameter(
-        'recharge_rooms',
-        [],
-        'Rooms with a charging station; they are never removed.',
-        of=str,
-        read_only=True,
-    )
-    if chosen == 'markers':
+    settings = node.declare_fields(PlaceSettings(source))
+    if settings.map_source == 'markers':
         return None
     rooms, positions = node.parameters_under('map'), node.parameters_under('room_positions')
     if not rooms and not positions and not required:
         return None
     try:
-        return make_place(rooms, positions, robot_room, stations)
+        return make_place(rooms, positions, settings.robot_room, settings.recharge_rooms)
     except PlaceError as error:
         raise ParameterError(f'{node.get_name()}: parameter {error}') from None
