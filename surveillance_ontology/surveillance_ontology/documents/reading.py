@@ -9,7 +9,7 @@ from __future__ import annotations
 import codecs
 import contextlib
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
@@ -101,16 +101,15 @@ def read_ontology(
                 seen.add(path.resolve())
                 _, other = _read(path, name, size_limit)
                 documents.append((f'{path.name}: ', other, path.parent))
-    declared = [pair for _, document, _ in documents for pair in document.declared]
+    several = len(documents) > 1
+    declared = [pair for _, document, _ in documents if several for pair in document.declared]
     axioms: dict[Axiom, None] = {}
     blanks: set[str] = set()
     unsupported: list[str] = []
     for number, (prefix, document, _) in enumerate(documents):
         with uncollected():
-            document.read(declared if documents[1:] else ())
-        read: Iterable[Axiom] = document.axioms
-        if documents[1:]:
-            read = _apart(read, blanks, f'_:d{number}.')
+            document.read(declared)
+        read = _apart(document.axioms, blanks, f'_:d{number}.') if several else document.axioms
         for axiom in read:
             if not isinstance(axiom, Import) or axiom.iri in missing:
                 axioms[axiom] = None
@@ -119,15 +118,16 @@ def read_ontology(
     return OntologyDocument(list(axioms), unsupported, form, main.iri, main.prefixes)
 
 
-def _apart(axioms: Iterable[Axiom], taken: set[str], prefix: str) -> list[Axiom]:
-    """Give individuals without a name other labels than those of documents read before."""
-    found = list(axioms)
-    own = {name for a in found for _, name in entities_of(a) if name.startswith('_:')}
-    for name in own & taken:
-        new = prefix + name[2:]
-        found = [renamed(axiom, 'individual', name, new) for axiom in found]
+def _apart(axioms: Iterable[Axiom], taken: set[str], prefix: str) -> Iterator[Axiom]:
+    """Yield axioms whose individuals without a name have labels that no earlier document took."""
+    own: set[str] = set()
+    for axiom in axioms:
+        for name in {name for _, name in entities_of(axiom) if name.startswith('_:')}:
+            own.add(name)
+            if name in taken:
+                axiom = renamed(axiom, 'individual', name, prefix + name[2:])
+        yield axiom
     taken |= own
-    return found
 
 
 def _imported(iri: str, folder: Path | None) -> Path | None:
