@@ -635,6 +635,10 @@ class Translation:
         for first, second in ax.pairs_of(map(normal_form, classes)):
             if THING in (first, second):
                 self._attempt(self._sub_class, second if first == THING else first, NOTHING)
+            elif not is_positive(second):
+                self._attempt(self._sub_class, first, normal_form(second, True))
+            elif not is_positive(first):
+                self._attempt(self._sub_class, second, normal_form(first, True))
             else:
                 self._disjoint(self._recognise(first), self._recognise(second))
 

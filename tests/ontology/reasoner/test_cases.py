@@ -174,6 +174,15 @@ def test_what_is_disjoint_with_everything_is_empty(axiom: Axiom) -> None:
     assert not kb.reason()
 
 
+def test_whoever_is_disjoint_with_a_complement_is_in_the_class() -> None:
+    outside = ex.ObjectComplementOf(A)
+    kb = reasoned(ax.DisjointClasses((outside, ex.ObjectOneOf((i,)))), ClassAssertion(B, j))
+    assert kb.instances(A) == {i}
+    kb.add(ax.DisjointUnion(C, (B, outside)))
+    assert kb.reason()
+    assert kb.instances(A) == {i, j}
+
+
 def test_as_many_values_as_a_range_has_are_all_of_them() -> None:
     some = ex.DataOneOf((whole(1), whole(2), whole(3)))
     all_three = SubClassOf(A, ex.DataMinCardinality(3, P, some))
