@@ -36,8 +36,8 @@ class _Counter:
         self.origin = condition.origin
         self.is_data = condition.prop.kind == 'data'
         self.difference = difference
-        self.succ: dict[Any, set[Any]] = self.prop.pred if self.inverse else self.prop.succ
-        self.pred: dict[Any, set[Any]] = self.prop.succ if self.inverse else self.prop.pred
+        self.succ: dict[Any, dict[Any, None]] = self.prop.pred if self.inverse else self.prop.succ
+        self.pred: dict[Any, dict[Any, None]] = self.prop.succ if self.inverse else self.prop.pred
         filler = condition.filler
         self.filler = filler if isinstance(filler, Predicate) else None
         self.test = None if isinstance(filler, Predicate) else filler

@@ -39,8 +39,8 @@ class Predicate:
         kind: 'class', 'object', 'data' or 'different'.
         name: IRI, or for an internal label a text that shows the expression.
         expression: The class expression or property the predicate stands for.
-        members: Individuals (kind 'class').
-        succ, pred: Values by subject and subjects by value (the other kinds).
+        members: Individuals (kind 'class'), in the order they came.
+        succ, pred: Values by subject and subjects by value (the other kinds), in this order.
         on_insert, on_delete: Called with a fact's arguments after it came, before it goes.
         supports: Pairs of a generator of premise tuples for given arguments and the origin to name.
         disjoint: Predicates that share no member with this one (kind 'class').
@@ -67,9 +67,9 @@ class Predicate:
         self.kind = kind
         self.name = name
         self.expression = expression
-        self.members: set[str] = set()
-        self.succ: dict[str, set[Any]] = {}
-        self.pred: dict[Any, set[str]] = {}
+        self.members: dict[str, None] = {}
+        self.succ: dict[str, dict[Any, None]] = {}
+        self.pred: dict[Any, dict[str, None]] = {}
         self.on_insert: list[Callable[..., None]] = []
         self.on_delete: list[Callable[..., None]] = []
         self.early: list[Callable[..., None]] = []
@@ -96,32 +96,32 @@ class Predicate:
     def insert(self, fact: Fact) -> None:
         """Add a fact that is not there."""
         if len(fact) == 2:
-            self.members.add(fact[1])
+            self.members[fact[1]] = None
             return
         _, x, y = fact
         values = self.succ.get(x)
         if values is None:
-            self.succ[x] = {y}
+            self.succ[x] = {y: None}
         else:
-            values.add(y)
+            values[y] = None
         subjects = self.pred.get(y)
         if subjects is None:
-            self.pred[y] = {x}
+            self.pred[y] = {x: None}
         else:
-            subjects.add(x)
+            subjects[x] = None
 
     def discard(self, fact: Fact) -> None:
         """Take away a fact that is there."""
         if len(fact) == 2:
-            self.members.discard(fact[1])
+            self.members.pop(fact[1], None)
             return
         _, x, y = fact
         values = self.succ[x]
-        values.discard(y)
+        values.pop(y, None)
         if not values:
             del self.succ[x]
         subjects = self.pred[y]
-        subjects.discard(x)
+        subjects.pop(x, None)
         if not subjects:
             del self.pred[y]
 

@@ -8,8 +8,8 @@ individual is *touched*, and whatever asks for differences of that individual is
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
-from typing import Protocol
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Any, Protocol
 
 from surveillance_ontology.owl.axioms import DifferentIndividuals
 from surveillance_ontology.reasoner.clauses import Fact, Predicate, Premises, Program
@@ -207,7 +207,7 @@ class AsymmetricEvidence:
     def premises(self, x: str, y: str) -> Iterator[Premises]:
         predicate = self._predicate
         for one, other in ((x, y), (y, x)):
-            for middle in predicate.pred.get(one, set()) & predicate.succ.get(other, set()):
+            for middle in _shared(predicate.pred.get(one), predicate.succ.get(other)):
                 yield ((predicate, middle, one), (predicate, other, middle))
 
 
@@ -232,13 +232,20 @@ class DisjointPropertyEvidence:
         else:
             of_subject, of_value = second.succ, second.pred
         for one, other in ((x, y), (y, x)):
-            for value in first.succ.get(one, set()) & of_subject.get(other, set()):
+            for value in _shared(first.succ.get(one), of_subject.get(other)):
                 fact = (second, value, other) if self._turned else (second, other, value)
                 yield ((first, one, value), fact)
             if first.kind == 'object':
-                for subject in first.pred.get(one, set()) & of_value.get(other, set()):
+                for subject in _shared(first.pred.get(one), of_value.get(other)):
                     fact = (second, other, subject) if self._turned else (second, subject, other)
                     yield ((first, subject, one), fact)
+
+
+def _shared(some: Mapping[Any, None] | None, others: Mapping[Any, None] | None) -> list[Any]:
+    if not some or not others:
+        return []
+    few, many = (some, others) if len(some) < len(others) else (others, some)
+    return [one for one in few if one in many]
 
 
 def _among(predicate: Predicate, x: str, y: str) -> Iterator[Fact]:

@@ -564,7 +564,7 @@ class Engine:
             if self._network.watch_disjoint(one):
                 self._attach_touching(one)
             self._touched.update(dict.fromkeys(one.members))
-        self._queue += [(self._nothing, x) for x in first.members & second.members]
+        self._queue += [(self._nothing, x) for x in first.members if x in second.members]
 
     def take_from_cases(self, facts: Iterable[Axiom] | None) -> None:
         """Add facts that reasoning by cases found; they hold until the next `update`.
@@ -692,7 +692,7 @@ class Engine:
                     x = fact[1]
                     if x in predicate.members:
                         continue
-                    predicate.members.add(x)
+                    predicate.members[x] = None
                     if changed is not None:
                         changed.setdefault(fact, False)
                     for fire in predicate.on_insert:
@@ -709,15 +709,15 @@ class Engine:
                         self._stop_generating(predicate)
                         continue
                 if values is None:
-                    succ[x] = {y}
+                    succ[x] = {y: None}
                 else:
-                    values.add(y)
+                    values[y] = None
                 pred = predicate.pred
                 subjects = pred.get(y)
                 if subjects is None:
-                    pred[y] = {x}
+                    pred[y] = {x: None}
                 else:
-                    subjects.add(x)
+                    subjects[x] = None
                 if changed is not None:
                     changed.setdefault(fact, False)
                 for fire in predicate.on_insert:

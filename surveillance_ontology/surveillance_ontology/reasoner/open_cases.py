@@ -87,7 +87,7 @@ class OpenCases:
         if isinstance(filler, ValueSet):
             witnesses = {value for value in witnesses if filler.contains(value)}
         elif filler is not None:
-            witnesses = witnesses & filler.members
+            witnesses = witnesses & filler.members.keys()
         return len(witnesses) < existential.n
 
     def _open_instance(self, clause: Clause) -> str | None:
@@ -128,8 +128,7 @@ class OpenCases:
 
 
 def _related(prop: Predicate, inverse: bool, z: str) -> set[Any]:
-    related: set[Any] = (prop.pred if inverse else prop.succ).get(z, set())
-    return related
+    return set((prop.pred if inverse else prop.succ).get(z, ()))
 
 
 def _sentence(origin: Axiom | None, name: str) -> str:
