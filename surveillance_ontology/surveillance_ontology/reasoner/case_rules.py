@@ -492,7 +492,7 @@ class CaseRules:
             self._property_axiom(axiom)
 
     def _all_disjoint(self, classes: tuple[ClassExpression, ...]) -> None:
-        for pair in ax.pairs_of(map(normal_form, classes)):
+        for pair in ax.pairs_of(classes):
             self.node_rule(frozenset(map(self.recognised, pair)), ())
 
     def _property_axiom(self, axiom: Axiom) -> None:

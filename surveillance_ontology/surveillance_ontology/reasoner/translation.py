@@ -632,7 +632,8 @@ class Translation:
             self.imply(body, sup, _X)
 
     def _all_disjoint(self, classes: tuple[ClassExpression, ...]) -> None:
-        for first, second in ax.pairs_of(map(normal_form, classes)):
+        for pair in ax.pairs_of(classes):
+            first, second = map(normal_form, pair)
             if THING in (first, second):
                 self._attempt(self._sub_class, second if first == THING else first, NOTHING)
             elif not is_positive(second):

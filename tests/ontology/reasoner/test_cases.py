@@ -165,6 +165,7 @@ def test_a_chain_over_somebody_unnamed_and_back_reaches_nobody_else() -> None:
     [
         ax.DisjointClasses((A, ex.ObjectUnionOf((B, ex.ObjectComplementOf(NOTHING))))),
         ax.DisjointUnion(D, (A, THING)),
+        ax.DisjointClasses((A, ex.ObjectIntersectionOf((A, THING)), D)),
     ],
 )
 def test_what_is_disjoint_with_everything_is_empty(axiom: Axiom) -> None:
