@@ -145,7 +145,7 @@ class ParameterSpec:
         raise self.error(whole)
 
     def _usual(self) -> float:
-        """Return a default that is not finite says that such values make sense."""
+        """Return the default that is not finite, which says that such values make sense; else 0."""
         defaults = self.default if isinstance(self.default, list | tuple) else [self.default]
         return next((d for d in defaults if isinstance(d, float) and not math.isfinite(d)), 0.0)
 

@@ -42,6 +42,9 @@ class Steersman:
     def move(self, _odometry: Any) -> None:
         pass
 
+    def set_closed(self, _doors: Any) -> None:
+        pass
+
 
 @pytest.fixture
 def steersman() -> Steersman:
