@@ -35,6 +35,23 @@ def test_the_shortest_lawful_round_of_a_grid_is_found() -> None:
     assert search.best.length == pytest.approx(1.2 * graph.tour.length)
 
 
+def test_a_round_is_filled_where_the_robot_would_wait_for_a_room() -> None:
+    legs = {'A': {'B': 8.0, 'C': 17.0, 'D': 22.0, 'E': 17.0}, 'B': {'A': 8.0, 'D': 19.0}}
+    legs |= {'C': {'A': 17.0}, 'D': {'A': 22.0, 'B': 19.0}, 'E': {'A': 17.0}}
+    graph = PatrolGraph(legs)
+    rules = rules_of(graph, graph.tour.length)
+    search = RoundSearch(rules, [[graph.tour.order]], fills=True)
+    search.improve(100_000.0)
+    assert not search.best.breaches
+    # Nobody waits: the round is as long as its ways, and hardly longer than it must be.
+    assert search.best.length == pytest.approx(rules.length(search.best.targets))
+    assert rules.least_period <= search.best.length <= 1.05 * rules.least_period
+    patrol = Patrol(graph, Rules(), 'tour', graph.tour.length, 'A')
+    for _ in patrol.until(20.0 * graph.tour.length):
+        pass
+    assert patrol.run.settled <= search.best.length + 1e-6
+
+
 @settings(max_examples=30)
 @given(graphs(), st.floats(0.1, 2.0))
 def test_a_round_visits_every_place_in_its_length(graph: PatrolGraph, factor: float) -> None:
