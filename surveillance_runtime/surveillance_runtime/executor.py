@@ -5,7 +5,7 @@ a task and two coroutines for each callback: half of the processor time of a pro
 patrol's nodes (230 entities, 30 waits for each simulated second). Here the entities are gathered
 when one came or went, and a callback is simply called. While messages and timers alone keep the
 process busy, the rest (most of the entities) is looked at in every fifth wait, and the events of
-publishers and subscriptions when nothing else is to be done.
+publishers and subscriptions in every hundredth.
 
 rclpy's own `EventsExecutor` waits for no set at all, but in Jazzy it leaves asynchronous service
 callbacks unanswered (rclpy 1613), asks a waiting coroutine again without pause, and may end the
@@ -36,8 +36,10 @@ from rclpy.waitable import NumberOfEntities
 
 _MOST_LISTS = 30
 """Wait lists that are kept: one for each set of callback groups that coroutines held at once."""
-_MOST_BUSY_WAITS = 4
-"""Waits in a row that may look at messages and timers alone, when there always are some."""
+_WORK_PERIOD = 5
+"""Of so many waits that find something at once, one looks at more than messages and timers."""
+_EVENTS_PERIOD = 100
+"""Of so many, one looks at the events of publishers and subscriptions, too."""
 _BUSY_KINDS = ('timer', 'subscription')
 _KINDS = ('timer', 'subscription', 'guard_condition', 'client', 'service')
 
@@ -205,9 +207,10 @@ class PatrolExecutor(SingleThreadedExecutor):  # type: ignore[misc]  # rclpy has
                 self._close_wait_lists()
             self._wait_lists[held] = self._new_wait_lists()
         busy, work, everything = self._wait_lists[held]
-        self._busy_waits = (self._busy_waits + 1) % (_MOST_BUSY_WAITS + 1)
+        self._busy_waits = (self._busy_waits + 1) % _EVENTS_PERIOD
         try:
-            self._ready.extend((busy if self._busy_waits else work).wait(0))
+            if self._busy_waits:
+                self._ready.extend((busy if self._busy_waits % _WORK_PERIOD else work).wait(0))
             if not self._ready:
                 self._busy_waits = 0
                 for kind, entity in everything.wait(timeout):

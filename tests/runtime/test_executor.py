@@ -12,6 +12,7 @@ from builtin_interfaces.msg import Time
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from rclpy.clock import JumpThreshold
 from rclpy.duration import Duration
+from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -273,3 +274,16 @@ def test_a_service_answers_while_messages_keep_the_executor_busy(spun: Spun) -> 
     echo.publish(Int32())
     answer = caller.call_async(Trigger.Request())
     spun.until(answer.done)
+
+
+def test_events_are_told_while_messages_keep_the_executor_busy(spun: Spun) -> None:
+    server, client = spun.nodes
+    echo = server.create_publisher(Int32, 'numbers', 10)
+    server.create_subscription(Int32, 'numbers', echo.publish, 10)
+    spun.until(lambda: echo.get_subscription_count() == 1)
+    echo.publish(Int32())
+    told: list[object] = []
+    events = PublisherEventCallbacks(matched=told.append)
+    client.create_publisher(Int32, 'other', 10, event_callbacks=events)
+    server.create_subscription(Int32, 'other', lambda _message: None, 10)
+    spun.until(lambda: told)
