@@ -45,3 +45,10 @@ def test_pose_is_the_same_through_a_distorting_lens():
     seen = cv2.projectPoints(points, np.zeros(3), np.zeros(3), lens.matrix, distortion)[0]
     pose = pose_of(seen.reshape(4, 2), 0.2, lens)
     assert pose.position == pytest.approx(points.mean(axis=0), abs=2e-3)
+
+
+def test_camera_matrix_beyond_all_numbers_gives_no_pose_and_no_warning(recwarn):
+    matrix = np.array([[1e-170, 0.0, 320.0], [0.0, 1e-170, 240.0], [0.0, 0.0, 1.0]])
+    corners = corners_in_image(Panel(0, 1.0), CAMERA)
+    assert pose_of(corners, 0.2, CameraModel(640, 480, matrix)) is None
+    assert not recwarn.list

@@ -61,13 +61,13 @@ def pose_of(corners: Array, size: float, camera: CameraModel) -> MarkerPose | No
     """
     outline = _OUTLINE * (size / 2.0)
     rays = camera.rays(np.asarray(corners, dtype=float))
-    if rays is None:
+    # a matrix that is no camera's spreads corners so far that their squares are no numbers
+    if rays is None or not np.abs(rays).max() < _FARTHEST:
         return None
     # the corners as a camera without distortion would see them
     seen = rays @ camera.matrix[:2, :2].T + camera.matrix[:2, 2]
     rotation, position = _from_homography(homographies_of(rays[None])[0], size)
-    # not a number, or so far away that its square is none
-    if not np.isfinite(rotation).all() or not np.abs(position).max() < _FARTHEST:
+    if not np.isfinite(rotation).all() or not 0.0 < np.abs(position).max() < _FARTHEST:
         return None
     found = [
         pose
