@@ -286,7 +286,7 @@ class BorderCheck:
         points.append(_border(along, 1.0 - cell * 0.5))
         points.append(np.stack([each.ravel() for each in np.meshgrid(inner, inner)]))
         flat = np.concatenate(points, axis=1)
-        self._grid = np.vstack([flat, np.ones(flat.shape[1])])
+        self._grid = np.vstack([flat, np.ones(flat.shape[1])]).astype(np.float32)
 
     def correlation(
         self, pyramid: ImagePyramid, homographies: Array, least_contrast: float
@@ -349,7 +349,7 @@ class EdgeFit:
         out = 1.0 + across
         sides = [(along, -out), (out, along), (along, out), (-out, along)]
         points = np.concatenate([np.stack(side) for side in sides], axis=1)
-        self._grid = np.vstack([points, np.ones(points.shape[1])])
+        self._grid = np.vstack([points, np.ones(points.shape[1])]).astype(np.float32)
 
     def fitted(self, pyramid: ImagePyramid, quads: Quads) -> Quads:
         """Return quads (m, 4, 2) with their sides on the edges nearest to them."""

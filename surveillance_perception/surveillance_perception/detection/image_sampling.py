@@ -25,7 +25,7 @@ class ImagePyramid:
     def __init__(self, image: Grey) -> None:
         self._levels = [image]
 
-    def sample(self, homographies: Array, grid: Array, levels: npt.NDArray[np.int64]) -> Patches:
+    def sample(self, homographies: Array, grid: Patches, levels: npt.NDArray[np.int64]) -> Patches:
         """Return grey levels under homographies, linearly interpolated.
 
         Args:
@@ -36,9 +36,13 @@ class ImagePyramid:
         Returns:
             (m, n) grey levels; outside the image those of its edge.
         """
-        points = homographies @ grid
+        # pixel centres have whole coordinates in each of the images
+        half = homographies[:, 2:] / 2.0
+        shrunk = (homographies[:, :2] + half) * 0.5 ** levels[:, None, None] - half
+        # OpenCV interpolates between 32 steps of a pixel: single precision is more than enough
+        points = np.concatenate([shrunk, homographies[:, 2:]], axis=1).astype(np.float32) @ grid
         depth = points[:, 2]
-        depth = np.where(np.abs(depth) < 1e-6, 1e-6, depth)
+        depth = np.where(np.abs(depth) < 1e-6, np.float32(1e-6), depth)
         x, y = points[:, 0] / depth, points[:, 1] / depth
         first = int(levels[0]) if len(levels) else 0
         if (levels == first).all():
@@ -49,18 +53,13 @@ class ImagePyramid:
             patches[chosen] = self._read(x[chosen], y[chosen], int(level))
         return patches
 
-    def _read(self, x: Array, y: Array, level: int) -> Patches:
+    def _read(self, x: Patches, y: Patches, level: int) -> Patches:
         while len(self._levels) <= level:
             last = self._levels[-1]
             size = (max(1, last.shape[1] // 2), max(1, last.shape[0] // 2))
             self._levels.append(cv2.resize(last, size, interpolation=cv2.INTER_AREA))
-        scale = 2.0**level
         sampled = cv2.remap(
-            self._levels[level],
-            ((x + 0.5) / scale - 0.5).astype(np.float32),
-            ((y + 0.5) / scale - 0.5).astype(np.float32),
-            cv2.INTER_LINEAR,
-            borderMode=cv2.BORDER_REPLICATE,
+            self._levels[level], x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
         )
         return np.asarray(sampled, dtype=np.float32)
 
