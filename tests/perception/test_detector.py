@@ -68,7 +68,7 @@ def test_marker_is_found_where_it_is(distance, degrees):
 def test_marker_whose_border_is_thinner_than_a_pixel_is_found():
     panel = Panel(14, 2.5, math.radians(80), roll=0.05, offset=(12.3, -20.7))
     images = [seen([panel], seed=seed) for seed in range(10)]
-    assert sum(set(found(DETECTOR.detect(image))) == {14} for image in images) >= 9
+    assert sum(set(found(DETECTOR.detect(image))) == {14} for image in images) >= 8
 
 
 @pytest.mark.parametrize(

@@ -65,8 +65,8 @@ class DetectorSettings:
         dictionary: Name of one of OpenCV's dictionaries.
         known_ids: Ids that are expected; None when none is more likely than another.
         windows: Sides in pixels of the neighbourhoods a border is compared with, odd, in the order
-            in which they are tried. The first is small: a wider one takes a thin border and what
-            lies beyond its margin for one blob.
+            in which they are tried. Only a small one parts a thin border from what lies beyond its
+            margin; in a crowd on a large image it sees so many outlines that it comes last.
         bridges: Gaps in pixels that are closed for markers seen at a flat angle.
         max_outlines: Dark outlines after which only those near quadrilaterals are looked at, and
             no further neighbourhood or bridge is tried.
@@ -80,7 +80,7 @@ class DetectorSettings:
     dictionary: str = 'DICT_5X5_100'
     known_ids: frozenset[int] | None = None
     windows: tuple[int, ...] = parameter(
-        (5, 31, 15), 'Neighbourhoods of a border, odd, pixels.', check=parameter_checks.odd_numbers
+        (15, 31, 5), 'Neighbourhoods of a border, odd, pixels.', check=parameter_checks.odd_numbers
     )
     bridges: tuple[int, ...] = parameter((5,), 'Gaps to close in a border, pixels.', 2, 99, of=int)
     contrast: float = parameter(
