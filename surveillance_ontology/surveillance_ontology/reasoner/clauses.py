@@ -174,8 +174,14 @@ class RangeAtom:
 
 @dataclass(frozen=True, slots=True)
 class ComputedAtom:
-    """A built-in: `builtin` is its local name, the first term may be unbound where `solve` is
-    given.
+    """A built-in.
+
+    Attributes:
+        builtin: Its local name.
+        holds: Tells whether it holds for values of its terms.
+        solve: Gives the values of the first term, which nothing else in the body binds; None for a
+            built-in that only tests.
+        terms: Its arguments.
     """
 
     builtin: str

@@ -140,16 +140,17 @@ class _Writer:
                 self.bind(second, self.text(first))
         elif isinstance(atom, RangeAtom):
             self.open(f'if {self.use(atom.test)}({self.text(atom.terms[0])}):')
-        else:
+        elif atom.solve is None:
             arguments = ', '.join(map(self.text, atom.terms))
-            if all(map(self.is_bound, atom.terms)):
-                self.open(f'if {self.use(atom.holds)}({arguments}):')
+            self.open(f'if {self.use(atom.holds)}({arguments}):')
+        else:
+            result = atom.terms[0]
+            values = f'{self.use(atom.solve)}({", ".join(map(self.text, atom.terms[1:]))})'
+            if self.is_bound(result):
+                self.open(f'if {self.text(result)} in {values}:')
             else:
-                rest = ', '.join(map(self.text, atom.terms[1:]))
-                result = atom.terms[0]
-                assert isinstance(result, int)
-                self.open(f'for v{result} in {self.use(atom.solve)}({rest}):')
-                self.bound.add(result)
+                self.open(f'for v{result} in {values}:')
+                self.bound.add(result)  # type: ignore[arg-type]
 
     def _class_step(self, atom: PredicateAtom) -> None:
         (term,) = atom.terms

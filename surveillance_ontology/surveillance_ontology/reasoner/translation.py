@@ -8,6 +8,7 @@ clause can express is reported, with the axiom, in `Program.unsupported`.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 from itertools import permutations, product
 from typing import Any
 
@@ -745,13 +746,18 @@ class Translation:
             self._heads(rule, self._bound(body, terms), terms)
 
     def _bound(self, body: tuple[BodyAtom, ...], terms: _Terms) -> tuple[BodyAtom, ...]:
-        """Return the body with owl:Thing for individuals that nothing else binds.
+        """Return the body, in which what stands in no fact is found by other means.
+
+        Such individuals are members of owl:Thing, such values are computed by a built-in. All other
+        built-ins only test: they take 3 and 3.0 as equal, the lookup of a computed value among the
+        facts would not, and the order of the join decides which of the two is done.
 
         Raises:
             UnsupportedError: A value is bound by nothing.
         """
         program = self.program
         bound: set[Term] = set()
+        computing: set[BodyAtom] = set()
         for atom in body:
             if isinstance(atom, PredicateAtom):
                 bound.update(atom.terms)
@@ -773,15 +779,22 @@ class Translation:
                 unbound = [
                     term for term in atom.terms if isinstance(term, int) and term not in bound
                 ]
-                first_only = unbound == [atom.terms[0]] and isinstance(atom, ComputedAtom)
-                if not unbound or (first_only and atom.solve is not None):  # type: ignore[union-attr]
+                if unbound == [atom.terms[0]] and isinstance(atom, ComputedAtom) and atom.solve:
+                    computing.add(atom)
+                    unbound = []
+                if not unbound:
                     bound.update(atom.terms)
                     waiting.remove(atom)
                     progress = True
         if waiting:
             name = waiting[0].builtin if isinstance(waiting[0], ComputedAtom) else 'a data range'
             raise UnsupportedError(f'an argument of {name} is bound by no other atom')
-        return body
+        return tuple(
+            replace(atom, solve=None)
+            if isinstance(atom, ComputedAtom) and atom not in computing
+            else atom
+            for atom in body
+        )
 
     def _heads(self, rule: ax.Rule, body: tuple[BodyAtom, ...], terms: _Terms) -> None:
         program = self.program

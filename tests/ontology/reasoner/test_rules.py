@@ -121,6 +121,29 @@ def test_builtins(given: object, atoms: list[BuiltinAtom], result: Literal | Non
     assert kb.data_values(T, i) == set()
 
 
+def test_values_of_two_spaces_are_equal_whichever_comes_first() -> None:
+    values = (DataPropertyAtom(S, X, V), DataPropertyAtom(T, X, W))
+    rule = Rule((*values, computed('add', W, V, 1)), (ClassAtom(A, X),))
+    facts = [has(S, i, 2), has(T, i, num('3.0', 'float'))]
+    for fact in facts:
+        kb = base(rule, *facts)
+        assert kb.instances(A) == {i}
+        kb.remove(fact)
+        kb.reason()
+        assert kb.instances(A) == set()
+        kb.add(fact)
+        kb.reason()
+        assert kb.instances(A) == {i}
+
+
+def test_an_equal_value_of_another_space_is_not_what_a_rule_computed() -> None:
+    rule = Rule((DataPropertyAtom(S, X, V), computed('add', W, V, 1)), (DataPropertyAtom(T, X, W),))
+    kb = base(rule, has(S, i, 2), has(T, i, num('3.0', 'float')))
+    kb.remove(has(T, i, num('3.0', 'float')))
+    kb.reason()
+    assert kb.data_values(T, i) == {num(3)}
+
+
 def test_rules_speak_of_named_individuals_only() -> None:
     rule = Rule((ObjectPropertyAtom(P, X, Y), ClassAtom(B, Y)), (ClassAtom(C, X),))
     kb = base(SubClassOf(A, ObjectSomeValuesFrom(P, B)), rule, is_a(A, i))
