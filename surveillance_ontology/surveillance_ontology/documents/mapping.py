@@ -153,7 +153,8 @@ class Mapping:
     def _guess_kinds(self) -> None:
         """Give undeclared properties the kinds that their values and ranges have.
 
-        rdf:Property tells no kind: without values and ranges it is an object property.
+        rdf:Property tells no kind: without values and ranges it is an object property. Nor does the
+        header: what is used there alone annotates the ontology.
         """
         guessed: dict[str, set[str]] = {}
 
@@ -168,7 +169,7 @@ class Mapping:
             for predicate, values in properties.items():
                 if predicate == RDFS + 'range':
                     guess(subject, (isinstance(v, str) and self._is_data_range(v) for v in values))
-                else:
+                elif subject != self._header:
                     guess(predicate, (isinstance(value, Literal) for value in values))
         for name, kinds in guessed.items():
             self._kinds[name] = kinds or {'object_property'}
@@ -470,7 +471,9 @@ class Mapping:
 
     def _statement(self, subject: str, predicate: str, value: Node) -> None:
         kinds = self._kinds.get(predicate, set())
-        if 'annotation_property' in kinds or predicate in ANNOTATIONS or subject == self._header:
+        fitting = 'data_property' if isinstance(value, Literal) else 'object_property'
+        annotates = 'annotation_property' in kinds or predicate in ANNOTATIONS
+        if annotates or (subject == self._header and fitting not in kinds):
             if subject.startswith('_:') and self._is_construct(subject):
                 self._report(subject, f'{local_name(predicate)} of what has no name is not kept')
             else:

@@ -235,6 +235,27 @@ def test_turtle_that_begins_as_n_triples_do_and_names_that_are_no_iris(text: str
     ]
 
 
+def test_a_header_has_values_of_declared_properties() -> None:
+    document = read_turtle(
+        ':about a owl:ObjectProperty ; rdfs:range :Place . :since a owl:DatatypeProperty .\n'
+        '<http://x/> :about :Hall , "rooms" ; :since 2020 , :now ; :by "me" .'
+    )
+    x = 'http://x/#'
+    assert [axiom for axiom in document.axioms if hasattr(axiom, 'subject')] == [
+        ax.ObjectPropertyAssertion(x + 'about', 'http://x/', x + 'Hall'),
+        ax.AnnotationAssertion(x + 'about', 'http://x/', Literal('rooms')),
+        ax.DataPropertyAssertion(x + 'since', 'http://x/', Literal('2020', XSD + 'integer')),
+        ax.AnnotationAssertion(x + 'since', 'http://x/', x + 'now'),
+        ax.AnnotationAssertion(x + 'by', 'http://x/', Literal('me')),
+    ]
+    assert document.unsupported == []
+    kb = KnowledgeBase(IRI, document.axioms)
+    kb.reason()
+    assert kb.instances(x + 'Place') == {x + 'Hall'}
+    again = read_ontology(ontology_bytes(document.axioms, 'http://x/', 'rdfxml'), 'http://x/')
+    assert set(again.axioms) >= set(document.axioms)
+
+
 @pytest.mark.parametrize('form', ['rdfxml', 'ntriples'])
 def test_a_value_stays_one_where_the_header_has_its_property_too(form: str) -> None:
     text = '<http://x/> :title "Rooms" . :i :title "Hall" .'
