@@ -49,7 +49,10 @@ class InitialState(PatrolNode):
         self._scan = self.declare_live(InitialScan())
         pictures = self.parameter('pictures', 6, 'Pictures to take at each pose.', minimum=1)
         patience = self.parameter(
-            'patience', 2.0, 'Seconds after which a pose is left without them.', minimum=0.0
+            'patience',
+            3.0,
+            'Seconds of real time after which a pose is left without them.',
+            minimum=0.0,
         )
         look_again: float = self.parameter(
             'look_again',
@@ -147,6 +150,7 @@ class InitialState(PatrolNode):
             self._publish(notes, self._configured.start)
         else:
             logger = self.get_logger()
+            self._camera.await_peers()
             report = self._scan.run(
                 self._camera,
                 self._inquiry.judge,

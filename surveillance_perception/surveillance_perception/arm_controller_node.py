@@ -66,7 +66,9 @@ class ArmSettings:
     pictures: int = parameter(
         4, 'Pictures that the marker detector must have looked at before a view is left.', 0
     )
-    patience: float = parameter(1.5, 'Seconds after which a view is left without them.', 0.0)
+    patience: float = parameter(
+        3.0, 'Seconds of real time after which a view is left without them.', 0.0
+    )
     horizontal: float = converted(
         math.radians,
         60.0,

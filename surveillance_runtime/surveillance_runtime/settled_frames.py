@@ -26,9 +26,13 @@ class SettledFrames:
         self._since: Time | None = None
         self._wanted = 0
         self._changed = Interrupt()
-        node.create_subscription(
+        self._subscription = node.create_subscription(
             MarkerDetectionArray, 'aruco_detector/detections', self._on_picture, 10
         )
+
+    def is_told(self) -> bool:
+        """Tell whether a marker detector is there."""
+        return bool(self._subscription.get_publisher_count())
 
     def wait(self, pictures: int, dwell: float, patience: float, interrupt: Interrupt) -> bool:
         """Wait for pictures that were taken from now on; from a worker thread only.
@@ -36,7 +40,7 @@ class SettledFrames:
         Args:
             pictures: How many to wait for.
             dwell: Shortest wait, seconds of ROS time.
-            patience: Seconds after that at which the wait ends without them.
+            patience: Seconds of real time after that at which the wait ends without them.
             interrupt: Ends the wait early.
 
         Returns:
@@ -49,7 +53,7 @@ class SettledFrames:
         try:
             if not self._clock.sleep(dwell, interrupt):
                 return False
-            self._clock.sleep(patience, self._changed)
+            self._changed.wait(patience)
         finally:
             remove()
             self._since = None

@@ -6,6 +6,8 @@ a ceiling bounds the rate, and time stands still while a program is at work on i
 - a controller on the next command, while the base is under command or a drive is executed: each
   measurement has its command before the next one is made;
 - a localisation on the next estimate of the pose;
+- who moves the arm, until it is seen to rest at the end of its trajectory, and then the marker
+  detector on the next picture, while somebody may look through the camera there;
 - whoever writes the robot's place into the ontology, while a place was told and not written;
 - a planner on a path, while one of its goals is executed;
 - the mission on its next step: it says until which simulated time it waits, and time does not
@@ -17,6 +19,7 @@ silent for `patience` real seconds is given up until it answers again, and time 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from surveillance_runtime.parameters import parameter
@@ -25,6 +28,8 @@ PLANNING = ('compute_path', 'motion/planner')
 """Actions that take no simulated time: it stands still while one of their goals is executed."""
 DRIVING = ('follow_path', 'motion/controller')
 """Actions during which the mission waits for the robot."""
+LOOKING = 3.0
+"""Simulated seconds that a program looks through the camera where the arm has come to rest."""
 MIN_STEP = 0.001
 """The shortest step of time, seconds."""
 LONGEST_DEBT = 0.5
@@ -38,7 +43,8 @@ class ClockRateModel:
     Attributes:
         window: Simulated seconds that may pass after a command before the next one must come.
         estimate_window: Likewise after the measurement that an estimate of the pose answers.
-        patience: Real seconds that time waits for either.
+        look_window: Likewise after the arm's trajectory, its rest, or a picture that was read.
+        patience: Real seconds that time waits for any of them.
     """
 
     speed: float = parameter(
@@ -54,9 +60,12 @@ class ClockRateModel:
     step: float = parameter(
         0.1, 'Simulated seconds between two messages on clock, odom and scan.', 0.005, 0.5
     )
-    idle_step: float = parameter(0.5, 'The same while nothing moves and speed is 0.', 0.005, 5.0)
+    idle_step: float = parameter(
+        0.5, 'The same while nothing moves, nobody looks and speed is 0.', 0.005, 5.0
+    )
     window: float = 0.05
     estimate_window: float = 0.45
+    look_window: float = 0.2
     patience: float = 3.0
 
     @property
@@ -104,6 +113,7 @@ class ClockRate:
 
     Attributes:
         is_waiting: Whether time stood still, when last asked, until a program answers.
+        awaits_picture: Whether that is one that reads a picture, or sees that the arm rests.
     """
 
     def __init__(self, model: ClockRateModel, steady: float) -> None:
@@ -113,13 +123,15 @@ class ClockRate:
         self._owed = 0.0
         self._commands = Answers(model.window, model.patience)
         self._estimates = Answers(model.estimate_window, model.patience)
+        self._looks = Answers(model.look_window, model.patience)
+        self._look_from, self._look_until = math.inf, math.inf
         self._mission_waits_until: float | None = None
         self._mission_late_since: float | None = None
         self._executed: dict[str, bool] = {}
         self._place_told = -1.0
         self._place_written: float | None = None
         self._place_late_since: float | None = None
-        self.is_waiting = False
+        self.is_waiting = self.awaits_picture = False
 
     def mission_waits(self, until: float) -> None:
         """Note that the mission waits until this simulated time, seconds; inf: for an event."""
@@ -186,9 +198,28 @@ class ClockRate:
         """Note an estimate of the pose from what was measured at this simulated time, seconds."""
         self._estimates.note(measured)
 
+    def arm_moves(self, until: float) -> None:
+        """Note that the arm follows a trajectory that ends at this simulated time, seconds."""
+        self._looks.note(until)
+        self._look_from, self._look_until = math.inf, math.inf
+
+    def arm_rests(self, simulated: float) -> None:
+        """Note that whoever moves the arm has seen at this simulated time that it rests."""
+        self._looks.note(simulated)
+        self._look_from, self._look_until = simulated, simulated + LOOKING
+
+    def picture_read(self, taken: float) -> None:
+        """Note that a picture taken at this simulated time, seconds, has been read."""
+        if self._look_from <= taken <= self._look_until:
+            self._looks.note(taken)
+
     def waits(self, simulated: float, steady: float) -> bool:
         """Return whether time stands still until a program answers; times as for `due`."""
+        if simulated > self._look_until:
+            self._looks.end()
+        self.awaits_picture = self._looks.are_late(simulated, steady)
         late = (
+            self.awaits_picture,
             self._commands.are_late(simulated, steady),
             self._estimates.are_late(simulated, steady),
             self._mission_is_late(simulated, steady),
@@ -213,7 +244,8 @@ class ClockRate:
             self._owed = min(self._owed + elapsed * model.ceiling, step)
             return 0.0
         if model.speed == 0.0:
-            if not moving and not any(self._executed.values()):
+            looking = self._look_from <= simulated <= self._look_until
+            if not (moving or looking or any(self._executed.values())):
                 step = model.idle_step
             if self._mission_waits_until is not None and not any(self._executed.values()):
                 step = min(step, max(self._mission_waits_until - simulated, MIN_STEP))

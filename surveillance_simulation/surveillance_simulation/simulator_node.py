@@ -16,9 +16,10 @@ from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseWithCovarianceStamped, Twist
 from rclpy.clock import Clock as RclpyClock
 from rclpy.clock import ClockType
+from std_msgs.msg import Bool
 from trajectory_msgs.msg import JointTrajectory
 
-from surveillance_interfaces.msg import RobotPlace
+from surveillance_interfaces.msg import MarkerDetectionArray, RobotPlace
 from surveillance_runtime.configuration import PLACE_TABLES
 from surveillance_runtime.conversions import seconds_of
 from surveillance_runtime.node import PatrolNode
@@ -93,12 +94,13 @@ class Simulator(PatrolNode):
         self._next_measurement = self.robot.time + self._measurement_period
         if rate.speed:
             rate = replace(rate, step=min(rate.step, OBEYS_WITHIN * rate.speed))
-        self._rate = ClockRate(rate, time.monotonic())
         self._sensors = SensorFeed(self, self.robot, drives_clock=self._drives_clock)
         try:
             self._camera = CameraFeed(self, self.robot, seed, self._changing, self._stamp)
         except (PlaceError, ImportError) as error:
             raise ParameterError(f'simulator: {error}') from None
+        rate = replace(rate, look_window=self._camera.period + rate.step)
+        self._rate = ClockRate(rate, time.monotonic())
         FaultServices(self, self.robot, self._changing, self._changed)
         self._is_monitored = False
         self.create_subscription(Twist, 'cmd_vel', self._on_command, 1)
@@ -117,10 +119,14 @@ class Simulator(PatrolNode):
                 STATE_QOS,
             )
         self.create_subscription(JointTrajectory, 'arm/joint_trajectory', self._on_trajectory, 1)
+        self.create_subscription(Bool, 'arm/at_rest', self._on_arm_rest, STATE_QOS)
+        self.create_subscription(
+            MarkerDetectionArray, 'aruco_detector/detections', self._on_detections, 10
+        )
         steady = RclpyClock(clock_type=ClockType.STEADY_TIME)
         self._sensors.publish(self._stamp())
         self._timer = self.create_timer(rate.period, self._tick, clock=steady)
-        self.create_timer(LOOK_PERIOD, self._go_on, clock=steady)
+        self.create_timer(LOOK_PERIOD, self._look_again, clock=steady)
         if self._drives_clock:
             self._told_of_clock = False
             self.create_timer(1.0, self._look_for_another_clock, clock=steady)
@@ -166,6 +172,11 @@ class Simulator(PatrolNode):
             self._timer.reset()
             self._tick()
 
+    def _look_again(self) -> None:
+        if self._rate.is_waiting and self._rate.awaits_picture:
+            self._camera.ask()  # the last one may have been taken before the rest was known
+        self._go_on()
+
     def _look_for_another_clock(self) -> None:
         others = self.count_publishers('/clock') - 1
         if others > 0 and not self._told_of_clock:
@@ -210,6 +221,15 @@ class Simulator(PatrolNode):
         self._rate.place_written(seconds_of(stamp))
         self._go_on()
 
+    def _on_arm_rest(self, message: Bool) -> None:
+        if message.data:
+            self._rate.arm_rests(self.robot.time)
+            self._go_on()
+
+    def _on_detections(self, message: MarkerDetectionArray) -> None:
+        self._rate.picture_read(seconds_of(message.header.stamp))
+        self._go_on()
+
     def _on_goals(self, action: str, message: GoalStatusArray) -> None:
         executed = any(goal.status in _UNDER_WAY for goal in message.status_list)
         self._rate.goals(action, self.robot.time, executed=executed)
@@ -220,6 +240,7 @@ class Simulator(PatrolNode):
         try:
             with self._changing:
                 self.robot.arm.follow(names, points, self.robot.time)
+                self._rate.arm_moves(self.robot.time + (points[-1].time if points else 0.0))
         except ValueError as error:
             self.get_logger().error(f'arm/joint_trajectory: {error}')
 

@@ -13,7 +13,7 @@ from std_srvs.srv import Empty
 from surveillance_behaviour.initial_state_node import InitialState
 from surveillance_fsm.ros import GoalServer
 from surveillance_interfaces.action import ScanSurroundings
-from surveillance_interfaces.msg import OntologyMap
+from surveillance_interfaces.msg import MarkerDetectionArray, OntologyMap
 from surveillance_interfaces.srv import MarkerRoutine, ReferenceName
 from surveillance_perception.marker_server_node import MarkerServer
 from surveillance_runtime.node import PatrolNode
@@ -39,6 +39,8 @@ class Robot:
         self.poses: list[int] = []
         self.maps = graph.listen(OntologyMap, 'ontology_map/build_map', STATE_QOS)
         self.ids = graph.node.create_publisher(Int32, 'aruco_detector/id', 100)
+        topic = 'aruco_detector/detections'  # it tells of no picture
+        self.detections = graph.node.create_publisher(MarkerDetectionArray, topic, 10)
         graph.node.create_service(MarkerRoutine, 'move_arm', self._move)
         graph.node.create_service(ReferenceName, 'ontology_map/reference_name', self._built)
 

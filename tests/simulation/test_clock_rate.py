@@ -148,3 +148,23 @@ def test_time_waits_until_the_ontology_has_the_place_as_long_as_somebody_writes_
     rate.place_told(3.0)
     assert rate.due(3.0, 3.0, moving=True) == 0.0
     assert rate.due(3.0, 6.1, moving=True) > 0.0, 'given up after its patience'
+
+
+def test_time_waits_for_who_looks_where_the_arm_has_come_to_rest() -> None:
+    rate = ClockRate(ClockRateModel(speed=0.0, look_window=0.2), 0.0)
+    assert not rate.waits(0.0, 0.0)
+    rate.arm_moves(2.0)
+    assert not rate.waits(2.1, 0.1)
+    assert rate.waits(2.2, 0.2)  # until its controller sees that it rests
+    rate.arm_rests(2.2)
+    assert not rate.waits(2.3, 0.3)
+    assert rate.waits(2.4, 0.4)  # until a picture of that view is read
+    assert rate.awaits_picture
+    rate.picture_read(1.9)
+    assert rate.waits(2.4, 0.5)
+    rate.picture_read(2.3)
+    assert not rate.waits(2.4, 0.6)
+    assert rate.waits(2.5, 0.7)
+    assert not rate.waits(5.3, 0.8)  # nobody looks for so long
+    rate.picture_read(5.3)
+    assert not rate.waits(9.0, 0.9)

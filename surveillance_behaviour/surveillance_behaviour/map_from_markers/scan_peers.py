@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import queue
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -11,7 +12,7 @@ from std_msgs.msg import Int32
 from surveillance_behaviour.conversions import place_note_from
 from surveillance_behaviour.map_from_markers.assembly import Survey, SurveyReport
 from surveillance_fsm import Interrupt
-from surveillance_fsm.ros import CallError, ClockWait, GoalCaller, ServiceCaller
+from surveillance_fsm.ros import CallError, ClockWait, GoalCaller, ServiceCaller, await_ready
 from surveillance_interfaces.action import ScanSurroundings
 from surveillance_interfaces.msg import MarkerDetectionArray
 from surveillance_interfaces.srv import MarkerRoutine, RoomInformation
@@ -20,6 +21,7 @@ from surveillance_runtime.settled_frames import SettledFrames
 
 _ARM_SECONDS = 30.0
 _ANSWER_SECONDS = 5.0
+_START_SECONDS = 10.0
 
 
 class CameraScanner:
@@ -39,6 +41,16 @@ class CameraScanner:
         self._move = ServiceCaller(node, MarkerRoutine, 'move_arm')
         self._scan = GoalCaller(node, ScanSurroundings, 'scan_surroundings', cancel_timeout=1.0)
         self._read = SettledFrames(node)
+
+    def await_peers(self) -> None:
+        """Wait for the nodes of arm and detector: only then does looking begin."""
+        arm, detector = self._move.is_ready, self._read.is_told
+        try:
+            for is_ready, what in (arm, 'service move_arm'), (detector, 'marker detector'):
+                deadline = time.monotonic() + _START_SECONDS
+                await_ready(is_ready, deadline, self._node.stopping, what)
+        except CallError as error:
+            self._complain(str(error))
 
     def pose(self, number: int) -> None:
         """Take one of the arm's poses and look."""

@@ -26,6 +26,7 @@ from surveillance_fsm.ros.calls import (
     GoalEnd,
     ServiceCaller,
     UnavailableError,
+    await_ready,
 )
 from surveillance_fsm.ros.states import (
     ConditionState,
@@ -59,6 +60,7 @@ __all__ = [
     'ServiceState',
     'SimpleActionState',
     'UnavailableError',
+    'await_ready',
     'set_preempt_handler',
     'work_aside',
 ]

@@ -47,6 +47,7 @@ class CameraFeed:
 
     Attributes:
         conditions: Light, noise and blur of the next pictures.
+        period: Simulated seconds from picture to picture.
     """
 
     def __init__(
@@ -81,7 +82,7 @@ class CameraFeed:
         robot.world.wall_brightness = options.wall_brightness
         take = MujocoRenderer if options.renderer == 'mujoco' else Renderer
         self._renderer: Renderer | MujocoRenderer = take(robot.world, self._camera)
-        self._period = 1.0 / options.rate
+        self.period = 1.0 / options.rate
         self._next = 0.0
         self._rng = np.random.default_rng(seed)
         self._changing = changing
@@ -103,7 +104,11 @@ class CameraFeed:
         now = self._robot.time
         if now + 1e-9 < self._next:
             return
-        self._next = now + self._period
+        self._next = now + self.period
+        self.ask()
+
+    def ask(self) -> None:
+        """Ask for a picture if somebody looks; never blocks."""
         if self.is_watched or self._infos.get_subscription_count():
             self._wanted.release()
 
