@@ -20,11 +20,7 @@ PAUSE = 0.0002
 
 @contextmanager
 def uncollected() -> Iterator[None]:
-    """Switch the garbage collector off for a while, where it is on.
-
-    What was made meanwhile counts as old afterwards: else the collector would look through it all
-    at the next allocation.
-    """
+    """Switch the garbage collector off for a while, where it is on."""
     if not gc.isenabled():
         yield
         return
@@ -32,9 +28,6 @@ def uncollected() -> Iterator[None]:
     try:
         yield
     finally:
-        if gc.get_count()[0] > LARGE and not gc.get_freeze_count():
-            gc.freeze()
-            gc.unfreeze()
         gc.enable()
 
 
@@ -45,7 +38,7 @@ def settle(axioms: int) -> None:
 
 
 def release(parts: Iterable[None], others: bool) -> None:
-    """Give the memory of a large ontology back to the system; other threads go on meanwhile.
+    """Give the memory of an ontology back to the system; other threads go on meanwhile.
 
     Args:
         parts: Lets go of a part of the ontology with each step.
@@ -57,6 +50,5 @@ def release(parts: Iterable[None], others: bool) -> None:
     if not others:
         gc.unfreeze()
         gc.collect()
-        gc.freeze()
     with suppress(OSError, AttributeError):  # Not glibc: it decides itself.
         ctypes.CDLL('libc.so.6').malloc_trim(0)

@@ -25,6 +25,15 @@ def test_the_collector_is_off_inside_and_as_before_outside() -> None:
     assert gc.isenabled()
 
 
+def test_what_was_made_and_dropped_meanwhile_is_looked_at_soon() -> None:
+    with memory.uncollected():
+        rings = [Ring() for _ in range(memory.LARGE + 1)]
+        gone = weakref.ref(rings[0])
+        del rings
+    gc.collect(1)
+    assert gone() is None, 'it waits for a collection of everything, which may not come'
+
+
 def test_what_settled_is_looked_at_again_when_something_was_dropped() -> None:
     ring = Ring()
     gone = weakref.ref(ring)

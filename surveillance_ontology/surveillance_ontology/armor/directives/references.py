@@ -164,17 +164,17 @@ def _drop(session: Session, request: DirectiveRequest) -> DirectiveResponse:
                 session.store.dropped(ref.name)
             session.references.remove(ref)
             session.tell(ref.name, None)
-            if len(ref.kb) > memory.LARGE:
-                # Not yet: this directive and those that wait for the lock still refer to it.
-                release = threading.Timer(RELEASE_AFTER, _release, args=(session, ref))
-                release.daemon = True
-                release.start()
+            # Not yet: this directive and those that wait for the lock still refer to it.
+            release = threading.Timer(RELEASE_AFTER, _release, args=(session, ref))
+            release.daemon = True
+            release.start()
     return DirectiveResponse()
 
 
 def _release(session: Session, ref: Reference) -> None:
-    """Give back the memory of a large ontology, also of the processes that know its graph."""
-    session.sparql.forget()
+    """Give back an ontology's memory; of a large one also that of those who know its graph."""
+    if len(ref.kb) > memory.LARGE:
+        session.sparql.forget()
     with ref.lock:  # The last of those who found it before it was dropped.
         parts = ref.kb.give_up()
         ref.kb, ref.history = KnowledgeBase(ref.kb.iri), History()
