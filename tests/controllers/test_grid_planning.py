@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -113,8 +114,13 @@ def test_who_may_leave_a_door_is_planned_through_unless_there_is_a_way_round() -
     planner = GridPlanner(two_rooms(), ROBOT)
     planner.set_obstacles([(4.02, 2.0), (2.0, 2.0)], np.array([False, True]))
     path = geometry.equally_spaced(planner.plan((1, 2), (7, 2)), 0.02)
-    assert np.hypot(*(path - (4.02, 2)).T).min() < ROBOT.radius
+    assert np.hypot(*(path - (4.02, 2)).T).min() < ROBOT.radius + ROBOT.margin
     assert np.hypot(*(path - (2, 2)).T).min() >= ROBOT.radius
+    # Whoever stands where there is room is planned around all the same.
+    planner.set_obstacles([(4.02, 2.0), (2.0, 2.0)], np.array([False, False]))
+    path = geometry.equally_spaced(planner.plan((1, 2), (7, 2)), 0.02)
+    assert np.hypot(*(path - (2, 2)).T).min() >= ROBOT.radius + ROBOT.margin - 0.025
+    assert path[-1] == pytest.approx((7, 2))
     planner.set_obstacles([(4.02, 2.0)])
     with pytest.raises(NoPathError, match=r'an obstacle at \(4\.02, 2\.00\) is in the way'):
         planner.plan((1, 2), (7, 2))
@@ -124,8 +130,23 @@ def test_who_may_leave_a_door_is_planned_through_unless_there_is_a_way_round() -
         planner.plan((1, 2), (7, 2))
 
 
+def test_a_goal_on_which_somebody_stands_is_moved_only_where_there_is_room_beside_it() -> None:
+    planner = GridPlanner(two_rooms(), ROBOT)
+    someone = np.zeros(1, np.bool_)
+    planner.set_obstacles([(6.0, 2.0)], someone)
+    end = planner.plan((5, 2), (6, 2))[-1]
+    assert ROBOT.radius <= math.dist(end, (6, 2)) < 0.5
+    crowd = np.array(
+        [(6 + x, 2 + y) for x in np.arange(-1, 1.1, 0.2) for y in np.arange(-1, 1.1, 0.2)]
+    )
+    planner.set_obstacles(crowd, np.zeros(len(crowd), np.bool_))
+    assert planner.plan((4.5, 2), (6, 2))[-1] == pytest.approx((6, 2))
+
+
 def test_a_goal_beside_a_door_is_not_moved_through_it() -> None:
     planner = GridPlanner(two_rooms(), ROBOT, {'D1': (4.02, 1.5, 4.02, 2.5)})
+    planner.set_obstacles([(4.02, 2.0)])
+    assert 0.2 < math.dist(planner.plan((1, 2), (4.02, 2.0))[-1], (4.02, 2.0)) < 1.0
     planner.set_obstacles([(4.2, y) for y in np.arange(1.5, 2.6, 0.05)])
     # On this side of the door the place nearest to the goal is reached, through the door none is.
     assert planner.plan((6, 2), (4.2, 2.0))[-1][0] > 4.4

@@ -5,6 +5,7 @@ not free. Among them, cells near obstacles cost more, so that a path keeps to th
 passage where there is room. `grid_search` finds the cheapest way over the eight neighbours.
 Straight shortcuts that are no dearer replace the steps of the grid, and corners are rounded as far
 as the free space allows. A door or an obstacle that comes or goes changes the costs near it alone.
+What may leave costs more than a usual way round, and does not block.
 """
 
 from __future__ import annotations
@@ -22,13 +23,13 @@ from skimage.graph import MCP_Geometric
 from surveillance_controllers import geometry
 from surveillance_controllers.geometry import Points
 from surveillance_controllers.planning.grid_map import GridMap, distance_to, points_on, with_walls
-from surveillance_controllers.planning.grid_search import GridSearch
+from surveillance_controllers.planning.grid_search import Cell, GridSearch
 from surveillance_runtime.parameters import parameter
 
 Lines = Mapping[str, tuple[float, float, float, float]]
 """Named segments x1, y1, x2, y2, metres."""
 
-_THROUGH = 1e4
+_BLOCKED = 1e4
 """Cost of a blocked cell in the search for what blocks; more than any detour."""
 
 
@@ -47,6 +48,8 @@ class PlanningParameters:
         aversion: How many times what an open cell costs one at the margin costs, minus one.
         escape: A start that is not free may be left over at most this distance, metres.
         goal_shift: A goal on which an obstacle stands is moved by at most this distance, metres.
+        waiting: How many times what an open cell costs one does that somebody blocks who may leave;
+            past a person these are about as many metres of a way round.
         corner: Longest part of a straight line that rounding a corner may take, metres.
     """
 
@@ -56,6 +59,7 @@ class PlanningParameters:
     aversion: float = parameter(3.0, 'How much more a path near obstacles costs.', 0.0, 20.0)
     escape: float = 0.6
     goal_shift: float = 1.0
+    waiting: float = 100.0
     corner: float = 0.5
 
 
@@ -73,16 +77,20 @@ class GridPlanner:
     parameters: PlanningParameters = field(default_factory=PlanningParameters)
     doors: Lines = field(default_factory=dict)
     _closed: Lines = field(default_factory=dict, init=False)
-    _obstacles: Points = field(default_factory=lambda: np.zeros((0, 2)), init=False)
-    _lasting: Points = field(default_factory=lambda: np.zeros((0, 2)), init=False)
-    _extra: set[tuple[int, int]] = field(default_factory=set, init=False)
+    _staying: Points = field(default_factory=lambda: np.zeros((0, 2)), init=False)
+    _leaving: Points = field(default_factory=lambda: np.zeros((0, 2)), init=False)
+    _firm_cells: set[Cell] = field(default_factory=set, init=False)
+    _loose_cells: set[Cell] = field(default_factory=set, init=False)
 
     def __post_init__(self) -> None:
         p, shape = self.parameters, self.grid.cells.shape
         self._static = self._distance(~self.grid.free)
         self._reach = math.ceil((p.radius + p.margin + p.comfort) / self.grid.resolution) + 1
-        self._clearance = self._static.copy()
+        # From what stays, and from everything.
+        self._firm, self._clearance = self._static.copy(), self._static.copy()
         self._cost = np.empty(shape, np.float32)
+        # Where nothing blocks the way, not even what may leave.
+        self._open = np.empty(shape, np.bool_)
         self._price_cells(np.s_[:, :])
         self._search = GridSearch(self._cost)
         self._divide()
@@ -104,13 +112,9 @@ class GridPlanner:
                 there. None: all of them.
         """
         array = np.asarray(points, dtype=float).reshape(-1, 2)
-        self._lasting = array if stay is None else array[stay]
-        self._take(array)
-
-    def _take(self, obstacles: Points) -> None:
-        if not np.array_equal(obstacles, self._obstacles):
-            self._obstacles = obstacles
-            self._update()
+        stays = np.ones(len(array), np.bool_) if stay is None else stay
+        self._staying, self._leaving = array[stays], array[~stays]
+        self._update()
 
     @property
     def cost(self) -> NDArray[np.float32]:
@@ -133,7 +137,8 @@ class GridPlanner:
     def plan(self, start: ArrayLike, goal: ArrayLike) -> Points:
         """Find the way from one point to another.
 
-        Where none leads around all obstacles, it leads through those that may be gone by then.
+        Where the way around is very long, or there is none, it leads through obstacles that may be
+        gone by then.
 
         Args:
             start: x, y in metres; when it is not free, the path leaves it by the shortest way.
@@ -148,24 +153,10 @@ class GridPlanner:
         """
         begin: Points = np.asarray(start, dtype=float)[:2]
         end: Points = np.asarray(goal, dtype=float)[:2]
-        try:
-            return self._way(begin, end)
-        except NoPathError:
-            if len(self._lasting) == len(self._obstacles):
-                raise
-        everything = self._obstacles
-        self._take(self._lasting)
-        try:
-            return self._way(begin, end)
-        finally:
-            self._take(everything)
-
-    def _way(self, begin: Points, end: Points) -> Points:
-        """Find the way around everything that is known; see `plan`."""
-        goal_cell = self._cell('the goal', end)
+        wanted = self._cell('the goal', end)
         start_cell = self._free_cell_near(begin)
-        if self._regions[goal_cell] == 0:
-            goal_cell = self._cell_beside(end, goal_cell, start_cell)
+        goal_cell = wanted if self._open[wanted] else self._cell_beside(end, wanted, start_cell)
+        if goal_cell != wanted:
             end = self.grid.centres_of(goal_cell)[0]
         if self._regions[start_cell] != self._regions[goal_cell]:
             raise NoPathError(
@@ -187,49 +178,58 @@ class GridPlanner:
     def _update(self) -> None:
         """Take the doors and obstacles into account that came or went."""
         lines = [points_on(line, self.grid.resolution / 2) for line in self._closed.values()]
-        cells = self.grid.cells_of(np.concatenate([*lines, self._obstacles]))
-        extra = {(int(row), int(rank)) for row, rank in cells[self.grid.contains(cells)]}
-        changed = np.array(sorted(extra ^ self._extra), dtype=np.intp).reshape(-1, 2)
-        self._extra = extra
+        firm = self._cells_of(np.concatenate([*lines, self._staying]))
+        loose = self._cells_of(self._leaving)
+        changed = np.array(
+            sorted((firm ^ self._firm_cells) | (loose ^ self._loose_cells)), dtype=np.intp
+        ).reshape(-1, 2)
+        self._firm_cells, self._loose_cells = firm, loose
         if not len(changed):
             return
         # What is further away than this from a change costs what it did.
         rows, columns = self.grid.cells.shape
         top, left = np.maximum(changed.min(axis=0) - self._reach, 0)
         bottom, right = np.minimum(changed.max(axis=0) + self._reach + 1, (rows, columns))
-        self._measure(int(top), int(bottom), int(left), int(right))
-        self._price_cells(np.s_[top:bottom, left:right])
-        self._search.changed(int(top), int(bottom), int(left), int(right))
+        bounds = int(top), int(bottom), int(left), int(right)
+        window = np.s_[top:bottom, left:right]
+        self._firm[window] = np.minimum(self._static[window], self._measured(firm, *bounds))
+        self._clearance[window] = np.minimum(self._firm[window], self._measured(loose, *bounds))
+        self._price_cells(window)
+        self._search.changed(*bounds)
         self._divide()
 
-    def _measure(self, top: int, bottom: int, left: int, right: int) -> None:
-        """Measure the clearance in a window; exact up to `_reach`, no less than that beyond."""
+    def _cells_of(self, points: Points) -> set[Cell]:
+        cells = self.grid.cells_of(points)
+        return {(int(row), int(rank)) for row, rank in cells[self.grid.contains(cells)]}
+
+    def _measured(
+        self, cells: set[Cell], top: int, bottom: int, left: int, right: int
+    ) -> NDArray[np.float32]:
+        """Return the distance to cells in a window; exact up to `_reach`, no less beyond."""
         north, south = max(top - self._reach, 0), bottom + self._reach
         west, east = max(left - self._reach, 0), right + self._reach
         around = np.zeros(self._static[north:south, west:east].shape, np.bool_)
-        near = [
-            (r - north, c - west) for r, c in self._extra if north <= r < south and west <= c < east
-        ]
+        near = [(r - north, c - west) for r, c in cells if north <= r < south and west <= c < east]
         if near:
             at = np.array(near)
             around[at[:, 0], at[:, 1]] = True
-        inside = np.s_[top - north : bottom - north, left - west : right - west]
-        self._clearance[top:bottom, left:right] = np.minimum(
-            self._static[top:bottom, left:right], self._distance(around)[inside]
-        )
+        return self._distance(around)[top - north : bottom - north, left - west : right - west]
 
     def _price_cells(self, window: tuple[slice, slice]) -> None:
         p = self.parameters
-        spare = self._clearance[window] - np.float32(p.radius + p.margin)
+        needed = np.float32(p.radius + p.margin)
+        spare = self._clearance[window] - needed
         crowded = np.clip(1 - spare / np.float32(max(p.comfort, 1e-6)), 0, 1)
         price = 1 + np.float32(p.aversion) * crowded * crowded
-        self._cost[window] = np.where(spare >= 0, price, np.float32(-1))
+        blocked = np.where(self._firm[window] >= needed, np.float32(p.waiting), np.float32(-1))
+        self._open[window] = spare >= 0
+        self._cost[window] = np.where(self._open[window], price, blocked)
 
     def _divide(self) -> None:
         free = (self._cost > 0).astype(np.uint8)
         self._regions = cv2.connectedComponents(free, connectivity=8)[1]
 
-    def _cell(self, what: str, point: Points) -> tuple[int, int]:
+    def _cell(self, what: str, point: Points) -> Cell:
         cell = self.grid.cells_of(point)
         if not np.isfinite(point).all() or not self.grid.contains(cell)[0]:
             rows, columns = self.grid.cells.shape
@@ -245,34 +245,35 @@ class GridPlanner:
     def _is_free_at(self, point: Points) -> bool:
         return bool(self.clearance(point)[0] >= self.parameters.radius)
 
-    def _free_cell_near(self, start: Points) -> tuple[int, int]:
-        row, column = self._cell('the start', start)
-        if self._regions[row, column] != 0:
-            return row, column
-        if not self.grid.free[row, column]:
+    def _free_cell_near(self, start: Points) -> Cell:
+        at = self._cell('the start', start)
+        if self._open[at]:
+            return at
+        if not self.grid.free[at]:
             raise NoPathError(f'the start {_shown(start)} {self._why_not_free(start)}')
-        for cell in self._cells_around((row, column), self.parameters.escape, self._regions > 0):
+        for cell in self._cells_around(at, self.parameters.escape, self._open):
             if self._can_escape(start, self.grid.centres_of(cell)[0]):
                 return cell
+        if self._regions[at] != 0:
+            return at
         raise NoPathError(f'the start {_shown(start)} {self._why_not_free(start)}')
 
-    def _cell_beside(
-        self, goal: Points, cell: tuple[int, int], start: tuple[int, int]
-    ) -> tuple[int, int]:
+    def _cell_beside(self, goal: Points, cell: Cell, start: Cell) -> Cell:
         """Return the cell nearest to a goal that an obstacle covers, among those of the same room
-        that can be reached.
+        that can be reached; the goal's own where there is none, and it may become free.
         """
         needed = self.parameters.radius + self.parameters.margin
         if self._static[cell] >= needed:
-            region = self._regions == self._regions[start]
-            region &= self._rooms == self._rooms[cell]
+            region = self._open & (self._regions == self._regions[start])
+            if self._rooms[cell]:  # Else it lies in a door, so in both rooms.
+                region &= self._rooms == self._rooms[cell]
             for nearest in self._cells_around(cell, self.parameters.goal_shift, region):
                 return nearest
+            if self._regions[cell] != 0:
+                return cell
         raise NoPathError(f'the goal {_shown(goal)} {self._why_not_free(goal)}')
 
-    def _cells_around(
-        self, cell: tuple[int, int], reach: float, wanted: NDArray[np.bool_]
-    ) -> Iterator[tuple[int, int]]:
+    def _cells_around(self, cell: Cell, reach: float, wanted: NDArray[np.bool_]) -> Iterator[Cell]:
         """Yield the wanted cells within reach of a cell, metres, the nearest ones first."""
         steps = math.ceil(reach / self.grid.resolution)
         low = np.maximum(np.array(cell) - steps, 0)
@@ -311,16 +312,16 @@ class GridPlanner:
             )
             for name, line in self._closed.items()
         }
-        if len(self._obstacles):
-            index = int(np.argmin(np.hypot(*(self._obstacles - point).T)))
-            obstacle = self._obstacles[index]
+        if len(self._staying):
+            index = int(np.argmin(np.hypot(*(self._staying - point).T)))
+            obstacle = self._staying[index]
             gaps[f'an obstacle at {_shown(obstacle)}'] = float(np.hypot(*(obstacle - point)))
         return min(gaps, key=lambda name: gaps[name])
 
-    def _what_blocks(self, start: tuple[int, int], goal: tuple[int, int]) -> str:
+    def _what_blocks(self, start: Cell, goal: Cell) -> str:
         """Name what lies on the path that would be taken if doors and obstacles were not there."""
         needed = np.float32(self.parameters.radius + self.parameters.margin)
-        cost = np.where(self._cost > 0, self._cost, np.float32(_THROUGH))
+        cost = np.where(self._cost > 0, self._cost, np.float32(_BLOCKED))
         cost = np.where(self._static >= needed, cost, np.float32(-1))
         search = MCP_Geometric(cost)
         try:
@@ -394,7 +395,7 @@ class GridPlanner:
             share = np.arange(count)[:, None] / (count - 1)
             curve = (1 - share) ** 2 * entry + 2 * share * (1 - share) * corner + share**2 * leave
             cells = ((curve - self.grid.origin) / self.grid.resolution).astype(np.intp)
-            if self._cost[cells[:, 1], cells[:, 0]].min() > 0:
+            if self._open[cells[:, 1], cells[:, 0]].all():
                 step = max(1, count // 6)
                 return np.vstack([curve[:-1:step], curve[-1:]])
             arms = [arm / 2 for arm in arms]
