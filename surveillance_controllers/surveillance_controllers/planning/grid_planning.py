@@ -217,12 +217,16 @@ class GridPlanner:
 
     def _price_cells(self, window: tuple[slice, slice]) -> None:
         p = self.parameters
-        needed = np.float32(p.radius + p.margin)
-        spare = self._clearance[window] - needed
-        crowded = np.clip(1 - spare / np.float32(max(p.comfort, 1e-6)), 0, 1)
-        price = 1 + np.float32(p.aversion) * crowded * crowded
-        blocked = np.where(self._firm[window] >= needed, np.float32(p.waiting), np.float32(-1))
-        self._open[window] = spare >= 0
+
+        def priced(clearance: NDArray[np.float32]) -> tuple[NDArray[np.bool_], NDArray[np.float32]]:
+            spare = clearance[window] - np.float32(p.radius + p.margin)
+            crowded = np.clip(1 - spare / np.float32(max(p.comfort, 1e-6)), 0, 1)
+            return spare >= 0, 1 + np.float32(p.aversion) * crowded * crowded
+
+        self._open[window], price = priced(self._clearance)
+        # Past somebody, too, the path keeps to the middle of a passage, and not to the side.
+        passable, waiting = priced(self._firm)
+        blocked = np.where(passable, np.float32(p.waiting) * waiting, np.float32(-1))
         self._cost[window] = np.where(self._open[window], price, blocked)
 
     def _divide(self) -> None:
