@@ -8,7 +8,6 @@ here: new facts wait in `queue`, individuals whose relations or values are to be
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from itertools import count
 from typing import Any, NamedTuple, TypeAlias
@@ -63,7 +62,7 @@ class CaseModel:
         self._individuals: dict[str, int] = {}
         self._numbers = count(1)
         self._trail: list[tuple[dict[Any, Any], Any, Any]] = []
-        self.queue: deque[tuple[int, ...]] = deque()
+        self.queue: list[tuple[int, ...]] = []
         self.recount: dict[int, None] = {}
         self.revalue: dict[int, None] = {}
 

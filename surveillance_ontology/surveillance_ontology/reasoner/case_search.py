@@ -150,7 +150,8 @@ class CaseSearch:
         queue, recount, revalue, is_gone = model.queue, model.recount, model.revalue, model.is_gone
         while queue or recount or revalue:
             while queue:
-                event = queue.popleft()
+                # The newest first: a contradiction is met before all else that follows is.
+                event = queue.pop()
                 if is_gone(event[0]):
                     continue
                 if len(event) == 2:
