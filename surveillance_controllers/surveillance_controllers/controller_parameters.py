@@ -40,6 +40,18 @@ class ControllerSettings:
 
 
 @dataclass(frozen=True)
+class PeerSettings(ControllerSettings):
+    """What a controller is told that asks for map and ontology."""
+
+    peer_timeout: float = parameter(
+        10.0,
+        'How long map and ontology may take to appear and answer, s of real time.',
+        0.1,
+        3600.0,
+    )
+
+
+@dataclass(frozen=True)
 class StationSettings(ControllerSettings):
     """What a controller is told that models where the robot is or how far it is charged."""
 
@@ -129,7 +141,7 @@ class Environment:
 
 
 @dataclass(frozen=True)
-class PlannerSettings(ControllerSettings):
+class PlannerSettings(PeerSettings):
     """What `planner_controller` is told by its parameters; units as declared."""
 
     environment: Environment = converted(
@@ -145,12 +157,6 @@ class PlannerSettings(ControllerSettings):
     via_point_delay: float = parameter(
         0.1, 'Time between two feedbacks of motion/planner, s.', 0.0, 60.0
     )
-    peer_timeout: float = parameter(
-        10.0,
-        'How long map and ontology may take to appear and answer, s of real time.',
-        0.1,
-        3600.0,
-    )
 
     def spacing(self, length: float) -> float:
         """Return the distance of the via points of a path of `length` metres, metres."""
@@ -158,7 +164,7 @@ class PlannerSettings(ControllerSettings):
 
 
 @dataclass(frozen=True)
-class MotionSettings(StationSettings):
+class MotionSettings(PeerSettings, StationSettings):
     """What `motion_controller` is told by its parameters; units as declared."""
 
     navigator: str = parameter(
@@ -183,10 +189,4 @@ class MotionSettings(StationSettings):
         '',
         'MANUAL, RANDOM and Nav2: the room in which the robot starts; empty: as the map says that '
         'is built from a message.',
-    )
-    peer_timeout: float = parameter(
-        10.0,
-        'How long map and ontology may take to appear and answer, s of real time.',
-        0.1,
-        3600.0,
     )

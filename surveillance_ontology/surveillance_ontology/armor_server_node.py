@@ -233,8 +233,8 @@ def _service(node: PatrolNode, keep: bool) -> ArmorService:
         keep: Whether the store is on by default.
 
     Raises:
-        ParameterError: A parameter is of the wrong type or out of range.
-        ParameterError: The store cannot be used.
+        ParameterError: A parameter is of the wrong type or out of range, or the store cannot be
+            used.
     """
     settings = node.declare_fields(Settings())
     stored = node.parameter(

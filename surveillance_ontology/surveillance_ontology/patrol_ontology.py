@@ -292,16 +292,6 @@ class PatrolOntology:
             ]
         )
 
-    def set_urgency_threshold(self, seconds: float) -> None:
-        """Set how long a place may go unvisited before it is URGENT.
-
-        Raises:
-            ArmorServiceCallError: The server does not answer.
-            ArmorServiceInternalError: It refuses.
-        """
-        told = self._set_value('urgencyThreshold', self._robot, int(seconds))
-        self._carry_out([told, self._request('REASON')])
-
     def snapshot(
         self,
         now: float,

@@ -58,7 +58,7 @@ def ontology(armor: ArmorClient) -> PatrolOntology:
     ontology = PatrolOntology(armor)
     ontology.build(PLACE, ONTOLOGY, IRI, now=100)
     ontology.record_place('E', 100)
-    ontology.set_urgency_threshold(30.0)
+    PatrolOntology(armor).snapshot(100.0, (), threshold=30.0)  # by somebody else
     return ontology
 
 
@@ -96,7 +96,7 @@ def test_each_verb_is_one_round_trip(ontology: PatrolOntology, transport: Counti
     before = transport.trips
     ontology.record_place('C1', 200)
     ontology.snapshot(120.0, RULES, visits={'C1': 120.0}, not_before=200)
-    ontology.set_urgency_threshold(20.0)
+    ontology.snapshot(121.0, RULES, threshold=20.0)
     assert transport.trips - before == 3
 
 

@@ -40,8 +40,7 @@ def described_place(
         None when the map comes from markers, or when none is described and none required.
 
     Raises:
-        ParameterError: A parameter is of the wrong type.
-        ParameterError: What is described is not a place.
+        ParameterError: A parameter is of the wrong type, or what is described is not a place.
     """
     settings = node.declare_fields(PlaceSettings(source))
     if settings.map_source == 'markers':
