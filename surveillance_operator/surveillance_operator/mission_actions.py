@@ -42,6 +42,8 @@ from surveillance_runtime.node import PatrolNode
 
 _DISCOVERY = 2.0
 """Seconds in which a node that has just started finds the services that there are."""
+_OPTIONAL = ('simulation/', 'move_arm')
+"""How the names of services begin that a mission need not have."""
 ARM_SECONDS = 60.0
 """Deadline of a movement of the arm, whose answer comes when it has arrived."""
 _NAME = re.compile(r'[A-Za-z]\w{0,63}\Z', re.ASCII)
@@ -228,8 +230,10 @@ class MissionActions:
 
     def _call(self, service: str, request: Any, timeout: float | None = None) -> Any:
         caller = self._callers[service]
-        # Nobody waits for a service that this kind of mission does not have.
-        discovery = max(min(0.5, self._timeout), self._found_by - time.monotonic())
+        discovery = self._timeout
+        if service.startswith(_OPTIONAL):
+            # Nobody waits for a service that this kind of mission does not have.
+            discovery = max(min(0.5, self._timeout), self._found_by - time.monotonic())
         try:
             return caller.call(
                 request, timeout or self._timeout, self._node.stopping, discovery=discovery

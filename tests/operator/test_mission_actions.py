@@ -136,6 +136,17 @@ def test_a_service_that_is_not_there_is_said_at_once(actions: MissionActions) ->
         actions.remove_obstacle('box')
 
 
+def test_a_service_that_each_mission_has_is_waited_for(graph: Any) -> None:
+    actions = MissionActions(graph.add(PatrolNode, name='hands'), timeout=60.0)
+    actions._found_by = 0.0  # it started long ago
+    with ThreadPoolExecutor() as pool:
+        asked = pool.submit(actions.why_not, 'R1')
+        with pytest.raises(TimeoutError):
+            asked.result(1.0)
+        serve(graph, WhyNot, 'why_not', success=True, message='too far')
+        assert asked.result(60.0) == ('too far', [])
+
+
 def test_facts_and_their_proofs_come_from_the_ontology(graph: Any, actions: MissionActions) -> None:
     graph.add(ArmorServer)
     graph.add(OntologyMapBuilder, parameters=PLACE)
