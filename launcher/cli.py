@@ -51,7 +51,11 @@ def main(argv: Sequence[str]) -> int:
     _make_streams_safe()
     try:
         interrupt.raise_at_stop_signals()
-        return _dispatch(list(argv))
+        try:
+            return _dispatch(list(argv))
+        except Exception:
+            interrupt.raise_if_lost()
+            raise
     except ValueError as error:
         print(f'launch.py: {error}', file=sys.stderr)
         return EXIT_BAD_INPUT

@@ -1,7 +1,8 @@
 """Stop signals until a command has its own way to end: they raise, and are not forgotten.
 
 Python drops an exception that a handler raises in the middle of a `__del__` or of a weakref's
-callback, as there are many in an import. A Ctrl-C that falls there would be lost.
+callback, as there are many in an import, and up to 3.11 makes another one of it in the middle of a
+`__set_name__`. A Ctrl-C that falls there would be lost, or end in a traceback.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ def _raise(_number: int, _frame: object) -> NoReturn:
 
 
 def raise_if_lost() -> None:
-    """Raise what a signal raised before and Python dropped.
+    """Raise what a signal raised before and Python dropped or replaced.
 
     Raises:
         KeyboardInterrupt: A stop signal has come.

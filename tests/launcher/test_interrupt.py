@@ -68,3 +68,20 @@ def test_a_ctrl_c_that_python_drops_is_raised_before_the_next_step():
         [sys.executable, '-c', program], cwd=ROOT, capture_output=True, text=True, check=True
     )
     assert done.stdout == 'dropped\nraised\n'
+
+
+def test_a_ctrl_c_that_python_makes_another_error_of_is_one_line():
+    program = (
+        'import signal, sys\n'
+        'from launcher import cli\n'
+        'class Field:\n'
+        '    def __set_name__(self, owner, name):\n'
+        '        signal.raise_signal(signal.SIGINT)\n'
+        'cli._dispatch = lambda argv: type("Settings", (), {"speed": Field()})\n'
+        'sys.exit(cli.main([]))\n'
+    )
+    done = subprocess.run(
+        [sys.executable, '-c', program], cwd=ROOT, capture_output=True, text=True, timeout=60.0
+    )
+    assert done.returncode == 130
+    assert done.stderr.strip() == 'launch.py: interrupted'
