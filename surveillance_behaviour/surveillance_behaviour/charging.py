@@ -11,9 +11,9 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from surveillance_behaviour.peers.ports import InterruptedWaitError, PeerError
 from surveillance_behaviour.policy.battery_reserve import Battery
 from surveillance_fsm import Clock, Interrupt
+from surveillance_fsm.exceptions import CallError, CallInterruptedError
 
 LONG = 1e6
 """One wait without a limit, seconds; it is repeated as long as need be."""
@@ -130,8 +130,8 @@ def charge(
         recharge: Asks for a charge and returns when done; None: the battery charges by itself.
 
     Raises:
-        PeerError: The battery is not charged, or its level stalls.
-        InterruptedWaitError: The interrupt was raised.
+        CallError: The battery is not charged, or its level stalls.
+        CallInterruptedError: The interrupt was raised.
     """
     while not enough():
         _await_contact(battery, enough, interrupt, settle_seconds)
@@ -143,16 +143,16 @@ def charge(
         with battery.interrupting(interrupt, lambda: battery.charging is False) as off:
             try:
                 recharge(off)
-            except InterruptedWaitError:
+            except CallInterruptedError:
                 if interrupt.is_set():
                     raise
                 continue
         with battery.interrupting(interrupt, enough) as told:
             told.wait(settle_seconds)
         if interrupt.is_set():
-            raise InterruptedWaitError
+            raise CallInterruptedError
         if not enough():
-            raise PeerError('recharge', f'it ended at {battery.level_text()}')
+            raise CallError(f'recharge: it ended at {battery.level_text()}')
 
 
 def _await_contact(
@@ -161,8 +161,8 @@ def _await_contact(
     """Wait until a battery that says it is not being charged says otherwise.
 
     Raises:
-        PeerError: It does not in time: the robot is not where it can charge.
-        InterruptedWaitError: The interrupt was raised.
+        CallError: It does not in time: the robot is not where it can charge.
+        CallInterruptedError: The interrupt was raised.
     """
 
     def contact() -> bool:
@@ -171,10 +171,10 @@ def _await_contact(
     with battery.interrupting(interrupt, contact) as told:
         told.wait(seconds)
     if interrupt.is_set():
-        raise InterruptedWaitError
+        raise CallInterruptedError
     if not contact():
-        raise PeerError(
-            'battery', f'it is not charged ({battery.level_text()}): the robot is not at a station'
+        raise CallError(
+            f'battery: it is not charged ({battery.level_text()}): the robot is not at a station'
         )
 
 
@@ -188,8 +188,8 @@ def _watch_level(
     """Wait until the level has risen, is enough, or the contact is lost.
 
     Raises:
-        PeerError: Nothing of that happened in time.
-        InterruptedWaitError: The interrupt was raised.
+        CallError: Nothing of that happened in time.
+        CallInterruptedError: The interrupt was raised.
     """
     before = battery.level
 
@@ -201,6 +201,6 @@ def _watch_level(
     with battery.interrupting(interrupt, news) as wake:
         late = clock.sleep(seconds if seconds > 0.0 else LONG, wake)
     if interrupt.is_set():
-        raise InterruptedWaitError
+        raise CallInterruptedError
     if late and seconds > 0.0:
-        raise PeerError('battery', f'still at {battery.level_text()} after {seconds:g} s')
+        raise CallError(f'battery: still at {battery.level_text()} after {seconds:g} s')

@@ -158,7 +158,7 @@ class Decider:
             avoided: Places that could not be reached lately.
 
         Raises:
-            PeerError: The ontology cannot be asked.
+            CallError: The ontology cannot be asked.
         """
         with self._looking:
             world = self.model.refresh(now, interrupt, avoided)
@@ -201,7 +201,7 @@ class Decider:
         """Look for the first time; where the robot is.
 
         Raises:
-            PeerError: The ontology cannot be asked.
+            CallError: The ontology cannot be asked.
         """
         return self.look(now, interrupt).place
 
@@ -222,7 +222,7 @@ class Decider:
             to_charge: Only a charging place will do.
 
         Raises:
-            PeerError: The ontology cannot be asked.
+            CallError: The ontology cannot be asked.
             NowhereToGoError: Nothing can be reached.
         """
         if self.experience.requested in avoided:
@@ -340,7 +340,7 @@ class Decider:
 
         Raises:
             ValueError: There is no such place.
-            PeerError: The ontology cannot be asked.
+            CallError: The ontology cannot be asked.
         """
         world = self.look(now, interrupt, avoided)
         return why_not(place, world, self.battery(), self.settings)

@@ -19,9 +19,9 @@ from surveillance_behaviour.decider import Decider, MemorySettings
 from surveillance_behaviour.decision import DecisionSettings, NowhereToGoError
 from surveillance_behaviour.peers.announcing import DecisionTopic
 from surveillance_behaviour.peers.decision_services import DecisionServices
-from surveillance_behaviour.peers.ports import InterruptedWaitError, PeerError
 from surveillance_behaviour.peers.ros_ports import Deadlines, RosPlaces, hear_battery, ros_ontology
 from surveillance_fsm import Interrupt
+from surveillance_fsm.exceptions import CallError, CallInterruptedError
 from surveillance_fsm.ros import ClockWait
 from surveillance_interfaces.msg import MissionStatus
 from surveillance_interfaces.srv import Reason
@@ -98,10 +98,10 @@ class Reasoner(PatrolNode):
             self._next = None
         try:
             decision = self._decider.decide(self._wait.now(), self._interrupt, self._avoided)
-        except (PeerError, NowhereToGoError) as error:
+        except (CallError, NowhereToGoError) as error:
             self.get_logger().warn(f'no place to name: {error}')
             return ''
-        except InterruptedWaitError:
+        except CallInterruptedError:
             return ''
         self._decisions.publish(decision)
         return decision.place

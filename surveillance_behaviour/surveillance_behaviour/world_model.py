@@ -23,18 +23,13 @@ from surveillance_behaviour.mission.mission_log import (
     on_present_clock,
     read,
 )
-from surveillance_behaviour.peers.ports import (
-    Ontology,
-    PeerError,
-    Places,
-    Point,
-    UnknownPlaceError,
-)
+from surveillance_behaviour.peers.ports import Ontology, Places, Point, UnknownPlaceError
 from surveillance_behaviour.policy.battery_reserve import DrawEstimate
 from surveillance_behaviour.policy.graph import GraphError, PatrolGraph
 from surveillance_behaviour.policy.leg_times import LegTimes
 from surveillance_behaviour.policy.world import PolicyMemory, World
 from surveillance_fsm import Interrupt
+from surveillance_fsm.exceptions import CallError
 from surveillance_ontology.patrol_ontology import Snapshot
 
 SIMULTANEOUS = 1.0
@@ -193,7 +188,7 @@ class WorldModel:
             avoided: Places that could not be reached lately.
 
         Raises:
-            PeerError: The ontology or the positions cannot be had, or do not fit together.
+            CallError: The ontology or the positions cannot be had, or do not fit together.
         """
         self.experience.tell_time(now)
         self._since = now if self._since is None else min(self._since, now)
@@ -237,7 +232,7 @@ class WorldModel:
                 continue  # It was removed from the map a moment ago; the ontology will follow.
         self._all = frozenset(positions)
         if found.place not in positions:
-            raise PeerError('ontology', f'the robot is in {found.place}, which is not on the map')
+            raise CallError(f'ontology: the robot is in {found.place}, which is not on the map')
         times, dwell = self.experience.leg_times, self.settings.exploration_seconds
         times.forget_fit(self.settings.speed)
         legs = {
@@ -254,7 +249,7 @@ class WorldModel:
             try:
                 self.graph = PatrolGraph(legs, dwell).connected(found.place)
             except GraphError as error:
-                raise PeerError('ontology', str(error)) from None
+                raise CallError(f'ontology: {error}') from None
             self._graph_key = (True, *key[1:])
         return self.graph
 

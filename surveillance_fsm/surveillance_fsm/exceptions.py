@@ -1,10 +1,12 @@
-"""The errors of the engine, with SMACH's names.
+"""The errors of the engine, with SMACH's names, and those of calls to other nodes.
 
-Every message names the state by its path from the root (``ROOT/CHILD/LEAF``), the outcome or the
-userdata key in question, and what was expected instead.
+Every message of a `SmachError` names the state by its path from the root (``ROOT/CHILD/LEAF``), the
+outcome or the userdata key in question, and what was expected instead.
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 
 class SmachError(Exception):
@@ -51,6 +53,31 @@ class MachineFileError(SmachError):
 
     Also: it does not fit the machine. The message names the place.
     """
+
+
+class CallError(Exception):
+    """Another node did not do what it was asked; the message is one line that names it."""
+
+
+class UnavailableError(CallError):
+    """The server is not there, or went away before it answered: only its return helps.
+
+    Args:
+        message: One line that names the server.
+        is_back: Whether a server is there now; None: nobody can tell.
+    """
+
+    def __init__(self, message: str, is_back: Callable[[], bool] | None = None) -> None:
+        super().__init__(message)
+        self.is_back = is_back
+
+
+class CallTimeoutError(CallError):
+    """The server is there but did not answer in time."""
+
+
+class CallInterruptedError(CallError):
+    """The caller's interrupt ended the wait; a goal that ran on the server was cancelled."""
 
 
 def describe(error: BaseException) -> str:

@@ -16,17 +16,11 @@ from surveillance_behaviour.decider import Decider
 from surveillance_behaviour.decision import NowhereToGoError
 from surveillance_behaviour.mission.mission import Mission, MissionSettings
 from surveillance_behaviour.mission.mission_log import CutOff, MissionRecord
-from surveillance_behaviour.peers.ports import (
-    AwayError,
-    InterruptedWaitError,
-    PeerError,
-    Point,
-    Ports,
-    UnknownPlaceError,
-)
+from surveillance_behaviour.peers.ports import Point, Ports, UnknownPlaceError
 from surveillance_behaviour.policy.world import Decision
 from surveillance_behaviour.world_model import Experience
 from surveillance_fsm import Interrupt
+from surveillance_fsm.exceptions import CallError, CallInterruptedError, UnavailableError
 from surveillance_ontology.patrol_ontology import Snapshot
 from tests.seven_rooms import SEVEN_ROOMS
 
@@ -142,7 +136,7 @@ class World:
         self.calls.append(name)
         self.faults(name)
         if not self.clock.sleep(0.0, interrupt):
-            raise InterruptedWaitError
+            raise CallInterruptedError
 
     def neighbours(self, place: str) -> tuple[str, ...]:
         """Return where the open doors of a place lead."""
@@ -203,7 +197,7 @@ class World:
     def position(self, place: str, interrupt: Interrupt) -> Point:
         self._call('position', interrupt)
         if place not in self.positions or place not in self.rooms:
-            raise UnknownPlaceError('ontology_map/room_position', f'there is no place {place}')
+            raise UnknownPlaceError(f'ontology_map/room_position: there is no place {place}')
         return self.positions[place]
 
     def push(self, place: str) -> None:
@@ -228,7 +222,7 @@ class World:
         for point in path:
             seconds = math.dist(self.at, point) / self.speed
             if not self.clock.sleep(seconds, interrupt):
-                raise InterruptedWaitError
+                raise CallInterruptedError
             self.at = point
         self.battery.set_charging(self.docked())
         self.place = min(self.rooms, key=lambda room: math.dist(self.positions[room], self.at))
@@ -249,9 +243,9 @@ class World:
         self._call('recharge', interrupt)
         while self.level < 100.0 and self.docked():
             if not self.charge:
-                raise PeerError('recharge', 'nothing came from it for 60 s')
+                raise CallError('recharge: nothing came from it for 60 s')
             if not self.clock.sleep(1.0, interrupt):
-                raise InterruptedWaitError
+                raise CallInterruptedError
 
     def decision(self, decision: Decision) -> None:
         self.decisions.append(decision)
@@ -310,7 +304,7 @@ class ScriptedReasoner(Decider):
         try:
             return super().decide(now, interrupt, avoided, to_charge=to_charge)
         except NowhereToGoError as error:
-            raise PeerError('reason', str(error)) from None
+            raise CallError(f'reason: {error}') from None
 
 
 @dataclass
@@ -344,7 +338,7 @@ class ScriptedRoutine:
     def plan(self, target: str, interrupt: Interrupt) -> list[Point]:
         world = self.world
         if target not in world.rooms:
-            raise PeerError('motion/planner', f'there is no place {target}')
+            raise CallError(f'motion/planner: there is no place {target}')
         return world.plan_path(world.at, world.positions[target], interrupt)
 
     def control(self, via_points: Sequence[Point], interrupt: Interrupt) -> Point:
@@ -354,16 +348,16 @@ class ScriptedRoutine:
         self.world.recharge(interrupt)
 
 
-def started_again(peer: str, reason: str) -> AwayError:
+def started_again(message: str) -> UnavailableError:
     """Return the error of a peer that was lost and is there again."""
-    return AwayError(peer, reason, lambda: True)
+    return UnavailableError(message, lambda: True)
 
 
 def fails(
     method: str,
     times: float = math.inf,
     reason: str = 'scripted fault',
-    kind: Callable[[str, str], PeerError] = PeerError,
+    kind: Callable[[str], CallError] = CallError,
 ) -> Callable[[str], None]:
     """Return a fault: the first ``times`` calls of a port method fail."""
     left = [times]
@@ -371,6 +365,6 @@ def fails(
     def fault(call: str) -> None:
         if call == method and left[0] > 0:
             left[0] -= 1
-            raise kind(method, reason)
+            raise kind(f'{method}: {reason}')
 
     return fault

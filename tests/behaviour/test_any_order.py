@@ -20,8 +20,8 @@ from surveillance_behaviour.decision import DecisionSettings
 from surveillance_behaviour.machines import MACHINES
 from surveillance_behaviour.mission.mission import MissionSettings
 from surveillance_behaviour.mission.mission_log import MissionRecord, read
-from surveillance_behaviour.peers.ports import AwayError, PeerError
 from surveillance_behaviour.policy.world import Decision
+from surveillance_fsm.exceptions import CallError, UnavailableError
 
 from .scripted_world import World
 
@@ -71,7 +71,7 @@ class AnyOrder(RuleBasedStateMachine):
         self.folder = tempfile.TemporaryDirectory()
         self.path = Path(self.folder.name) / 'mission.jsonl'
         self.world = CheckedWorld(draw=0.1, low_below=20.0)
-        self.faults: dict[str, tuple[int, type[PeerError]]] = {}
+        self.faults: dict[str, tuple[int, type[CallError]]] = {}
         self.refused_when_low = False
         self.world.faults = self.fault
         self.record = MissionRecord(self.path)
@@ -102,11 +102,11 @@ class AnyOrder(RuleBasedStateMachine):
         assert self.go.acquire(timeout=60.0)
 
     def fault(self, call: str) -> None:
-        times, kind = self.faults.get(call, (0, PeerError))
+        times, kind = self.faults.get(call, (0, CallError))
         if times > 0:
             self.faults[call] = (times - 1, kind)
             self.refused_when_low |= self.world.battery.low
-            raise kind(call, 'scripted fault')
+            raise kind(f'{call}: scripted fault')
 
     @rule(seconds=st.floats(1.0, 120.0))
     def time_passes(self, seconds: float) -> None:
@@ -120,9 +120,9 @@ class AnyOrder(RuleBasedStateMachine):
     @rule(
         call=st.sampled_from(CALLS),
         times=st.integers(1, 8),
-        kind=st.sampled_from([PeerError, AwayError]),
+        kind=st.sampled_from([CallError, UnavailableError]),
     )
-    def calls_will_fail(self, call: str, times: int, kind: type[PeerError]) -> None:
+    def calls_will_fail(self, call: str, times: int, kind: type[CallError]) -> None:
         self.faults[call] = (times, kind)
 
     @rule(drop=st.floats(0.0, 30.0))

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from surveillance_behaviour.peers.armor_knowledge import ArmorKnowledge, Whereabouts
-from surveillance_behaviour.peers.ports import InterruptedWaitError, PeerError
 from surveillance_fsm import Interrupt
+from surveillance_fsm.exceptions import CallError, CallInterruptedError
 from surveillance_ontology.armor.access import DATA
 from surveillance_ontology.armor.client import (
     ArmorClient,
@@ -80,7 +80,7 @@ def test_the_answer_knows_where_the_robot_was_heard_of_last(
     heard = Whereabouts()
     heard.note('C1', 5_000_000_000)
     knowledge = ArmorKnowledge('test', transport, Interrupt(), lambda _interrupt: 'map', heard)
-    with pytest.raises(PeerError, match='nobody told it where the robot is'):
+    with pytest.raises(CallError, match='nobody told it where the robot is'):
         ask(knowledge, 110.0)
     PatrolOntology(armor).record_place('C1', 5_000_000_000)
     assert ask(knowledge, 110.0).place == 'C1'
@@ -90,13 +90,13 @@ def test_the_answer_knows_where_the_robot_was_heard_of_last(
 
 def test_a_lost_robot_is_named(knowledge: ArmorKnowledge, armor: ArmorClient) -> None:
     armor.manipulation.remove_objectprop_from_ind('isIn', 'Robot1', 'E')
-    with pytest.raises(PeerError, match='Robot1 in no place'):
+    with pytest.raises(CallError, match='Robot1 in no place'):
         ask(knowledge, 110.0)
 
 
 def test_a_visit_time_that_is_none_is_named(knowledge: ArmorKnowledge, armor: ArmorClient) -> None:
     armor.manipulation.add_dataprop_to_ind('visitedAt', 'R1', 'STRING', 'yesterday')
-    with pytest.raises(PeerError, match=r'inconsistent|visitedAt of R1'):
+    with pytest.raises(CallError, match=r'inconsistent|visitedAt of R1'):
         ask(knowledge, 110.0)
 
 
@@ -111,7 +111,7 @@ def test_a_new_place_is_believed_at_once(knowledge: ArmorKnowledge, armor: Armor
 def test_an_unknown_ontology_is_asked_for_anew(transport: InProcessTransport) -> None:
     names = ['other', 'map']
     knowledge = ArmorKnowledge('test', transport, Interrupt(), lambda _interrupt: names.pop(0))
-    with pytest.raises(PeerError, match="unknown reference 'other'"):
+    with pytest.raises(CallError, match="unknown reference 'other'"):
         ask(knowledge, 110.0)
     assert ask(knowledge, 110.0).place == 'E'
 
@@ -125,7 +125,7 @@ def test_an_interrupted_call_is_no_fault_of_the_server(transport: InProcessTrans
 
     transport.call_list = cut_off  # type: ignore[method-assign, assignment]
     knowledge = ArmorKnowledge('test', transport, Interrupt(), lambda _interrupt: 'map')
-    with pytest.raises(InterruptedWaitError):
+    with pytest.raises(CallInterruptedError):
         knowledge.snapshot(110.0, RULES, {}, raised)
-    with pytest.raises(PeerError, match='armor: interrupted'):
+    with pytest.raises(CallError, match='armor: interrupted'):
         ask(knowledge, 110.0)

@@ -9,7 +9,7 @@ import pytest
 
 import surveillance_fsm as fsm
 from surveillance_behaviour.machines import MACHINES
-from surveillance_behaviour.peers.ports import PeerError
+from surveillance_fsm.exceptions import CallError
 
 from .machine_runs import CALLS, Run
 from .scripted_world import World, fails, started_again
@@ -102,7 +102,7 @@ def troubled(
     times: float,
     level: float,
     charge: float = 2.0,
-    kind: Callable[[str, str], PeerError] = PeerError,
+    kind: Callable[[str], CallError] = CallError,
 ) -> World:
     """Return a world in which calls fail at the start and again later, with a battery that
     falls.

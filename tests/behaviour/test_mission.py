@@ -14,16 +14,16 @@ from surveillance_behaviour.mission.mission_log import (
     read,
     summarize,
 )
-from surveillance_behaviour.peers.ports import AwayError, PeerError
 from surveillance_behaviour.world_model import Experience
+from surveillance_fsm.exceptions import CallError, UnavailableError
 
 from .machine_runs import Killed, Run, settings
 from .scripted_world import SEVEN_ROOMS, World
 
 
-@pytest.mark.parametrize('kind', [PeerError, AwayError])
+@pytest.mark.parametrize('kind', [CallError, UnavailableError])
 def test_a_visit_that_could_not_be_told_is_told_later(
-    kind: type[PeerError], machine: str, tmp_path: Path
+    kind: type[CallError], machine: str, tmp_path: Path
 ) -> None:
     world = World()
     right = world.snapshot
@@ -32,7 +32,7 @@ def test_a_visit_that_could_not_be_told_is_told_later(
     def snapshot(*args: object) -> object:
         if world.clock.time > 60.0 and len(away) < 7:
             away.append(world.clock.time)
-            raise kind('armor', 'scripted fault')
+            raise kind('armor: scripted fault')
         return right(*args)  # type: ignore[arg-type]
 
     world.snapshot = snapshot  # type: ignore[method-assign, assignment]
@@ -57,7 +57,7 @@ def test_the_ontology_is_told_of_no_visit_that_the_record_lacks(
         if name in ('follow', 'control') and world.clock.time > 60.0 and not cut_short:
             world.is_in = next(place for place in world.rooms if place != world.is_in)
             cut_short.append((world.clock.time, world.is_in))
-            raise PeerError(name, 'scripted fault')
+            raise CallError(f'{name}: scripted fault')
 
     def snapshot(*args: Any) -> object:
         found = right(*args)

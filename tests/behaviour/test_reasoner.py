@@ -5,9 +5,9 @@ from __future__ import annotations
 import threading
 from typing import Any
 
-from surveillance_behaviour.peers.ports import PeerError
 from surveillance_behaviour.policy.world import Decision
 from surveillance_behaviour.reasoner_node import Reasoner
+from surveillance_fsm.exceptions import CallError
 from surveillance_interfaces.srv import Reason
 
 
@@ -21,7 +21,7 @@ def test_requests_that_come_while_a_choice_is_made_share_the_next_one(
         done = threading.Event()
         looks.append(done)
         assert done.wait(60.0)
-        raise PeerError('armor', 'away')
+        raise CallError('armor: away')
 
     monkeypatch.setattr(reasoner._decider, 'decide', look)
     client = graph.node.create_client(Reason, 'reason')

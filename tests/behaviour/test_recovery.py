@@ -7,7 +7,8 @@ import math
 import pytest
 
 import surveillance_fsm as fsm
-from surveillance_behaviour.peers.ports import AwayError, PeerError, Point
+from surveillance_behaviour.peers.ports import Point
+from surveillance_fsm.exceptions import CallError, UnavailableError
 
 from .machine_runs import CALLS, Run, visited
 from .scripted_world import POSITIONS, SEVEN_ROOMS, World, fails, started_again
@@ -44,7 +45,7 @@ def test_a_peer_that_stays_away_is_cried_about_and_waited_for(name: str, call: s
 
 def test_a_peer_that_is_away_is_waited_for_at_once(machine: str) -> None:
     world = World()
-    world.faults = fails('plan', 3, 'no server', AwayError)
+    world.faults = fails('plan', 3, 'no server', UnavailableError)
     Run(machine, world).until(60.0)
     assert len([cry for cry in world.cries if 'no server' in cry]) == 3
     assert not any('another' in text for text in world.said)
@@ -59,7 +60,7 @@ def test_the_return_of_a_peer_ends_the_pause(machine: str) -> None:
         tries.append(world.clock.time)
         if is_back():
             return right(*args)  # type: ignore[arg-type]
-        raise AwayError('plan', 'no server', is_back)
+        raise UnavailableError('plan: no server', is_back)
 
     def is_back() -> bool:
         return not 60.0 < world.clock.time < 180.0
@@ -137,7 +138,7 @@ def test_a_blocked_door_is_gone_around(machine: str) -> None:
 
     def plan(start: Point, goal: Point, interrupt: fsm.Interrupt) -> list[Point]:
         if {start, goal} == blocked:
-            raise PeerError('compute_path', 'a closed door is in the way')
+            raise CallError('compute_path: a closed door is in the way')
         return right(start, goal, interrupt)
 
     world.plan_path = plan  # type: ignore[method-assign]
@@ -184,7 +185,7 @@ def test_an_ontology_that_lost_the_robot_is_waited_for(machine: str) -> None:
 
     def snapshot(*args: object) -> object:
         if 100.0 < world.clock.time < 130.0:
-            raise PeerError('armor', 'ontology map has Robot1 in no place')
+            raise CallError('armor: ontology map has Robot1 in no place')
         return right(*args)  # type: ignore[arg-type]
 
     world.snapshot = snapshot  # type: ignore[method-assign, assignment]

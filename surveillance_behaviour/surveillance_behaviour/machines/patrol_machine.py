@@ -149,7 +149,7 @@ def drive(
     """Drive through the points and make sure that it ends in ``target``; metres driven.
 
     Raises:
-        PeerError: It does not.
+        CallError: It does not.
     """
     check_path(via_points, None, 0.0, 'motion/planner')
     mission.departs()

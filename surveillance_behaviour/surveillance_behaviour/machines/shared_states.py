@@ -12,7 +12,8 @@ from surveillance_behaviour.charging import charge
 from surveillance_behaviour.decision import NowhereToGoError
 from surveillance_behaviour.mission.mission import Mission
 from surveillance_behaviour.mission.recovery import Step
-from surveillance_behaviour.peers.ports import AwayError, InterruptedWaitError, PeerError, Point
+from surveillance_behaviour.peers.ports import Point
+from surveillance_fsm.exceptions import CallError, CallInterruptedError, UnavailableError
 
 PREEMPTED = 'preempted'
 FAILED = 'failed'
@@ -48,11 +49,11 @@ class MissionState(fsm.State):
             return self.preempted()
         try:
             return self.work(ud, self.interrupt)
-        except InterruptedWaitError:
+        except CallInterruptedError:
             return self.preempted() if self.preempt_requested() else self.interrupted(ud)
-        except AwayError as error:
+        except UnavailableError as error:
             self.mission.failed(self.task, str(error), is_over=error.is_back)
-        except (PeerError, NowhereToGoError) as error:
+        except (CallError, NowhereToGoError) as error:
             self.mission.failed(self.task, str(error), self.goal(ud), charging=self.charging)
         return FAILED
 
@@ -189,17 +190,16 @@ def check_path(path: list[Point], goal: Point | None, tolerance: float, peer: st
     """Refuse a path that leads nowhere, or elsewhere.
 
     Raises:
-        PeerError: It is empty, not finite, or ends too far from ``goal``.
+        CallError: It is empty, not finite, or ends too far from ``goal``.
     """
     if not path:
-        raise PeerError(peer, 'the path has no points')
+        raise CallError(f'{peer}: the path has no points')
     if not all(math.isfinite(value) for point in path for value in point):
-        raise PeerError(peer, 'the path has a point that is not finite')
-    if goal is not None and math.dist(path[-1][:2], goal[:2]) > tolerance:
-        raise PeerError(
-            peer,
-            f'the path ends {math.dist(path[-1][:2], goal[:2]):.2f} m from the goal, expected '
-            f'at most {tolerance:g} m',
+        raise CallError(f'{peer}: the path has a point that is not finite')
+    gap = 0.0 if goal is None else math.dist(path[-1][:2], goal[:2])
+    if gap > tolerance:
+        raise CallError(
+            f'{peer}: the path ends {gap:.2f} m from the goal, expected at most {tolerance:g} m'
         )
 
 
@@ -207,10 +207,10 @@ def check_arrival(end: Point, goal: Point, tolerance: float, peer: str) -> None:
     """Refuse an arrival that is none.
 
     Raises:
-        PeerError: The robot stopped too far from ``goal``.
+        CallError: The robot stopped too far from ``goal``.
     """
     away = math.dist(end[:2], goal[:2])
     if not away <= tolerance:
-        raise PeerError(
-            peer, f'the robot stopped {away:.2f} m short, expected at most {tolerance:g} m'
+        raise CallError(
+            f'{peer}: the robot stopped {away:.2f} m short, expected at most {tolerance:g} m'
         )

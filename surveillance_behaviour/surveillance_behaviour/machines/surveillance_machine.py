@@ -147,7 +147,7 @@ def drive(mission: Mission, place: str, interrupt: fsm.Interrupt) -> list[Point]
     """Plan a path to a place and follow it; return the path.
 
     Raises:
-        PeerError: The robot did not get there.
+        CallError: The robot did not get there.
     """
     motion, before = mission.ports.motion, mission.place
     assert motion is not None

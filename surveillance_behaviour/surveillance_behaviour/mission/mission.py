@@ -14,10 +14,11 @@ from surveillance_behaviour.mission.mission_log import (
     is_other_simulation,
 )
 from surveillance_behaviour.mission.recovery import Failure, Recovery, RecoveryLimits
-from surveillance_behaviour.peers.ports import PeerError, Point, Ports
+from surveillance_behaviour.peers.ports import Point, Ports
 from surveillance_behaviour.policy.battery_reserve import Battery
 from surveillance_behaviour.policy.world import Decision
 from surveillance_fsm import Clock, Interrupt
+from surveillance_fsm.exceptions import CallError
 from surveillance_runtime.parameters import parameter, parameters
 
 
@@ -108,7 +109,7 @@ class Mission:
         """Look at the map for the first time, record the start, take up what was begun before.
 
         Raises:
-            PeerError: The ontology cannot be asked.
+            CallError: The ontology cannot be asked.
         """
         decisions = self.ports.decisions
         self.place = decisions.begin(self.now(), interrupt)
@@ -142,7 +143,7 @@ class Mission:
             to_charge: The robot is to charge: only a charging place will do.
 
         Raises:
-            PeerError: Who decides cannot be asked.
+            CallError: Who decides cannot be asked.
             NowhereToGoError: Nothing can be reached.
         """
         self._notice_place(interrupt)
@@ -187,12 +188,12 @@ class Mission:
         """Make sure that a drive ended in ``place``.
 
         Raises:
-            PeerError: The robot is elsewhere.
+            CallError: The robot is elsewhere.
         """
         seconds = self.settings.settle_seconds
         found = self.ports.ontology.await_place(place, seconds, interrupt)
         if found not in (place, ''):
-            raise PeerError('robot_place', f'the robot is in {found} instead of {place}')
+            raise CallError(f'robot_place: the robot is in {found} instead of {place}')
 
     def came_back(self, distance: float) -> None:
         """Note that the robot is again where it was last known to be."""

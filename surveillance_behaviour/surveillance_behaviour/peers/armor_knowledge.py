@@ -9,11 +9,7 @@ from contextlib import contextmanager
 from typing import Protocol
 
 import surveillance_fsm as fsm
-from surveillance_behaviour.peers.ports import (
-    AwayError,
-    InterruptedWaitError,
-    PeerError,
-)
+from surveillance_fsm.exceptions import CallError, CallInterruptedError, UnavailableError
 from surveillance_ontology.armor.client import (
     ArmorClient,
     ArmorError,
@@ -131,7 +127,7 @@ class ArmorKnowledge:
         """Wait until the robot is in ``place``; return where it is then, empty when nobody says."""
         found = self._whereabouts.await_place(place, seconds, interrupt)
         if interrupt.is_set():
-            raise InterruptedWaitError
+            raise CallInterruptedError
         return found
 
     def snapshot(
@@ -162,8 +158,8 @@ class ArmorKnowledge:
         """Heed the interrupt, and turn what went wrong into the ports' errors.
 
         Raises:
-            PeerError: ARMOR is away, refuses something, or the ontology is not ready.
-            InterruptedWaitError: The interrupt was raised.
+            CallError: ARMOR is away, refuses something, or the ontology is not ready.
+            CallInterruptedError: The interrupt was raised.
         """
         if not self._armor.reference_name:
             self.wait_until_built(interrupt)
@@ -175,10 +171,10 @@ class ArmorKnowledge:
                 # A server that was started anew does not know the ontology yet.
                 self._armor.reference_name = ''
             if interrupt.is_set():
-                raise InterruptedWaitError from None
+                raise CallInterruptedError from None
             if isinstance(error, ArmorServiceCallError):
-                raise AwayError('armor', str(error), self._is_back) from None
-            raise PeerError('armor', str(error)) from None
+                raise UnavailableError(f'armor: {error}', self._is_back) from None
+            raise CallError(f'armor: {error}') from None
         finally:
             forget()
             self._wake.clear()

@@ -2,57 +2,27 @@
 
 A machine talks to its peers only through these ports. On the robot they are services and actions
 (:mod:`surveillance_behaviour.peers.ros_ports`); in a test they are plain Python. Every method may
-take its time, ends early when the interrupt is raised, and raises :class:`PeerError` when the peer
-did not do what was asked - within a deadline that the port knows.
+take its time and ends early when the interrupt is raised. It raises `CallError` when the peer did
+not do what was asked within a deadline that the port knows, `UnavailableError` when it is away.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 from surveillance_behaviour.policy.world import Decision
 from surveillance_fsm import Interrupt
+from surveillance_fsm.exceptions import CallError
 from surveillance_ontology.patrol_ontology import Snapshot
 
 Point = tuple[float, float, float]
 """x, y, z in metres, world frame."""
 
 
-class PeerError(Exception):
-    """A peer did not do what was asked.
-
-    Args:
-        peer: Who: the service, action or node.
-        reason: What went wrong, as a clause.
-    """
-
-    def __init__(self, peer: str, reason: str) -> None:
-        super().__init__(f'{peer}: {reason}')
-        self.peer = peer
-        self.reason = reason
-
-
-class AwayError(PeerError):
-    """A peer is not there, or went away: no other path or place helps, only its return.
-
-    Args:
-        peer, reason: As for `PeerError`.
-        is_back: Whether it is there again; None: nobody can tell.
-    """
-
-    def __init__(self, peer: str, reason: str, is_back: Callable[[], bool] | None = None) -> None:
-        super().__init__(peer, reason)
-        self.is_back = is_back
-
-
-class UnknownPlaceError(PeerError):
+class UnknownPlaceError(CallError):
     """A place is not there, or not any more."""
-
-
-class InterruptedWaitError(Exception):
-    """The interrupt was raised while a port was at work; what ran on the peer was cancelled."""
 
 
 class Ontology(Protocol):

@@ -21,22 +21,15 @@ from surveillance_behaviour.charging import BatteryMonitor
 from surveillance_behaviour.decision import ANY, RECHARGE
 from surveillance_behaviour.peers.announcing import MissionClock
 from surveillance_behaviour.peers.armor_knowledge import ArmorKnowledge, Whereabouts
-from surveillance_behaviour.peers.ports import (
-    AwayError,
-    InterruptedWaitError,
-    Ontology,
-    PeerError,
-    Point,
-    UnknownPlaceError,
-)
+from surveillance_behaviour.peers.ports import Ontology, Point, UnknownPlaceError
 from surveillance_behaviour.policy.world import Decision
 from surveillance_fsm import Interrupt
 from surveillance_fsm.ros import (
     CallError,
     CallInterruptedError,
+    CallTimeoutError,
     GoalCaller,
     ServiceCaller,
-    UnavailableError,
 )
 from surveillance_interfaces.action import ComputePath, Control, FollowPath, Plan
 from surveillance_interfaces.msg import Decision as DecisionMessage
@@ -100,7 +93,7 @@ def ros_ontology(node: PatrolNode, deadlines: Deadlines) -> ArmorKnowledge:
         request = ReferenceName.Request()
         answer = ask(names, request, deadlines.build, interrupt, deadlines.answer)
         if not answer.name:
-            raise PeerError(names.name, 'the reference name is empty')
+            raise CallError(f'{names.name}: the reference name is empty')
         return str(answer.name)
 
     transport = RosTransport(
@@ -144,9 +137,9 @@ class RosPlaces:
     def position(self, place: str, interrupt: Interrupt) -> Point:
         """Return a point in the place."""
         request = RoomPosition.Request(room_name=place)
-        answer = call(self._service, request, self._deadlines.answer, interrupt)
+        answer = self._service.call(request, self._deadlines.answer, interrupt)
         if not answer.valid:
-            raise UnknownPlaceError(self._service.name, f'there is no place {place}')
+            raise UnknownPlaceError(f'{self._service.name}: there is no place {place}')
         return conversions.point_from(answer.position)
 
 
@@ -257,13 +250,13 @@ class RosReasoner:
                 return decision
             interrupt.wait(0.1)
             if interrupt.is_set():
-                raise InterruptedWaitError
+                raise CallInterruptedError
 
     def _ask(self, now: float, interrupt: Interrupt) -> Decision:
         self._decision = None
-        answer = call(self._reason, Reason.Request(), self._deadlines.answer, interrupt)
+        answer = self._reason.call(Reason.Request(), self._deadlines.answer, interrupt)
         if not answer.point:
-            raise PeerError(self._reason.name, 'it names no place; its log says why')
+            raise CallError(f'{self._reason.name}: it names no place; its log says why')
         place = str(answer.point)
 
         def told() -> bool:
@@ -356,12 +349,12 @@ class RosRoutine:
             watchdog.feed()
             limits = self._deadlines
             self._clock.wait_for_event()
-            call(self._recharge, Empty.Request(), LONGEST_CHARGE, either, limits.answer)
-        except InterruptedWaitError:
+            self._recharge.call(Empty.Request(), LONGEST_CHARGE, either, discovery=limits.answer)
+        except CallInterruptedError:
             if interrupt.is_set() or not stalled.is_set():
                 raise
-            raise PeerError(
-                self._recharge.name, f'nothing came from it for {self._deadlines.charge:g} s'
+            raise CallError(
+                f'{self._recharge.name}: nothing came from it for {self._deadlines.charge:g} s'
             ) from None
         finally:
             for end in forget:
@@ -391,39 +384,10 @@ class _Watchdog:
             self._timer.cancel()
 
 
-def call(
-    caller: ServiceCaller,
-    request: Any,
-    deadline: float,
-    interrupt: Interrupt,
-    discovery: float | None = None,
-) -> Any:
-    """Call a service.
-
-    Args:
-        caller: The service.
-        request: The request message.
-        deadline: Seconds of steady time.
-        interrupt: Ends the wait.
-        discovery: Seconds after which a server that is not there is given up, for services whose
-            answer may take much longer; default: the deadline.
-
-    Raises:
-        PeerError: No server, or no answer in time.
-        InterruptedWaitError: The interrupt was raised.
-    """
-    try:
-        return caller.call(request, deadline, interrupt, discovery=discovery)
-    except CallInterruptedError:
-        raise InterruptedWaitError from None
-    except CallError as error:
-        raise _peer_error(caller, error) from None
-
-
 def ask(
     caller: ServiceCaller, request: Any, deadline: float, interrupt: Interrupt, discovery: float
 ) -> Any:
-    """Call a service whose answer takes long and that may be asked twice; else as `call`.
+    """Call a service whose answer takes long and that may be asked twice.
 
     It is asked anew now and then: a server that has just taken the place of another one may have
     been found before its end of the line was there, and does not know that anybody waits.
@@ -432,10 +396,8 @@ def ask(
     while True:
         patience = min(ASK_AGAIN, max(discovery, late - time.monotonic()))
         try:
-            return call(caller, request, patience, interrupt, discovery)
-        except AwayError:
-            raise
-        except PeerError:
+            return caller.call(request, patience, interrupt, discovery=discovery)
+        except CallTimeoutError:
             if time.monotonic() >= late:
                 raise
 
@@ -459,28 +421,16 @@ def run(
         on_feedback: Called with each feedback message.
 
     Raises:
-        PeerError: No server, or the goal was rejected, aborted, or not done in time.
-        InterruptedWaitError: The interrupt was raised.
+        CallError: No server, or the goal was rejected, aborted, or not done in time.
+        CallInterruptedError: The interrupt was raised.
     """
-    try:
-        end = caller.run(
-            goal,
-            accept_timeout=accept_deadline,
-            result_timeout=result_deadline or None,
-            interrupt=interrupt,
-            on_feedback=on_feedback,
-        )
-    except CallInterruptedError:
-        raise InterruptedWaitError from None
-    except CallError as error:
-        raise _peer_error(caller, error) from None
+    end = caller.run(
+        goal,
+        accept_timeout=accept_deadline,
+        result_timeout=result_deadline or None,
+        interrupt=interrupt,
+        on_feedback=on_feedback,
+    )
     if end.status != 'succeeded':
-        raise PeerError(caller.name, f'the goal was {end.status}')
+        raise CallError(f'{caller.name}: the goal was {end.status}')
     return end.result
-
-
-def _peer_error(caller: ServiceCaller | GoalCaller, error: CallError) -> PeerError:
-    reason = str(error).partition(f'{caller.name}: ')[2] or str(error)
-    if isinstance(error, UnavailableError):
-        return AwayError(caller.name, reason, caller.is_ready)
-    return PeerError(caller.name, reason)

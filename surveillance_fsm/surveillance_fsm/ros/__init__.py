@@ -12,22 +12,19 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from surveillance_fsm.exceptions import (
+    CallError,
+    CallInterruptedError,
+    CallTimeoutError,
+    UnavailableError,
+)
 from surveillance_fsm.ros.action_server import (
     ActionServerWrapper,
     GoalAbortedError,
     GoalRun,
     GoalServer,
 )
-from surveillance_fsm.ros.calls import (
-    CallError,
-    CallInterruptedError,
-    CallTimeoutError,
-    GoalCaller,
-    GoalEnd,
-    ServiceCaller,
-    UnavailableError,
-    await_ready,
-)
+from surveillance_fsm.ros.calls import GoalCaller, GoalEnd, ServiceCaller, await_ready
 from surveillance_fsm.ros.states import (
     ConditionState,
     MonitorState,

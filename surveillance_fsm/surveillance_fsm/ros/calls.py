@@ -26,6 +26,12 @@ from rclpy.node import Node
 from rclpy.task import Future
 
 from surveillance_fsm.clock import Interrupt
+from surveillance_fsm.exceptions import (
+    CallError,
+    CallInterruptedError,
+    CallTimeoutError,
+    UnavailableError,
+)
 from surveillance_fsm.ros.waiting import ACTION_CLIENT_QOS, CLIENT_QOS, own
 
 DISCOVERY_PERIOD = 0.02
@@ -51,22 +57,6 @@ Servers answer each request when the goal has ended, and may forget the result 1
 
 CANCEL_PERIOD = 0.5
 """Seconds after which a cancel that was not answered is sent again."""
-
-
-class CallError(Exception):
-    """A call did not bring an answer; the message is one line that names the peer."""
-
-
-class UnavailableError(CallError):
-    """The server is not there, or went away before it answered."""
-
-
-class CallTimeoutError(CallError):
-    """The server is there but did not answer in time."""
-
-
-class CallInterruptedError(CallError):
-    """The caller's interrupt ended the wait."""
 
 
 class RoundTrips:
@@ -142,7 +132,7 @@ class _Servers:
         def look() -> None:
             nonlocal lost
             if lost:
-                raise UnavailableError(f'{self._what}: {lost}')
+                raise UnavailableError(f'{self._what}: {lost}', self._is_ready)
             # Not before the next look: an answer may be under way.
             if not self._is_ready():
                 lost = 'the server went away before it answered'
@@ -240,7 +230,7 @@ class ServiceCaller:
             CallTimeoutError: No answer within the time.
         """
         if not self.is_ready():
-            raise UnavailableError(f'{self._what}: no server')
+            raise UnavailableError(f'{self._what}: no server', self.is_ready)
         timeout = self.round_trips.deadline(timeout)
         deadline = time.monotonic() + timeout
         look, failure = self._servers.look_for_loss(DOUBTFUL_SECONDS), []
@@ -332,7 +322,7 @@ def await_ready(
     pause = interrupt if interrupt is not None else Interrupt()
     while not is_ready():
         if time.monotonic() >= deadline:
-            raise UnavailableError(f'{what}: no server')
+            raise UnavailableError(f'{what}: no server', is_ready)
         if pause.wait(DISCOVERY_PERIOD):
             raise CallInterruptedError(f'{what}: interrupted')
 

@@ -19,13 +19,8 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 
 import surveillance_fsm as fsm
 from surveillance_fsm.clock import Interrupt
-from surveillance_fsm.exceptions import describe
-from surveillance_fsm.ros.calls import (
-    CallError,
-    CallInterruptedError,
-    GoalCaller,
-    ServiceCaller,
-)
+from surveillance_fsm.exceptions import CallError, CallInterruptedError, describe
+from surveillance_fsm.ros.calls import GoalCaller, ServiceCaller
 from surveillance_fsm.ros.exchange import (
     Incoming,
     Outgoing,
