@@ -262,7 +262,7 @@ def _test(argv: list[str]) -> int:
         print(_TEST_HELP)
         return 0
     _enter(['test', *argv], extras=('test',))
-    spread = any(a.startswith(('-n', '--numprocesses', '--pdb', '-p')) for a in argv)
+    spread = any(a.startswith(('-n', '--numprocesses', '--pdb')) or 'no:xdist' in a for a in argv)
     # On two cores three are a seventh faster than two: many tests wait for other processes.
     _exec(['-m', 'pytest', *([] if spread else ['-n', '3', '--dist', 'loadfile']), *argv])
     return 0

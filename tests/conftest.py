@@ -117,7 +117,7 @@ class Graph:
         self._spinner.executor.create_task(lambda: (node.destroy_node(), done.set()))
         assert done.wait(60.0), 'executor does not spin'
 
-    def until(self, predicate: Callable[[], Any], timeout: float = 40.0) -> Any:
+    def until(self, predicate: Callable[[], Any], timeout: float = 60.0) -> Any:
         """Wait until the predicate holds; it is looked at whenever `touch` is called and often.
 
         Returns:

@@ -1,41 +1,51 @@
 """ROS domains for whoever must not meet other nodes on this machine: tests and benchmarks.
 
-Nodes of one domain hear each other. A claim is a locked file in the system's temporary folder, so
-it ends with the process however that ends.
+Nodes of one domain hear each other. A claim is a name that the system gives to one socket at a
+time, so it holds for all users and ends with the process however that ends.
 """
 
 from __future__ import annotations
 
-import fcntl
-import os
-import tempfile
-from pathlib import Path
-from typing import IO
+import socket
 
 LAST_DOMAIN = 101
 """The highest ROS domain whose ports lie below those that Linux gives to clients."""
 
-_held: list[IO[str]] = []
+_held: list[socket.socket] = []
 
 
 def claim_domain() -> int:
-    """Take a ROS domain, from 1 to `LAST_DOMAIN`, that no other process has claimed.
+    """Take a ROS domain, from 1 to `LAST_DOMAIN`, that nobody has claimed and no node uses.
+
+    The highest comes first: people who choose a domain by hand take low ones.
 
     Raises:
-        RuntimeError: All are claimed.
+        RuntimeError: There is none.
     """
-    folder = Path(tempfile.gettempdir(), f'surveillance-domains-{os.getuid()}')
-    folder.mkdir(mode=0o700, exist_ok=True)
-    if folder.is_symlink() or folder.stat().st_uid != os.getuid():
-        raise RuntimeError(f'{folder}: belongs to somebody else')
-    for domain in range(1, LAST_DOMAIN + 1):
-        flags = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW
-        lock = open(os.open(folder / str(domain), flags, 0o600), 'w')  # noqa: SIM115 - held
+    for domain in range(LAST_DOMAIN, 0, -1):
+        claim = socket.socket(socket.AF_UNIX)
         try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            claim.bind(f'\0surveillance-domain-{domain}')
         except OSError:
-            lock.close()
+            claim.close()
             continue
-        _held.append(lock)
+        if _is_used(domain):
+            claim.close()
+            continue
+        _held.append(claim)
         return domain
-    raise RuntimeError(f'all ROS domains from 1 to {LAST_DOMAIN} are claimed')
+    raise RuntimeError(f'all ROS domains from 1 to {LAST_DOMAIN} are claimed or in use')
+
+
+def _is_used(domain: int) -> bool:
+    """Tell whether a node runs in the domain, as one that outlived its test does.
+
+    Each process of a domain listens on the domain's port for discovery (DDSI-RTPS 2.5, 9.6.1.1);
+    they share it, but only with each other.
+    """
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.bind(('', 7400 + 250 * domain))
+        except OSError:
+            return True
+    return False

@@ -62,11 +62,11 @@ def test_end_of_input_leaves_the_node_at_work(graph: Any, operator: Any) -> None
     operator.hang_up()
     levels = graph.listen(UInt8, 'battery_level', STATE_QOS)
     caller = ServiceCaller(graph.node, ConsoleCommand, 'battery_controller/command')
-    answer = caller.call(ConsoleCommand.Request(line='battery set 33'), 5.0)
+    answer = caller.call(ConsoleCommand.Request(line='battery set 33'), 60.0)
     assert answer.accepted
     assert answer.answer == 'The battery is at 33 %.'
     graph.until(lambda: values(levels)[-1:] == [33])
-    answer = caller.call(ConsoleCommand.Request(line='move 1 2'), 5.0)
+    answer = caller.call(ConsoleCommand.Request(line='move 1 2'), 60.0)
     assert not answer.accepted
     assert answer.answer.startswith("'move' is no command: expected 'battery'")
 
@@ -104,7 +104,7 @@ def test_recharge_answers_when_full_and_logs_lines_without_a_terminal(graph: Any
         },
     )
     levels = graph.listen(UInt8, 'battery_level', STATE_QOS)
-    ServiceCaller(graph.node, Empty, 'recharge').call(Empty.Request(), 5.0)
+    ServiceCaller(graph.node, Empty, 'recharge').call(Empty.Request(), 60.0)
     graph.until(lambda: values(levels)[-1:] == [100])
     # By the node's logger, which has a rate: who asks again and again does not fill the disk.
     graph.until(lambda: any(line.msg == 'Charging: 100 %' for line in said))
@@ -153,11 +153,11 @@ def test_the_simulated_battery_drains_and_charges_only_at_the_station(graph: Any
     graph.until(lambda: states and states[-1].percentage < 0.9)
     away = states[-1]
     assert away.power_supply_status == BatteryState.POWER_SUPPLY_STATUS_DISCHARGING
-    recharge.call(Empty.Request(), 5.0)
+    recharge.call(Empty.Request(), 60.0)
     assert states[-1].percentage < 0.9
 
     poses.publish(pose_at(1.2, 2.1))
-    recharge.call(Empty.Request(), 5.0)
+    recharge.call(Empty.Request(), 60.0)
     graph.until(lambda: states[-1].power_supply_status == BatteryState.POWER_SUPPLY_STATUS_FULL)
     assert states[-1].percentage == pytest.approx(1.0)
 

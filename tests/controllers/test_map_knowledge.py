@@ -30,7 +30,7 @@ def test_who_is_told_of_a_new_room_finds_it_with_its_point(
     knowledge.watch_doors(graph.node.stopping, on_change)
     graph.until(lambda: told and len(told[-1][0]) == 7)  # the map is built door by door
     request = AddRoom.Request(room_name='ALCOVE', position=Point(x=12.5, y=8.0), doors=['D9'])
-    answer = ServiceCaller(graph.node, AddRoom, 'ontology_map/add_room').call(request, 10.0)
+    answer = ServiceCaller(graph.node, AddRoom, 'ontology_map/add_room').call(request, 60.0)
     assert answer.success, answer.message
     graph.until(lambda: any('ALCOVE' in rooms for rooms, _ in told))
     assert all(has_point for rooms, has_point in told if 'ALCOVE' in rooms)

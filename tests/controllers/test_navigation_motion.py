@@ -48,7 +48,7 @@ class World:
         self._control = GoalCaller(node, Control, 'motion/controller')
 
     def call(self, kind: Any, service: str, **fields: Any) -> Any:
-        answer = ServiceCaller(self.graph.node, kind, service).call(kind.Request(**fields), 5.0)
+        answer = ServiceCaller(self.graph.node, kind, service).call(kind.Request(**fields), 60.0)
         assert answer.success, answer.message
         return answer
 
@@ -81,9 +81,9 @@ class World:
 
     def ask_until(self, holds: Callable[[], bool]) -> None:
         """Ask again and again, which `graph.until` cannot: it must not wait for answers."""
-        deadline = time.monotonic() + 40.0
+        deadline = time.monotonic() + 60.0
         while not holds():
-            assert time.monotonic() < deadline, 'not within 40 s'
+            assert time.monotonic() < deadline, 'not within 60 s'
 
     def can_reach(self, place: str) -> bool:
         return place in self.armor.query.objectprop_b2_ind('canReach', 'Robot1')

@@ -56,12 +56,12 @@ def test_manual_requests_wait_for_the_operator(
 def test_a_command_without_a_request_is_refused(graph: Any) -> None:
     graph.add(PlannerController, {'execution_mode': 'MANUAL', 'console': False})
     caller = ServiceCaller(graph.node, ConsoleCommand, 'planner_controller/command')
-    answer = caller.call(ConsoleCommand.Request(line='plan set []'), 5.0)
+    answer = caller.call(ConsoleCommand.Request(line='plan set []'), 60.0)
     assert (answer.accepted, answer.answer) == (
         False,
         'no request is waiting: expected one before this command',
     )
-    answer = caller.call(ConsoleCommand.Request(line='status'), 5.0)
+    answer = caller.call(ConsoleCommand.Request(line='status'), 60.0)
     assert (answer.accepted, answer.answer) == (True, 'No request is waiting.')
 
 
@@ -88,7 +88,7 @@ def test_a_new_goal_takes_the_place_of_the_one_that_waits(graph: Any, in_backgro
     assert first().status == 'aborted'
     graph.until(lambda: sum(t.data.startswith('New request') for t in told) == 2)
     caller = ServiceCaller(graph.node, ConsoleCommand, 'planner_controller/command')
-    assert caller.call(ConsoleCommand.Request(line='plan set []'), 5.0).accepted
+    assert caller.call(ConsoleCommand.Request(line='plan set []'), 60.0).accepted
     assert second().status == 'succeeded'
 
 

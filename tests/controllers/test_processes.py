@@ -38,7 +38,7 @@ def wait_for(process: subprocess.Popen[str], text: str) -> list[str]:
 
 def test_a_piped_operator_sets_the_battery_and_leaves(ros_domain: int) -> None:
     process = start('battery_controller', 'execution_mode:=MANUAL')
-    out, _ = process.communicate('battery set 15\nbattery set x\nexit\n', timeout=30)
+    out, _ = process.communicate('battery set 15\nbattery set x\nexit\n', timeout=60)
     assert 'The battery is at 15 %.' in out
     assert "battery set: VALUE is 'x': expected a whole number from 0 to 100" in out
     assert 'Stopping.' in out
@@ -49,7 +49,7 @@ def test_a_node_without_input_goes_on_until_it_is_told_to_stop(ros_domain: int) 
     process = start('motion_controller', 'execution_mode:=MANUAL', stdin=subprocess.DEVNULL)
     wait_for(process, 'The console is closed (end of input)')
     process.send_signal(signal.SIGINT)
-    out, _ = process.communicate(timeout=30)
+    out, _ = process.communicate(timeout=60)
     assert process.returncode == 0
     assert 'Traceback' not in out
 
@@ -75,7 +75,7 @@ def test_a_node_that_cannot_start_says_so_in_one_line(
             pytest.skip('nav2_msgs is installed here')
         arguments.append('execution_mode:=SIMULATED')
     process = start(node, *arguments)
-    out, _ = process.communicate(timeout=30)
+    out, _ = process.communicate(timeout=60)
     assert process.returncode != 0
     (complaint,) = [line for line in out.splitlines() if line]
     assert text in complaint

@@ -21,7 +21,7 @@ from surveillance_runtime.node import PatrolNode
 from .states import Answer, Waiter
 
 SHORT = 0.3
-LONG = 20.0
+LONG = 60.0
 
 
 def machine_of(state, userdata=None):

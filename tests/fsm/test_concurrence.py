@@ -97,7 +97,7 @@ def test_a_request_to_a_state_that_an_earlier_run_left_behind_is_kept():
     assert root.execute() == 'preempted'
     assert not root.preempt_requested()
     deaf.release.set()
-    assert deaf.ended.wait(5.0)
+    assert deaf.ended.wait(60.0)
     assert root.execute() == 'done'
 
 
@@ -281,7 +281,7 @@ def test_an_interrupts_state_that_ignores_a_preempt_is_left_behind(depth, caplog
     assert 'ignored a preempt' in caplog.text
     assert not concurrence.is_running()
     deaf.release.set()
-    assert deaf.ended.wait(5.0)
+    assert deaf.ended.wait(60.0)
 
 
 class Ending(fsm.State):

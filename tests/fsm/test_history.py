@@ -309,10 +309,10 @@ def test_a_fake_clock_wakes_whom_it_should():
         thread.start()
     clock.until_sleeping(2)
     clock.advance(1.5)
-    threads[0].join(5.0)
+    threads[0].join(60.0)
     assert ends == [(1.0, True)]
     stop.set()
-    threads[1].join(5.0)
+    threads[1].join(60.0)
     assert ends == [(1.0, True), (2.0, False)]
     with pytest.raises(AssertionError, match='0 threads sleep'):
         clock.until_sleeping(1, timeout=0.01)

@@ -129,7 +129,7 @@ def test_a_state_that_ignores_a_preempt_is_left_behind_and_named(depth, caplog):
     assert root.control.left_behind() == [culprit]
     assert not root.preempt_requested()
     deaf.release.set()
-    assert deaf.ended.wait(5.0)
+    assert deaf.ended.wait(60.0)
     # It can be executed again, and the next run knows nothing of the old preempt.
     deaf.release.set()
     assert root.execute() == 'done'
@@ -146,7 +146,7 @@ def test_userdata_is_closed_to_a_state_that_was_left_behind():
     root.request_preempt()
     assert run.result() == 'preempted'
     deaf.release.set()
-    assert deaf.ended.wait(5.0)
+    assert deaf.ended.wait(60.0)
     assert machines[2].userdata.key == 'before'
     assert isinstance(deaf.late_error, fsm.InvalidUserCodeError)
 

@@ -75,7 +75,7 @@ def test_a_cancel_preempts_the_machine_and_the_next_goal_starts_afresh(graph):
     for _ in range(2):
         client = machine_of(action(graph.node))
         run = Background(client)
-        began(waiter, 10.0)
+        began(waiter)
         client.request_preempt()
         assert run.result() == 'preempted'
 

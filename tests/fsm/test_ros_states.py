@@ -352,7 +352,7 @@ def test_a_preempt_ends_checking_a_condition(graph):
     state = ConditionState(graph.node, lambda ud: checked.set(), poll_rate=0.001, max_checks=-1)
     machine = machine_of(state)
     run = Background(machine)
-    assert checked.wait(5.0)
+    assert checked.wait(60.0)
     machine.request_preempt()
     assert run.result() == 'preempted'
 

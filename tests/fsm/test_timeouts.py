@@ -86,7 +86,7 @@ def test_a_nested_machine_has_a_deadline_as_a_whole():
     assert not inner.is_running()
     assert not inner.preempt_requested()
     deaf.release.set()
-    assert deaf.ended.wait(5.0)
+    assert deaf.ended.wait(60.0)
     # The inner machine is good for another run.
     assert inner.execute() == 'done'
 

@@ -62,7 +62,7 @@ def test_ctrl_c_ends_a_mission_with_its_summary_and_leaves_nothing_behind(launch
     mission = launch('--mode', 'RANDOM')
     processes = [process_of(mission, node) for node in NODES]
     mission.until(r'robot_behavior +\| decision 1:', timeout=60)
-    mission.until(r'robot_behavior +\| arrived in', timeout=30)
+    mission.until(r'robot_behavior +\| arrived in', timeout=60)
     code, seconds = mission.end(signal.SIGINT)
     assert code == 0
     assert seconds < 15  # nothing had to be killed, on however busy a machine

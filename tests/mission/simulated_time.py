@@ -70,7 +70,7 @@ class SimulatedTime:
         with self._condition:
             self._ended = True
             self._condition.notify_all()
-        self._thread.join(5.0)
+        self._thread.join(60.0)
 
     def at(self, seconds: float, action: Any) -> None:
         """Do something ``seconds`` after the start, while everybody sleeps."""
@@ -110,7 +110,7 @@ class SimulatedTime:
                     self.error = error
                     raise
             with self._condition:
-                self._condition.wait_for(lambda: self._ended or not self._overdue(), timeout=5.0)
+                self._condition.wait_for(lambda: self._ended or not self._overdue(), timeout=60.0)
 
     def _all_wait(self) -> bool:
         if self.unattended:
@@ -125,7 +125,7 @@ class SimulatedTime:
         message.clock.sec = int(self.now)
         message.clock.nanosec = round((self.now - int(self.now)) * 1e9) % 10**9
         nanoseconds = message.clock.sec * 10**9 + message.clock.nanosec
-        late = time.monotonic() + 5.0
+        late = time.monotonic() + 60.0
         self._topic.publish(message)
         told = time.monotonic()
         while any(node.get_clock().now().nanoseconds < nanoseconds for node in self._nodes()):

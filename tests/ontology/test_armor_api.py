@@ -32,7 +32,7 @@ BASE = 'http://www.semanticweb.org/emarolab/pyarmor/test'
 PROGRAM = """
 from armor_api.armor_client import ArmorClient
 
-client = ArmorClient('client', 'reference', timeout=20)
+client = ArmorClient('client', 'reference', timeout=60)
 client.utils.load_ref_from_file('PATH', 'BASE', True, 'PELLET', True, False)
 client.utils.mount_on_ref()
 client.utils.set_log_to_terminal(True)
@@ -76,7 +76,7 @@ def test_a_program_of_armor_py_api_runs_as_it_is(server: ArmorServer, tmp_path: 
 
 
 def test_errors_carry_code_and_msg(server: ArmorServer) -> None:
-    client = ArmorClient('one', 'reference', timeout=5)
+    client = ArmorClient('one', 'reference', timeout=60)
     with pytest.raises(ArmorServiceInternalError) as refused:
         client.manipulation.add_ind_to_class('a', 'B')
     assert refused.value.code == 205
@@ -260,7 +260,7 @@ def test_exceptions_are_made_as_in_armor_py_api() -> None:
 
 
 def test_rows_of_a_sparql_answer_have_key_and_value(server: ArmorServer) -> None:
-    made = ArmorClient('one', 'reference', timeout=20)
+    made = ArmorClient('one', 'reference', timeout=60)
     made.utils.load_ref_from_file(ONTOLOGY, BASE)
     made.manipulation.add_ind_to_class('a', 'B')
     response = made.call('QUERY', 'SPARQL', 'FORMATTED', [f'SELECT ?x {{ ?x a <{BASE}#B> }}'])

@@ -128,7 +128,7 @@ def test_a_client_beside_a_burst_of_another_is_answered_in_its_turn(graph: Any) 
             send('burst')
         send('good')
 
-    assert all(client.wait_for_service(5.0) for client in clients.values())
+    assert all(client.wait_for_service(60.0) for client in clients.values())
     graph.node.executor.create_task(both)
     assert done.wait(60.0), f'{601 - len(order)} of 601 requests were lost'
     assert order.index('good') < 300
@@ -141,7 +141,7 @@ def test_loads_that_wait_for_one_another_keep_nobody_waiting(graph: Any) -> None
     loaded: list[str] = []
 
     async def load(name: str) -> None:
-        client = ArmorClient(graph.node, 'test', name, timeout=20.0)
+        client = ArmorClient(graph.node, 'test', name, timeout=60.0)
         await client.utils.load_ref_from_file.call_async(ONTOLOGY, IRI)
         loaded.append(name)
 

@@ -55,7 +55,7 @@ class Caller:
         }
 
     def __call__(self, name: str, **fields: Any) -> Any:
-        return self._callers[name].call(self._kinds[name].Request(**fields), 10.0)
+        return self._callers[name].call(self._kinds[name].Request(**fields), 60.0)
 
 
 @pytest.fixture

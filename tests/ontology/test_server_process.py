@@ -25,7 +25,7 @@ def start(store: Path) -> subprocess.Popen[bytes]:
 def test_a_killed_server_comes_back_with_what_it_answered_and_clients_go_on(
     graph: Any, tmp_path: Path
 ) -> None:
-    armor = ArmorClient(graph.node, 'test', 'map', timeout=20.0)
+    armor = ArmorClient(graph.node, 'test', 'map', timeout=60.0)
     server = start(tmp_path / 'store')
     try:
         build_seven_rooms(armor, False, True)
@@ -42,7 +42,7 @@ def test_a_killed_server_comes_back_with_what_it_answered_and_clients_go_on(
             except ArmorServiceCallError:
                 return None
 
-        assert graph.until(reached, timeout=30.0) == ['C2', 'E', 'R1', 'R2']
+        assert graph.until(reached, timeout=60.0) == ['C2', 'E', 'R1', 'R2']
         assert armor.utils.get_ref_client() == 'test'
         server.send_signal(signal.SIGINT)
         assert server.wait(60.0) == 0

@@ -60,7 +60,7 @@ class Terminal:
         """Press keys."""
         os.write(self._ours, text.encode())
 
-    def until(self, *words: str, timeout: float = 40.0) -> str:
+    def until(self, *words: str, timeout: float = 90.0) -> str:
         """Wait until the screen shows all words; return what it shows."""
         deadline = time.monotonic() + timeout
         while True:

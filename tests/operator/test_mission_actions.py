@@ -29,7 +29,7 @@ PLACE = {
 
 @pytest.fixture
 def actions(graph: Any) -> MissionActions:
-    return MissionActions(graph.add(PatrolNode, name='hands'), timeout=5.0)
+    return MissionActions(graph.add(PatrolNode, name='hands'), timeout=60.0)
 
 
 def serve(graph: Any, kind: Any, name: str, **answer: Any) -> list[Any]:

@@ -21,7 +21,7 @@ def test_a_message_ends_the_wait_and_is_taken_by_whoever_asks(graph: Any) -> Non
     assert words.take() is None
     graph.until(lambda: publisher.get_subscription_count() == 1)
     publisher.publish(String(data='come'))
-    await_message(graph.context, [words, others], 40.0)
+    await_message(graph.context, [words, others], 60.0)
     taken = words.take()
     assert taken is not None
     assert taken[0].data == 'come'

@@ -207,7 +207,7 @@ def test_settings_change_while_it_runs(graph: Any) -> None:
         request = SetParameters.Request(
             parameters=[Parameter(name, value=value).to_parameter_msg()]
         )
-        return setter.call(request, 5.0).results[0]
+        return setter.call(request, 60.0).results[0]
 
     assert change('known_ids', [7]).successful
     assert change('marker_dictionary', 'DICT_4X4_50').successful
@@ -254,10 +254,10 @@ def test_wrong_parameters_are_refused_at_the_start(graph: Any, wrong: dict[str, 
 def test_marker_server_answers_from_its_file(graph: Any) -> None:
     graph.add(MarkerServer)
     client = ServiceCaller(graph.node, RoomInformation, 'room_info')
-    answer = client.call(RoomInformation.Request(id=16), 5.0)
+    answer = client.call(RoomInformation.Request(id=16), 60.0)
     assert (answer.room, answer.x, answer.y) == ('R3', 9.0, 3.0)
     assert [(c.connected_to, c.through_door) for c in answer.connections] == [('C2', 'D3')]
-    unknown = client.call(RoomInformation.Request(id=99), 5.0)
+    unknown = client.call(RoomInformation.Request(id=99), 60.0)
     assert unknown.room == 'no room associated with this marker id'
     assert not unknown.connections
 
@@ -327,20 +327,20 @@ def test_arm_takes_its_poses_and_looks_at_points(graph: Any) -> None:
     rests = graph.listen(Bool, 'arm/at_rest', STATE_QOS)
     graph.add(ArmController)
     move = ServiceCaller(graph.node, MarkerRoutine, 'move_arm')
-    answer = move.call(MarkerRoutine.Request(pos=MarkerRoutine.Request.LEFT), 10.0)
+    answer = move.call(MarkerRoutine.Request(pos=MarkerRoutine.Request.LEFT), 60.0)
     assert (answer.success, answer.message) == (True, 'at pose left')
     assert np.allclose(arm.camera_direction(), [0, 1, 0], atol=0.03)
     assert [each.data for each in rests][-2:] == [False, True]
-    wrong = move.call(MarkerRoutine.Request(pos=9), 10.0)
+    wrong = move.call(MarkerRoutine.Request(pos=9), 60.0)
     assert (wrong.success, wrong.message) == (False, 'no pose 9, expected 1 to 5')
-    assert move.call(MarkerRoutine.Request(pos=MarkerRoutine.Request.STOP), 10.0).success
+    assert move.call(MarkerRoutine.Request(pos=MarkerRoutine.Request.STOP), 60.0).success
     point = ServiceCaller(graph.node, PointCamera, 'point_camera')
-    answer = point.call(PointCamera.Request(point=Point(x=1.0, y=3.0, z=1.5)), 10.0)
+    answer = point.call(PointCamera.Request(point=Point(x=1.0, y=3.0, z=1.5)), 60.0)
     assert answer.success
     lens = ARM.camera_frame(arm._at)[:3, 3]
     sight = np.array([1.0, 3.0, 1.5]) - lens
     assert arm.camera_direction() @ sight / np.linalg.norm(sight) > math.cos(math.radians(2))
-    unknown = point.call(PointCamera.Request(point=Point(x=1.0), frame_id='moon'), 10.0)
+    unknown = point.call(PointCamera.Request(point=Point(x=1.0), frame_id='moon'), 60.0)
     assert unknown.message == "frame 'moon' is not known, expected 'base_link'"
 
 
@@ -370,5 +370,5 @@ def test_arm_that_does_not_report_is_named(graph: Any, monkeypatch: pytest.Monke
     node = graph.add(ArmController)
     monkeypatch.setattr(node._driver, '_patience', 0.05)
     move = ServiceCaller(graph.node, MarkerRoutine, 'move_arm')
-    answer = move.call(MarkerRoutine.Request(pos=1), 10.0)
+    answer = move.call(MarkerRoutine.Request(pos=1), 60.0)
     assert (answer.success, answer.message) == (False, 'the arm does not report its joints')

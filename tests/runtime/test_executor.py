@@ -24,17 +24,16 @@ from std_srvs.srv import Trigger
 
 from surveillance_runtime import executor
 from surveillance_runtime.executor import PatrolExecutor
-from surveillance_runtime.testing import claim_domain
 
-PATIENCE = 20.0
+PATIENCE = 60.0
 
 
 class Spun:
     """Two nodes and the executor that spins them in this thread."""
 
-    def __init__(self) -> None:
+    def __init__(self, domain: int) -> None:
         self.context = rclpy.Context()
-        rclpy.init(context=self.context, domain_id=claim_domain())
+        rclpy.init(context=self.context, domain_id=domain)
         self.executor = PatrolExecutor(context=self.context)
         self.nodes = [self.node(name) for name in ('first', 'second')]
 
@@ -58,8 +57,8 @@ class Spun:
 
 
 @pytest.fixture
-def spun() -> Iterator[Spun]:
-    it = Spun()
+def spun(ros_domain: int) -> Iterator[Spun]:
+    it = Spun(ros_domain)
     yield it
     it.close()
 

@@ -74,7 +74,7 @@ def test_an_exception_in_a_callback_costs_that_message_alone(graph, capfd):
 @pytest.mark.parametrize('service', ['sync', 'later'])
 def test_a_service_whose_callback_fails_answers_all_the_same(graph, service):
     graph.add(Failing)
-    response = ServiceCaller(graph.node, Trigger, service).call(Trigger.Request(), 10.0)
+    response = ServiceCaller(graph.node, Trigger, service).call(Trigger.Request(), 60.0)
     assert not response.success
 
 
@@ -109,7 +109,7 @@ def test_a_parameter_of_a_type_that_there_is_not_is_refused(graph, kind):
     caller = ServiceCaller(graph.node, kind, f'failing/{name}')
     odd = ParameterMessage(name='level', value=ParameterValue(type=255))
     for _ in range(2):
-        response = caller.call(kind.Request(parameters=[odd]), 10.0)
+        response = caller.call(kind.Request(parameters=[odd]), 60.0)
         results = response.results if kind is SetParameters else [response.result]
         assert [result.successful for result in results] == [False]
 

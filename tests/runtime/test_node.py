@@ -155,7 +155,7 @@ sys.exit(run_node(Traced, []))
 def test_signals_in_the_middle_of_any_step_of_a_wait_stop_the_process():
     program = PROGRAM.rpartition('sys.exit')[0] + SIGNALS_IN_EVERY_STEP
     run = subprocess.run(
-        [sys.executable, '-c', program], capture_output=True, text=True, timeout=20
+        [sys.executable, '-c', program], capture_output=True, text=True, timeout=60
     )
     assert run.returncode == 0
     assert 'stopping' in run.stdout

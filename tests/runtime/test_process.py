@@ -19,7 +19,6 @@ from rosgraph_msgs.msg import Clock as ClockMessage
 from surveillance_runtime.discovery import prefer_quick_discovery
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import ExecutorThread, share_clock
-from surveillance_runtime.testing import claim_domain
 
 PROGRAM = """
 import numpy, scipy.linalg
@@ -56,9 +55,11 @@ def test_a_process_finds_its_peers_quickly_unless_told_how(
     assert os.environ['FASTRTPS_DEFAULT_PROFILES_FILE'] == 'mine.xml'
 
 
-def test_nodes_of_one_process_hear_the_clock_once_and_each_keeps_its_own() -> None:
+def test_nodes_of_one_process_hear_the_clock_once_and_each_keeps_its_own(
+    ros_domain: int,
+) -> None:
     context = rclpy.Context()
-    rclpy.init(context=context, domain_id=claim_domain())
+    rclpy.init(context=context, domain_id=ros_domain)
     simulated = Parameter('use_sim_time', value=True)
     nodes = [
         PatrolNode(name, context=context, parameter_overrides=[simulated])

@@ -53,7 +53,7 @@ def simulator(graph: Any, **parameters: Any) -> Simulator:
 
 def ask(graph: Any, kind: Any, service: str, **request: Any) -> Any:
     client = graph.node.create_client(kind, f'simulation/{service}')
-    assert client.wait_for_service(10)
+    assert client.wait_for_service(60.0)
     future = client.call_async(kind.Request(**request))
     return graph.until(lambda: future.done() and future.result())
 

@@ -2,16 +2,26 @@
 
 from __future__ import annotations
 
+import contextlib
 import signal
 import socket
 from collections.abc import Iterator
 
 import pytest
 
-from surveillance_runtime.testing import claim_domain
+from surveillance_runtime.testing import LAST_DOMAIN, claim_domain
 from tests.launcher.conftest import ROOT, Started
 
 LAUNCH = [str(ROOT / '.venv/bin/python'), str(ROOT / 'launch.py')]
+
+
+def free_port(domain: int) -> int:
+    """Return a port that nobody else asks for: of the domain, and none that clients are given."""
+    for port in range(20000 + domain, 32768, LAST_DOMAIN + 1):
+        with contextlib.suppress(OSError), socket.socket() as free:
+            free.bind(('127.0.0.1', port))
+            return port
+    raise RuntimeError('no port is free')
 
 
 @pytest.fixture(scope='module')
@@ -23,9 +33,7 @@ def mission_domain() -> int:
 @pytest.fixture(scope='module')
 def mission(mission_domain: int, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Started]:
     """Provide a patrol at four times real time, with a page that may control it."""
-    with socket.socket() as free:
-        free.bind(('127.0.0.1', 0))
-        port = free.getsockname()[1]  # a page that is started again keeps its address
+    port = free_port(mission_domain)  # a page that is started again keeps its address
     words = ['--composed', '--web-control', '--web-address', f'127.0.0.1:{port}']
     words += ['--domain', str(mission_domain), '--record', str(tmp_path_factory.mktemp('runs'))]
     words += ['-p', 'speed:=4.0', '--params', str(ROOT / 'config/fast.yaml')]
