@@ -16,10 +16,10 @@ from launcher import run_folder
 from launcher.system import LaunchError
 from surveillance_runtime import node_table
 from surveillance_runtime.configuration import Configuration, file_layer
+from surveillance_runtime.files import FileError
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.place import read_place_file
 from surveillance_runtime.testing import LAST_DOMAIN
-from surveillance_runtime.yaml_file import YamlFileError
 
 NOT_RECORDED = 'off'
 RECORDER, MARKERS, PAGE = 'mission_recorder', 'mission_markers', 'mission_page'
@@ -91,12 +91,12 @@ class Run:
         if self.place is not None:
             try:
                 read_place_file(self.place)
-            except YamlFileError as error:
+            except FileError as error:
                 raise LaunchError(f'--map {error}') from None
         if self.parameters is not None:
             try:
                 Configuration((file_layer(self.parameters),)).check()
-            except (YamlFileError, ParameterError) as error:
+            except (FileError, ParameterError) as error:
                 raise LaunchError(f'--params {error}') from None
         if self.web_address is not None:
             page_address(self.web_address)

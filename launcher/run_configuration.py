@@ -19,6 +19,7 @@ from surveillance_runtime.configuration import (
     argument_layer,
     resolved_text,
 )
+from surveillance_runtime.files import FileError
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.run_parameters import (
     BEHAVIOUR_NODE,
@@ -28,7 +29,6 @@ from surveillance_runtime.run_parameters import (
     record_entries,
     run_layers,
 )
-from surveillance_runtime.yaml_file import YamlFileError
 
 RECORD = 'mission.jsonl'
 ONTOLOGIES = 'ontologies'
@@ -55,7 +55,7 @@ def configuration(
         merged.check()
         merged.place('simulator', full_name(run.namespace, 'simulator'))
         _check_behaviour(merged, run)
-    except YamlFileError as error:
+    except FileError as error:
         raise LaunchError(f'parameter file {error}') from None
     except ParameterError as error:
         raise LaunchError(str(error)) from None

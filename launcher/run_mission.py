@@ -19,6 +19,7 @@ from launcher.run_processes import COMPOSED, node_environ, programs_of, ros_doma
 from launcher.supervisor import Supervisor
 from surveillance_behaviour.mission import mission_log
 from surveillance_runtime import node_table
+from surveillance_runtime.files import FileError
 from surveillance_runtime.run_parameters import BEHAVIOUR_NODE, place_file, write_parameters
 
 PLACE = 'place.yaml'
@@ -138,11 +139,11 @@ def _supervised(
 
 def what_to_look_at(folder: Path) -> list[str]:
     """Write the report of a run; return where it is, and how to replay the run."""
-    from surveillance_operator.recording import RecordingError, timeline
+    from surveillance_operator.recording import timeline
     from surveillance_operator.report import write_report
 
     lines = []
-    with contextlib.suppress(RecordingError):  # nothing was visited: the summary says so
+    with contextlib.suppress(FileError):  # nothing was visited: the summary says so
         lines.append(f'report: {_short(write_report(folder))}')
     if (folder / timeline.NAME).exists():
         lines.append(f'replay: python3 launch.py replay {_short(folder)}')
@@ -165,7 +166,7 @@ def summary(record: Path) -> str:
         return NOTHING_RECORDED
     try:
         return str(mission_log.summarize(mission_log.read(record)))
-    except mission_log.MissionLogError as error:
+    except FileError as error:
         return f'Mission: {error}'
 
 

@@ -74,7 +74,7 @@ def start_nodes(context: LaunchContext) -> list[Node]:
     """Return the nodes that the arguments ask for, each with one file of parameters.
 
     Raises:
-        ParameterError, YamlFileError: One line about the first thing that is wrong with the
+        ParameterError, FileError: One line about the first thing that is wrong with the
             parameters or the place; then no node is started.
     """
     given = {each.name: LaunchConfiguration(each.name).perform(context) for each in ARGUMENTS}

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import contextlib
 import json
-import os
 import queue
 from collections.abc import Sequence
 from pathlib import Path
@@ -31,6 +30,7 @@ from surveillance_behaviour.map_from_markers.scan_peers import CameraScanner, Ma
 from surveillance_fsm.ros import CallError, ServiceCaller
 from surveillance_interfaces.msg import OntologyMap
 from surveillance_interfaces.srv import ReferenceName
+from surveillance_runtime.files import replace_text
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.place.parameters import described_place
 from surveillance_runtime.process import run_node
@@ -127,10 +127,8 @@ class InitialState(PatrolNode):
         if self._file is None or kept == self._kept:
             return
         self._kept = kept
-        new = self._file.with_name(self._file.name + '.new')
         with contextlib.suppress(OSError):
-            new.write_text(kept, encoding='utf-8')
-            os.replace(new, self._file)
+            replace_text(self._file, kept)
 
     def _take_kept(self) -> None:
         if self._file is None or not self._file.exists():

@@ -22,13 +22,7 @@ from surveillance_behaviour.decider import Decider, MemorySettings
 from surveillance_behaviour.decision import DecisionSettings
 from surveillance_behaviour.machines import MACHINES
 from surveillance_behaviour.mission.mission import Mission, MissionSettings
-from surveillance_behaviour.mission.mission_log import (
-    CutOff,
-    MissionLogError,
-    MissionRecord,
-    cut_off,
-    read,
-)
+from surveillance_behaviour.mission.mission_log import CutOff, MissionRecord, cut_off, read
 from surveillance_behaviour.peers.announcing import DecisionTopic, MissionClock, RosAnnouncer
 from surveillance_behaviour.peers.decision_services import DecisionServices
 from surveillance_behaviour.peers.ports import Ports
@@ -42,6 +36,7 @@ from surveillance_behaviour.peers.ros_ports import (
     ros_ontology,
 )
 from surveillance_fsm.ros import IntrospectionServer
+from surveillance_runtime.files import FileError
 from surveillance_runtime.node import JOIN_SECONDS, PatrolNode
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.process import run_node
@@ -156,7 +151,7 @@ class RobotBehavior(PatrolNode):
             return None
         try:
             return cut_off(read(path))
-        except MissionLogError as error:
+        except FileError as error:
             self.get_logger().warn(f'what was begun before is begun anew: {error}')
             return None
 
@@ -166,7 +161,7 @@ def _open_record(path: str) -> MissionRecord | None:
         return None
     try:
         return MissionRecord(path)
-    except MissionLogError as error:
+    except FileError as error:
         raise ParameterError(f'parameter record: {error}') from None
 
 

@@ -10,19 +10,13 @@ from __future__ import annotations
 import contextlib
 import json
 import math
-import os
 import random
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from surveillance_behaviour.decision import DecisionSettings
-from surveillance_behaviour.mission.mission_log import (
-    MissionLogError,
-    account_of,
-    on_present_clock,
-    read,
-)
+from surveillance_behaviour.mission.mission_log import account_of, on_present_clock, read
 from surveillance_behaviour.peers.ports import Ontology, Places, Point, UnknownPlaceError
 from surveillance_behaviour.policy.battery_reserve import DrawEstimate
 from surveillance_behaviour.policy.graph import GraphError, PatrolGraph
@@ -31,6 +25,7 @@ from surveillance_behaviour.policy.world import PolicyMemory, World
 from surveillance_fsm import Interrupt
 from surveillance_fsm.exceptions import CallError
 from surveillance_ontology.patrol_ontology import Snapshot
+from surveillance_runtime.files import FileError, replace_text
 
 SIMULTANEOUS = 1.0
 """Seconds by which what several threads take for the present may differ."""
@@ -77,7 +72,7 @@ class Experience:
         if record and Path(record).is_file():
             try:
                 account = account_of(read(record))
-            except MissionLogError as error:
+            except FileError as error:
                 experience.problem = str(error)
                 return experience
             experience.visits.update(account.visits)
@@ -110,11 +105,9 @@ class Experience:
             'sent_to_charge': self.sent_to_charge,
             'requested': self.requested,
         }
-        new = self.path.with_name(self.path.name + '.new')
         with contextlib.suppress(OSError):
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            new.write_text(json.dumps(kept), encoding='utf-8')
-            os.replace(new, self.path)
+            replace_text(self.path, json.dumps(kept))
 
     def saw(self, place: str, now: float) -> None:
         """Note that the robot was in ``place``."""

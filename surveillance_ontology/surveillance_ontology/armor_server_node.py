@@ -23,9 +23,10 @@ from surveillance_ontology.armor.access import Settings, state_folder
 from surveillance_ontology.armor.protocol import DirectiveRequest
 from surveillance_ontology.armor.service import ArmorService
 from surveillance_ontology.armor.session import ChangeFeed, NumberedChange
-from surveillance_ontology.armor.store import JournalError, Store
+from surveillance_ontology.armor.store import Store
 from surveillance_ontology.armor_client import CHANGES_TOPIC
 from surveillance_ontology.conversions import changes_to_ros, fill_response, request_from_ros
+from surveillance_runtime.files import FileError
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.process import run_node
@@ -256,7 +257,7 @@ def _service(node: PatrolNode, keep: bool) -> ArmorService:
             kept = ', '.join(service.references.names()) or 'nothing'
             log.info(f'store {folder}, which holds {kept}; "-p store:=none" keeps nothing')
         return service
-    except JournalError as error:
+    except FileError as error:
         raise ParameterError(f'{node.get_name()}: parameter store: {error}') from None
 
 

@@ -11,8 +11,8 @@ from pathlib import Path
 
 from surveillance_behaviour.mission import mission_log
 from surveillance_behaviour.policy.graph import PatrolGraph
-from surveillance_operator.recording.bag import RecordingError
 from surveillance_runtime.command_line import EXIT_BAD_INPUT, CommandParser
+from surveillance_runtime.files import FileError
 from surveillance_runtime.place import Place, read_place_file
 from surveillance_runtime.place.drawing import Run, draw_place
 from surveillance_runtime.place.floor_plan import FloorPlan
@@ -57,14 +57,14 @@ def run_of(events: Sequence[mission_log.Event], place: Place, source: str) -> Ru
     """Return what a mission's record adds to the picture of its place.
 
     Raises:
-        RecordingError: The record is of another place, or empty.
+        FileError: The record is of another place, or empty.
     """
     summary = mission_log.summarize(events)
     if not summary.visits:
-        raise RecordingError(f'{source}: nothing was recorded')
+        raise FileError(f'{source}: nothing was recorded')
     unknown = sorted(set(summary.visits) - set(place.rooms))
     if unknown:
-        raise RecordingError(
+        raise FileError(
             f"{source}: visits '{unknown[0]}', which the place does not have; "
             f'expected the record of a run through {", ".join(place.rooms)}'
         )

@@ -28,14 +28,13 @@ from surveillance_operator.recording import timeline
 from surveillance_operator.recording.bag import (
     NAME,
     BagWriter,
-    DiskFullError,
-    RecordingError,
     TopicType,
     prune,
     repair,
 )
 from surveillance_operator.recording.schemas import definition, message_class
 from surveillance_operator.recording.timeline import TimelineWriter
+from surveillance_runtime.files import FileError
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.process import run_node
@@ -87,10 +86,10 @@ class MissionRecorder(PatrolNode):
         self._next_seal = self._next_line = self._next_prune = 0.0
         try:
             self._bag.seal()
-        except DiskFullError:
-            pass  # it is tried again
-        except RecordingError as error:
+        except FileError as error:
             raise ParameterError(str(error)) from error
+        except OSError:
+            pass  # the disk is full: it is tried again
         self._images = ImageRecorder(self, self._bag, image_period)
         self._subscriptions_by_topic: dict[str, PolledSubscription] = {}
         self._unknown: set[str] = set()
@@ -122,7 +121,7 @@ class MissionRecorder(PatrolNode):
         """Write; what fails is said once, and tried again after a pause."""
         try:
             work()
-        except (RecordingError, OSError) as error:
+        except (FileError, OSError) as error:
             if not self._waits_for_disk:
                 self._waits_for_disk = True
                 self.get_logger().warn(f'nothing is recorded at present: {error}')

@@ -19,10 +19,10 @@ from typing import TYPE_CHECKING, Any
 from surveillance_operator.page.hub import Hub
 from surveillance_operator.page.server import Action, Page
 from surveillance_operator.recording import timeline
-from surveillance_operator.recording.bag import RecordingError
 from surveillance_operator.recording.runs import Recording, find_recording, run_parser
 from surveillance_operator.recording.timeline import MARKS, Timeline
 from surveillance_runtime.command_line import EXIT_BAD_INPUT
+from surveillance_runtime.files import FileError
 
 if TYPE_CHECKING:
     from surveillance_operator.recording.stored import RecordedSights
@@ -199,7 +199,7 @@ def main(argv: Sequence[str] | None = None) -> int:
                 port=options.port,
                 replay=True,
             )
-        except (RecordingError, OSError) as error:
+        except (FileError, OSError) as error:
             print(f'replay: {error}', file=sys.stderr)
             return EXIT_BAD_INPUT
         thread = threading.Thread(target=player.run, name='replay', daemon=True)
@@ -220,7 +220,7 @@ def open_player(recording: Recording, hub: Hub, stack: contextlib.ExitStack) -> 
     """Return a player of a recording; what it needs ends with the stack.
 
     Raises:
-        RecordingError: It cannot be read, or holds nothing of a mission.
+        FileError: It cannot be read, or holds nothing of a mission.
     """
     path, read = recording.timeline, lambda: 1.0
     if not recording.is_whole:

@@ -15,14 +15,13 @@ from surveillance_behaviour.mission import mission_log
 from surveillance_behaviour.mission.mission_log import Event
 from surveillance_operator.map_command import facts, graph_over_doors, in_words, run_of
 from surveillance_operator.recording import bag, timeline
-from surveillance_operator.recording.bag import RecordingError
 from surveillance_operator.recording.runs import PLACE, RECORD, find_run, run_parser
 from surveillance_operator.recording.timeline import Timeline
 from surveillance_runtime.command_line import EXIT_BAD_INPUT
+from surveillance_runtime.files import FileError
 from surveillance_runtime.place import read_place_file
 from surveillance_runtime.place.drawing import Run, draw_place
 from surveillance_runtime.place.floor_plan import FloorPlan
-from surveillance_runtime.yaml_file import YamlFileError
 
 NAME, PICTURE = 'report.html', 'report.png'
 MOST_LINES = 2000
@@ -50,12 +49,12 @@ def write_report(folder: Path) -> Path:
     """Write the report of a run into its folder; return its path.
 
     Raises:
-        RecordingError: The run has no record, or it cannot be read.
+        FileError: The run has no record, or it cannot be read.
     """
     with _one_line(folder):
         events, plan, run = _material(folder)
         if not any(mission_log.summarize(events).visits.values()):
-            raise RecordingError(f'{folder / RECORD}: no visit was recorded')
+            raise FileError(f'{folder / RECORD}: no visit was recorded')
         drawn = _map(plan, run) if plan is not None and run is not None else ''
         speed = _fastest(events)
         bound = graph_over_doors(plan).tour.bound / speed if plan is not None and speed else None
@@ -68,7 +67,7 @@ def draw_picture(folder: Path) -> Path | None:
     """Draw the way driven as a picture beside the report; None without a place.
 
     Raises:
-        RecordingError: As for `write_report`.
+        FileError: As for `write_report`.
     """
     with _one_line(folder):
         _, plan, run = _material(folder)
@@ -84,10 +83,8 @@ def _one_line(folder: Path) -> Iterator[None]:
     """Say what goes wrong in one line."""
     try:
         yield
-    except (mission_log.MissionLogError, YamlFileError) as error:
-        raise RecordingError(str(error)) from None
     except OSError as error:
-        raise RecordingError(f'{folder}: {error.strerror or error}') from None
+        raise FileError(f'{folder}: {error.strerror or error}') from None
 
 
 def _material(folder: Path) -> tuple[Sequence[Event], FloorPlan | None, Run | None]:
@@ -154,7 +151,7 @@ def _fastest(events: Sequence[Event]) -> float:
 def _threshold(folder: Path) -> float | None:
     try:
         line = Timeline(folder / timeline.NAME)
-    except RecordingError:
+    except FileError:
         return None
     _, _, parts = line.at(math.inf)
     line.close()
@@ -298,7 +295,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(write_report(folder))
         if (picture := draw_picture(folder)) is not None:
             print(picture)
-    except RecordingError as error:
+    except FileError as error:
         print(f'report: {error}', file=sys.stderr)
         return EXIT_BAD_INPUT
     return 0

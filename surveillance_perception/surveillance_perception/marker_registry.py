@@ -42,7 +42,7 @@ def read_registry(path: Path) -> dict[int, MarkedPlace]:
             a mapping from door to place, and perhaps `hangs_at`.
 
     Raises:
-        YamlFileError: The file cannot be read, or something in it is not as expected.
+        FileError: The file cannot be read, or something in it is not as expected.
     """
     file = read_yaml_file(path)
     entries = file.values.get('markers')

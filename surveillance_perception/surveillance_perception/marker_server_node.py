@@ -13,10 +13,10 @@ from surveillance_interfaces.msg import MarkerDetectionArray
 from surveillance_interfaces.srv import RoomInformation
 from surveillance_perception.conversions import fused_from_ros, marked_place_to_ros
 from surveillance_perception.marker_registry import MarkedPlace, read_registry
+from surveillance_runtime.files import FileError
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.process import run_node
-from surveillance_runtime.yaml_file import YamlFileError
 
 _DISPLACED = 4.0
 """Standard deviations at which a marker is said to hang elsewhere."""
@@ -45,7 +45,7 @@ class MarkerServer(PatrolNode):
         self._displaced: set[int] = set()
         try:
             self._read(path)
-        except YamlFileError as error:
+        except FileError as error:
             raise ParameterError(f'{self.get_name()}: {error}') from None
         self.create_service(RoomInformation, 'room_info', self._on_room_info)
         self.create_subscription(MarkerDetectionArray, 'arm/markers', self._on_seen, 10)
@@ -94,7 +94,7 @@ def registry_expected(path: str) -> str | None:
     """Ask for a file of markers."""
     try:
         read_registry(_file(path))
-    except YamlFileError as error:
+    except FileError as error:
         return f'a file of markers ({error})'
     return None
 

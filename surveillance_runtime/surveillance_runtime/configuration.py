@@ -24,6 +24,7 @@ from typing import Any
 
 import yaml
 
+from surveillance_runtime.files import FileError
 from surveillance_runtime.node_table import LOG_LEVELS
 from surveillance_runtime.parameters import Check, ParameterError, ParameterSpec
 from surveillance_runtime.place import Place, PlaceError, checked_place
@@ -33,7 +34,6 @@ from surveillance_runtime.suggestions import nearest
 from surveillance_runtime.yaml_file import (
     UNREADABLE,
     YamlFile,
-    YamlFileError,
     parameters_of,
     read_yaml_file,
     with_exponent,
@@ -179,7 +179,7 @@ def file_layer(path: str | Path) -> Layer:
     """Read a ROS parameter file.
 
     Raises:
-        YamlFileError: It cannot be read or is not of a parameter file's form.
+        FileError: It cannot be read or is not of a parameter file's form.
     """
     file = read_yaml_file(path)
     origins = _noted_origins(file)
@@ -461,7 +461,7 @@ class RosArguments:
         """
         try:
             layers = [file_layer(path) for path in self.files]
-        except YamlFileError as error:
+        except FileError as error:
             raise ParameterError(f'parameter file {error}') from None
         return Configuration((*layers, argument_layer(self.assignments)))
 

@@ -48,7 +48,7 @@ def run_layers(
         options: What options say as parameters.
 
     Raises:
-        YamlFileError, ParameterError: A file cannot be used.
+        FileError, ParameterError: A file cannot be used.
     """
     layers = [file_layer(config / 'parameters.yaml')]
     layers.append(file_layer(place_file(config, behaviour, place)))

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import json
 import math
-import os
 from collections.abc import Mapping
 from pathlib import Path
 
 from surveillance_fsm import Interrupt
+from surveillance_runtime.files import replace_text
 from surveillance_runtime.node import PatrolNode
 
 WRITE_PERIOD = 0.2
@@ -79,10 +79,8 @@ class StateFile:
 
     def _write(self, state: State) -> None:
         assert self._path is not None
-        draft = self._path.with_name(self._path.name + '.new')
         try:
-            draft.write_text(json.dumps(state) + '\n', encoding='utf-8')
-            os.replace(draft, self._path)
+            replace_text(self._path, json.dumps(state) + '\n')
         except OSError as error:
             self._complain(f'parameter state_file: {error}; the state is not kept')
         else:

@@ -16,6 +16,8 @@ from typing import Any
 
 import yaml
 
+from surveillance_runtime.files import FileError
+
 MAX_BYTES = 4_000_000
 MAX_DEPTH = 30
 MAX_VALUES = 200_000
@@ -36,10 +38,6 @@ UNREADABLE = (yaml.YAMLError, ValueError, LookupError, TypeError, AttributeError
 """What PyYAML raises for a value; the last three for a tag like `!!int` before something else."""
 
 
-class YamlFileError(ValueError):
-    """A file that cannot be used; the message is one line ``file:line: what``."""
-
-
 @dataclass(frozen=True)
 class YamlFile:
     """What a file holds, with the line of each key.
@@ -54,33 +52,33 @@ class YamlFile:
     values: Mapping[str, Any]
     lines: Mapping[KeyPath, int]
 
-    def error(self, where: KeyPath, problem: str) -> YamlFileError:
+    def error(self, where: KeyPath, problem: str) -> FileError:
         """Make the error that says ``problem`` at the line of ``where`` or its nearest parent."""
         prefix = '.'.join(where) + ': ' if where else ''
         return self.error_at(where, prefix + problem)
 
-    def error_at(self, where: KeyPath, problem: str) -> YamlFileError:
+    def error_at(self, where: KeyPath, problem: str) -> FileError:
         """As `error`, without the key's name in the message."""
         line = 1
         for depth in range(len(where), -1, -1):
             if where[:depth] in self.lines:
                 line = self.lines[where[:depth]]
                 break
-        return YamlFileError(f'{self.path}:{line}: {problem}')
+        return FileError(f'{self.path}:{line}: {problem}')
 
 
 def read_yaml_file(path: str | Path) -> YamlFile:
     """Read a file whose document is a mapping.
 
     Raises:
-        YamlFileError: The file is missing, too large, not YAML, no mapping, holds a key twice, uses
+        FileError: The file is missing, too large, not YAML, no mapping, holds a key twice, uses
             an alias, or has a mapping inside a list.
     """
     path = Path(path)
     root = _compose(path)
     reader = _Reader(path)
     if not isinstance(root, yaml.MappingNode):
-        raise YamlFileError(f'{path}:1: expected a mapping, got {_kind(root)}')
+        raise FileError(f'{path}:1: expected a mapping, got {_kind(root)}')
     reader.lines[()] = root.start_mark.line + 1
     return YamlFile(path, reader.mapping(root, ()), reader.lines)
 
@@ -89,17 +87,15 @@ def _compose(path: Path) -> yaml.Node | None:
     try:
         found = path.stat()
         if not stat.S_ISREG(found.st_mode):
-            raise YamlFileError(
-                f'{path}: expected a file, got {_KINDS[stat.S_IFMT(found.st_mode)]}'
-            )
+            raise FileError(f'{path}: expected a file, got {_KINDS[stat.S_IFMT(found.st_mode)]}')
         if found.st_size > MAX_BYTES:
-            raise YamlFileError(f'{path}: {found.st_size} bytes, at most {MAX_BYTES} are read')
+            raise FileError(f'{path}: {found.st_size} bytes, at most {MAX_BYTES} are read')
         with path.open('rb') as stream:  # files of /proc say that they are empty
             text = stream.read(MAX_BYTES).decode('utf-8')
     except OSError as error:
-        raise YamlFileError(f'{path}: {error.strerror or error}') from None
+        raise FileError(f'{path}: {error.strerror or error}') from None
     except UnicodeDecodeError as error:
-        raise YamlFileError(f'{path}: not UTF-8 text (byte {error.start})') from None
+        raise FileError(f'{path}: not UTF-8 text (byte {error.start})') from None
     try:
         # PyYAML says better than libyaml where a mistake is.
         loader_kind: Any = yaml.SafeLoader if len(text) < _SMALL else _Loader
@@ -112,10 +108,10 @@ def _compose(path: Path) -> yaml.Node | None:
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         line = mark.line + 1 if mark else 1
-        raise YamlFileError(f'{path}:{line}: not valid YAML: {error.problem}') from None
+        raise FileError(f'{path}:{line}: not valid YAML: {error.problem}') from None
     except yaml.YAMLError as error:
         first_line = str(error).splitlines()[0]
-        raise YamlFileError(f'{path}: not valid YAML: {first_line}') from None
+        raise FileError(f'{path}: not valid YAML: {first_line}') from None
     return node
 
 
@@ -156,7 +152,7 @@ class _Reader:
         for key, value in node.value:
             line = key.start_mark.line + 1
             if not isinstance(key, yaml.ScalarNode):
-                raise YamlFileError(f'{self.path}:{line}: expected a name as key')
+                raise FileError(f'{self.path}:{line}: expected a name as key')
             where = (*prefix, key.value)
             if key.value in found:
                 raise twice(self.path, (key.value,), line, self.lines[where])
@@ -172,18 +168,18 @@ class _Reader:
             return [self._value(item) for item in node.value]
         if isinstance(node, yaml.MappingNode):
             line = node.start_mark.line + 1
-            raise YamlFileError(f'{self.path}:{line}: a list cannot hold a mapping')
+            raise FileError(f'{self.path}:{line}: a list cannot hold a mapping')
         line = node.start_mark.line + 1
         try:
             value = self._scalars.construct_object(node)
         except UNREADABLE:
-            raise YamlFileError(
+            raise FileError(
                 f"{self.path}:{line}: '{node.value}' cannot be read as a value; quote it"
             ) from None
         if isinstance(node, yaml.ScalarNode) and node.style is None:
             value = with_exponent(value)
         if isinstance(value, int) and not -_INT64 <= value < _INT64:
-            raise YamlFileError(f'{self.path}:{line}: {node.value:.40}: expected a 64-bit number')
+            raise FileError(f'{self.path}:{line}: {node.value:.40}: expected a 64-bit number')
         return value
 
 
@@ -192,10 +188,10 @@ def with_exponent(value: Any) -> Any:
     return float(value) if isinstance(value, str) and _EXPONENT.match(value) else value
 
 
-def twice(path: Path, where: KeyPath, line: int, first: int) -> YamlFileError:
+def twice(path: Path, where: KeyPath, line: int, first: int) -> FileError:
     """Make the error that a key is given again in ``line``, first in ``first``."""
     name = '.'.join(where)
-    return YamlFileError(f"{path}:{line}: duplicate key '{name}', first given in line {first}")
+    return FileError(f"{path}:{line}: duplicate key '{name}', first given in line {first}")
 
 
 def _kind(node: yaml.Node | None) -> str:
@@ -210,7 +206,7 @@ def parameters_of(file: YamlFile, section: str) -> Iterator[tuple[KeyPath, str, 
     The names of nested keys are joined with dots.
 
     Raises:
-        YamlFileError: It is not of a parameter file's form, or gives a parameter twice.
+        FileError: It is not of a parameter file's form, or gives a parameter twice.
     """
     below = file.values[section]
     if not isinstance(below, Mapping) or not isinstance(below.get('ros__parameters'), Mapping):
@@ -249,7 +245,7 @@ def read_parameter_file(path: str | Path) -> YamlFile:
         The parameters below ``ros__parameters``; dots in keys are resolved into nesting.
 
     Raises:
-        YamlFileError: The file cannot be read, is not of a parameter file's form, or gives a
+        FileError: The file cannot be read, is not of a parameter file's form, or gives a
             parameter twice.
     """
     file = read_yaml_file(path)

@@ -14,7 +14,6 @@ from hypothesis import strategies as st
 
 from surveillance_behaviour.mission.mission_log import (
     CutOff,
-    MissionLogError,
     MissionRecord,
     account_of,
     cut_off,
@@ -22,6 +21,7 @@ from surveillance_behaviour.mission.mission_log import (
     read_all,
     summarize,
 )
+from surveillance_runtime.files import FileError
 
 
 @pytest.fixture
@@ -78,19 +78,17 @@ def test_a_torn_last_line_is_skipped_and_then_cut_off(path: Path, kept: int) -> 
 def test_a_broken_line_is_named(path: Path) -> None:
     path.parent.mkdir()
     path.write_text('{"event": "end", "time": 1}\nnot json\n')
-    with pytest.raises(
-        MissionLogError, match=r'mission\.jsonl:2: expected a JSON object .*not json'
-    ):
+    with pytest.raises(FileError, match=r'mission\.jsonl:2: expected a JSON object .*not json'):
         read(path)
     path.write_text('{"event": "visit", "time": 1, "place": "E"}\n')
-    with pytest.raises(MissionLogError, match=r"jsonl:1: event 'visit' lacks distance"):
+    with pytest.raises(FileError, match=r"jsonl:1: event 'visit' lacks distance"):
         read(path)
 
 
 def test_files_that_cannot_be_used_are_named(tmp_path: Path) -> None:
-    with pytest.raises(MissionLogError, match=r'cannot read the mission record .*missing\.jsonl'):
+    with pytest.raises(FileError, match=r'cannot read the mission record .*missing\.jsonl'):
         read(tmp_path / 'missing.jsonl')
-    with pytest.raises(MissionLogError, match='cannot write the mission record'):
+    with pytest.raises(FileError, match='cannot write the mission record'):
         MissionRecord(tmp_path)
 
 
@@ -222,7 +220,7 @@ def test_a_writer_that_was_killed_between_two_files_loses_nothing(path: Path) ->
 def test_a_damaged_snapshot_is_named(path: Path) -> None:
     path.parent.mkdir()
     path.write_text('{"event": "snapshot", "time": 1, "account": {"summary": {}}}\n')
-    with pytest.raises(MissionLogError, match='a snapshot of the mission record is damaged'):
+    with pytest.raises(FileError, match='a snapshot of the mission record is damaged'):
         summarize(read(path))
 
 

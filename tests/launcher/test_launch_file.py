@@ -18,9 +18,9 @@ import pytest
 from launcher.run import Run
 from launcher.run_configuration import configuration
 from surveillance_runtime.configuration import Configuration, file_layer
+from surveillance_runtime.files import FileError
 from surveillance_runtime.node_table import BEHAVIOURS, MODES, find, select
 from surveillance_runtime.parameters import ParameterError
-from surveillance_runtime.yaml_file import YamlFileError
 from tests.launcher.conftest import ROOT
 
 SOURCE = ROOT / 'surveillance_behaviour' / 'launch' / 'surveillance.launch.py'
@@ -130,7 +130,7 @@ def test_the_users_place_parameters_record_and_namespace_reach_the_nodes(start, 
 @pytest.mark.parametrize(
     ('given', 'error', 'said'),
     [
-        ({'map': '/no.yaml'}, YamlFileError, r'/no.yaml: .*No such file'),
+        ({'map': '/no.yaml'}, FileError, r'/no.yaml: .*No such file'),
         ({'params': 'TYPO'}, ParameterError, r'own.yaml:1: .*urgency_treshold.*urgency_threshold'),
     ],
 )

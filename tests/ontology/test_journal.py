@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from surveillance_ontology.armor.store import Journal, JournalError
+from surveillance_ontology.armor.store import Journal
+from surveillance_runtime.files import FileError
 
 
 def reopened(directory: Path) -> list[object]:
@@ -140,7 +141,7 @@ def test_a_snapshot_that_was_not_finished_changes_nothing(tmp_path: Path) -> Non
 
 def test_only_one_process_at_a_time(tmp_path: Path) -> None:
     journal = Journal(tmp_path)
-    with pytest.raises(JournalError, match='in use by another process'):
+    with pytest.raises(FileError, match='in use by another process'):
         Journal(tmp_path)
     journal.close()
     Journal(tmp_path).close()
@@ -155,7 +156,7 @@ def test_a_write_that_fails_leaves_nothing(tmp_path: Path, monkeypatch: pytest.M
 
     with monkeypatch.context() as patch:
         patch.setattr(os, 'fdatasync', full)
-        with pytest.raises(JournalError, match='No space left'):
+        with pytest.raises(FileError, match='No space left'):
             journal.append([2])
     journal.append([3])
     journal.close()
@@ -164,7 +165,7 @@ def test_a_write_that_fails_leaves_nothing(tmp_path: Path, monkeypatch: pytest.M
 
 def test_a_directory_that_cannot_be_used(tmp_path: Path) -> None:
     (tmp_path / 'file').write_text('')
-    with pytest.raises(JournalError, match='file'):
+    with pytest.raises(FileError, match='file'):
         Journal(tmp_path / 'file' / 'store')
 
 
@@ -176,7 +177,7 @@ def test_a_record_that_fits_in_part_is_refused_and_leaves_nothing(tmp_path: Path
     # A file at its size limit takes what fits, as a disk does that is almost full.
     resource.setrlimit(resource.RLIMIT_FSIZE, (end + 20, before[1]))
     try:
-        with pytest.raises(JournalError, match='too large'):
+        with pytest.raises(FileError, match='too large'):
             journal.append(['x' * 200])
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
@@ -198,7 +199,7 @@ def test_what_a_failed_write_left_is_removed_before_the_next(
         patch.setattr(os, 'fdatasync', broken)
         patch.setattr(os, 'ftruncate', broken)
         for record in (2, 3):
-            with pytest.raises(JournalError, match='Input/output error'):
+            with pytest.raises(FileError, match='Input/output error'):
                 journal.append([record])
     journal.append([4])
     journal.close()

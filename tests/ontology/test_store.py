@@ -19,7 +19,8 @@ from surveillance_ontology.armor.access import Settings
 from surveillance_ontology.armor.protocol import DirectiveRequest
 from surveillance_ontology.armor.reference import Reference
 from surveillance_ontology.armor.service import ArmorService
-from surveillance_ontology.armor.store import Journal, JournalError, Store
+from surveillance_ontology.armor.store import Journal, Store
+from surveillance_runtime.files import FileError
 
 from .seven_rooms import IRI, ONTOLOGY, Ask, asker, names
 
@@ -252,7 +253,7 @@ def test_a_store_of_a_newer_version_is_refused(tmp_path: Path) -> None:
     journal = Journal(tmp_path / 'store')
     journal.append([['more', 'map', []]])
     journal.close()
-    with pytest.raises(JournalError, match=r'cannot be read: unknown kind .more.'):
+    with pytest.raises(FileError, match=r'cannot be read: unknown kind .more.'):
         Server(tmp_path / 'store')
 
 

@@ -27,13 +27,13 @@ from std_msgs.msg import UInt8
 from surveillance_interfaces.msg import Decision, FactChange, FactChanges, MissionStatus
 from surveillance_interfaces.msg import Fact as FactMessage
 from surveillance_operator.mission_markers_node import markers_of
-from surveillance_operator.recording.bag import RecordingError
 from surveillance_operator.recording.reading import Messages
 from surveillance_operator.recording.runs import find_recording
 from surveillance_operator.recording.schemas import definition
 from surveillance_operator.recording.stored import Conversion, RecordedSights, prefix_of
 from surveillance_operator.recording.timeline import Timeline
 from surveillance_operator.snapshot import Snapshot
+from surveillance_runtime.files import FileError
 
 START = 1_000_000.0
 SECONDS = 20
@@ -152,7 +152,7 @@ def test_a_bag_and_its_file_are_found_by_name(bag: Path, tmp_path: Path) -> None
     for name in (bag, file):
         found = find_recording(str(name), tmp_path)
         assert (found.is_whole, found.messages) == (False, name)
-    with pytest.raises(RecordingError, match='expected'):
+    with pytest.raises(FileError, match='expected'):
         find_recording(str(tmp_path / 'nothing.mcap'), tmp_path)
 
 
@@ -269,11 +269,11 @@ def test_a_recording_of_something_else_is_refused(tmp_path: Path) -> None:
     with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
         connection = writer.add_connection('/words', 'std_msgs/msg/UInt8', typestore=store)
         writer.write(connection, 5, serialize_message(UInt8(data=1)))
-    with pytest.raises(RecordingError, match='no topic of a mission'):
+    with pytest.raises(FileError, match='no topic of a mission'):
         Conversion(folder, tmp_path / 'timeline.jsonl')
     (file,) = folder.glob('*.mcap')
     file.write_bytes(b'no such file')
-    with pytest.raises(RecordingError, match='no MCAP file'):
+    with pytest.raises(FileError, match='no MCAP file'):
         Conversion(folder, tmp_path / 'timeline.jsonl')
 
 

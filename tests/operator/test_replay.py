@@ -22,7 +22,8 @@ from surveillance_operator.page.server import Page
 from surveillance_operator.recording.runs import find_run
 from surveillance_operator.recording.timeline import Timeline
 from surveillance_operator.replay import Player
-from surveillance_operator.report import RecordingError, draw_picture, write_report
+from surveillance_operator.report import draw_picture, write_report
+from surveillance_runtime.files import FileError
 from surveillance_runtime.place import read_place_file
 from tests.operator.test_timeline import record
 
@@ -178,13 +179,13 @@ def test_a_run_is_found_by_what_it_holds_and_not_by_a_wrong_name(
 ) -> None:
     assert find_run(str(run / 'mission.jsonl'), run.parent) == run
     monkeypatch.chdir(run)  # the folder of a run itself
-    with pytest.raises(RecordingError, match='nowhere'):
+    with pytest.raises(FileError, match='nowhere'):
         find_run('nowhere', run.parent)
 
 
 def test_a_run_without_a_visit_has_no_report(run: Path) -> None:
     (run / 'mission.jsonl').write_text('')
-    with pytest.raises(RecordingError, match='no visit was recorded'):
+    with pytest.raises(FileError, match='no visit was recorded'):
         write_report(run)
 
 

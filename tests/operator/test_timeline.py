@@ -11,8 +11,9 @@ import pytest
 
 from surveillance_behaviour.policy.world import Decision
 from surveillance_operator.frames import Framer
-from surveillance_operator.recording.timeline import RecordingError, Timeline, TimelineWriter
+from surveillance_operator.recording.timeline import Timeline, TimelineWriter
 from surveillance_operator.snapshot import Snapshot
+from surveillance_runtime.files import FileError
 
 DECISION = Decision(0.0, 'A', 'B', 'B', 'URGENT', 'tour', 'why', {'B': 1.0})
 
@@ -91,7 +92,7 @@ def test_what_is_no_time_line_is_said_in_one_line(content: str | None, tmp_path:
     path = tmp_path / 'timeline.jsonl'
     if content is not None:
         path.write_text(content)
-    with pytest.raises(RecordingError, match=r'timeline\.jsonl: '):
+    with pytest.raises(FileError, match=r'timeline\.jsonl: '):
         Timeline(path)
 
 

@@ -22,7 +22,7 @@ from surveillance_perception.testing.marker_scene import (
     backdrop_of,
     image_of,
 )
-from surveillance_runtime.yaml_file import YamlFileError
+from surveillance_runtime.files import FileError
 
 CONFIG = Path(__file__).parents[2] / 'config'
 
@@ -219,7 +219,7 @@ def test_registry_holds_the_seven_markers():
 def test_wrong_registry_is_refused_in_one_line_that_names_the_file(tmp_path, text, reason):
     path = tmp_path / 'markers.yaml'
     path.write_text(text)
-    with pytest.raises(YamlFileError) as error:
+    with pytest.raises(FileError) as error:
         read_registry(path)
     assert str(error.value).startswith(str(path))
     assert reason in str(error.value)
@@ -227,5 +227,5 @@ def test_wrong_registry_is_refused_in_one_line_that_names_the_file(tmp_path, tex
 
 
 def test_registry_that_is_not_there_is_named(tmp_path):
-    with pytest.raises(YamlFileError, match='No such file'):
+    with pytest.raises(FileError, match='No such file'):
         read_registry(tmp_path / 'none.yaml')

@@ -24,8 +24,8 @@ from surveillance_runtime.configuration import (
     resolved_text,
     split_arguments,
 )
+from surveillance_runtime.files import FileError
 from surveillance_runtime.parameters import ParameterError
-from surveillance_runtime.yaml_file import YamlFileError
 from tests.launcher.conftest import ROOT
 
 CONFIG = ROOT / 'config'
@@ -201,14 +201,14 @@ def test_places_that_a_robot_cannot_use_are_refused_with_file_and_line(tmp_path)
 
 @pytest.mark.parametrize('path', ['/dev/zero', '/dev/null', '/', '/proc/self/mem'])
 def test_devices_and_folders_are_no_parameter_files(path):
-    with pytest.raises(YamlFileError) as caught:
+    with pytest.raises(FileError) as caught:
         file_layer(path)
     assert '\n' not in str(caught.value)
 
 
 def test_a_pipe_is_no_parameter_file(tmp_path):
     os.mkfifo(tmp_path / 'pipe')
-    with pytest.raises(YamlFileError, match='expected a file, got a pipe'):
+    with pytest.raises(FileError, match='expected a file, got a pipe'):
         file_layer(tmp_path / 'pipe')
 
 
@@ -216,7 +216,7 @@ def test_a_pipe_is_no_parameter_file(tmp_path):
 def test_a_tag_before_what_is_not_of_its_type_costs_one_line(tmp_path, value):
     file = tmp_path / 'own.yaml'
     file.write_text(f'/**:\n  ros__parameters:\n    urgency_threshold: {value}\n')
-    with pytest.raises(YamlFileError, match=r'own.yaml:3: .*cannot be read as a value'):
+    with pytest.raises(FileError, match=r'own.yaml:3: .*cannot be read as a value'):
         file_layer(file)
     with pytest.raises(ParameterError, match=r'-p urgency_threshold.*not valid YAML'):
         argument_layer([f'urgency_threshold:={value}'])
@@ -229,7 +229,7 @@ def test_a_tag_before_what_is_not_of_its_type_costs_one_line(tmp_path, value):
 def test_yaml_without_bound_is_refused_soon(tmp_path, text):
     path = written(tmp_path, text)
     start = time.process_time()
-    with pytest.raises(YamlFileError) as caught:
+    with pytest.raises(FileError) as caught:
         file_layer(path)
     assert time.process_time() - start < 5.0
     assert '\n' not in str(caught.value)
@@ -281,7 +281,7 @@ def test_every_value_takes_effect_or_costs_one_line(tmp_path, pattern, name, cho
             path.write_text(yaml.safe_dump(content, allow_unicode=True))
             layer = file_layer(path)
         configuration = merged(layer)
-    except (ParameterError, YamlFileError) as error:
+    except (ParameterError, FileError) as error:
         refusal = str(error)
     else:
         refusal = ''

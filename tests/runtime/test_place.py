@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from surveillance_runtime.files import FileError
 from surveillance_runtime.place import Place, PlaceError, make_place, read_place_file
-from surveillance_runtime.yaml_file import YamlFileError
 from tests.seven_rooms import SEVEN_ROOMS
 
 POSITIONS = {room: [float(index), 0.0] for index, room in enumerate(SEVEN_ROOMS)}
@@ -139,7 +139,7 @@ def test_errors_of_a_file_name_the_line(tmp_path: Path, old: str, new: str, word
     path = tmp_path / 'place.yaml'
     assert old in GOOD
     path.write_text(GOOD.replace(old, new, 1))
-    with pytest.raises(YamlFileError) as refusal:
+    with pytest.raises(FileError) as refusal:
         read_place_file(path)
     assert str(refusal.value).startswith(str(path))
     assert words in str(refusal.value)
@@ -147,11 +147,11 @@ def test_errors_of_a_file_name_the_line(tmp_path: Path, old: str, new: str, word
 
 
 def test_files_that_are_not_there_or_not_text(tmp_path: Path) -> None:
-    with pytest.raises(YamlFileError, match='No such file'):
+    with pytest.raises(FileError, match='No such file'):
         read_place_file(tmp_path / 'none.yaml')
     binary = tmp_path / 'binary.yaml'
     binary.write_bytes(b'\xff\xfe\x00')
-    with pytest.raises(YamlFileError, match='not UTF-8'):
+    with pytest.raises(FileError, match='not UTF-8'):
         read_place_file(binary)
 
 
@@ -166,7 +166,7 @@ def problem_of(path: Path) -> str:
     """Return what is wrong with a place's file; empty when nothing is."""
     try:
         read_place_file(path)
-    except YamlFileError as error:
+    except FileError as error:
         return str(error)
     return ''
 

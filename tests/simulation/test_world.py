@@ -8,10 +8,10 @@ import random
 import numpy as np
 import pytest
 
+from surveillance_runtime.files import FileError
 from surveillance_runtime.place import generation as place_generation
 from surveillance_runtime.place import occupancy_grid
 from surveillance_runtime.place.floor_plan import Marker, PlaceError
-from surveillance_runtime.yaml_file import YamlFileError
 from surveillance_simulation.world.world import World, read_world
 
 from .places import CONFIG, changed, two_rooms
@@ -163,7 +163,7 @@ def test_an_error_in_a_file_names_file_and_line(tmp_path) -> None:
     path = tmp_path / 'broken.yaml'
     path.write_text(text.replace('D5: [12.5, 10.0,', 'D5: [12.5, 11.0,'))
     line = 1 + text[: text.index('D5: [12.5')].count('\n')
-    with pytest.raises(YamlFileError) as caught:
+    with pytest.raises(FileError) as caught:
         read_world(path)
     assert str(caught.value).startswith(f'{path}:{line}: doors.D5: (12.5, 11)')
 

@@ -7,18 +7,14 @@ from dataclasses import dataclass, field
 
 from surveillance_behaviour.charging import BatteryMonitor
 from surveillance_behaviour.decision import DecisionSettings
-from surveillance_behaviour.mission.mission_log import (
-    CutOff,
-    MissionLogError,
-    MissionRecord,
-    is_other_simulation,
-)
+from surveillance_behaviour.mission.mission_log import CutOff, MissionRecord, is_other_simulation
 from surveillance_behaviour.mission.recovery import Failure, Recovery, RecoveryLimits
 from surveillance_behaviour.peers.ports import Point, Ports
 from surveillance_behaviour.policy.battery_reserve import Battery
 from surveillance_behaviour.policy.world import Decision
 from surveillance_fsm import Clock, Interrupt
 from surveillance_fsm.exceptions import CallError
+from surveillance_runtime.files import FileError
 from surveillance_runtime.parameters import parameter, parameters
 
 
@@ -268,7 +264,7 @@ class Mission:
             return
         try:
             self._record.write(event, self.now(), **fields)
-        except MissionLogError as error:
+        except FileError as error:
             # A full disk is no reason to stop patrolling; once is enough to say so.
             if str(error) != self._record_complaint:
                 self._record_complaint = str(error)

@@ -44,6 +44,7 @@ from types import TracebackType
 from typing import Any
 
 from surveillance_behaviour.decision import RECHARGE
+from surveillance_runtime.files import FileError
 
 EVENTS: Mapping[str, tuple[str, ...]] = {
     'start': ('machine', 'place', 'places'),
@@ -63,10 +64,6 @@ A_DATE = 1e9
 """From here on, in seconds, a time is a date of a machine's clock; a simulation counts from 0."""
 SEGMENT_BYTES = 4_000_000
 """Size from which on a record's file is packed away and a new one begun."""
-
-
-class MissionLogError(ValueError):
-    """A record cannot be read or written; the message names the file and the line."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +102,7 @@ class MissionRecord:
         segment_bytes: Size from which on it is packed away and a new one begun.
 
     Raises:
-        MissionLogError: The file cannot be opened for writing.
+        FileError: The file cannot be opened for writing.
     """
 
     def __init__(self, path: str | Path, segment_bytes: int = SEGMENT_BYTES) -> None:
@@ -121,9 +118,7 @@ class MissionRecord:
             self._file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
             self._cut_torn_line()
         except OSError as error:
-            raise MissionLogError(
-                f'cannot write the mission record {path}: {error.strerror}'
-            ) from None
+            raise FileError(f'cannot write the mission record {path}: {error.strerror}') from None
 
     def _cut_torn_line(self) -> None:
         """Drop an unfinished last line, so that the next one starts on a line of its own."""
@@ -134,7 +129,7 @@ class MissionRecord:
             os.ftruncate(self._file, complete)
         try:
             self._account = account_of(_events(content[:complete], f'{self.path}'))
-        except MissionLogError:
+        except FileError:
             self._account = Account()  # Whoever reads it says which line is broken.
 
     def write(self, name: str, time: float, **fields: object) -> None:
@@ -146,7 +141,7 @@ class MissionRecord:
             fields: The event's own fields; those of :data:`EVENTS` are required.
 
         Raises:
-            MissionLogError: Unknown event, a required field is missing, or the file takes no more.
+            FileError: Unknown event, a required field is missing, or the file takes no more.
         """
         _check(name, fields, f'{self.path}')
         line = json.dumps({'event': name, 'time': round(time, 3), **fields}) + '\n'
@@ -158,7 +153,7 @@ class MissionRecord:
                 os.ftruncate(self._file, os.fstat(self._file).st_size - written)
                 raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         except OSError as error:
-            raise MissionLogError(
+            raise FileError(
                 f'cannot write the mission record {self.path}: {error.strerror}'
             ) from None
         self._account.take(Event(name, round(time, 3), json.loads(line)))
@@ -202,24 +197,22 @@ class MissionRecord:
 
 def _check(name: str, fields: Mapping[str, object], where: str) -> None:
     if name not in EVENTS:
-        raise MissionLogError(
-            f'{where}: unknown event {name!r}, expected one of {", ".join(EVENTS)}'
-        )
+        raise FileError(f'{where}: unknown event {name!r}, expected one of {", ".join(EVENTS)}')
     missing = [key for key in EVENTS[name] if key not in fields]
     if missing:
-        raise MissionLogError(f'{where}: event {name!r} lacks {", ".join(missing)}')
+        raise FileError(f'{where}: event {name!r} lacks {", ".join(missing)}')
 
 
 def read(path: str | Path) -> list[Event]:
     """Read a record, without an unfinished last line.
 
     Raises:
-        MissionLogError: The file cannot be read, or a finished line is not an event.
+        FileError: The file cannot be read, or a finished line is not an event.
     """
     try:
         content = Path(path).read_bytes()
     except OSError as error:
-        raise MissionLogError(f'cannot read the mission record {path}: {error.strerror}') from None
+        raise FileError(f'cannot read the mission record {path}: {error.strerror}') from None
     return list(_events(content, f'{path}'))
 
 
@@ -227,13 +220,13 @@ def read_all(path: str | Path) -> Iterator[Event]:
     """Give every event of a record, those that were packed away too, one file at a time.
 
     Raises:
-        MissionLogError: A file cannot be read, or a finished line is not an event.
+        FileError: A file cannot be read, or a finished line is not an event.
     """
     for packed in _segments(Path(path)):
         try:
             content = gzip.decompress(packed.read_bytes())
         except (OSError, EOFError, zlib.error) as error:
-            raise MissionLogError(f'cannot read the mission record {packed}: {error}') from None
+            raise FileError(f'cannot read the mission record {packed}: {error}') from None
         yield from (e for e in _events(content, f'{packed}') if e.name != 'snapshot')
     yield from (event for event in read(path) if event.name != 'snapshot')
 
@@ -254,7 +247,7 @@ def _event(line: bytes, where: str) -> Event:
         name, time = str(values.pop('event')), float(values.pop('time'))
     except (ValueError, KeyError, TypeError, AttributeError):
         shown = line.decode(errors='replace')[:60]
-        raise MissionLogError(
+        raise FileError(
             f'{where}: expected a JSON object with event and time, got {shown!r}'
         ) from None
     _check(name, values, where)
@@ -331,7 +324,7 @@ class Account:
         """Count one event.
 
         Raises:
-            MissionLogError: A snapshot does not hold what it should.
+            FileError: A snapshot does not hold what it should.
         """
         if event.name == 'snapshot':
             self._restore(event.fields['account'])
@@ -377,7 +370,7 @@ class Account:
             self.summary, self.left_at = summary, left_at
             self.last_seen, self.visits = dict(kept['last_seen']), dict(kept['visits'])
         except (KeyError, TypeError, ValueError) as error:
-            raise MissionLogError(f'a snapshot of the mission record is damaged: {error}') from None
+            raise FileError(f'a snapshot of the mission record is damaged: {error}') from None
 
 
 def is_other_simulation(before: float, now: float) -> bool:

@@ -28,8 +28,9 @@ from surveillance_ontology.armor.protocol import (
 from surveillance_ontology.armor.reference import Change, Reference, Registry
 from surveillance_ontology.armor.rendering import one_line, shown
 from surveillance_ontology.armor.session import Session
-from surveillance_ontology.armor.store import JournalError, Store
+from surveillance_ontology.armor.store import Store
 from surveillance_ontology.reasoner.java_reasoning import JavaReasonerError
+from surveillance_runtime.files import FileError
 
 LONG_ARGUMENTS = 1000
 """Arguments from which on a directive is not quick."""
@@ -48,7 +49,7 @@ class ArmorService:
         clock: Seconds since the epoch, for QUERY AT.
 
     Raises:
-        JournalError: What is in the store cannot be read.
+        FileError: What is in the store cannot be read.
     """
 
     def __init__(
@@ -87,7 +88,7 @@ class ArmorService:
                 exit_code=int(error.exit_code),
                 error_description=error.description,
             )
-        except JournalError as error:
+        except FileError as error:
             response = _refusal(f'{request.words}: nothing was done: {error}')
         except JavaReasonerError as error:
             response = _refusal(f'{request.words}: {error}; native derivations only')
@@ -144,7 +145,7 @@ class ArmorService:
             try:
                 with self._store.batch() if self._store else contextlib.nullcontext():
                     responses = [self.execute(request) for request in requests]
-            except JournalError as error:
+            except FileError as error:
                 problem = f'lost at the next start: {error}'
                 return ListResponse(False, False, [_refusal(problem) for _ in requests])
         return ListResponse(

@@ -45,6 +45,7 @@ from surveillance_ontology.owl import axioms, expressions
 from surveillance_ontology.owl.axioms import Axiom
 from surveillance_ontology.owl.expressions import Literal
 from surveillance_ontology.reasoner.java_reasoning import JavaReasonerError
+from surveillance_runtime.files import FileError
 
 Record = list[Any]
 """``[what, reference name, ...]``."""
@@ -61,10 +62,6 @@ MOST_WAITING = 200_000
 _NAME = re.compile(r'(journal|snapshot)-(\d+)\.log\Z')
 
 
-class JournalError(Exception):
-    """A journal that cannot be opened or written: one line with file and place."""
-
-
 class Journal:
     """Records on disk.
 
@@ -72,7 +69,7 @@ class Journal:
         directory: Where they are; made if it is not there. One process at a time may have it open.
 
     Raises:
-        JournalError: In use by another process, or not readable.
+        FileError: In use by another process, or not readable.
 
     Attributes:
         notes: One line for each part that was found damaged or missing.
@@ -87,12 +84,12 @@ class Journal:
             directory.mkdir(parents=True, exist_ok=True)
             self._lock = (directory / 'lock').open('w')
         except OSError as error:
-            raise JournalError(f'{directory}: {error.strerror}') from None
+            raise FileError(f'{directory}: {error.strerror}') from None
         try:
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
             self._lock.close()
-            raise JournalError(f'{directory}: in use by another process') from None
+            raise FileError(f'{directory}: in use by another process') from None
         try:
             self._open()
         except BaseException:
@@ -130,7 +127,7 @@ class Journal:
         """Write records as one: after a crash all of them are there or none.
 
         Raises:
-            JournalError: They could not be written; none of them is there.
+            FileError: They could not be written; none of them is there.
         """
         self.check_open()
         *first, last = records
@@ -145,7 +142,7 @@ class Journal:
         except OSError as error:
             with suppress(OSError):
                 self._cut()
-            raise JournalError(f'{self._directory}: {error.strerror}') from None
+            raise FileError(f'{self._directory}: {error.strerror}') from None
         self._end += len(lines)
         self.size += len(lines)
 
@@ -160,7 +157,7 @@ class Journal:
         try:
             file = self._segment(number)
         except OSError as error:
-            raise JournalError(f'{self._directory}: {error.strerror}') from None
+            raise FileError(f'{self._directory}: {error.strerror}') from None
         self._file.close()
         self._file, self._number, self.size, self._end = file, number, 0, 0
         return number
@@ -169,7 +166,7 @@ class Journal:
         """Write the snapshot and remove what it stands for; records may be appended meanwhile.
 
         Raises:
-            JournalError: It could not be written; the journal goes on without it.
+            FileError: It could not be written; the journal goes on without it.
         """
         path = self._path('snapshot', number)
         try:
@@ -181,7 +178,7 @@ class Journal:
         except OSError as error:
             # It may hold the last space that there was.
             path.with_suffix('.tmp').unlink(missing_ok=True)
-            raise JournalError(f'{self._directory}: {error.strerror}') from None
+            raise FileError(f'{self._directory}: {error.strerror}') from None
 
     def close(self) -> None:
         """Let another process open the journal."""
@@ -192,10 +189,10 @@ class Journal:
         """Check that records can be appended.
 
         Raises:
-            JournalError: The journal was closed.
+            FileError: The journal was closed.
         """
         if self._file.closed:
-            raise JournalError(f'{self._directory}: closed')
+            raise FileError(f'{self._directory}: closed')
 
     def _cut(self) -> None:
         """Remove what a write that failed may have left behind the records."""
@@ -229,7 +226,7 @@ class Journal:
         except FileNotFoundError:
             return []
         except OSError as error:
-            raise JournalError(f'{path}: {error.strerror}') from None
+            raise FileError(f'{path}: {error.strerror}') from None
         if contents.damage:
             first, count = contents.damage[0], len(contents.damage)
             place = f'{path}: {count} damaged entr{"y" if count == 1 else "ies"}, from byte {first}'
@@ -391,7 +388,7 @@ class Store:
         compact_from: See `COMPACT_FROM`.
 
     Raises:
-        JournalError: The directory cannot be used.
+        FileError: The directory cannot be used.
 
     Attributes:
         directory: Where the journal is.
@@ -420,14 +417,14 @@ class Store:
             history: Axioms of past changes that are kept for each.
 
         Raises:
-            JournalError: A record that this version does not know.
+            FileError: A record that this version does not know.
         """
         recovery = _Recovery(history)
         for record in self._journal.records():
             try:
                 recovery.take(record)
             except (IndexError, TypeError, ValueError) as error:
-                raise JournalError(f'record {record!r:.80} cannot be read: {error}') from None
+                raise FileError(f'record {record!r:.80} cannot be read: {error}') from None
         self._names = set(recovery.references)
         if recovery.orphans:
             self.notes.append(
@@ -468,7 +465,7 @@ class Store:
         """Make what is written inside durable at the end, all of it or nothing.
 
         Raises:
-            JournalError: At the end: the store was closed meanwhile.
+            FileError: At the end: the store was closed meanwhile.
         """
         records: list[Record] = []
         self._batch.records = records
@@ -503,7 +500,7 @@ class Store:
                     states = [_state(ref) for ref in kept]
                 records = (record for state in states for record in _records(*state))
                 journal.finish_snapshot(number, records)
-            except JournalError as error:
+            except FileError as error:
                 self.warn(str(error))
 
         with self._beginning:
@@ -532,11 +529,11 @@ class Store:
         """Make records durable, now or with the batch.
 
         Raises:
-            JournalError: The store was closed, or too much waits to be written.
+            FileError: The store was closed, or too much waits to be written.
         """
         self._journal.check_open()
         if len(self._waiting) > MOST_WAITING:
-            raise JournalError(f'{self.directory}: {len(self._waiting)} changes wait to be written')
+            raise FileError(f'{self.directory}: {len(self._waiting)} changes wait to be written')
         pending: list[Record] | None = getattr(self._batch, 'records', None)
         if pending is not None:
             pending += records
@@ -556,7 +553,7 @@ class Store:
                 return
             try:
                 self._journal.append(records)
-            except JournalError as error:
+            except FileError as error:
                 self._waiting += records
                 self.warn(f'{error}: until it can be written, changes are lost at a restart')
                 threading.Thread(target=self._catch_up, name='store', daemon=True).start()
@@ -574,7 +571,7 @@ class Store:
         if self._waiting:
             try:
                 self._journal.append(self._waiting)
-            except JournalError:
+            except FileError:
                 return False
             self._waiting = []
         return True

@@ -27,6 +27,8 @@ from mcap.records import Channel, Message, Schema
 from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 
+from surveillance_runtime.files import FileError
+
 NAME = 'recording'
 """The folder of a run that holds its recording, and the start of its segments' names."""
 METADATA = 'metadata.yaml'
@@ -37,14 +39,6 @@ MAGIC = b'\x89MCAP0\r\n'
 """The first and the last bytes of a whole file."""
 INFINITE = {'sec': 9223372036, 'nsec': 854775807}
 """rosbag2's way to write a duration without end."""
-
-
-class RecordingError(ValueError):
-    """A recording cannot be written or read, or there is none; one line that says which."""
-
-
-class DiskFullError(RecordingError):
-    """A recording cannot be written until there is space again."""
 
 
 @dataclass(frozen=True)
@@ -97,8 +91,8 @@ class BagWriter:
         folder: Where to; made when it is missing, continued with a new segment when it exists.
         segment_bytes, segment_seconds: Limits of a segment in size and age.
 
-    Its methods raise `RecordingError` when a file cannot be written, `DiskFullError` for want of
-    space. The next call tries again, with a new segment.
+    Its methods raise `FileError` when a file cannot be written, `OSError` for want of space
+    (ENOSPC, EDQUOT). The next call tries again, with a new segment.
     """
 
     def __init__(
@@ -160,9 +154,9 @@ class BagWriter:
                 with contextlib.suppress(OSError):
                     self._file.close()
             self._file = self._closed = None
-            full = error.errno in (errno.ENOSPC, errno.EDQUOT)
-            kind = DiskFullError if full else RecordingError
-            raise kind(f'{self.folder}: cannot be written: {error.strerror}') from None
+            if error.errno in (errno.ENOSPC, errno.EDQUOT):
+                raise OSError(error.errno, error.strerror, str(self.folder)) from None
+            raise FileError(f'{self.folder}: cannot be written: {error.strerror}') from None
 
     def _begin_segment(self) -> BufferedWriter:
         if self._closed is None:

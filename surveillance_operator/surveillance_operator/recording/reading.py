@@ -25,7 +25,8 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, Schema
 from mcap.stream_reader import get_chunk_data_stream
 
-from surveillance_operator.recording.bag import ENCODING, MAGIC, RecordingError
+from surveillance_operator.recording.bag import ENCODING, MAGIC
+from surveillance_runtime.files import FileError
 
 SUFFIX = '.mcap'
 FIRST_SPANS = 20
@@ -51,11 +52,11 @@ def files_of(recording: Path) -> list[Path]:
     """Return the MCAP files of a recording: its folder's, or itself.
 
     Raises:
-        RecordingError: There is none.
+        FileError: There is none.
     """
     files = sorted(recording.glob(f'*{SUFFIX}')) if recording.is_dir() else [recording]
     if not files or files[0].suffix != SUFFIX or not files[0].is_file():
-        raise RecordingError(
+        raise FileError(
             f'{recording}: expected a file *{SUFFIX}, or a folder that holds some '
             f'(`ros2 bag convert` makes one of a *.db3)'
         )
@@ -84,7 +85,7 @@ class _RecordedFile:
         is_known: Whether that is all.
 
     Raises:
-        RecordingError: It cannot be read.
+        FileError: It cannot be read.
     """
 
     def __init__(self, path: Path) -> None:
@@ -92,9 +93,9 @@ class _RecordedFile:
             with open(path, 'rb') as file:
                 self._bytes = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
         except (OSError, ValueError) as error:
-            raise RecordingError(f'{path}: cannot be read: {error}') from None
+            raise FileError(f'{path}: cannot be read: {error}') from None
         if self._bytes[: len(MAGIC)] != MAGIC:
-            raise RecordingError(f'{path}: cannot be read: this is no MCAP file')
+            raise FileError(f'{path}: cannot be read: this is no MCAP file')
         self.size = len(self._bytes)
         self.spans: list[_Span] = []
         self.types: dict[str, str] = {}
@@ -223,7 +224,7 @@ class Messages:
         recording: Its folder, or its only file.
 
     Raises:
-        RecordingError: There is no file, or one cannot be read.
+        FileError: There is no file, or one cannot be read.
     """
 
     def __init__(self, recording: Path) -> None:

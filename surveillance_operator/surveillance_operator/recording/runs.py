@@ -6,9 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from surveillance_operator.recording import timeline
-from surveillance_operator.recording.bag import NAME, RecordingError
+from surveillance_operator.recording.bag import NAME
 from surveillance_operator.recording.reading import SUFFIX, files_of
 from surveillance_runtime.command_line import CommandParser
+from surveillance_runtime.files import FileError
 
 LAST = 'last'
 RECORD = 'mission.jsonl'
@@ -19,12 +20,12 @@ def find_run(name: str, runs: Path) -> Path:
     """Return the folder of a run: a path, a name below `runs`, or `last`.
 
     Raises:
-        RecordingError: There is none.
+        FileError: There is none.
     """
     known = sorted(path.name for path in runs.glob('*') if is_run(path))
     if name == LAST:
         if not known:
-            raise RecordingError(f'no run in {runs} yet')
+            raise FileError(f'no run in {runs} yet')
         return runs / known[-1]
     given = Path(name)
     # A file or folder of a run stands for the run.
@@ -33,7 +34,7 @@ def find_run(name: str, runs: Path) -> Path:
         if is_run(folder):
             return folder
     newest = f', e.g. {known[-1]}, or {LAST}' if known else ''
-    raise RecordingError(f'{name}: expected the folder of a run below {runs}{newest}')
+    raise FileError(f'{name}: expected the folder of a run below {runs}{newest}')
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,7 @@ def find_recording(name: str, runs: Path) -> Recording:
     """Return the recording of a run, or one that another program wrote.
 
     Raises:
-        RecordingError: There is none.
+        FileError: There is none.
     """
     given = Path(name)
     if given.suffix == SUFFIX and given.is_file():
@@ -68,7 +69,7 @@ def find_recording(name: str, runs: Path) -> Recording:
     line, recorded = folder / timeline.NAME, folder / NAME
     has_messages = recorded.is_dir() and any(recorded.glob(f'*{SUFFIX}'))
     if not line.is_file() and not has_messages:
-        raise RecordingError(f'{folder}: nothing was recorded')
+        raise FileError(f'{folder}: nothing was recorded')
     return Recording(folder, line, recorded if has_messages else None, line.is_file())
 
 

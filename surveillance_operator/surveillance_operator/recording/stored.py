@@ -28,7 +28,6 @@ from visualization_msgs.msg import MarkerArray
 from surveillance_interfaces.msg import FactChanges
 from surveillance_ontology.conversions import changes_from_ros
 from surveillance_operator import conversions
-from surveillance_operator.recording.bag import RecordingError
 from surveillance_operator.recording.reading import Messages
 from surveillance_operator.recording.timeline import TimelineWriter
 from surveillance_operator.snapshot import STALE, Snapshot, follow
@@ -41,6 +40,7 @@ from surveillance_operator.topics import (
     read_message,
     with_fact,
 )
+from surveillance_runtime.files import FileError
 
 CLOCK = '/clock'
 WINDOW = 0.4
@@ -90,7 +90,7 @@ class Conversion:
         keep: Where it is put when it is complete; nothing is kept where that cannot be written.
 
     Raises:
-        RecordingError: A file cannot be read, or holds nothing of a mission.
+        FileError: A file cannot be read, or holds nothing of a mission.
     """
 
     def __init__(self, recording: Path, path: Path, keep: Path | None = None) -> None:
@@ -106,7 +106,7 @@ class Conversion:
             for each in STORED_TOPICS
         }
         if not self._topics.keys() & self._messages.types.keys():
-            raise RecordingError(f'{recording}: holds no topic of a mission, like mission_status')
+            raise FileError(f'{recording}: holds no topic of a mission, like mission_status')
 
     def share(self) -> float:
         """Return which share of the recording is in the time line, 0 to 1."""
@@ -197,7 +197,7 @@ class RecordedSights:
         recording: Its folder, or its only file.
 
     Raises:
-        RecordingError: It cannot be read.
+        FileError: It cannot be read.
     """
 
     def __init__(self, recording: Path) -> None:

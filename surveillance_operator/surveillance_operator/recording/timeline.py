@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any
 
 from surveillance_operator.frames import Framer, Parts, lengthen
-from surveillance_operator.recording.bag import RecordingError
 from surveillance_operator.snapshot import Snapshot
+from surveillance_runtime.files import FileError
 
 NAME = 'timeline.jsonl'
 LEFT_OUT = frozenset({'scan', 'figures'})
@@ -115,7 +115,7 @@ class Timeline:
         marks: Times by what happened, one of `MARKS`.
 
     Raises:
-        RecordingError: There is no such file, or nothing in it.
+        FileError: There is no such file, or nothing in it.
     """
 
     def __init__(self, path: Path) -> None:
@@ -126,11 +126,11 @@ class Timeline:
         try:
             self._file = open(path, 'rb')  # noqa: SIM115 - kept open
         except OSError as error:
-            raise RecordingError(f'{path}: {error.strerror}') from None
+            raise FileError(f'{path}: {error.strerror}') from None
         self._offset = 0
         self.extend()
         if not self._wholes:
-            raise RecordingError(f'{path}: holds nothing to replay')
+            raise FileError(f'{path}: holds nothing to replay')
 
     def extend(self) -> None:
         """Read on in a file that grows."""

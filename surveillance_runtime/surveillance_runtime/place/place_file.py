@@ -44,7 +44,7 @@ def read_place_file(path: str | Path, *, walls: bool = False) -> PlaceFile:
         walls: Whether walls and doors must be given, as a simulated place needs them.
 
     Raises:
-        YamlFileError: The file cannot be read, or what it describes is no sound place; one line
+        FileError: The file cannot be read, or what it describes is no sound place; one line
             with file and line number.
     """
     file = read_parameter_file(path)

@@ -237,7 +237,7 @@ def read_world(path: str | Path) -> World:
     """Return the world that a place's file describes.
 
     Raises:
-        YamlFileError: The file cannot be read, or describes no sound place; one line.
+        FileError: The file cannot be read, or describes no sound place; one line.
     """
     file = read_parameter_file(path)
     try:
